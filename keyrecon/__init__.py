@@ -1,0 +1,44 @@
+"""keyrecon: 3D motion of one athlete from one ordinary camera and a few annotated keyframes.
+
+Conventions, the same everywhere:
+
+- Pictures are RGB, x right, y down, pixel centres at integers.
+- Space has the camera's axes: x right, y down, z away from the camera.
+- Angles in radians, time in seconds, frames counted from 0 in presentation order of the
+  (trimmed) video, quaternions as scipy orders them (x, y, z, w), unknown numbers NaN.
+
+`prepare` does everything up to the point where a person is needed, `reconstruct` the rest:
+
+    video = keyrecon.open_video("rally.mp4")
+    preparation = keyrecon.prepare(video, picks)
+    motion = keyrecon.reconstruct(preparation, annotations)
+"""
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+
+try:
+    __version__ = version("keyrecon")
+except PackageNotFoundError:
+    __version__ = "0+unknown"
+
+_PUBLIC = {
+    "KeyreconError": "keyrecon.errors",
+    "open_video": "keyrecon.video",
+    "prepare": "keyrecon.pipeline",
+    "reconstruct": "keyrecon.pipeline",
+    "Options": "keyrecon.pipeline",
+    "Pick": "keyrecon.records",
+    "Annotations": "keyrecon.records",
+    "Motion": "keyrecon.records",
+    "Skeleton": "keyrecon.body",
+    "LSP14": "keyrecon.body",
+}
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first used, so that the import itself stays light."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'keyrecon' has no attribute '{name}'")
+    return getattr(import_module(_PUBLIC[name]), name)

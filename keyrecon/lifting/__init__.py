@@ -1,0 +1,1 @@
+"""From image to space: Taylor's lifting, depth signs, interpolation, refinement."""

@@ -1,0 +1,1 @@
+"""Which frames look alike: edge elements, pose distances, keyframes, joints carried over."""

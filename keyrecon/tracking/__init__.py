@@ -1,0 +1,1 @@
+"""Where the player is: camera motion, colours, radial symmetry, Viterbi path, background."""

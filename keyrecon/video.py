@@ -1,0 +1,210 @@
+"""The only file that opens a video: exact frames by presentation order, RGB, true times.
+
+A frame is its index in presentation order, never time x rate. The index is built once from the
+packets (no decoding): the presentation times of all packets that are shown, sorted. A frame is
+fetched by seeking to a key packet at or before it and decoding up to its exact time. Rotation
+stored in the file is applied here, as players do. Slow-motion footage tells its factor, so
+that times are those of the world.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from keyrecon.errors import KeyreconError
+
+if TYPE_CHECKING:
+    import av
+
+VARIABLE_RATE = 0.25
+"""Frame spacing that differs by more than this share from its median counts as variable."""
+
+
+@dataclass(frozen=True, eq=False)
+class Video:
+    """A trimmed video file; frame 0 is the first frame after the trim."""
+
+    path: Path
+    width: int
+    height: int
+    """Size after rotation, px."""
+    stamps: Int[np.ndarray, "T"]
+    """Presentation times of the frames, in ticks of the stream."""
+    time: Float[np.ndarray, "T"]
+    """Seconds in the world since frame 0."""
+    fps: float
+    """Frames per second of the world (median spacing)."""
+    turns: int
+    """Quarter turns counter-clockwise that stand the stored picture upright."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.stamps)
+
+    @property
+    def variable_rate(self) -> bool:
+        """Whether frames are unevenly spaced in time."""
+        steps = np.diff(self.time)
+        return bool(len(steps) and np.abs(steps * self.fps - 1).max() > VARIABLE_RATE)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Tells this file from others: its size, first and last megabyte."""
+        return fingerprint_file(self.path)
+
+    def frames(
+        self, start: int = 0, stop: int | None = None, width: int | None = None
+    ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        """Frames start..stop-1 in order, one in memory at a time; reduced to `width` if given."""
+        stop = len(self) if stop is None else min(stop, len(self))
+        if start >= stop:
+            return
+        wanted = self.stamps[start:stop]
+        found = 0
+        with _open(self.path) as container:
+            for frame in _decode_from(container, int(wanted[0])):
+                if frame.pts is None or frame.pts < wanted[found]:
+                    continue
+                if frame.pts != wanted[found]:
+                    break
+                yield self._picture(frame, width)
+                found += 1
+                if found == len(wanted):
+                    return
+        raise KeyreconError(
+            f"{self.path}: frame {start + found} of {len(self)} cannot be decoded; the file is "
+            "damaged there. Trim the project before it with --end, or repair the file."
+        )
+
+    def frame(self, index: int, width: int | None = None) -> UInt8[np.ndarray, "h w 3"]:
+        """One frame by its number."""
+        if not 0 <= index < len(self):
+            raise KeyreconError(f"Frame {index} is outside the video of {len(self)} frames.")
+        return next(self.frames(index, index + 1, width))
+
+    def _picture(
+        self, frame: av.VideoFrame, width: int | None
+    ) -> UInt8[np.ndarray, "h w 3"]:
+        if width and width != self.width:
+            height = max(1, round(self.height * width / self.width))
+            stored = (height, width) if self.turns % 2 else (width, height)
+            picture = frame.to_ndarray(
+                format="rgb24", width=stored[0], height=stored[1], interpolation="AREA"
+            )
+        else:
+            picture = frame.to_ndarray(format="rgb24")
+        return np.ascontiguousarray(np.rot90(picture, self.turns)) if self.turns else picture
+
+
+def fingerprint_file(path: Path) -> str:
+    """Hash of a file's size, first and last megabyte."""
+    size = path.stat().st_size
+    digest = hashlib.sha256(str(size).encode())
+    with path.open("rb") as file:
+        digest.update(file.read(1 << 20))
+        file.seek(max(0, size - (1 << 20)))
+        digest.update(file.read())
+    return digest.hexdigest()[:32]
+
+
+def open_video(
+    path: str | Path, start: int = 0, end: int | None = None, slow_motion: float = 1.0
+) -> Video:
+    """Index a video file; frames start..end-1, filmed `slow_motion` times faster than shown.
+
+    Raises KeyreconError for a file that is missing, empty, without pictures or damaged.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise KeyreconError(f"There is no video at {path}.")
+    if path.stat().st_size == 0:
+        raise KeyreconError(f"{path} is empty (0 bytes).")
+    if slow_motion <= 0:
+        raise KeyreconError(f"The slow-motion factor must be positive, not {slow_motion}.")
+    with _open(path) as container:
+        stream = container.streams.video[0]
+        stamps = np.array(sorted(_shown_stamps(container, path)), dtype=np.int64)
+        first = next(_decode_from(container, int(stamps[0])), None)
+        if first is None:
+            raise KeyreconError(f"{path}: no picture can be decoded; the file is damaged.")
+        seconds_per_tick = float(stream.time_base)
+    turns = round(first.rotation / 90) % 4
+    width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
+    if not 0 <= start < (end or len(stamps)) <= len(stamps):
+        raise KeyreconError(
+            f"{path} has {len(stamps)} frames; start {start} and end {end} do not fit them."
+        )
+    stamps = stamps[start:end]
+    time = (stamps - stamps[0]) * seconds_per_tick / slow_motion
+    fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
+    return Video(path, width, height, stamps, time, fps, turns)
+
+
+def _open(path: Path) -> av.container.InputContainer:
+    """Open a file that has pictures, or say what it is."""
+    import av
+
+    try:
+        container = av.open(str(path))
+    except (av.FFmpegError, ValueError) as fault:
+        raise KeyreconError(
+            f"{path} is not a video that can be read ({fault}); mp4, mov, mkv and avi can."
+        ) from fault
+    if not container.streams.video:
+        container.close()
+        raise KeyreconError(f"{path} holds no pictures, only sound; a video is needed.")
+    container.streams.video[0].thread_type = "AUTO"
+    return container
+
+
+def _shown_stamps(container: av.container.InputContainer, path: Path) -> list[int]:
+    """Presentation times of all packets that a player would show."""
+    import av
+
+    stamps = []
+    try:
+        for packet in container.demux(video=0):
+            if packet.pts is not None and packet.size and not packet.is_discard:
+                stamps.append(packet.pts)
+    except av.FFmpegError as fault:
+        raise KeyreconError(
+            f"{path} breaks off after {len(stamps)} frames ({fault}); repair or re-encode it."
+        ) from fault
+    if not stamps:
+        raise KeyreconError(f"{path} holds no frames; it may have been cut off while copied.")
+    return stamps
+
+
+def _decode_from(
+    container: av.container.InputContainer, stamp: int
+) -> Iterator[av.VideoFrame]:
+    """Decode in presentation order from a key frame at or before a presentation time."""
+    import av
+
+    stream = container.streams.video[0]
+    before = stamp
+    for back in (0.0, 2.0, 10.0, None):
+        if back is None:
+            container.seek(0)
+        else:
+            before = stamp - int(back / float(stream.time_base))
+            container.seek(before, stream=stream, backward=True, any_frame=False)
+        frames = container.decode(stream)
+        try:
+            first = next(frames, None)
+            if back is not None and (first is None or first.pts is None or first.pts > stamp):
+                continue
+            while first is not None:
+                yield first
+                first = next(frames, None)
+        except av.FFmpegError:
+            return
+        return
