@@ -1,0 +1,288 @@
+"""The project folder: the only place that knows file names, and keep-or-make of results.
+
+    project.toml       the video (relative path, fingerprint, trim) and options that were set
+    picks.json         colours that a person clicked
+    keyframes.json     frames to annotate
+    annotations.json   what a person marked
+    motion.npz, report.html
+    cache/             results of the stages; safe to delete
+
+`keep` is what the recipe in `pipeline.py` calls for every stage: it returns the stored result
+if the same inputs and options made it, else it runs the stage and stores the result. What a
+person made is written durably and never replaced by something that does not parse.
+"""
+
+import hashlib
+import inspect
+import json
+import os
+import time
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from keyrecon.durable import write_durably
+from keyrecon.errors import KeyreconError
+from keyrecon.formats.picks import read_picks, write_picks
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Pick
+from keyrecon.storage import load_record, save_record
+from keyrecon.video import Video, fingerprint_file, open_video
+
+SHARED_CODE = ("background", "body", "camera", "colors", "records", "video")
+"""Modules whose change makes the results of every stage anew."""
+
+OPTIONS_TABLE = "\n# Options that differ from the defaults.\n[options]\n"
+
+
+class Workspace:
+    """A project folder."""
+
+    def __init__(self, folder: Path, force: bool = False) -> None:
+        """Open the project in `folder`; `force` makes every stage again."""
+        self.folder = folder
+        self.force = force
+        self.seconds: dict[str, float] = {}
+        """How long each stage took that was run, seconds."""
+        self._keys: dict[int, tuple[object, str]] = {}
+        if not self.project_file.is_file():
+            raise KeyreconError(
+                f"{folder} is not a keyrecon project (no project.toml); "
+                f"make one with: keyrecon new VIDEO --project {folder}"
+            )
+        try:
+            self.project = tomllib.loads(self.project_file.read_text())
+            self.project["video"]["path"], self.project["video"]["fingerprint"]
+        except (tomllib.TOMLDecodeError, KeyError, UnicodeDecodeError) as fault:
+            raise KeyreconError(
+                f"{self.project_file} cannot be read ({fault}); mend it or make the project "
+                "anew in another folder."
+            ) from fault
+
+    @property
+    def project_file(self) -> Path:
+        """project.toml"""
+        return self.folder / "project.toml"
+
+    @property
+    def picks_file(self) -> Path:
+        """picks.json"""
+        return self.folder / "picks.json"
+
+    @property
+    def keyframes_file(self) -> Path:
+        """keyframes.json"""
+        return self.folder / "keyframes.json"
+
+    @property
+    def annotations_file(self) -> Path:
+        """annotations.json"""
+        return self.folder / "annotations.json"
+
+    @property
+    def motion_file(self) -> Path:
+        """motion.npz"""
+        return self.folder / "motion.npz"
+
+    @property
+    def report_file(self) -> Path:
+        """report.html"""
+        return self.folder / "report.html"
+
+    @property
+    def cache(self) -> Path:
+        """Folder of stage results."""
+        return self.folder / "cache"
+
+    @classmethod
+    def create(cls, folder: Path, video: Video, video_file: Path, trim: dict) -> "Workspace":
+        """Start a project; never touches one that exists."""
+        file = folder / "project.toml"
+        if file.exists():
+            raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
+        folder.mkdir(parents=True, exist_ok=True)
+        lines = ["# A keyrecon project.", "version = 1", "", "[video]"]
+        lines += [f"path = {json.dumps(_relative(video_file, folder))}"]
+        lines += [f'fingerprint = "{video.fingerprint}"']
+        lines += [f"{name} = {value}" for name, value in trim.items() if value is not None]
+        write_durably(file, "\n".join(lines) + "\n")
+        return cls(folder)
+
+    def video(self) -> Video:
+        """The project's video; looks beside the project when it has moved."""
+        wanted = self.project["video"]
+        path = (self.folder / wanted["path"]).resolve()
+        if not path.is_file():
+            path = self._find_video(Path(wanted["path"]).name, wanted["fingerprint"])
+        elif fingerprint_file(path) != wanted["fingerprint"]:
+            raise KeyreconError(
+                f"{path} has changed since the project was made (its fingerprint differs); "
+                "bring the old file back, or start a new project for the new one."
+            )
+        return open_video(
+            path,
+            wanted.get("start", 0),
+            wanted.get("end"),
+            wanted.get("slow_motion", 1.0),
+        )
+
+    def relink(self, video_file: Path) -> None:
+        """Point the project at the place its video has moved to."""
+        if not video_file.is_file():
+            raise KeyreconError(f"There is no video at {video_file}.")
+        if fingerprint_file(video_file) != self.project["video"]["fingerprint"]:
+            raise KeyreconError(
+                f"{video_file} is not the video of this project (its fingerprint differs); "
+                "start a new project for it with: keyrecon new"
+            )
+        old = f"path = {json.dumps(self.project['video']['path'])}"
+        new = f"path = {json.dumps(_relative(video_file, self.folder))}"
+        write_durably(self.project_file, self.project_file.read_text().replace(old, new, 1))
+        self.project = tomllib.loads(self.project_file.read_text())
+
+    def _find_video(self, name: str, fingerprint: str) -> Path:
+        for place in (self.folder, self.folder.resolve().parent):
+            candidate = place / name
+            if candidate.is_file() and fingerprint_file(candidate) == fingerprint:
+                return candidate
+        raise KeyreconError(
+            f"The video {self.project['video']['path']} is not where the project expects it; "
+            f"tell where it is now with: keyrecon relink {self.folder} VIDEO"
+        )
+
+    def picks(self) -> tuple[Pick, ...]:
+        """What a person clicked; KeyreconError when there is nothing yet."""
+        if not self.picks_file.is_file():
+            raise KeyreconError(
+                f"{self.folder} has no picks yet; click the player's head, feet and clothes with: "
+                f"keyrecon pick {self.folder} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
+            )
+        return read_picks(self.picks_file)
+
+    def add_picks(self, picks: Sequence[Pick]) -> tuple[Pick, ...]:
+        """Add clicks to those there are."""
+        old = self.picks() if self.picks_file.is_file() else ()
+        together = tuple(dict.fromkeys((*old, *picks)))
+        write_picks(self.picks_file, together)
+        return together
+
+    def options(self, defaults: Any) -> Any:
+        """`defaults` with the options that this project has set."""
+        return _apply(defaults, self.project.get("options", {}), "options")
+
+    def remember(self, options: Any, defaults: Any) -> None:
+        """Write the options that differ from the defaults into project.toml."""
+        text = self.project_file.read_text().split(OPTIONS_TABLE)[0]
+        changed = _differences(options, defaults)
+        if changed:
+            text += OPTIONS_TABLE + "".join(f"{n} = {json.dumps(v)}\n" for n, v in changed.items())
+        if text != self.project_file.read_text():
+            write_durably(self.project_file, text)
+            self.project = tomllib.loads(text)
+
+    def keep(
+        self,
+        name: str,
+        stage: Callable[..., Any],
+        *inputs: object,
+        options: object = None,
+        progress: Progress = silent,
+    ) -> Any:
+        """The result of a stage: stored if the same inputs and options made it, else made."""
+        key = self._key((_code_of(stage), name, options, *inputs))
+        path = self.cache / f"{name}-{key}.npz"
+        if path.is_file() and not self.force:
+            result = load_record(path)
+        else:
+            started = time.perf_counter()
+            arguments = {} if options is None else {"options": options}
+            result = stage(*inputs, **arguments, progress=progress)
+            self.seconds[name] = time.perf_counter() - started
+            self._forget(name)
+            save_record(path, result)
+        self._keys[id(result)] = (result, key)
+        return result
+
+    def _forget(self, name: str) -> None:
+        """Drop results of a stage that other inputs made."""
+        for old in self.cache.glob(f"{name}-*.npz"):
+            old.unlink()
+        for part in self.cache.glob("*.part"):
+            if time.time() - part.stat().st_mtime > 3600:
+                part.unlink()
+
+    def _key(self, value: object) -> str:
+        digest = hashlib.sha256()
+        self._digest(value, digest)
+        return digest.hexdigest()[:16]
+
+    def _digest(self, value: object, digest: "hashlib._Hash") -> None:
+        """Feed a value's content; a result that `keep` made counts by its own key."""
+        known = self._keys.get(id(value))
+        if known is not None:
+            digest.update(known[1].encode())
+        elif isinstance(value, Video):
+            digest.update(value.fingerprint.encode() + value.stamps.tobytes())
+            digest.update(value.time.tobytes())
+        elif isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+        elif is_dataclass(value):
+            digest.update(type(value).__name__.encode())
+            for field in fields(value):
+                digest.update(field.name.encode())
+                self._digest(getattr(value, field.name), digest)
+        elif isinstance(value, tuple):
+            digest.update(f"tuple{len(value)}".encode())
+            for part in value:
+                self._digest(part, digest)
+        else:
+            digest.update(repr(value).encode())
+
+
+def _code_of(stage: Callable[..., Any]) -> str:
+    """Hash of the stage's folder and of what all stages share: new code makes new results."""
+    folder, base = Path(inspect.getfile(stage)).parent, Path(__file__).parent
+    sources = sorted({*folder.glob("*.py"), *(base / f"{name}.py" for name in SHARED_CODE)})
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """`path` as seen from `folder`, with forward slashes."""
+    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+
+
+def _differences(options: Any, defaults: Any, prefix: str = "") -> dict[str, Any]:
+    changed = {}
+    for field in fields(options):
+        value, default = getattr(options, field.name), getattr(defaults, field.name)
+        if is_dataclass(value):
+            changed |= _differences(value, default, f"{prefix}{field.name}.")
+        elif value != default and value is not None:
+            changed[prefix + field.name] = value
+    return changed
+
+
+def _apply(options: Any, changes: dict, where: str) -> Any:
+    """Set fields of nested option records from nested tables of project.toml."""
+    known = {field.name for field in fields(options)}
+    new = {}
+    for name, value in changes.items():
+        if name not in known:
+            raise KeyreconError(
+                f"project.toml sets {where}.{name}, which does not exist; "
+                f"{where} has {', '.join(sorted(known))}."
+            )
+        old = getattr(options, name)
+        if is_dataclass(old):
+            new[name] = _apply(old, value, f"{where}.{name}")
+        elif isinstance(value, dict) or isinstance(value, str) != isinstance(old, str):
+            raise KeyreconError(f"project.toml: {where}.{name} cannot be {value!r}.")
+        else:
+            new[name] = tuple(value) if isinstance(value, list) else value
+    return replace(options, **new)
+
+

@@ -1,0 +1,42 @@
+"""Small videos with known frames, shared by the tests."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+
+def numbered_picture(number, width=128, height=64):
+    """A grey picture whose blocks encode `number` in binary."""
+    picture = np.full((height, width, 3), 60, dtype=np.uint8)
+    for bit in range(10):
+        value = 220 if number >> bit & 1 else 20
+        picture[16:48, 4 + bit * 12 : 14 + bit * 12] = value
+    return picture
+
+
+def read_number(picture):
+    """The number that `numbered_picture` drew."""
+    blocks = [picture[28:36, 7 + bit * 12 : 11 + bit * 12].mean() for bit in range(10)]
+    return sum((value > 120) << bit for bit, value in enumerate(blocks))
+
+
+@pytest.fixture(scope="session")
+def write_numbered(tmp_path_factory):
+    """Write a video of numbered pictures with the given times (ticks of 1/600 s)."""
+
+    def write(name, ticks, options=None, codec="libx264", turn=0):
+        path = tmp_path_factory.mktemp("video") / name
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream(codec, rate=50, options=options or {})
+            stream.width, stream.height, stream.pix_fmt = 128, 64, "yuv420p"
+            stream.time_base = stream.codec_context.time_base = Fraction(1, 600)
+            for number, tick in enumerate(ticks):
+                frame = av.VideoFrame.from_ndarray(numbered_picture(number), format="rgb24")
+                frame.pts, frame.time_base = tick, Fraction(1, 600)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+        return path
+
+    return write

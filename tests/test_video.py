@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+from conftest import read_number
+
+from keyrecon import KeyreconError
+from keyrecon.video import open_video
+
+EVEN = list(range(0, 60 * 12, 12))
+UNEVEN = np.cumsum([0, *np.random.default_rng(3).choice([10, 12, 30], 59)]).tolist()
+KINDS = {
+    "constant rate": (EVEN, {}),
+    "variable rate": (UNEVEN, {}),
+    "B-frames": (EVEN, {"bf": "3", "g": "20"}),
+    "open GOP": (EVEN, {"x264-params": "open-gop=1:bframes=3:keyint=15:min-keyint=15"}),
+    "late start": ([t + 6000 for t in EVEN], {"bf": "2"}),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_picture_of_frame_n_is_frame_n(write_numbered, kind):
+    ticks, options = KINDS[kind]
+    video = open_video(write_numbered("numbered.mp4", ticks, options))
+    assert len(video) == len(ticks)
+    assert [read_number(p) for p in video.frames()] == list(range(len(ticks)))
+    order = np.random.default_rng(0).permutation(len(ticks))[:25]
+    assert [read_number(video.frame(int(n))) for n in order] == order.tolist()
+
+
+def test_times_are_those_of_the_file_and_slow_motion_divides_them(write_numbered):
+    path = write_numbered("uneven.mp4", UNEVEN)
+    assert np.allclose(open_video(path).time, np.array(UNEVEN) / 600, atol=1e-3)
+    assert np.allclose(open_video(path, slow_motion=4).time, np.array(UNEVEN) / 2400, atol=1e-3)
+    assert open_video(path).variable_rate
+    assert not open_video(write_numbered("even.mp4", EVEN)).variable_rate
+
+
+def test_a_trimmed_video_counts_from_its_first_frame(write_numbered):
+    video = open_video(write_numbered("trim.mp4", EVEN), start=20, end=30)
+    assert [read_number(p) for p in video.frames()] == list(range(20, 30))
+    assert read_number(video.frame(3)) == 23
+    assert video.time[0] == 0
+
+
+def test_a_reduced_picture_shows_the_same_frame(write_numbered):
+    video = open_video(write_numbered("small.mp4", EVEN))
+    small = next(video.frames(7, 8, width=64))
+    assert small.shape == (32, 64, 3)
+
+
+def test_stored_rotation_is_applied(write_numbered, monkeypatch):
+    import av
+
+    path = write_numbered("upright.mp4", EVEN)
+    monkeypatch.setattr(av.VideoFrame, "rotation", property(lambda _: 90), raising=False)
+    video = open_video(path)
+    assert (video.width, video.height) == (64, 128)
+    assert video.frame(5).shape == (128, 64, 3)
+    assert read_number(np.rot90(video.frame(5), -1)) == 5
+
+
+def test_a_missing_video_is_named(tmp_path):
+    with pytest.raises(KeyreconError, match="no video at"):
+        open_video(tmp_path / "none.mp4")
+
+
+def test_an_empty_file_is_called_empty(tmp_path):
+    (tmp_path / "empty.mp4").touch()
+    with pytest.raises(KeyreconError, match="empty"):
+        open_video(tmp_path / "empty.mp4")
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path):
+    (tmp_path / "text.mp4").write_text("not a video at all" * 100)
+    with pytest.raises(KeyreconError, match="not a video that can be read"):
+        open_video(tmp_path / "text.mp4")
+
+
+def test_sound_alone_is_not_a_video(tmp_path):
+    import av
+
+    with av.open(str(tmp_path / "sound.mp4"), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), "fltp", "mono")
+        frame.sample_rate = 8000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(KeyreconError, match="only sound"):
+        open_video(tmp_path / "sound.mp4")
+
+
+def test_a_file_cut_off_while_copied_is_refused_with_one_message(write_numbered, tmp_path):
+    whole = write_numbered("whole.mp4", EVEN).read_bytes()
+    (tmp_path / "cut.mp4").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(KeyreconError, match="cannot be read|cut off|not a video|damaged"):
+        list(open_video(tmp_path / "cut.mp4").frames())
+
+
+def test_damage_inside_a_file_names_the_frame(write_numbered, tmp_path):
+    path = write_numbered("whole.mkv", EVEN, {"g": "60"})
+    content = path.read_bytes()
+    (tmp_path / "cut.mkv").write_bytes(content[: int(len(content) * 0.6)])
+    try:
+        video = open_video(tmp_path / "cut.mkv")
+        assert len(video) < len(EVEN)
+        shown = [read_number(p) for p in video.frames()]
+        assert shown == list(range(len(shown)))
+    except KeyreconError as fault:
+        assert "damaged" in str(fault) or "breaks off" in str(fault)
+
+
+def test_a_trim_that_does_not_fit_is_refused(write_numbered):
+    with pytest.raises(KeyreconError, match="has 60 frames"):
+        open_video(write_numbered("short.mp4", EVEN), start=70)
