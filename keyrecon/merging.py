@@ -1,0 +1,71 @@
+"""Add annotations to annotations without losing any: conflicts are told, never settled here."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from keyrecon.errors import KeyreconError
+from keyrecon.records import Annotations
+
+SAME_PX = 0.51
+"""Marks closer than this on both axes are the same mark, rounded by some format."""
+
+
+def find_conflicts(old: Annotations, new: Annotations) -> list[str]:
+    """Marks that stand in both and differ, as 'frame 12 left_knee'."""
+    conflicts = []
+    for frame in np.intersect1d(old.frames, new.frames):
+        before = old.joints[np.searchsorted(old.frames, frame)]
+        after = new.joints[np.searchsorted(new.frames, frame)]
+        differ = (np.abs(before - after) > SAME_PX).any(axis=1)  # NaN compares false
+        conflicts += [f"frame {frame} {old.skeleton.names[j]}" for j in np.flatnonzero(differ)]
+    return conflicts
+
+
+def merge_annotations(old: Annotations, new: Annotations) -> Annotations:
+    """Old and new marks together; where both stand, the new one."""
+    if old.skeleton.names != new.skeleton.names:
+        raise KeyreconError("The new annotations have another skeleton than the project.")
+    frames = np.union1d(old.frames, new.frames)
+    merged = _spread(old, frames)
+    rows = np.searchsorted(frames, new.frames)
+    marked = np.isfinite(new.joints).all(axis=2)
+    merged.joints[rows] = np.where(marked[..., None], new.joints, merged.joints[rows])
+    merged.visible[rows] = np.where(marked, new.visible, merged.visible[rows])
+    merged.nearer[rows] = np.where(new.nearer != 0, new.nearer, merged.nearer[rows])
+    return merged
+
+
+def _spread(annotations: Annotations, frames: np.ndarray) -> Annotations:
+    """A copy with a row for each of `frames`, unmarked where there was none."""
+    rows = np.searchsorted(frames, annotations.frames)
+    joints = np.full((len(frames), *annotations.joints.shape[1:]), np.nan)
+    visible = np.zeros(joints.shape[:2], dtype=bool)
+    nearer = np.zeros((len(frames), annotations.nearer.shape[1]), dtype=np.int64)
+    joints[rows], visible[rows] = annotations.joints, annotations.visible
+    nearer[rows] = annotations.nearer
+    return replace(annotations, frames=frames, joints=joints, visible=visible, nearer=nearer)
+
+
+def missing_marks(
+    annotations: Annotations | None, upper: np.ndarray, lower: np.ndarray
+) -> dict[int, list[str]]:
+    """Halves of the body without any mark on keyframes that need them, by frame."""
+    missing: dict[int, list[str]] = {}
+    for frames, lower_half in ((upper, False), (lower, True)):
+        for frame in frames.tolist():
+            wanted = _unmarked(annotations, frame, lower_half)
+            if wanted:
+                missing.setdefault(frame, []).extend(wanted)
+    return dict(sorted(missing.items()))
+
+
+def _unmarked(annotations: Annotations | None, frame: int, lower_half: bool) -> list[str]:
+    if annotations is None or frame not in annotations.frames:
+        return ["lower body" if lower_half else "upper body"]
+    row = annotations.joints[np.searchsorted(annotations.frames, frame)]
+    skeleton = annotations.skeleton
+    half = skeleton.is_lower == lower_half
+    if not np.isfinite(row[half]).any():
+        return ["lower body" if lower_half else "upper body"]
+    return []

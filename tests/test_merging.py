@@ -1,0 +1,42 @@
+import numpy as np
+
+from keyrecon.body import LSP14
+from keyrecon.merging import find_conflicts, merge_annotations, missing_marks
+from keyrecon.records import Annotations
+
+
+def marks(frames, value, joints=range(14)):
+    points = np.full((len(frames), 14, 2), np.nan)
+    points[:, list(joints)] = value
+    return Annotations(
+        LSP14,
+        np.array(frames),
+        points,
+        np.isfinite(points).all(axis=2),
+        np.zeros((len(frames), 13), dtype=np.int64),
+    )
+
+
+def test_marks_of_other_frames_are_added():
+    merged = merge_annotations(marks([3, 9], 1.0), marks([5], 2.0))
+    assert merged.frames.tolist() == [3, 5, 9]
+    assert merged.joints[:, 0, 0].tolist() == [1, 2, 1]
+
+
+def test_unmarked_joints_erase_nothing():
+    merged = merge_annotations(marks([3], 1.0), marks([3], 2.0, joints=[4]))
+    assert merged.joints[0, 4, 0] == 2
+    assert merged.joints[0, 5, 0] == 1
+
+
+def test_only_marks_that_differ_are_conflicts():
+    assert find_conflicts(marks([3], 1.0), marks([3], 1.2)) == []
+    assert find_conflicts(marks([3], 1.0), marks([3], 9.0, joints=[0])) == ["frame 3 right_ankle"]
+    assert find_conflicts(marks([3], 1.0), marks([4], 9.0)) == []
+
+
+def test_a_keyframe_needs_marks_for_its_half_only():
+    upper = [j for j in range(14) if j not in LSP14.lower]
+    done = marks([3, 5], 1.0, joints=upper)
+    assert missing_marks(done, np.array([3]), np.array([5])) == {5: ["lower body"]}
+    assert missing_marks(None, np.array([3]), np.array([3])) == {3: ["upper body", "lower body"]}
