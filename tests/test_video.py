@@ -29,7 +29,7 @@ def test_the_picture_of_frame_n_is_frame_n(write_numbered, kind):
 def test_times_are_those_of_the_file_and_slow_motion_divides_them(write_numbered):
     path = write_numbered("uneven.mp4", UNEVEN)
     assert np.allclose(open_video(path).time, np.array(UNEVEN) / 600, atol=1e-3)
-    assert np.allclose(open_video(path, slow_motion=4).time, np.array(UNEVEN) / 2400, atol=1e-3)
+    assert np.allclose(open_video(path, slow_motion=4.0).time, np.array(UNEVEN) / 2400, atol=1e-3)
     assert open_video(path).variable_rate
     assert not open_video(write_numbered("even.mp4", EVEN)).variable_rate
 
@@ -91,7 +91,7 @@ def test_sound_alone_is_not_a_video(tmp_path):
 def test_a_file_cut_off_while_copied_is_refused_with_one_message(write_numbered, tmp_path):
     whole = write_numbered("whole.mp4", EVEN).read_bytes()
     (tmp_path / "cut.mp4").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(KeyreconError, match="cannot be read|cut off|not a video|damaged"):
+    with pytest.raises(KeyreconError, match=r"cannot be read|cut off|damaged"):
         list(open_video(tmp_path / "cut.mp4").frames())
 
 

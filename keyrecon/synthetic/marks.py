@@ -40,6 +40,6 @@ def mark_from_truth(
     parent, child = skeleton.bones.T
     depth = points3d[frames][..., 2]
     nearer = np.sign(depth[:, parent] - depth[:, child]).astype(np.int64)
-    nearer[~asked[:, child] | ~options.signs] = 0
+    nearer[~asked[:, child] | (not options.signs)] = 0
     seen = asked if visible is None else asked & visible[frames]
     return Annotations(skeleton, frames, joints, seen, nearer)
