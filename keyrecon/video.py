@@ -156,7 +156,8 @@ def _open(path: Path) -> av.container.InputContainer:
         container = av.open(str(path))
     except (av.FFmpegError, ValueError) as fault:
         raise KeyreconError(
-            f"{path} is not a video that can be read ({fault}); mp4, mov, mkv and avi can."
+            f"{path} cannot be read as a video ({getattr(fault, 'strerror', fault)}); it may be "
+            "cut off, or of another kind: mp4, mov, mkv and avi work."
         ) from fault
     if not container.streams.video:
         container.close()

@@ -71,7 +71,7 @@ def test_an_empty_file_is_called_empty(tmp_path):
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
     (tmp_path / "text.mp4").write_text("not a video at all" * 100)
-    with pytest.raises(KeyreconError, match="not a video that can be read"):
+    with pytest.raises(KeyreconError, match="cannot be read as a video"):
         open_video(tmp_path / "text.mp4")
 
 
