@@ -1,0 +1,63 @@
+"""Writing what a person made: a file appears whole and survives a loss of power, or not at all.
+
+The bytes go to a file of a name of its own in the same folder, which reaches the disk (fsync)
+before it takes the place of the old one; then the folder itself is synchronised, because a
+rename without that is atomic but not durable.
+"""
+
+import os
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+from keyrecon.errors import KeyreconError
+
+
+def write_durably(path: Path, content: bytes | str) -> None:
+    """Replace `path` by `content`; text is written as UTF-8.
+
+    On any failure the old file stays as it was and nothing is left beside it. Raises
+    KeyreconError where the folder does not take the file (missing, full, read-only).
+    """
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        _replace(path, data)
+    except OSError as fault:
+        raise KeyreconError(
+            f"{path} could not be written ({fault.strerror or fault}); the former content is "
+            "unchanged. Free some space or choose another folder."
+        ) from fault
+
+
+def _replace(path: Path, data: bytes) -> None:
+    mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
+    with NamedTemporaryFile(
+        dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
+    ) as file:
+        try:
+            file.write(data)
+            file.flush()
+            os.fchmod(file.fileno(), mode)
+            os.fsync(file.fileno())
+            os.replace(file.name, path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
+    _synchronise_folder(path.parent)
+
+
+def _umask() -> int:
+    """The mask for new files; it can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def _synchronise_folder(folder: Path) -> None:
+    """Bring the folder's entry to the disk, where folders can be opened (not on Windows)."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
