@@ -4,11 +4,12 @@ The command line passes one that draws a bar; the library's default stays silent
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 Item = TypeVar("Item")
 
 
+@runtime_checkable
 class Progress(Protocol):
     """Hands on the items of a long loop and shows how many are done."""
 

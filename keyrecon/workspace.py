@@ -1,40 +1,29 @@
-"""The project folder: the only place that knows file names, and keep-or-make of results.
+"""The project folder: the only place that knows file names.
 
     project.toml       the video (relative path, fingerprint, trim) and options that were set
     picks.json         colours that a person clicked
-    keyframes.json     frames to annotate
+    keyframes.json     frames to annotate, with a picture of each in keyframes/
     annotations.json   what a person marked
     motion.npz, report.html
     cache/             results of the stages; safe to delete
 
-`keep` is what the recipe in `pipeline.py` calls for every stage: it returns the stored result
-if the same inputs and options made it, else it runs the stage and stores the result. What a
-person made is written durably and never replaced by something that does not parse.
+What a person made is written durably and never replaced by something that does not parse.
 """
 
-import hashlib
-import inspect
 import json
 import os
-import time
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from keyrecon.durable import write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.picks import read_picks, write_picks
-from keyrecon.progress import Progress, silent
 from keyrecon.records import Pick
-from keyrecon.storage import load_record, save_record
+from keyrecon.stages import StageStore
 from keyrecon.video import Video, fingerprint_file, open_video
-
-SHARED_CODE = ("background", "body", "camera", "colors", "records", "video")
-"""Modules whose change makes the results of every stage anew."""
 
 OPTIONS_TABLE = "\n# Options that differ from the defaults.\n[options]\n"
 
@@ -45,10 +34,7 @@ class Workspace:
     def __init__(self, folder: Path, force: bool = False) -> None:
         """Open the project in `folder`; `force` makes every stage again."""
         self.folder = folder
-        self.force = force
-        self.seconds: dict[str, float] = {}
-        """How long each stage took that was run, seconds."""
-        self._keys: dict[int, tuple[object, str]] = {}
+        self.stages = StageStore(folder / "cache", force)
         if not self.project_file.is_file():
             raise KeyreconError(
                 f"{folder} is not a keyrecon project (no project.toml); "
@@ -94,9 +80,9 @@ class Workspace:
         return self.folder / "report.html"
 
     @property
-    def cache(self) -> Path:
-        """Folder of stage results."""
-        return self.folder / "cache"
+    def pictures(self) -> Path:
+        """Folder with a picture of every keyframe to annotate."""
+        return self.folder / "keyframes"
 
     @classmethod
     def create(cls, folder: Path, video: Video, video_file: Path, trim: dict) -> "Workspace":
@@ -170,6 +156,11 @@ class Workspace:
         write_picks(self.picks_file, together)
         return together
 
+    def put_aside(self, file: Path) -> None:
+        """Keep a copy of a file that a person made, before it changes."""
+        number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
+        write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
+
     def options(self, defaults: Any) -> Any:
         """`defaults` with the options that this project has set."""
         return _apply(defaults, self.project.get("options", {}), "options")
@@ -183,71 +174,6 @@ class Workspace:
         if text != self.project_file.read_text():
             write_durably(self.project_file, text)
             self.project = tomllib.loads(text)
-
-    def keep(
-        self,
-        name: str,
-        stage: Callable[..., Any],
-        *inputs: object,
-        options: object = None,
-        progress: Progress = silent,
-    ) -> Any:
-        """The result of a stage: stored if the same inputs and options made it, else made."""
-        key = self._key((_code_of(stage), name, options, *inputs))
-        path = self.cache / f"{name}-{key}.npz"
-        if path.is_file() and not self.force:
-            result = load_record(path)
-        else:
-            started = time.perf_counter()
-            arguments = {} if options is None else {"options": options}
-            result = stage(*inputs, **arguments, progress=progress)
-            self.seconds[name] = time.perf_counter() - started
-            self._forget(name)
-            save_record(path, result)
-        self._keys[id(result)] = (result, key)
-        return result
-
-    def _forget(self, name: str) -> None:
-        """Drop results of a stage that other inputs made."""
-        for old in self.cache.glob(f"{name}-*.npz"):
-            old.unlink()
-        for part in self.cache.glob("*.part"):
-            if time.time() - part.stat().st_mtime > 3600:
-                part.unlink()
-
-    def _key(self, value: object) -> str:
-        digest = hashlib.sha256()
-        self._digest(value, digest)
-        return digest.hexdigest()[:16]
-
-    def _digest(self, value: object, digest: "hashlib._Hash") -> None:
-        """Feed a value's content; a result that `keep` made counts by its own key."""
-        known = self._keys.get(id(value))
-        if known is not None:
-            digest.update(known[1].encode())
-        elif isinstance(value, Video):
-            digest.update(value.fingerprint.encode() + value.stamps.tobytes())
-            digest.update(value.time.tobytes())
-        elif isinstance(value, np.ndarray):
-            digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
-        elif is_dataclass(value):
-            digest.update(type(value).__name__.encode())
-            for field in fields(value):
-                digest.update(field.name.encode())
-                self._digest(getattr(value, field.name), digest)
-        elif isinstance(value, tuple):
-            digest.update(f"tuple{len(value)}".encode())
-            for part in value:
-                self._digest(part, digest)
-        else:
-            digest.update(repr(value).encode())
-
-
-def _code_of(stage: Callable[..., Any]) -> str:
-    """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    folder, base = Path(inspect.getfile(stage)).parent, Path(__file__).parent
-    sources = sorted({*folder.glob("*.py"), *(base / f"{name}.py" for name in SHARED_CODE)})
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
 
 
 def _relative(path: Path, folder: Path) -> str:
