@@ -7,7 +7,7 @@ C colours. Unknown numbers are NaN. Pixels and axes as in the package docstring.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.body import Skeleton
 
@@ -73,15 +73,69 @@ class Edges:
 
 
 @dataclass(frozen=True, eq=False)
-class Distances:
-    """Pose distances between every two frames, one half of the body (Section 4.2)."""
+class Colors:
+    """What the player's parts and the surroundings look like, as smoothed Lab histograms."""
 
-    matched: Float[np.ndarray, "T T"]
+    names: tuple[str, ...]
+    """The parts picked: 'head', 'foot' and the regions. Labels and edges count in this order."""
+    seen: Float[np.ndarray, "C bins"]
+    """Share of each part's pixels in each colour bin (see `keyrecon.colors`)."""
+    surroundings: Float[np.ndarray, "bins"]
+    """Share of the pixels around the player in each colour bin."""
+    height: float
+    """Length from head to mid-feet where both were picked, px."""
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """The scene without the player, a mosaic in the coordinates of the reference frame."""
+
+    plate: UInt8[np.ndarray, "h w 3"]
+    """Median colour, Lab."""
+    spread: Float[np.ndarray, "h w"]
+    """Usual deviation from the median, grey levels."""
+    known: Bool[np.ndarray, "h w"]
+    """False where the scene was never seen."""
+    from_reference: Float[np.ndarray, "3 3"]
+    """Homography from pixels of the reference frame to those of the plate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """The player's coloured regions in every frame, and their directed edges."""
+
+    edges: tuple[Edges, ...]
+    """One per frame."""
+    labels: UInt8[np.ndarray, "T h w"]
+    """Crops around the player at a common player height: 0 background, 1 + c colour c of
+    `Colors.names`."""
+    origin: Float[np.ndarray, "T 2"]
+    """Picture position of each crop's pixel (0, 0), px."""
+    scale: Float[np.ndarray, "T"]
+    """Crop pixels per picture pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Pose distances between every two frames, each half of the body apart (Section 4.2).
+
+    M frames are compared: all T of a short video, exemplars that stand for their neighbours in
+    time in a long one.
+    """
+
+    upper: Float[np.ndarray, "M M"]
     """C: truncated directed chamfer distance, made symmetric, in player heights."""
-    smoothed: Float[np.ndarray, "T T"]
-    """D: C averaged over frames of the same pose."""
-    beta: float
-    """Distance under which two frames show the same pose."""
+    lower: Float[np.ndarray, "M M"]
+    frames: Int[np.ndarray, "M"]
+    """Frame number of each row, ascending."""
+    row: Int[np.ndarray, "T"]
+    """Row that stands for each frame."""
+    detour: Float[np.ndarray, "2 T"]
+    """C between each frame and the one that stands for it, upper and lower body."""
+    step: Float[np.ndarray, "2 S"]
+    """C between each frame and the next, upper and lower body; S is T - 1."""
+    clarity: Float[np.ndarray, "T"]
+    """0-1: how well a person could annotate each frame (tracked, not blurred)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +151,11 @@ class HalfKeyframes:
     coverage: float
     """Share of frames represented, or between two such frames at most T apart (Eq. 1)."""
     beta: float
+    """Distance under which a keyframe represents a frame, player heights."""
+    distance: Float[np.ndarray, "T"]
+    """D between each frame and its keyframe, player heights."""
+    printed_count: int
+    """Keyframes that Eq. 2-4 as printed would take at this beta and coverage."""
 
 
 @dataclass(frozen=True, eq=False)
