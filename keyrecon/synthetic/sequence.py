@@ -1,0 +1,204 @@
+"""Make a sequence: motion, camera and looks by a seed, then video, truth, picks and settings.
+
+Files written: `video.mp4`, `truth.npz` (see `write_truth`), `picks.json` (what a person would
+click, taken from the renderer's own part labels) and `scene.json` (options and looks).
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from multiprocessing import get_context
+from os import cpu_count
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.body import LSP14
+from keyrecon.formats.mocap import read_mocap
+from keyrecon.formats.picks import write_picks
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Pick
+from keyrecon.synthetic.cameras import CameraOptions, plan_camera
+from keyrecon.synthetic.clips import JoinOptions, join_clips
+from keyrecon.synthetic.court import draw_background
+from keyrecon.synthetic.figure import PARTS, point_figure
+from keyrecon.synthetic.looks import choose_look
+from keyrecon.synthetic.render import Frame, Stage, draw_frame
+from keyrecon.synthetic.shading import make_tiles
+from keyrecon.video_writer import write_video
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """How a motion is filmed."""
+
+    seed: int = 0
+    """Decides looks, light, camera placement and noise."""
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    shutter: float = 0.012
+    """Seconds that the shutter is open."""
+    noise: float = 2.2
+    """Spread of the sensor noise, grey levels."""
+    left_handed: bool = False
+    """Which hand holds the racket."""
+    crf: int = 23
+    """Constant quality of the video, 18 very good to 28 coarse."""
+    workers: int = 0
+    """Processes that draw; 0 for one per core. The pictures do not depend on it."""
+
+
+@dataclass(frozen=True)
+class SynthOptions:
+    """A whole sequence: what moves, and how it is filmed."""
+
+    scene: SceneOptions = field(default_factory=SceneOptions)
+    """Camera, looks and noise."""
+    clips: JoinOptions = field(default_factory=JoinOptions)
+    """Length and frame rate of the sequence, and how clips are joined."""
+    trim: int = 30
+    """Frames dropped at both ends of every motion-capture file, where markers come and go."""
+
+
+def synthesize(
+    out: Path,
+    mocap: Sequence[Path] = (),
+    options: SynthOptions = SynthOptions(),
+    progress: Progress = silent,
+) -> None:
+    """Render a sequence into a folder, from motion capture or from the built-in tennis motion."""
+    points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), options.clips)
+    render_sequence(points, options.clips.fps, options.scene, out, progress)
+
+
+def set_stage(
+    points: Float[np.ndarray, "T 14 3"], fps: float, options: SceneOptions = SceneOptions()
+) -> Stage:
+    """Everything that frames are drawn from; `points` in the world, metres, y up, floor at 0."""
+    rng = np.random.default_rng([options.seed, 3])
+    look = choose_look(options.seed)
+    pointers = point_figure(points, fps, options.left_handed)
+    move = plan_camera(points, fps, pointers.stature, options.camera, rng)
+    width, height = move.size
+    grey = rng.normal(0, options.noise, (height + 64, width + 64, 1))
+    color = rng.normal(0, 0.6 * options.noise, (height + 64, width + 64, 3))
+    return Stage(
+        points, pointers, move, draw_background(move, look, options.seed), look,
+        make_tiles(rng), np.round(grey + color).astype(np.int8),
+        min(1.0, options.shutter * fps), options.seed,
+    )  # fmt: skip
+
+
+def render_sequence(
+    points: Float[np.ndarray, "T 14 3"],
+    fps: float,
+    options: SceneOptions,
+    out: Path,
+    progress: Progress = silent,
+) -> None:
+    """Film a motion and write the sequence into a folder, which is made if need be."""
+    out.mkdir(parents=True, exist_ok=True)
+    stage = set_stage(points, fps, options)
+    chosen = {round(share * (len(points) - 1)) for share in (0.1, 0.5, 0.9)}
+    picks: list[Pick] = []
+    visible = np.zeros((len(points), len(LSP14.names)), bool)
+
+    def pictures() -> Iterator[np.ndarray]:
+        drawn = _draw_all(stage, options.workers or cpu_count() or 1, chosen)
+        for t, frame in enumerate(progress(drawn, "Drawing", len(points))):
+            visible[t] = frame.visible
+            if t in chosen:
+                picks.extend(click_parts(frame.parts, t))
+            yield frame.picture
+
+    write_video(out / "video.mp4", pictures(), fps, options.crf)
+    write_truth(out / "truth.npz", stage, fps, visible)
+    write_picks(out / "picks.json", picks)
+    scene = {"options": asdict(options), "look": asdict(stage.look), "fps": fps}
+    (out / "scene.json").write_text(json.dumps(scene, indent=2, default=str) + "\n")
+
+
+_stage: Stage | None = None
+
+
+def _enter(stage: Stage) -> None:
+    """Keep the stage in a worker process, so that it travels once."""
+    global _stage
+    _stage = stage
+    cv2.setNumThreads(1)
+
+
+def _draw_chunk(frames: range, labelled: frozenset[int]) -> list[Frame]:
+    return [_without_labels(draw_frame(_stage, t), t in labelled) for t in frames]
+
+
+def _without_labels(frame: Frame, keep: bool) -> Frame:
+    """Spare the process boundary the part labels that nobody reads."""
+    return frame if keep else Frame(frame.picture, frame.parts[:0], frame.visible)
+
+
+def _draw_all(stage: Stage, workers: int, labelled: set[int]) -> Iterator[Frame]:
+    """All frames in order, drawn by several processes that stay a little ahead."""
+    frames = len(stage.points)
+    if workers == 1 or frames < 32:
+        yield from (draw_frame(stage, t) for t in range(frames))
+        return
+    chunks = [range(t, min(t + 8, frames)) for t in range(0, frames, 8)]
+    draw = partial(_draw_chunk, labelled=frozenset(labelled))
+    with ProcessPoolExecutor(workers, get_context("spawn"), _enter, (stage,)) as pool:
+        ahead = 2 * workers
+        waiting = [pool.submit(draw, c) for c in chunks[:ahead]]
+        for following in range(ahead, len(chunks) + ahead):
+            if not waiting:
+                return
+            yield from waiting.pop(0).result()
+            if following < len(chunks):
+                waiting.append(pool.submit(draw, chunks[following]))
+
+
+def write_truth(
+    path: Path, stage: Stage, fps: float, visible: np.ndarray
+) -> None:
+    """Joints in each frame's camera axes (metres) and pixels, and the camera they are seen by."""
+    move = stage.move
+    np.savez(
+        path,
+        points3d=move.to_camera(stage.points),
+        points2d=move.project(stage.points),
+        joint_names=np.array(LSP14.names),
+        fps=fps,
+        visible=visible,
+        height_m=stage.pointers.stature,
+        focal=move.focal,
+        rotation=move.rotation,
+        center=move.center,
+        principal=move.principal,
+    )
+
+
+_CLICKS: dict[str, tuple[Sequence[str], ...]] = {
+    "head": (("hair", "face"),),
+    "foot": (("right_shoe",), ("left_shoe",)),
+    "shirt": (("shirt",),),
+    "shorts": (("shorts",),),
+    "skin": (("skin",),),
+    "hair": (("hair",),),
+}
+SMALLEST = 1.6
+"""px from the edge of a part within which nobody clicks."""
+
+
+def click_parts(parts: np.ndarray, frame: int) -> list[Pick]:
+    """The point deepest inside every visible part, as a careful person clicks it."""
+    picks = []
+    for name, places in _CLICKS.items():
+        for members in places:
+            mask = np.isin(parts, [PARTS.index(m) for m in members])
+            depth = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 5)
+            y, x = np.unravel_index(depth.argmax(), depth.shape)
+            if depth[y, x] > SMALLEST:
+                picks.append(Pick(frame, name, float(x - 1), float(y - 1)))
+    return picks
