@@ -133,7 +133,8 @@ def find_joints(
             return joints, _toes(figure, names, rig)
     raise KeyreconError(
         f"No known rig has joints called {', '.join(list(names)[:12])} ...; "
-        "rename the joints as in the CMU, MotionBuilder or DAZ skeletons (RightUpLeg, RightLeg, RightFoot, ...)."
+        "rename the joints as in the CMU, MotionBuilder or DAZ skeletons "
+        "(RightUpLeg, RightLeg, RightFoot, ...)."
     )
 
 
