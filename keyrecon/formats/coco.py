@@ -1,0 +1,202 @@
+"""COCO keypoints JSON, the format of annotations.json.
+
+`images[]` carry id, file_name, width, height and `frame`, the frame number (where another
+program left it out, the number at the end of the file name). `annotations[]` carry `keypoints`,
+x, y, v for every joint of the category (v = 0 not labelled, 1 placed though hidden, 2 visible),
+and `attributes.nearer`, one number per limb of the category's skeleton (1-based pairs of joints,
+parent first): 1 the child end is nearer the camera, -1 farther, 0 unknown.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.body import Skeleton
+from keyrecon.durable import write_durably
+from keyrecon.errors import KeyreconError
+from keyrecon.formats.marks import (
+    Mark,
+    Sheet,
+    annotations_from_marks,
+    canonical_name,
+    frame_of_picture,
+)
+from keyrecon.records import Annotations
+
+Json = dict[str, Any]
+
+
+def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
+    """Read and check marks; `size` is the width and height of the video's pictures, px.
+
+    Joints are matched by name, and only joints that are marked need to be in the skeleton.
+    Raises KeyreconError for a file that does not parse or does not fit the video, naming the
+    frame and the joint.
+    """
+    sheet = Sheet(path, skeleton, n_frames, size)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        images = {image["id"]: image for image in data["images"]}
+        categories = {c["id"]: c for c in data["categories"] if c.get("keypoints")}
+        marks, nearer = [], {}
+        for annotation in data["annotations"]:
+            if annotation.get("category_id") in categories and "keypoints" in annotation:
+                category = categories[annotation["category_id"]]
+                frame = _frame(annotation, images, sheet)
+                marks += _marks(annotation, category, frame, sheet)
+                signs = _nearer(annotation, category, frame, sheet)
+                nearer[frame] = np.where(signs, signs, nearer.get(frame, 0))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
+        raise KeyreconError(
+            f"{path} is not a COCO keypoints file ({_explain(fault)}); it needs images, "
+            "annotations with keypoints, and categories with the joints' names."
+        ) from fault
+    return annotations_from_marks(marks, sheet, nearer)
+
+
+def _refuse_constant(word: str) -> float:
+    raise ValueError(f"{word} is not a number")
+
+
+def _explain(fault: Exception) -> str:
+    return f"no {fault}" if isinstance(fault, KeyError) else str(fault)
+
+
+def _frame(annotation: Json, images: dict[Any, Json], sheet: Sheet) -> int:
+    """The frame that an annotation belongs to, checked."""
+    if annotation["image_id"] not in images:
+        raise KeyreconError(
+            f"{sheet.path}: annotation {annotation.get('id')} belongs to image "
+            f"{annotation['image_id']}, which is not in the list of images."
+        )
+    image = images[annotation["image_id"]]
+    sheet.check_size(int(image.get("width") or 0), int(image.get("height") or 0))
+    frame = image.get("frame")
+    if frame is None:
+        frame = frame_of_picture(image["file_name"], sheet.path)
+    if not isinstance(frame, int):
+        raise KeyreconError(f"{sheet.path}: {frame!r} is not a frame number.")
+    sheet.check_frame(frame)
+    return frame
+
+
+def _marks(annotation: Json, category: Json, frame: int, sheet: Sheet) -> Iterator[Mark]:
+    """The labelled joints of one annotation."""
+    names, values = category["keypoints"], annotation["keypoints"]
+    if len(values) != 3 * len(names):
+        raise KeyreconError(
+            f"{sheet.path}, frame {frame}: {len(values)} numbers in keypoints, but {len(names)} "
+            f"joints need {3 * len(names)} (x, y, v each)."
+        )
+    for name, x, y, v in zip(names, values[0::3], values[1::3], values[2::3], strict=True):
+        if v not in (0, 1, 2):
+            raise KeyreconError(
+                f"{sheet.path}, frame {frame}: {name} has visibility {v}; it must be 0 (not "
+                "labelled), 1 (hidden) or 2 (visible)."
+            )
+        if v:
+            yield Mark(frame, name, float(x), float(y), v == 2)
+
+
+def _nearer(annotation: Json, category: Json, frame: int, sheet: Sheet) -> np.ndarray:
+    """Signs in the order of our bones, whatever the order and direction of the file's limbs."""
+    signs = np.zeros(len(sheet.skeleton.bones), dtype=np.int64)
+    attributes = annotation.get("attributes") or {}
+    values = attributes.get("nearer") or []
+    limbs = category.get("skeleton") or []
+    if values and len(values) != len(limbs):
+        raise KeyreconError(
+            f"{sheet.path}, frame {frame}: {len(values)} numbers in nearer, but the skeleton has "
+            f"{len(limbs)} limbs."
+        )
+    bones = {tuple(bone): b for b, bone in enumerate(sheet.skeleton.bones.tolist())}
+    names = [canonical_name(name) for name in category["keypoints"]]
+    index = [sheet.skeleton.names.index(n) if n in sheet.skeleton.names else -1 for n in names]
+    for (parent, child), value in zip(limbs, values or [0] * len(limbs), strict=True):
+        if not (0 < parent <= len(names) and 0 < child <= len(names)):
+            raise KeyreconError(
+                f"{sheet.path}: the limb {parent}-{child} names joints that are not there; limbs "
+                "are pairs of joint numbers counted from 1."
+            )
+        if value not in (-1, 0, 1):
+            raise KeyreconError(
+                f"{sheet.path}, frame {frame}: nearer of {names[parent - 1]} - {names[child - 1]} "
+                f"is {value}; it must be 1, -1 or 0."
+            )
+        limb = (index[parent - 1], index[child - 1])
+        if limb in bones:
+            signs[bones[limb]] = value
+        elif limb[::-1] in bones:
+            signs[bones[limb[::-1]]] = -value
+    return signs
+
+
+def annotations_to_coco(annotations: Annotations, size: tuple[int, int]) -> Json:
+    """Marks as a COCO keypoints structure; `size` is the picture's width and height, px."""
+    skeleton = annotations.skeleton
+    joints = np.nan_to_num(annotations.joints)
+    v = np.where(np.isfinite(annotations.joints).all(axis=2), 1 + annotations.visible, 0)
+    return {
+        "info": {"description": "2D joints for keyrecon; frame = 0-based frame of the video"},
+        "images": [
+            {
+                "id": frame,
+                "file_name": f"frame_{frame:06d}.png",
+                "width": size[0],
+                "height": size[1],
+                "frame": frame,
+            }
+            for frame in annotations.frames.tolist()
+        ],
+        "annotations": [
+            _annotation(frame, joints[k], v[k], annotations.nearer[k].tolist())
+            for k, frame in enumerate(annotations.frames.tolist())
+        ],
+        "categories": [
+            {
+                "id": 1,
+                "name": "person",
+                "keypoints": list(skeleton.names),
+                "skeleton": (skeleton.bones + 1).tolist(),
+            }
+        ],
+    }
+
+
+def _annotation(
+    frame: int, joints: Float[np.ndarray, "J 2"], v: np.ndarray, nearer: list[int]
+) -> Json:
+    marked = joints[v > 0] if (v > 0).any() else np.zeros((1, 2))
+    x, y = marked.min(axis=0).tolist()
+    width, height = np.ptp(marked, axis=0).tolist()
+    keypoints = [
+        n for (a, b), c in zip(joints.tolist(), v.tolist(), strict=True) for n in (a, b, c)
+    ]
+    return {
+        "id": frame,
+        "image_id": frame,
+        "category_id": 1,
+        "keypoints": keypoints,
+        "num_keypoints": int((v > 0).sum()),
+        "bbox": [x, y, width, height],
+        "area": width * height,
+        "iscrowd": 0,
+        "attributes": {"nearer": nearer},
+    }
+
+
+def write_coco(path: Path, annotations: Annotations, size: tuple[int, int]) -> None:
+    """Write marks durably, one annotation to a line."""
+    data = annotations_to_coco(annotations, size)
+    parts = []
+    for key, value in data.items():
+        rows = value if isinstance(value, list) else [value]
+        body = ",\n  ".join(json.dumps(row, allow_nan=False) for row in rows)
+        parts.append(
+            f' "{key}": [\n  {body}\n ]' if isinstance(value, list) else f' "{key}": {body}'
+        )
+    write_durably(path, "{\n" + ",\n".join(parts) + "\n}\n")
