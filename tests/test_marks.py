@@ -7,7 +7,13 @@ from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 
 def half(frames, n=20):
     return HalfKeyframes(
-        np.array(frames), np.full(n, frames[0]), np.ones(n, bool), coverage=1.0, beta=0.1
+        frames=np.array(frames),
+        nearest=np.full(n, frames[0]),
+        represented=np.ones(n, bool),
+        coverage=1.0,
+        beta=0.1,
+        distance=np.zeros(n),
+        printed_count=len(frames),
     )
 
 

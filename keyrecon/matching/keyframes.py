@@ -1,0 +1,226 @@
+"""Choose the few frames that a person annotates (Section 4.3).
+
+A keyframe represents the frames whose pose is within beta of its own. The number of keyframes
+is given (the annotation budget), so beta is what is searched for: the smallest with which so
+many keyframes represent, or bridge by gaps of at most T frames, a share alpha of all frames
+(Eq. 1). Upper and lower body are chosen apart.
+
+method='paper' is the choice as printed: Eq. 2-4, distances smoothed with the same beta.
+method='coverage' maximises the coverage of Eq. 1 itself, reconsiders each keyframe, and at the
+end moves keyframes to the middle of what they represent. It smooths with a beta of its own, the
+distance between consecutive frames: two frames as alike as neighbours in time do show the same
+pose, which is what justifies averaging, whereas the beta of a small budget is far larger.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.errors import KeyreconError
+from keyrecon.matching.assignment import assign_frames, find_neighborhoods
+from keyrecon.matching.coverage import choose_as_printed, choose_greedily
+from keyrecon.matching.exchange import (
+    Goal,
+    drop_redundant,
+    exchange_for_closeness,
+    exchange_for_coverage,
+    shrink,
+)
+from keyrecon.matching.smoothing import smooth_distances
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Comparison, HalfKeyframes, Keyframes
+
+BETA_PRECISION = 0.01
+"""Beta is searched to one part in a hundred: less than one keyframe in a hundred."""
+BETA_STEP = 0.96
+"""Factor on beta from one attempt of the exchange search to the next."""
+
+
+@dataclass(frozen=True)
+class KeyframeOptions:
+    """How many frames a person is asked to annotate, and what they must stand for."""
+
+    budget: float = 0.015
+    """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video."""
+    coverage: float = 0.95
+    """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
+    reach: int = 10
+    """T of Eq. 1: longest gap to interpolate, in frames at 50 frames per second; other rates
+    get as much time."""
+    beta_upper: float | None = None
+    """Pose distance up to which a keyframe represents a frame, upper body, player heights; None
+    finds the smallest that the budget allows. With a value the budget is not looked at."""
+    beta_lower: float | None = None
+    """The same for the lower body."""
+    smoothing: float = 0.6
+    """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
+    smooths. method='paper' smooths with the beta of the choice instead."""
+    form: Literal["both", "mean"] = "both"
+    """Smoothed distances: rows then columns averaged, or the mean of both averages."""
+    method: Literal["coverage", "paper"] = "coverage"
+    """'paper': Eq. 2-4 as printed. 'coverage': fewer keyframes for the same coverage."""
+
+
+@dataclass(frozen=True, eq=False)
+class Half:
+    """What is known of one half of the body, and what is asked of its keyframes."""
+
+    comparison: Comparison
+    matched: Float[np.ndarray, "M M"]
+    smoothed: Float[np.ndarray, "M M"]
+    """D of method='coverage'."""
+    detour: Float[np.ndarray, "T"]
+    reach: int
+    uncovered: int
+    options: KeyframeOptions
+
+    def distances(self, beta: float) -> Float[np.ndarray, "M M"]:
+        """D for a choice with `beta`."""
+        if self.options.method == "paper":
+            return smooth_distances(self.matched, beta, self.options.form)
+        return self.smoothed
+
+    def goal(self, beta: float) -> Goal:
+        """What keyframes with `beta` represent, and have to."""
+        hoods = find_neighborhoods(self.distances(beta), self.comparison, self.detour, beta)
+        clarity = self.comparison.clarity[self.comparison.frames]
+        return Goal(hoods, self.reach, self.uncovered, clarity)
+
+
+def choose_keyframes(
+    comparison: Comparison,
+    fps: float,
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """Keyframes of both halves of the body within the budget.
+
+    Raises KeyreconError where the budget is less than one keyframe for each half.
+    """
+    n_frames = len(comparison.row)
+    reach = max(1, round(options.reach * fps / 50))
+    labels = int(2 * options.budget * n_frames + 1e-9)
+    if labels < 2 and None in (options.beta_upper, options.beta_lower):
+        raise KeyreconError(
+            f"A budget of {options.budget:.2%} of {n_frames} frames is {labels} half-body "
+            f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
+            "allows that."
+        )
+    halves = []
+    wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
+    names = progress(("upper", "lower"), "Choosing keyframes", 2)
+    for index, (name, (most, beta)) in enumerate(zip(names, wanted, strict=True)):
+        half = _half(comparison, getattr(comparison, name), index, reach, options)
+        also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
+        halves.append(_choose_half(half, most, beta, also))
+    return Keyframes(*halves, reach=reach, alpha=options.coverage)
+
+
+def _half(
+    comparison: Comparison,
+    matched: Float[np.ndarray, "M M"],
+    index: int,
+    reach: int,
+    options: KeyframeOptions,
+) -> Half:
+    step = comparison.step[index]
+    same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
+    return Half(
+        comparison=comparison,
+        matched=matched,
+        smoothed=smooth_distances(matched, same_pose, options.form),
+        detour=comparison.detour[index],
+        reach=reach,
+        uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
+        options=options,
+    )
+
+
+def _choose_half(
+    half: Half, most: int, beta: float | None, also: Int[np.ndarray, "K"]
+) -> HalfKeyframes:
+    """Keyframes of one half; `also` are frames that are annotated for the other half anyway."""
+    if beta is None:
+        beta, chosen = _smallest_beta(half, most)
+    else:
+        goal = half.goal(beta)
+        chosen = _choose(half, goal, len(goal.clarity))
+        if half.options.method == "coverage":
+            chosen = shrink(goal, chosen)
+    goal = half.goal(beta)
+    if half.options.method == "coverage":
+        chosen = _center(half, goal, chosen, also)
+    return _record(half, goal, beta, chosen)
+
+
+def _choose(half: Half, goal: Goal, most: int) -> list[int]:
+    """Keyframes by the selected method, at most `most`; the goal may be left unreached."""
+    if half.options.method == "paper":
+        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, most)
+    # What the greedy choice takes too many can often be dropped again.
+    chosen = choose_greedily(
+        goal.hoods, goal.reach, goal.uncovered, most + most // 5 + 1, goal.clarity
+    )
+    return drop_redundant(goal, chosen)[:most]
+
+
+def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
+    """The smallest beta with which `most` keyframes reach the coverage, and such keyframes."""
+    low, high = 0.0, 1.001 * float(max(half.matched.max(), half.detour.max())) + 1e-6
+    chosen = _choose(half, half.goal(high), most)
+    while high - low > BETA_PRECISION * high:
+        middle = (low + high) / 2
+        goal = half.goal(middle)
+        found = _choose(half, goal, most)
+        if goal.reached(found):
+            high, chosen = middle, found
+        else:
+            low = middle
+    if half.options.method == "paper":
+        return high, chosen
+    return _lower_beta(half, most, high, chosen)
+
+
+def _lower_beta(
+    half: Half, most: int, beta: float, chosen: list[int]
+) -> tuple[float, list[int]]:
+    """Exchange keyframes to do with a smaller beta still."""
+    while True:
+        goal = half.goal(beta * BETA_STEP)
+        start = choose_greedily(goal.hoods, goal.reach, goal.uncovered, most, goal.clarity)
+        found = exchange_for_coverage(goal, start)
+        if not goal.reached(found):
+            return beta, chosen
+        beta, chosen = beta * BETA_STEP, found
+
+
+def _center(
+    half: Half, goal: Goal, chosen: list[int], also: Int[np.ndarray, "K"]
+) -> list[int]:
+    """Move keyframes to the middle of what they represent, away from unclear frames.
+
+    A frame that is annotated for the other half anyway costs the person one frame less to look
+    at, which is worth half a percent of the distance.
+    """
+    unclear = 2 - goal.clarity - 0.005 * np.isin(half.comparison.frames, also)
+    members = np.bincount(half.comparison.row, minlength=len(goal.clarity))
+    distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
+    return exchange_for_closeness(goal, chosen, distance, members.astype(distance.dtype))
+
+
+def _record(half: Half, goal: Goal, beta: float, chosen: list[int]) -> HalfKeyframes:
+    frames = half.comparison.frames
+    nearest, distance = assign_frames(half.distances(beta), half.comparison, half.detour, chosen)
+    represented = goal.hoods.union(chosen)
+    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(frames))
+    return HalfKeyframes(
+        frames=frames[np.sort(chosen)],
+        nearest=frames[nearest],
+        represented=represented,
+        coverage=1 - goal.left_over(represented) / len(represented),
+        beta=beta,
+        distance=distance,
+        printed_count=len(printed),
+    )
