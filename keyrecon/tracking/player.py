@@ -1,0 +1,352 @@
+"""Where the player is: head, feet, size and box in every frame (Section 4.1).
+
+In pictures reduced so that the player is about 128 px tall, every frame is searched whole:
+
+    colour back-projection x foreground -> Gaussian low-pass -> radial symmetry -> candidates,
+
+round for the head, elliptical for the shoes. Colours recur in the scene (clay like skin, lines like
+white shoes), so back-projection is weighted by how far a pixel is from the background; and a head
+has the player's colours beneath it, a foot has them above it and not below. The cheapest path
+through the candidates (see `viterbi`) gives the head, then the feet given the head. What is missing
+is interpolated and told by `Track.trust`.
+
+The unit of length is the standing height from head to mid-feet. Players crouch, lunge and jump, so
+it is an upper envelope over time, divided by the camera's zoom, not the distance of the moment.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from scipy.ndimage import gaussian_filter1d, percentile_filter
+
+from keyrecon.background import BackgroundOptions, Scene, combine_plate, reduced_width
+from keyrecon.background import sample_frames as sampled
+from keyrecon.camera import warp_points
+from keyrecon.colors import color_bins, posterior_tables, to_lab
+from keyrecon.errors import KeyreconError
+from keyrecon.progress import Progress, silent
+from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
+from keyrecon.tracking.viterbi import Motion, cheapest_path
+from keyrecon.video import Video
+
+HEAD_RADIUS = 0.062
+"""Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
+SHOE_RADIUS = 0.045
+"""Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
+RADII = (0.8, 1.0, 1.25)
+"""Shares of a part's radius that are searched."""
+SHOES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
+"""Shoes from the side and pointing to or from the camera."""
+STILL_WEIGHT = 0.2
+"""Weight of colour where nothing differs from the background: a player may stand still."""
+HEADS, FEET = 8, 10
+"""Candidates kept of each, per frame."""
+LEAST_FOUND = 0.4
+"""Share of the frames in which a head must be found for a track to be believed."""
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """How the player is followed."""
+
+    player: float = 128.0
+    """Height of the player in the searched pictures, px; smaller is faster and less exact."""
+    head_speed: float = 3.0
+    """Usual speed of the head, player heights per second."""
+    foot_speed: float = 5.0
+    """Usual speed of the feet, player heights per second."""
+    envelope: float = 5.0
+    """The standing height may change over this time, seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """What one frame offers."""
+
+    heads: Float[np.ndarray, "m 2"]
+    head_score: Float[np.ndarray, "m"]
+    feet: Float[np.ndarray, "n 2"]
+    foot_score: Float[np.ndarray, "n"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """Maps of one frame, 0-1."""
+
+    head: Float[np.ndarray, "h w"]
+    foot: Float[np.ndarray, "h w"]
+    inside: Float[np.ndarray, "h1 w1"]
+    """Integral of the evidence for any part of the player."""
+
+
+def track_player(
+    video: Video,
+    colors: Colors,
+    camera: CameraPath,
+    options: TrackOptions = TrackOptions(),
+    progress: Progress = silent,
+) -> Track:
+    """Head, feet, standing height, box and trust in every frame.
+
+    Raises KeyreconError where no head is found in most frames.
+    """
+    width = reduced_width(video, colors.height, BackgroundOptions(player=options.player))
+    shrink = width / video.width
+    scene = _first_scene(video, camera, width)
+    tall = colors.height * shrink
+    tables = posterior_tables(colors).astype(np.float32)
+    found = []
+    pictures = video.frames(width=width)
+    for number, picture in enumerate(progress(pictures, "Following the player", len(video))):
+        lab = to_lab(picture)
+        evidence = _weigh(lab, tables, colors, scene.foreground(lab, number), tall)
+        found.append(_search(evidence, tall))
+    return _connect(found, video, camera, (shrink, tall), options)
+
+
+def _first_scene(video: Video, camera: CameraPath, width: int) -> Scene:
+    """The median of sampled frames: the player, who moves, mostly drops out."""
+    frames = set(sampled(len(video), BackgroundOptions.samples).tolist())
+    lab, used = [], []
+    for number, picture in enumerate(video.frames(width=width)):
+        if number in frames:
+            lab.append(to_lab(picture))
+            used.append(number)
+    shrink = width / video.width
+    everywhere = [np.ones(p.shape[:2], bool) for p in lab]
+    plate = combine_plate(lab, everywhere, camera.to_reference[used], shrink)
+    return Scene(plate, camera, shrink)
+
+
+def _weigh(
+    lab: UInt8[np.ndarray, "h w 3"],
+    tables: Float[np.ndarray, "C bins"],
+    colors: Colors,
+    foreground: Float[np.ndarray, "h w"],
+    tall: float,
+) -> _Evidence:
+    """Back-projection weighted by foreground, low-passed at the size of each part."""
+    bins = color_bins(lab)
+    weight = (STILL_WEIGHT + (1 - STILL_WEIGHT) * foreground).astype(np.float32)
+    head = tables[colors.names.index("head")][bins] * weight
+    foot = tables[colors.names.index("foot")][bins] * weight
+    any_part = tables.max(axis=0)[bins] * foreground.astype(np.float32)
+    return _Evidence(
+        head=cv2.GaussianBlur(head, (0, 0), max(0.8, 0.25 * HEAD_RADIUS * tall)),
+        foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
+        inside=cv2.integral(any_part),
+    )
+
+
+def _search(evidence: _Evidence, tall: float) -> _Candidates:
+    """Round head-coloured and elliptical shoe-coloured places, scored with their neighbourhood."""
+    radii = [max(1.0, r * HEAD_RADIUS * tall) for r in RADII]
+    score = radial_symmetry(find_slope(evidence.head), radii)
+    heads, strength = find_peaks(score, HEAD_RADIUS * tall, 3 * HEADS)
+    body = _mean_inside(evidence, heads, (-0.15, 0.12, 0.15, 0.65), tall)
+    strength = strength * (0.02 + body)
+    order = np.argsort(-strength)[:HEADS]
+    heads, strength = heads[order], strength[order]
+    feet, foot_strength = _search_feet(evidence, heads[:4], tall)
+    return _Candidates(heads, strength, feet, foot_strength)
+
+
+def _search_feet(
+    evidence: _Evidence, heads: Float[np.ndarray, "m 2"], tall: float
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n"]]:
+    """Shoe-coloured ellipses that have a leg above and nothing of the player below."""
+    below = np.zeros(evidence.foot.shape, bool)
+    for x, y in heads:
+        x0, x1 = max(0, round(x - 0.9 * tall)), max(0, round(x + 0.9 * tall))
+        y0, y1 = max(0, round(y + 0.35 * tall)), max(0, round(y + 1.35 * tall))
+        below[y0:y1, x0:x1] = True
+    slope = find_slope(np.where(below, evidence.foot, 0).astype(np.float32))
+    radii = [max(1.0, r * SHOE_RADIUS * tall) for r in RADII]
+    score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOES], axis=0)
+    feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below)
+    leg = _mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
+    under = _mean_inside(evidence, feet, (-0.06, 0.08, 0.06, 0.25), tall)
+    strength = strength * (0.05 + leg) * (1.05 - under)
+    order = np.argsort(-strength)[:FEET]
+    return feet[order], strength[order]
+
+
+def _mean_inside(
+    evidence: _Evidence,
+    places: Float[np.ndarray, "m 2"],
+    window: tuple[float, float, float, float],
+    tall: float,
+) -> Float[np.ndarray, "m"]:
+    """Mean evidence for the player in a window (player heights) around each place."""
+    rows, columns = np.array(evidence.inside.shape) - 1
+    x = np.rint(places[:, :1] + tall * np.array(window[0::2])).astype(int).clip(0, columns)
+    y = np.rint(places[:, 1:] + tall * np.array(window[1::2])).astype(int).clip(0, rows)
+    total = evidence.inside
+    inside = (
+        total[y[:, 1], x[:, 1]] - total[y[:, 0], x[:, 1]]
+        - total[y[:, 1], x[:, 0]] + total[y[:, 0], x[:, 0]]
+    )  # fmt: skip
+    area = tall * (window[2] - window[0]) * tall * (window[3] - window[1])
+    return inside / area
+
+
+def _connect(
+    found: list[_Candidates],
+    video: Video,
+    camera: CameraPath,
+    size: tuple[float, float],
+    options: TrackOptions,
+) -> Track:
+    """The path of the head, then that of the feet, in pixels of the full picture."""
+    shrink, tall = size
+    height = tall / shrink
+    back = (1 / shrink - 1) / 2
+    to_full = lambda places: places / shrink + back  # noqa: E731
+    heads = [to_full(c.heads) for c in found]
+    feet = [to_full(c.feet) for c in found]
+    head_cost = _costs([c.head_score for c in found])
+    speed = height / video.fps
+    stable = [_stabilise(h, camera, t)[:, None] for t, h in enumerate(heads)]
+    chosen = cheapest_path(head_cost, stable, Motion(options.head_speed * speed))
+    if (chosen >= 0).mean() < LEAST_FOUND:
+        raise _lost(chosen)
+    head = _fill(heads, chosen)
+    pairs = [_pairs(len(f)) for f in feet]
+    foot_cost = _costs([c.foot_score for c in found])
+    costs = [
+        _pair_costs(foot_cost[t], pairs[t], feet[t], head[t], height) for t in range(len(found))
+    ]
+    stable = [_stabilise(f, camera, t)[p] for t, (f, p) in enumerate(zip(feet, pairs, strict=True))]
+    taken = cheapest_path(costs, stable, Motion(options.foot_speed * speed, gap=12, miss=7.0))
+    both = _order(_fill([f[p].reshape(-1, 4) for f, p in zip(feet, pairs, strict=True)], taken))
+    standing = standing_height(head, both.mean(axis=1), zoom(camera, video), video, options)
+    head_trust = np.array([_trust(c, s) for c, s in zip(head_cost, chosen, strict=True)])
+    feet_trust = np.array([_trust(c / 2, s) for c, s in zip(costs, taken, strict=True)])
+    trust = np.sqrt(head_trust * feet_trust)
+    return Track(head, both, standing, _boxes(head, both, standing), trust)
+
+
+def _lost(chosen: Int[np.ndarray, "T"]) -> KeyreconError:
+    """What to tell when there is no track."""
+    seen = chosen >= 0
+    gaps = np.flatnonzero(~seen)
+    middle = int(gaps[len(gaps) // 2])
+    return KeyreconError(
+        f"The head was found in only {seen.sum()} of {len(seen)} frames; pick its colour again "
+        f"on a frame where it was missed, for instance frame {middle}."
+    )
+
+
+def _costs(scores: list[Float[np.ndarray, "m"]]) -> list[Float[np.ndarray, "m"]]:
+    """-log of each score against the best scores of the sequence."""
+    best = [s.max() for s in scores if len(s)]
+    reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
+    return [-np.log((s / reference + 0.005) / 1.005) for s in scores]
+
+
+def _trust(cost: Float[np.ndarray, "m"], state: int) -> float:
+    """How good the state taken is, 0-1."""
+    return 0.0 if state < 0 else float(np.exp(-max(0.0, cost[state])) ** 0.5)
+
+
+def _stabilise(
+    places: Float[np.ndarray, "m 2"], camera: CameraPath, frame: int
+) -> Float[np.ndarray, "m 2"]:
+    return warp_points(camera.to_reference[frame], places)
+
+
+def _pairs(count: int) -> Int[np.ndarray, "s 2"]:
+    """All unordered pairs, a place paired with itself included: one foot behind the other."""
+    first, second = np.triu_indices(count)
+    return np.stack([first, second], axis=1)
+
+
+def _pair_costs(
+    cost: Float[np.ndarray, "n"],
+    pairs: Int[np.ndarray, "s 2"],
+    feet: Float[np.ndarray, "n 2"],
+    head: Float[np.ndarray, "2"],
+    height: float,
+) -> Float[np.ndarray, "s"]:
+    """Cost of two feet together: their own, and their place below the head."""
+    if not len(pairs):
+        return np.zeros(0)
+    both = feet[pairs]
+    middle = both.mean(axis=1) - head
+    short = np.maximum(0, 0.6 * height - middle[:, 1]) + np.maximum(0, middle[:, 1] - 1.1 * height)
+    aside = np.maximum(0, np.abs(middle[:, 0]) - 0.5 * height)
+    apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
+    off = (short**2 + aside**2 + apart**2) / (2 * (0.1 * height) ** 2)
+    same = pairs[:, 0] == pairs[:, 1]
+    # One place for both feet explains less of the picture than two.
+    return cost[pairs].sum(axis=1) + np.where(same, 1.5, 0.0) + np.minimum(off, 12.0)
+
+
+def _fill(
+    places: list[Float[np.ndarray, "m d"]], chosen: Int[np.ndarray, "T"]
+) -> Float[np.ndarray, "T d"]:
+    """The chosen places, linearly interpolated where none was."""
+    seen = np.flatnonzero(chosen >= 0)
+    if not len(seen):
+        raise KeyreconError(
+            "No feet were found below the head in any frame; pick the colour of the shoes again."
+        )
+    known = np.array([places[t][chosen[t]] for t in seen])
+    if known.shape[1] == 4:
+        known = _order(known).reshape(-1, 4)
+    return np.stack(
+        [np.interp(np.arange(len(chosen)), seen, column) for column in known.T], axis=1
+    )
+
+
+def _order(pairs: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 2 2"]:
+    """Swap the members of each pair so that each stays near its predecessor."""
+    both = pairs.reshape(-1, 2, 2).copy()
+    for t in range(1, len(both)):
+        direct = np.linalg.norm(both[t] - both[t - 1], axis=1).sum()
+        if np.linalg.norm(both[t][::-1] - both[t - 1], axis=1).sum() < direct:
+            both[t] = both[t][::-1]
+    return both
+
+
+def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
+    """Magnification of each frame against the first.
+
+    Accumulated from frame to frame at the centre of the picture, where turning the camera does
+    not magnify.
+    """
+    center = np.array([video.width / 2, video.height / 2])
+    step = np.linalg.inv(camera.to_reference[1:]) @ camera.to_reference[:-1]
+    weight = step[:, 2, :2] @ center + step[:, 2, 2]
+    area = np.linalg.det(step) / weight**3
+    return np.concatenate([[1.0], np.exp(np.cumsum(0.5 * np.log(np.maximum(area, 1e-6))))])
+
+
+def standing_height(
+    head: Float[np.ndarray, "T 2"],
+    mid_feet: Float[np.ndarray, "T 2"],
+    magnification: Float[np.ndarray, "T"],
+    video: Video,
+    options: TrackOptions,
+) -> Float[np.ndarray, "T"]:
+    """Upper envelope of the distance from head to mid-feet over time, px, zoom undone."""
+    length = np.linalg.norm(mid_feet - head, axis=1) / magnification
+    window = min(len(length), max(3, round(options.envelope * video.fps)) | 1)
+    envelope = percentile_filter(length, 80, size=window, mode="nearest")
+    return gaussian_filter1d(envelope, window / 4, mode="nearest") * magnification
+
+
+def _boxes(
+    head: Float[np.ndarray, "T 2"],
+    feet: Float[np.ndarray, "T 2 2"],
+    height: Float[np.ndarray, "T"],
+) -> Float[np.ndarray, "T 4"]:
+    """x0, y0, x1, y1 around head and feet, with room for a raised racket arm."""
+    spots = np.concatenate([head[:, None], feet], axis=1)
+    low, high = spots.min(axis=1), spots.max(axis=1)
+    room = height[:, None]
+    return np.concatenate([low - room * (0.5, 0.35), high + room * (0.5, 0.08)], axis=1)
+

@@ -1,0 +1,92 @@
+"""The most consistent path through candidates that are sometimes missing (Section 4.1).
+
+States of a frame are candidates (one point each, or an unordered pair of feet). A path pays for
+each state it takes, for movement, and for frames it skips: an edge may join frames up to `gap`
+apart and costs
+
+    |p(t) - p(t - g)|^2 / (2 g sigma^2), at most `jump`,   plus (g - 1) miss,
+
+so that a player who was lost is remembered where they were last seen. Paths start and end
+anywhere at `miss` per frame left out. Positions are given in stabilised coordinates, where a
+camera's own motion is already undone. Dynamic programming finds the cheapest path exactly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a path may move; all lengths in the unit of the positions."""
+
+    sigma: float
+    """Usual movement from one frame to the next."""
+    jump: float = 8.0
+    """Greatest cost of a movement: beyond it a jump is a jump."""
+    miss: float = 4.0
+    """Cost of a frame without a state."""
+    gap: int = 25
+    """Longest gap that is bridged, frames."""
+
+
+def cheapest_path(
+    costs: Sequence[Float[np.ndarray, "m"]],
+    points: Sequence[Float[np.ndarray, "m p 2"]],
+    motion: Motion,
+) -> Int[np.ndarray, "T"]:
+    """State taken in each frame, -1 where none; m differs from frame to frame.
+
+    Two points per state are an unordered pair: the cheaper assignment counts.
+    """
+    total: list[np.ndarray] = []
+    came: list[np.ndarray] = []
+    for t, own in enumerate(costs):
+        best = np.full(len(own), t * motion.miss)
+        source = np.full((len(own), 2), -1)
+        for g in range(1, min(motion.gap, t) + 1):
+            before = t - g
+            if not len(own) or not len(total[before]):
+                continue
+            moved = _movement(points[before], points[t]) / (2 * g * motion.sigma**2)
+            through = total[before][:, None] + np.minimum(moved, motion.jump)
+            through += (g - 1) * motion.miss
+            last = through.argmin(axis=0)
+            cost = through[last, np.arange(len(own))]
+            better = cost < best
+            best = np.where(better, cost, best)
+            source[better] = np.stack([np.full(len(own), before), last], axis=1)[better]
+        total.append(best + own)
+        came.append(source)
+    return _trace_back(total, came, motion.miss)
+
+
+def _movement(
+    before: Float[np.ndarray, "l p 2"], after: Float[np.ndarray, "m p 2"]
+) -> Float[np.ndarray, "l m"]:
+    """Mean squared movement of a state's points, under the cheaper assignment of a pair."""
+    direct = ((before[:, None] - after[None]) ** 2).sum(axis=-1).mean(axis=-1)
+    if before.shape[1] == 1:
+        return direct
+    crossed = ((before[:, None] - after[None, :, ::-1]) ** 2).sum(axis=-1).mean(axis=-1)
+    return np.minimum(direct, crossed)
+
+
+def _trace_back(
+    total: list[np.ndarray], came: list[np.ndarray], miss: float
+) -> Int[np.ndarray, "T"]:
+    """Follow the cheapest path back from its end."""
+    path = np.full(len(total), -1)
+    ends = [
+        (cost.min() + (len(total) - 1 - t) * miss, t) for t, cost in enumerate(total) if len(cost)
+    ]
+    if not ends or min(ends)[0] >= len(total) * miss:
+        return path
+    t = min(ends)[1]
+    state = int(total[t].argmin())
+    while t >= 0:
+        path[t] = state
+        t, state = came[t][state]
+    return path
