@@ -67,7 +67,8 @@ def group_elements(elements: Elements, pitch: float, directions: int, reach: flo
 
     center = np.stack([mean(elements.points[:, 0]), mean(elements.points[:, 1])], axis=1)
     angle = np.arctan2(mean(np.sin(elements.angle)), mean(np.cos(elements.angle)))
-    color = mean(elements.color).round().astype(np.int64)
+    color = np.zeros(len(used), dtype=np.int64)
+    color[of_element] = elements.color
     first, neighbor = _neighborhoods(center, angle, color, reach + pitch / 2)
     return Cells(of_element, center.astype(np.float32), first, neighbor)
 
