@@ -55,7 +55,7 @@ def uncovered_cost(n_frames: int, reach: int) -> GapCost:
 class Neighborhoods:
     """w(k): the frames that each candidate represents."""
 
-    first: Int[np.ndarray, "M+1"]
+    first: Int[np.ndarray, "ends"]
     """Where each candidate's frames start in `frame`, and the end of the last."""
     frame: Int[np.ndarray, "P"]
     """Frame numbers, ascending within each candidate."""
