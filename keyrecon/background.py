@@ -26,7 +26,7 @@ from keyrecon.video import Video
 
 LARGEST_MOSAIC = 4.0
 """Sides of the mosaic, pictures: a camera that turns far enough leaves any plane."""
-NOISE = 4.0
+NOISE = 4
 """Deviation of video noise and compression, grey levels; the least spread assumed."""
 SHADOW = 0.35
 """Weight of a darkening: a shadow takes up to half of the light and leaves the chroma."""
@@ -34,6 +34,8 @@ DEEPEST_SHADOW = 0.45
 """Share of the light that a cast shadow leaves, at least."""
 BODY_HALF_WIDTH = 0.33
 """Around the head-feet axis, player heights: nothing there is used for the plate."""
+UNKNOWN = 255
+"""Spread of what was never seen."""
 CHROMA = 1.6
 """Weight of a and b against L: chroma varies less with light."""
 
@@ -111,77 +113,68 @@ def shrinking(shrink: float) -> Float[np.ndarray, "3 3"]:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A background ready to be compared with the frames of a video of reduced size."""
+    """A background ready to be compared with the frames of its video."""
 
     background: Background
     camera: CameraPath
-    shrink: float
-    """Pixels of the compared pictures per pixel of the full picture."""
     sure: float = BackgroundOptions.sure
 
     @cached_property
-    def _range(self) -> UInt8[np.ndarray, "h w 7"]:
-        """Least and greatest colour around every pixel, and the spread (255 where unknown)."""
-        window = np.ones((3, 3), np.uint8)
-        plate = self.background.plate
-        spread = np.clip(self.background.spread * 8, 8, 254).astype(np.uint8)
-        unseen = cv2.dilate((~self.background.known).astype(np.uint8), window) > 0
-        spread[unseen] = 255
-        return np.dstack([cv2.erode(plate, window), cv2.dilate(plate, window), spread])
+    def _low(self) -> UInt8[np.ndarray, "h w 3"]:
+        """Least colour around every pixel of the plate."""
+        return cv2.erode(self.background.plate, np.ones((3, 3), np.uint8))
 
     @cached_property
-    def _still(self) -> bool:
-        return bool(np.allclose(self.camera.to_reference, np.eye(3), atol=1e-12))
+    def _high(self) -> UInt8[np.ndarray, "h w 3"]:
+        """Greatest colour around every pixel of the plate."""
+        return cv2.dilate(self.background.plate, np.ones((3, 3), np.uint8))
+
+    @cached_property
+    def _spread(self) -> UInt8[np.ndarray, "h w"]:
+        """Deviation in steps of 1/8 grey level; UNKNOWN where the scene was not seen."""
+        spread = np.clip(self.background.spread * 8, 8 * NOISE, UNKNOWN - 1).astype(np.uint8)
+        unseen = cv2.dilate((~self.background.known).astype(np.uint8), np.ones((3, 3), np.uint8))
+        spread[unseen > 0] = UNKNOWN
+        return spread
 
     def foreground(
-        self, lab: UInt8[np.ndarray, "h w 3"], frame: int, corner: tuple[int, int] = (0, 0)
+        self,
+        lab: UInt8[np.ndarray, "h w 3"],
+        frame: int,
+        to_picture: Float[np.ndarray, "3 3"],
     ) -> Float[np.ndarray, "h w"]:
         """Probability that each pixel of a crop is not background; 0.5 where nobody knows.
 
-        `corner` is the reduced picture's pixel at which the crop begins.
+        `to_picture` maps pixels of the crop to those of the full picture of this frame.
         """
-        low, high, spread = self._range_at(frame, corner, lab.shape[:2])
+        to_plate = self.background.from_reference @ self.camera.to_reference[frame] @ to_picture
+        size = (lab.shape[1], lab.shape[0])
+        low, high = (_seen_through(plate, to_plate, size) for plate in (self._low, self._high))
+        spread = _seen_through(self._spread, to_plate, size)
         under, over = cv2.subtract(low, lab), cv2.subtract(lab, high)
         off = cv2.max(under, over).astype(np.float32)
-        lightness = off[..., 0]
         # A shadow darkens by a share; deeper than any shadow counts fully again.
         floor = cv2.multiply(low[..., 0], DEEPEST_SHADOW)
         shadow = (under[..., 0] > 0) & (lab[..., 0] > floor)
-        lightness = np.where(shadow, SHADOW * lightness, lightness)
-        square = lightness**2 + CHROMA**2 * (off[..., 1] ** 2 + off[..., 2] ** 2)
-        unseen = spread >= 250
-        deviation = np.maximum(spread.astype(np.float32) / 8, NOISE) * self.sure
-        likely = square / (square + deviation**2)
-        likely[unseen] = 0.5
+        off[..., 0][shadow] *= SHADOW
+        off *= (1.0, CHROMA, CHROMA)
+        square = np.einsum("ijk,ijk->ij", off, off)
+        likely = square / (square + (spread.astype(np.float32) * (self.sure / 8)) ** 2)
+        likely[spread == UNKNOWN] = 0.5
         return likely
 
-    def _range_at(
-        self, frame: int, corner: tuple[int, int], shape: tuple[int, ...]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The plate's range where a crop of a frame lies."""
-        rows, columns = shape[:2]
-        x, y = corner
-        if self._still:
-            part = self._range[y : y + rows, x : x + columns]
-            if part.shape[:2] == (rows, columns):
-                return part[..., :3], part[..., 3:6], part[..., 6]
-        enlarge = np.linalg.inv(shrinking(self.shrink))
-        shift = np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]])
-        to_plate = (
-            self.background.from_reference @ self.camera.to_reference[frame] @ enlarge @ shift
-        )
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        size = (columns, rows)
-        low, high = (
-            cv2.warpPerspective(np.ascontiguousarray(self._range[..., c : c + 3]), to_plate, size,
-                                flags=flags)
-            for c in (0, 3)
-        )  # fmt: skip
-        spread = cv2.warpPerspective(
-            np.ascontiguousarray(self._range[..., 6]), to_plate, size,
-            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP, borderValue=255,
-        )  # fmt: skip
-        return low, high, spread
+
+def _seen_through(
+    plate: UInt8[np.ndarray, "h w *c"], to_plate: Float[np.ndarray, "3 3"], size: tuple[int, int]
+) -> UInt8[np.ndarray, "y x *c"]:
+    """The part of a plate that a crop of `size` (columns, rows) looks at."""
+    to_plate = to_plate / to_plate[2, 2]
+    if plate.shape[1::-1] == size and np.allclose(to_plate, np.eye(3), atol=1e-6):
+        return plate
+    smooth = cv2.INTER_LINEAR if plate.ndim == 3 else cv2.INTER_NEAREST
+    return cv2.warpPerspective(
+        plate, to_plate, size, flags=smooth | cv2.WARP_INVERSE_MAP, borderValue=UNKNOWN
+    )
 
 
 def _picked(

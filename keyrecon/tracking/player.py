@@ -21,7 +21,13 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
-from keyrecon.background import BackgroundOptions, Scene, combine_plate, reduced_width
+from keyrecon.background import (
+    BackgroundOptions,
+    Scene,
+    combine_plate,
+    reduced_width,
+    shrinking,
+)
 from keyrecon.background import sample_frames as sampled
 from keyrecon.camera import warp_points
 from keyrecon.colors import color_bins, posterior_tables, to_lab
@@ -98,11 +104,12 @@ def track_player(
     scene = _first_scene(video, camera, width)
     tall = colors.height * shrink
     tables = posterior_tables(colors).astype(np.float32)
-    found = []
+    found, to_picture = [], np.linalg.inv(shrinking(shrink))
     pictures = video.frames(width=width)
     for number, picture in enumerate(progress(pictures, "Following the player", len(video))):
         lab = to_lab(picture)
-        evidence = _weigh(lab, tables, colors, scene.foreground(lab, number), tall)
+        foreground = scene.foreground(lab, number, to_picture)
+        evidence = _weigh(lab, tables, colors, foreground, tall)
         found.append(_search(evidence, tall))
     return _connect(found, video, camera, (shrink, tall), options)
 
@@ -118,7 +125,7 @@ def _first_scene(video: Video, camera: CameraPath, width: int) -> Scene:
     shrink = width / video.width
     everywhere = [np.ones(p.shape[:2], bool) for p in lab]
     plate = combine_plate(lab, everywhere, camera.to_reference[used], shrink)
-    return Scene(plate, camera, shrink)
+    return Scene(plate, camera)
 
 
 def _weigh(

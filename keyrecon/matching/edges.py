@@ -1,0 +1,246 @@
+"""Coloured regions of the player and their directed edges (Section 4.1).
+
+Every frame is cut out around the player and brought to a common player height. A pixel of the crop
+belongs to part c of the player with
+
+    P(c) ~ f q_c(colour),   P(background) ~ (1 - f) b(colour),   P(something else) ~ f u,
+
+f the probability that it differs from the background, q and b the colour histograms, u a uniform
+colour: a racket differs from the background and yet is none of the player's colours. The maps are
+low-passed, the most likely one names the pixel, and components that are small or hang on nothing
+are dropped. Contours of each region, inner borders between two colours included, are walked so
+that the region lies on the left as seen on the picture, and sampled at regular arc length: each
+sample is an edge element, a point with a unit tangent.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.ndimage import gaussian_filter1d
+
+from keyrecon.background import Scene
+from keyrecon.colors import BINS, color_bins, to_lab
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Background, CameraPath, Colors, Edges, Figures, Track
+from keyrecon.video import Video
+
+CROP_WIDTH, CROP_HEIGHT = 1.75, 1.5
+"""Size of the crop, player heights: a lunge with an arm stretched out; a raised arm."""
+UNIFORM = 4.0
+"""Weight of a colour that is none of the player's, against all colours being equally likely."""
+SOFTEN = 0.008
+"""Low-pass of the maps, player heights: an edge stays where it is, noise goes."""
+LEAST_AREA = 0.0015
+"""Smaller components are dropped and smaller holes filled, squared player heights."""
+NEARBY = 0.06
+"""A component farther from the body is not part of it, player heights."""
+WAIST = 0.42
+"""Where the body is cut, shares of the way from head to mid-feet: hips .44, waist .37."""
+OVERLAP = 0.05
+"""Width of the band that counts for both halves, in the same shares."""
+LEAST_SAMPLES = 6
+"""Contours with fewer samples have no direction to speak of."""
+
+
+@dataclass(frozen=True)
+class EdgeOptions:
+    """How regions and edges are found."""
+
+    player: int = 112
+    """Player height in the crops, px; smaller is faster and coarser."""
+    step: float = 0.018
+    """Distance between edge elements along a contour, player heights."""
+    most: int = 400
+    """Edge elements of one frame at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Palette:
+    """Tables over colour bins, ready for looking up."""
+
+    parts: Float[np.ndarray, "bins C"]
+    surroundings: Float[np.ndarray, "bins"]
+
+
+def find_edges(  # noqa: PLR0913
+    video: Video,
+    track: Track,
+    camera: CameraPath,
+    background: Background,
+    colors: Colors,
+    options: EdgeOptions = EdgeOptions(),
+    progress: Progress = silent,
+) -> Figures:
+    """Label crops and directed edges of every frame; edges in px of the full picture."""
+    scene = Scene(background, camera)
+    palette = _Palette(np.ascontiguousarray(colors.seen.T), colors.surroundings)
+    scale = options.player / track.height
+    size = (round(CROP_WIDTH * options.player), round(CROP_HEIGHT * options.player))
+    center = (track.box[:, :2] + track.box[:, 2:]) / 2
+    origin = center - (np.array(size) - 1) / 2 / scale[:, None]
+    # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
+    width = min(video.width, round(video.width * 1.2 * float(np.median(scale))))
+    shrink = width / video.width
+    edges, labels = [], np.zeros((len(video), size[1], size[0]), np.uint8)
+    pictures = video.frames(width=width)
+    for t, picture in enumerate(progress(pictures, "Finding edges", len(video))):
+        crop, to_picture, present = _cut_out(picture, origin[t], float(scale[t]), shrink, size)
+        foreground = scene.foreground(crop, t, to_picture)
+        spots = (track.head[t], track.mid_feet[t])
+        axis = np.stack([(p - origin[t]) * scale[t] for p in spots])
+        labels[t] = label_crop(crop, foreground * present, palette, axis, options)
+        found = trace_edges(labels[t], options)
+        edges.append(_place(found, origin[t], float(scale[t]), track, t))
+    return Figures(tuple(edges), labels, origin, scale)
+
+
+def _cut_out(
+    picture: UInt8[np.ndarray, "h w 3"],
+    origin: Float[np.ndarray, "2"],
+    scale: float,
+    shrink: float,
+    size: tuple[int, int],
+) -> tuple[UInt8[np.ndarray, "y x 3"], Float[np.ndarray, "3 3"], UInt8[np.ndarray, "y x"]]:
+    """The crop in Lab, the way from its pixels to the full picture, and where there is one."""
+    to_picture = np.array([[1 / scale, 0, origin[0]], [0, 1 / scale, origin[1]], [0, 0, 1]])
+    offset = (shrink - 1) / 2
+    to_small = np.array([[shrink, 0, offset], [0, shrink, offset], [0, 0, 1]]) @ to_picture
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    crop = cv2.warpAffine(picture, to_small[:2], size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    columns = to_small[0, 0] * np.arange(size[0]) + to_small[0, 2]
+    rows = to_small[1, 1] * np.arange(size[1]) + to_small[1, 2]
+    inside = (rows >= 0) & (rows <= picture.shape[0] - 1)
+    across = (columns >= 0) & (columns <= picture.shape[1] - 1)
+    return to_lab(crop), to_picture, (inside[:, None] & across).astype(np.uint8)
+
+
+def label_crop(
+    lab: UInt8[np.ndarray, "h w 3"],
+    foreground: Float[np.ndarray, "h w"],
+    palette: _Palette,
+    axis: Float[np.ndarray, "2 2"],
+    options: EdgeOptions,
+) -> UInt8[np.ndarray, "h w"]:
+    """0 background, 1 + c part c; `axis` runs from head to mid-feet in crop pixels."""
+    bins = color_bins(lab)
+    count = palette.parts.shape[1]
+    likely = palette.parts[bins] * (foreground[..., None] / count)
+    nobody = foreground * (UNIFORM / np.prod(BINS)) + (1 - foreground) * (
+        palette.surroundings[bins] + 1e-6
+    )
+    likely /= likely.sum(axis=2, keepdims=True) + nobody[..., None]
+    likely = cv2.GaussianBlur(likely.astype(np.float32), (0, 0), SOFTEN * options.player)
+    labels = (likely.argmax(axis=2) + 1).astype(np.uint8)
+    labels[likely.sum(axis=2) < 0.5] = 0
+    return _clean(labels, axis, options)
+
+
+def _clean(
+    labels: UInt8[np.ndarray, "h w"], axis: Float[np.ndarray, "2 2"], options: EdgeOptions
+) -> UInt8[np.ndarray, "h w"]:
+    """Keep what hangs together with the body; give specks to what surrounds them."""
+    least = LEAST_AREA * options.player**2
+    size = max(3, round(NEARBY * options.player) | 1)
+    near = cv2.dilate((labels > 0).astype(np.uint8), np.ones((size, size), np.uint8))
+    _, pieces = cv2.connectedComponents(near, connectivity=4)
+    along = np.linspace(0, 1, 40)[:, None]
+    spots = np.rint(axis[0] + along * (axis[1] - axis[0])).astype(int)
+    rows = spots[:, 1].clip(0, labels.shape[0] - 1)
+    columns = spots[:, 0].clip(0, labels.shape[1] - 1)
+    votes = np.bincount(pieces[rows, columns], minlength=2)
+    votes[0] = 0
+    labels = np.where(pieces == votes.argmax(), labels, 0).astype(np.uint8)
+    filled = cv2.medianBlur(labels, 5)
+    for value in np.unique(labels):
+        _, parts, stats, _ = cv2.connectedComponentsWithStats((labels == value).astype(np.uint8))
+        small = stats[:, cv2.CC_STAT_AREA] < least
+        small[0] = False
+        if small.any():
+            specks = small[parts]
+            labels[specks] = np.where(filled[specks] == value, 0, filled[specks])
+    return labels
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Edge elements of a crop."""
+
+    points: Float[np.ndarray, "E 2"]
+    tangent: Float[np.ndarray, "E 2"]
+    color: Int[np.ndarray, "E"]
+
+
+def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elements:
+    """Contours of all regions as elements with the region on their left, in crop pixels."""
+    step = options.step * options.player
+    points, tangents, colors = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0, int)]
+    for value in np.unique(labels[labels > 0]):
+        mask = (labels == value).astype(np.uint8)
+        contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        for contour, place in zip(contours, tree[0] if contours else (), strict=True):
+            walk = _walk(contour[:, 0].astype(float), hole=place[3] >= 0)
+            sampled = _resample(walk, step)
+            if sampled is None:
+                continue
+            points.append(sampled[0])
+            tangents.append(sampled[1])
+            colors.append(np.full(len(sampled[0]), int(value) - 1))
+    found = _Elements(np.concatenate(points), np.concatenate(tangents), np.concatenate(colors))
+    size = np.array(labels.shape[::-1])
+    keep = ((found.points > 1) & (found.points < size - 2)).all(axis=1)
+    return _thin(found, keep, options.most)
+
+
+def _walk(contour: Float[np.ndarray, "n 2"], hole: bool) -> Float[np.ndarray, "n 2"]:
+    """A contour in the direction that has the region on its left, y pointing down."""
+    x, y = contour.T
+    area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+    # Seen on the picture, the shoelace sum is negative when walking counter-clockwise.
+    return contour if (area > 0) == hole else contour[::-1]
+
+
+def _resample(
+    walk: Float[np.ndarray, "n 2"], step: float
+) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]] | None:
+    """Regular samples of a closed contour and their tangents; None if it is too short."""
+    closed = np.concatenate([walk, walk[:1]])
+    length = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    count = round(length[-1] / step)
+    if count < LEAST_SAMPLES:
+        return None
+    at = np.arange(count) * (length[-1] / count)
+    points = np.stack([np.interp(at, length, c) for c in closed.T], axis=1)
+    points = gaussian_filter1d(points, 1.0, axis=0, mode="wrap", truncate=3)
+    tangent = np.roll(points, -2, axis=0) - np.roll(points, 2, axis=0)
+    size = np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent /= np.maximum(size, 1e-9)
+    # The contour runs through the centres of the region's outermost pixels; the edge is outside.
+    points += 0.5 * np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    good = size[:, 0] > 1e-6
+    return points[good], tangent[good]
+
+
+def _thin(found: _Elements, keep: Bool[np.ndarray, "E"], most: int) -> _Elements:
+    """The elements to keep, evenly thinned to `most`."""
+    chosen = np.flatnonzero(keep)
+    if len(chosen) > most:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(int)]
+    return _Elements(found.points[chosen], found.tangent[chosen], found.color[chosen])
+
+
+def _place(
+    found: _Elements, origin: Float[np.ndarray, "2"], scale: float, track: Track, frame: int
+) -> Edges:
+    """Elements in pixels of the full picture, told which half of the body they belong to."""
+    points = origin + found.points / scale
+    head, way = track.head[frame], track.mid_feet[frame] - track.head[frame]
+    share = (points - head) @ way / max(float(way @ way), 1e-9)
+    return Edges(
+        points=points,
+        tangent=found.tangent,
+        color=found.color,
+        upper=share < WAIST + OVERLAP / 2,
+        lower=share > WAIST - OVERLAP / 2,
+    )
