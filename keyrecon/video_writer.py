@@ -41,3 +41,10 @@ def write_video(
     if not count:
         raise KeyreconError(f"No frames came to be written to {path}; give at least one.")
     return count
+
+
+def write_picture(path: Path, picture: UInt8[np.ndarray, "h w 3"]) -> None:
+    """Write one RGB picture as PNG."""
+    import cv2
+
+    path.write_bytes(cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1].tobytes())

@@ -1,0 +1,56 @@
+"""The rendered sequences that everything is measured on, described in one place.
+
+Motion capture of tennis strokes (not part of the project; see --mocap) under cameras, looks
+and resolutions that differ in everything a user's video may differ in.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+DATA = Path(__file__).parent.parent.parent / "shared" / "data"
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """One rendered video with known truth."""
+
+    name: str
+    mocap: tuple[str, ...]
+    camera: str
+    pan: bool
+    seed: int
+    width: int = 1280
+    player: int = 350
+    """Standing height in the picture, px."""
+    seconds: float = 36.0
+
+
+FH, BH, SERVE = "jarua_Derecha_18seg", "jarua_Reves", "jarua_Servicio"
+FH2, VOLLEY, SERVE2 = "adorozco_Derecha", "adorozco_VDerecha", "adorozco_Servicio"
+
+TENNIS = (
+    Sequence("ground-back-static", (FH, BH), "back", False, 1, player=400),
+    Sequence("ground-oblique-pan", (FH, BH), "oblique", True, 2),
+    Sequence("serve-side-static", (SERVE,), "side", False, 3),
+    Sequence("serve-back-pan", (SERVE,), "back", True, 4, player=300),
+    Sequence("mixed-front-static", (FH2, SERVE2), "front", False, 5, player=450),
+    Sequence("mixed-side-pan", (FH2, SERVE2), "side", True, 6),
+    Sequence("volley-above-static", (VOLLEY, FH2), "above", False, 7, player=250),
+    Sequence("all-oblique-small", (BH, VOLLEY, SERVE2), "oblique", False, 8, 640, 170),
+)
+
+OTHER = (
+    Sequence("dance", ("cmu_05_12_daz",), "oblique", False, 11, seconds=10.0),
+    Sequence("soccer-kick", ("cmu_10_06_daz",), "side", False, 12, seconds=4.0),
+    Sequence("jumping-jacks", ("cmu_13_30_daz",), "front", False, 13, seconds=20.0),
+)
+
+
+def mocap_files(sequence: Sequence, folder: Path = DATA / "mocap") -> list[Path]:
+    """The motion-capture files of a sequence."""
+    found = [next(folder.glob(f"*/{name}.bvh"), None) for name in sequence.mocap]
+    if None in found:
+        raise SystemExit(
+            f"No motion capture for {sequence.name} under {folder}; give its folder with --mocap."
+        )
+    return found

@@ -1,0 +1,227 @@
+"""The command line: one function per command, a thin skin over the library.
+
+Exit codes: 0 success, 1 with one line on stderr for what a user can mend, 2 for bad usage,
+130 when interrupted (finished stages are kept, the same command goes on from there).
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from tyro.conf import Positional, UseAppendAction, arg
+
+from keyrecon import demo as demonstration
+from keyrecon import project as work
+from keyrecon.console import show
+from keyrecon.errors import KeyreconError
+from keyrecon.pipeline import Options
+from keyrecon.records import Pick
+from keyrecon.synthetic.sequence import SynthOptions, synthesize
+from keyrecon.workspace import Workspace
+
+Advanced = Annotated[Options, arg(name="")]
+Points = UseAppendAction[tuple[Annotated[str, arg(metavar="X,Y")], ...]]
+Regions = UseAppendAction[tuple[Annotated[str, arg(metavar="NAME:X,Y")], ...]]
+
+app = tyro.extras.SubcommandApp()
+
+
+@app.command
+def demo(name: Positional[Literal["tennis"]] = "tennis", out: Path = Path("demo")) -> None:
+    """Run the whole job on the built-in synthetic sequence and print its accuracy.
+
+    Renders 36 s of tennis whose truth is known, finds the player, chooses keyframes, takes the
+    marks kept in annotations/, reconstructs the motion and writes OUT/report.html. Needs no
+    network and no display.
+
+    Args:
+        name: Which sequence.
+        out: Folder for the video, the project and the report.
+    """
+    demonstration.run_demo(name, out, show, print)
+
+
+@app.command
+def new(
+    video: Positional[Path],
+    project: Path,
+    start: int = 0,
+    end: int | None = None,
+    slowmo: float = 1.0,
+) -> None:
+    """Start a project for a video.
+
+    The project remembers the video by relative path and fingerprint; the video is not copied.
+
+    Args:
+        video: An mp4, mov, mkv or avi file.
+        project: Folder to make.
+        start: First frame to use.
+        end: Frame after the last one to use.
+        slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
+    """
+    print(work.start(video, project, start, end, slowmo))
+
+
+@app.command
+def pick(
+    project: Positional[Path],
+    frame: int,
+    head: Points = (),
+    foot: Points = (),
+    region: Regions = (),
+) -> None:
+    """Click colours of the player: head, feet, clothing, skin.
+
+    Adds to the picks there are; several frames make the colours surer. Give both feet and each
+    part of the clothing, for example:
+
+        keyrecon pick rally --frame 0 --head 640,210 --foot 610,540 --foot 668,548 \
+            --region shirt:640,290 --region shorts:640,390 --region skin:655,450
+
+    Args:
+        project: Project folder.
+        frame: Frame number the clicks are on, counted from 0.
+        head: A point on the head.
+        foot: A point on a shoe; give it twice for both.
+        region: A point on a region of one colour, with the region's name.
+    """
+    picks = [Pick(frame, "head", *work.point(p, "--head")) for p in head]
+    picks += [Pick(frame, "foot", *work.point(p, "--foot")) for p in foot]
+    picks += [work.region_pick(frame, text) for text in region]
+    print(work.add_picks(Workspace(project), picks))
+
+
+@app.command
+def keyframes(
+    project: Positional[Path],
+    budget: float | None = None,
+    coverage: float | None = None,
+    reach: int | None = None,
+    force: bool = False,
+    options: Advanced = Options(),
+) -> None:
+    """Find the player and choose the keyframes to annotate.
+
+    Writes keyframes.json and a picture of every keyframe to annotate into keyframes/.
+
+    Args:
+        project: Project folder.
+        budget: Half-body labels per frame that a person will mark (default 0.015).
+        coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
+        reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
+        force: Make every stage again.
+    """
+    chosen = {"budget": budget, "coverage": coverage, "reach": reach}
+    print(work.find_keyframes(Workspace(project, force), options, chosen, show))
+
+
+@app.command(name="import")
+def import_(project: Positional[Path], file: Positional[Path], replace: bool = False) -> None:
+    """Take joints from a COCO keypoints JSON, DeepLabCut CSV or CVAT XML file.
+
+    Adds to the annotations there are; marks that differ from those in the project are refused
+    unless --replace is given, and then the old file is kept beside the new one.
+
+    Args:
+        project: Project folder.
+        file: The file; its kind is told by its content.
+        replace: Let marks from the file replace different ones in the project.
+    """
+    print(work.import_annotations(Workspace(project), file, replace))
+
+
+@app.command
+def run(
+    project: Positional[Path],
+    height: float | None = None,
+    method: Literal["best", "paper"] | None = None,
+    force: bool = False,
+    options: Advanced = Options(),
+) -> None:
+    """Carry the annotated joints to every frame, lift them to 3D and refine the motion.
+
+    Writes motion.npz and report.html. An interrupted run goes on where it stopped.
+
+    Args:
+        project: Project folder.
+        height: The athlete's height in metres; without it lengths are in body heights.
+        method: 'paper' uses the forms printed in the paper, 'best' ours (default).
+        force: Make every stage again.
+    """
+    workspace = Workspace(project, force)
+    chosen = work.settings(workspace.options(options), height, method)
+    print(work.run(workspace, chosen, show))
+
+
+@app.command
+def export(project: Positional[Path], files: Positional[tuple[Path, ...]]) -> None:
+    """Write the motion in other formats, told by suffix.
+
+    .bvh .trc .c3d .csv .nc .npz .glb, .json (COCO keypoints of every frame), .mp4 (overlay).
+
+    Args:
+        project: Project folder.
+        files: Files to write.
+    """
+    for line in work.export(Workspace(project), files, show):
+        print(line)
+
+
+@app.command
+def evaluate(motion: Positional[Path], truth: Path) -> None:
+    """Print the accuracy of a motion against a known truth.
+
+    Args:
+        motion: Project folder or motion.npz.
+        truth: truth.npz with points3d, points2d, joint_names and fps.
+    """
+    print(work.evaluate(motion, truth))
+
+
+@app.command
+def synth(
+    out: Path,
+    mocap: UseAppendAction[tuple[Path, ...]] = (),
+    options: Annotated[SynthOptions, arg(name="")] = SynthOptions(),
+) -> None:
+    """Render a sequence whose truth is known, from motion capture or built-in tennis.
+
+    Args:
+        out: Folder for video.mp4, truth.npz, picks.json and scene.json.
+        mocap: A .bvh, .amc (with its .asf) or .c3d file; repeat to join several.
+    """
+    synthesize(out, mocap, options, show)
+    print(f"Wrote {out}/video.mp4, truth.npz and picks.json.")
+
+
+@app.command
+def relink(project: Positional[Path], video: Positional[Path]) -> None:
+    """Tell a project where its video has moved to.
+
+    Args:
+        project: Project folder.
+        video: The same video in its new place.
+    """
+    Workspace(project).relink(video)
+    print(f"{project} now uses {video}.")
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app.cli(
+            prog="keyrecon",
+            description="3D motion of an athlete from one ordinary camera and a few keyframes.",
+        )
+    except KeyreconError as fault:
+        sys.stderr.write(f"keyrecon: {fault}\n")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.stderr.write("\nkeyrecon: stopped; finished stages are kept, run it again to go on.\n")
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""The recipe: everything up to the person, and everything after.
+
+`prepare` finds the player, draws edge elements, compares all frames and chooses the keyframes
+that a person should annotate. `reconstruct` carries the annotated joints to every frame, lifts
+them to 3D and refines the motion. Both call their stages through `keep`: by default it just
+runs them; the command line passes one that returns stored results where nothing has changed.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from keyrecon.background import BackgroundOptions, build_background
+from keyrecon.colors import ColorOptions, learn_colors
+from keyrecon.lifting.lift import LiftOptions, lift_motion
+from keyrecon.matching.edges import EdgeOptions, find_edges
+from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes
+from keyrecon.matching.matrix import CompareOptions, compare_frames
+from keyrecon.matching.propagate import PropagateOptions, propagate_joints
+from keyrecon.progress import Progress, silent
+from keyrecon.records import (
+    Annotations,
+    Background,
+    CameraPath,
+    Colors,
+    Comparison,
+    Figures,
+    Keyframes,
+    Motion,
+    Pick,
+    Track,
+)
+from keyrecon.tracking.camera_motion import CameraOptions, follow_camera
+from keyrecon.tracking.player import TrackOptions, track_player
+from keyrecon.video import Video
+
+Keep = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What every stage can be told."""
+
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    colors: ColorOptions = field(default_factory=ColorOptions)
+    track: TrackOptions = field(default_factory=TrackOptions)
+    background: BackgroundOptions = field(default_factory=BackgroundOptions)
+    edges: EdgeOptions = field(default_factory=EdgeOptions)
+    compare: CompareOptions = field(default_factory=CompareOptions)
+    keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
+    propagate: PropagateOptions = field(default_factory=PropagateOptions)
+    lift: LiftOptions = field(default_factory=LiftOptions)
+
+
+@dataclass(frozen=True, eq=False)
+class Preparation:
+    """Everything known before a person annotates keyframes."""
+
+    video: Video
+    camera: CameraPath
+    colors: Colors
+    track: Track
+    background: Background
+    figures: Figures
+    comparison: Comparison
+    keyframes: Keyframes
+
+
+def run(
+    name: str,
+    stage: Callable[..., Any],
+    *inputs: object,
+    options: object = None,
+    progress: Progress = silent,
+) -> Any:
+    """Run a stage; the simplest `keep`. The name is for those that store results."""
+    return stage(*inputs, **({} if options is None else {"options": options}), progress=progress)
+
+
+def prepare(
+    video: Video,
+    picks: Sequence[Pick],
+    options: Options = Options(),
+    keep: Keep = run,
+    progress: Progress = silent,
+) -> Preparation:
+    """Find the player, compare all frames and choose the keyframes to annotate (Section 4).
+
+    Raises KeyreconError when a pick is off the picture, the player is not found in most frames,
+    or the annotation budget cannot be met.
+    """
+    picks = tuple(picks)
+
+    def make(name: str, stage: Callable[..., Any], *inputs: object) -> Any:
+        stage_options = getattr(options, name)
+        return keep(name, stage, *inputs, options=stage_options, progress=progress)
+
+    camera = make("camera", follow_camera, video)
+    colors = make("colors", learn_colors, video, picks)
+    track = make("track", track_player, video, colors, camera)
+    background = make("background", build_background, video, camera, track)
+    figures = make("edges", find_edges, video, track, camera, background, colors)
+    comparison = make("compare", compare_frames, figures.edges, track)
+    keyframes = make("keyframes", choose_keyframes, comparison, video.fps)
+    return Preparation(
+        video, camera, colors, track, background, figures, comparison, keyframes
+    )
+
+
+def reconstruct(
+    preparation: Preparation,
+    annotations: Annotations,
+    options: Options = Options(),
+    keep: Keep = run,
+    progress: Progress = silent,
+) -> Motion:
+    """Carry the annotated joints to every frame and recover the 3D motion (Sections 5 and 6).
+
+    Lengths are in metres where `options.lift.height` is given, else in body heights. Raises
+    KeyreconError when keyframes are not annotated.
+    """
+    video, keyframes = preparation.video, preparation.keyframes
+    tracks = keep(
+        "propagate",
+        propagate_joints,
+        video,
+        preparation.figures,
+        Course(preparation.track, preparation.camera),
+        keyframes,
+        annotations,
+        options=options.propagate,
+        progress=progress,
+    )
+    lifted = keep(
+        "lift",
+        lift_motion,
+        tracks,
+        annotations,
+        keyframes,
+        preparation.track.height,
+        video.fps,
+        options=options.lift,
+        progress=progress,
+    )
+    return assemble_motion(preparation, annotations, tracks, lifted, options)
+
+
+def as_printed(options: Options = Options()) -> Options:
+    """The forms that the paper prints, for every stage that has another default."""
+    return replace(
+        options,
+        keyframes=replace(options.keyframes, method="paper"),
+        propagate=replace(options.propagate, method="paper"),
+        lift=replace(options.lift, method="paper"),
+    )
+
+
+def with_height(options: Options, height: float) -> Options:
+    """Options for an athlete of a known height, metres."""
+    return replace(options, lift=replace(options.lift, height=height))
