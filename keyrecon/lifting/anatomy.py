@@ -1,0 +1,120 @@
+"""What a body can do: costs, in nats, of candidate bone directions.
+
+Under orthography a bone may point towards or away from the camera by the same amount; joint
+limits tell many of these mirror images apart. Body axes: R to the person's right, U up the
+trunk, F = U x R forward (right-handed like the camera's axes). A knee bends backwards only:
+(thigh x shank) . R <= 0. Every cost is capped: a limit speaks against a pose, it does not
+forbid it, since the joints it is told from are uncertain themselves.
+
+Groups of bones whose signs depend on each other are decided together: the trunk, each leg,
+each arm. Bones of a skeleton that has no such joints stand alone and are free.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting.chain import unit
+
+CAP = 8.0
+"""Largest cost of one broken limit, nats."""
+
+
+@dataclass(frozen=True)
+class Limb:
+    """Two bones in a row and the kind of joint between them."""
+
+    bones: tuple[int, ...]
+    kind: str
+    """'leg', 'arm' or 'free'."""
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """Bones by the group in which their signs are decided."""
+
+    trunk: tuple[int, ...]
+    """Right hip, left hip, right shoulder, left shoulder; empty where one is missing."""
+    limbs: tuple[Limb, ...]
+
+
+def anatomy_of(skeleton: Skeleton) -> Anatomy:
+    """Groups of a skeleton, told by joint names and by the tree."""
+    bone_of = {skeleton.names[child]: b for b, (_, child) in enumerate(skeleton.bones)}
+    corners = ("right_hip", "left_hip", "right_shoulder", "left_shoulder")
+    joined = all(
+        name in bone_of and skeleton.parents[skeleton.index(name)] == skeleton.root
+        for name in corners
+    )
+    trunk = tuple(bone_of[name] for name in corners) if joined else ()
+    limbs = []
+    for side in ("right", "left"):
+        for kind, names in (("leg", ("knee", "ankle")), ("arm", ("elbow", "wrist"))):
+            members = [f"{side}_{name}" for name in names]
+            if trunk and all(name in bone_of for name in members):
+                limbs.append(Limb(tuple(bone_of[name] for name in members), kind))
+    taken = {*trunk, *(bone for limb in limbs for bone in limb.bones)}
+    limbs += [Limb((b,), "free") for b in range(len(skeleton.bones)) if b not in taken]
+    return Anatomy(trunk, tuple(limbs))
+
+
+def hinge(excess: Float[np.ndarray, "*n"], softness: float) -> Float[np.ndarray, "*n"]:
+    """0 up to a limit, then growing with the square of the excess, capped."""
+    return np.minimum(0.5 * (np.maximum(excess, 0.0) / softness) ** 2, CAP)
+
+
+def trunk_axes(
+    corners: Float[np.ndarray, "*n 4 3"],
+) -> tuple[Float[np.ndarray, "*n 3"], ...]:
+    """Hip axis, shoulder axis (to the right) and U of trunks given by their corners.
+
+    Corners relative to the neck, in the order of `Anatomy.trunk`.
+    """
+    hips = unit(corners[..., 0, :] - corners[..., 1, :])
+    shoulders = unit(corners[..., 2, :] - corners[..., 3, :])
+    up = unit(-(corners[..., 0, :] + corners[..., 1, :]))
+    return hips, shoulders, up
+
+
+def trunk_cost(
+    corners: Float[np.ndarray, "*n 4 3"], breadths: Float[np.ndarray, "2"]
+) -> Float[np.ndarray, "*n"]:
+    """Breadths that a trunk must keep, twist up to 50 degrees, girdles across the spine."""
+    hips, shoulders, up = trunk_axes(corners)
+    cost = np.zeros(corners.shape[:-2])
+    for first, wanted in zip((0, 2), breadths, strict=True):
+        across = np.linalg.norm(corners[..., first, :] - corners[..., first + 1, :], axis=-1)
+        cost += np.minimum(0.5 * ((across / wanted - 1) / 0.2) ** 2, CAP)
+    cost += hinge(np.cos(np.radians(50)) - (hips * shoulders).sum(-1), 0.3)
+    for axis in (hips, shoulders):
+        cost += hinge(np.abs((axis * up).sum(-1)) - 0.5, 0.2)
+    return cost
+
+
+def leg_cost(
+    hips: Float[np.ndarray, "*n 3"],
+    up: Float[np.ndarray, "*n 3"],
+    thigh: Float[np.ndarray, "*n 3"],
+    shank: Float[np.ndarray, "*n 3"],
+) -> Float[np.ndarray, "*n"]:
+    """Knees bend backwards; the thigh goes further forward than backward."""
+    bend = (np.cross(thigh, shank) * hips).sum(-1)
+    forward = np.cross(up, hips)
+    return hinge(bend - 0.05, 0.1) + hinge(-(thigh * forward).sum(-1) - 0.4, 0.2)
+
+
+def arm_cost(
+    shoulders: Float[np.ndarray, "*n 3"],
+    up: Float[np.ndarray, "*n 3"],
+    upper: Float[np.ndarray, "*n 3"],
+    forearm: Float[np.ndarray, "*n 3"],
+) -> Float[np.ndarray, "*n"]:
+    """Hands work in front of the chest; a bent elbow lifts the forearm forward or up."""
+    forward = np.cross(up, shoulders)
+    behind = -(upper * forward).sum(-1)
+    bend = (np.cross(upper, forearm) * shoulders).sum(-1)
+    return (
+        hinge(behind - 0.4, 0.2) + hinge(-bend, 0.2) + hinge(0.5 - (forearm * forward).sum(-1), 0.4)
+    )

@@ -1,0 +1,259 @@
+"""Which end of a bone is nearer the camera.
+
+Under scaled orthography a bone's |dz| follows from its length, its sign does not; but given
+scale and lengths the 2^B reconstructions fall apart into small groups (trunk, legs, arms),
+coupled through joint limits. For single poses the cheapest signs of trunk and limbs are found
+exactly: limbs hang on the trunk as a tree. Over time each group is a chain whose states are
+the sign vectors of its bones; a second-order cost on depth lets a bone swing through the image
+plane, which a first-order one would take for a bounce. The key poses vote, where they look
+alike in the picture, for the depths that the person confirmed there.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting.anatomy import (
+    Anatomy,
+    Limb,
+    anatomy_of,
+    arm_cost,
+    hinge,
+    leg_cost,
+    trunk_axes,
+    trunk_cost,
+)
+
+
+@dataclass(frozen=True)
+class FlipOptions:
+    """What speaks for a sign, and how loudly."""
+
+    confirmed: float = 8.0
+    """Cost of contradicting the annotated sign of a bone, nats."""
+    limits: float = 0.3
+    """Weight of joint limits per frame; errors stay alike over several frames."""
+    votes: float = 0.3
+    """Weight of the key poses per frame."""
+    alike: float = 0.08
+    """Difference of shown bone vectors at which two poses look alike, statures."""
+    jerk: float = 0.02
+    """Second difference of depth between frames to be expected, statures."""
+    reach: float = 6.0
+    """Largest cost of one jump, nats."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Bones as the picture shows them: everything but the sign of their depth."""
+
+    flat: Float[np.ndarray, "T B 2"]
+    """In-plane part of the bone vectors, statures."""
+    depth: Float[np.ndarray, "T B"]
+    """|dz|, statures."""
+    doubt: Float[np.ndarray, "T B"]
+    """Standard deviation of |dz|, statures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signs:
+    """Depth signs: 1 where the child end is farther from the camera (dz > 0)."""
+
+    sign: Int[np.ndarray, "T B"]
+    probability: Float[np.ndarray, "T B"]
+    """0.5-1: how likely the sign is."""
+
+
+def sign_states(bones: int) -> Int[np.ndarray, "S g"]:
+    """All sign vectors of a group of bones."""
+    return np.array(list(product((1, -1), repeat=bones)))
+
+
+def choose_signs(
+    shown: Shown,
+    nearer: Int[np.ndarray, "T B"],
+    breadths: Float[np.ndarray, "P"],
+    skeleton: Skeleton,
+    options: FlipOptions = FlipOptions(),
+) -> Signs:
+    """Cheapest signs of every pose by itself: an exact minimum over all sign vectors.
+
+    `nearer` as in `Annotations` (1: child end nearer, dz < 0); `breadths` in statures.
+    """
+    anatomy = anatomy_of(skeleton)
+    trunk, limbs = _costs(shown, breadths, anatomy)
+    trunk = trunk + _contradiction(anatomy.trunk, nearer, options.confirmed)
+    limbs = [
+        cost + _contradiction(limb.bones, nearer, options.confirmed)[:, None]
+        for limb, cost in zip(anatomy.limbs, limbs, strict=True)
+    ]
+    total = trunk + sum(cost.min(axis=-1) for cost in limbs)
+    sign = np.ones(nearer.shape, dtype=np.int64)
+    probability = np.ones(nearer.shape)
+    rows = np.arange(len(sign))
+    best = total.argmin(axis=1)
+    if anatomy.trunk:
+        bones = list(anatomy.trunk)
+        sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
+    for limb, cost in zip(anatomy.limbs, limbs, strict=True):
+        given = cost[rows, best % cost.shape[1]]
+        bones = list(limb.bones)
+        sign[:, bones], probability[:, bones] = _read(given.argmin(axis=1), given, len(bones))
+    return Signs(sign, probability)
+
+
+def follow_signs(
+    shown: Shown,
+    votes: "Votes",
+    breadths: Float[np.ndarray, "P"],
+    skeleton: Skeleton,
+    options: FlipOptions = FlipOptions(),
+) -> Signs:
+    """Signs in every frame of a sequence, group by group: trunk first, then what hangs on it."""
+    anatomy = anatomy_of(skeleton)
+    trunk, limbs = _costs(shown, breadths, anatomy)
+    sign = np.ones(shown.depth.shape, dtype=np.int64)
+    probability = np.ones(shown.depth.shape)
+    rows = np.arange(len(sign))
+    best = np.zeros(len(sign), dtype=np.int64)
+    if anatomy.trunk:
+        total = options.limits * (trunk + sum(cost.min(axis=-1) for cost in limbs))
+        total += votes.cost(anatomy.trunk, shown, options)
+        best = second_order_path(total, *_depths(anatomy.trunk, shown), options)
+        bones = list(anatomy.trunk)
+        sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
+    for limb, cost in zip(anatomy.limbs, limbs, strict=True):
+        given = options.limits * cost[rows, best % cost.shape[1]]
+        given += votes.cost(limb.bones, shown, options)
+        path = second_order_path(given, *_depths(limb.bones, shown), options)
+        bones = list(limb.bones)
+        sign[:, bones], probability[:, bones] = _read(path, given, len(bones))
+    return Signs(sign, probability)
+
+
+@dataclass(frozen=True, eq=False)
+class Votes:
+    """Key poses that vote for depths where they look alike."""
+
+    vectors: Float[np.ndarray, "K B 3"]
+    """Bone vectors of the key poses, statures."""
+    frames: Int[np.ndarray, "K"]
+    skeleton: Skeleton
+
+    def cost(
+        self, bones: tuple[int, ...], shown: Shown, options: FlipOptions
+    ) -> Float[np.ndarray, "T S"]:
+        """Cost of each sign vector of a group of bones in each frame, nats."""
+        context = sorted({*bones, *anatomy_of(self.skeleton).trunk})
+        flat = shown.flat[:, context].reshape(len(shown.flat), -1)
+        keys = self.vectors[:, context, :2].reshape(len(self.vectors), -1)
+        apart = ((flat[:, None] - keys[None]) ** 2).sum(-1) / (2 * options.alike**2)
+        states = sign_states(len(bones))
+        depth = states * shown.depth[:, None, list(bones)]  # (T, S, g)
+        wanted = self.vectors[:, list(bones), 2]
+        spread = options.alike**2 + shown.doubt[:, list(bones)] ** 2
+        off = (depth[:, :, None] - wanted) ** 2 / (2 * spread[:, None, None])
+        likelihood = np.exp(-apart[:, None] - off.sum(-1)).sum(-1)
+        cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
+        held = np.isin(self.frames, np.arange(len(shown.flat)))
+        cost[self.frames[held]] += options.confirmed * np.minimum(
+            off[self.frames[held], :, np.flatnonzero(held)].sum(-1), 1.0
+        )
+        return cost
+
+
+def second_order_path(
+    cost: Float[np.ndarray, "T S"],
+    depth: Float[np.ndarray, "T S g"],
+    doubt: Float[np.ndarray, "T g"],
+    options: FlipOptions,
+) -> Int[np.ndarray, "T"]:
+    """Cheapest sequence of states; jumps in the second difference of depth cost (Viterbi)."""
+    frames, states = cost.shape
+    if frames < 3:
+        return cost.argmin(axis=1)
+    total = cost[0][:, None] + cost[1][None]
+    back = np.zeros((frames, states, states), dtype=np.int8 if states < 128 else np.int64)
+    spread = 2 * (options.jerk**2 + doubt**2)
+    for t in range(2, frames):
+        bend = depth[t - 2][:, None, None] - 2 * depth[t - 1][None, :, None] + depth[t][None, None]
+        jump = np.minimum((bend**2 / spread[t - 1]).sum(-1), options.reach)
+        through = total[:, :, None] + jump
+        back[t] = through.argmin(axis=0)
+        total = through.min(axis=0) + cost[t][None]
+    path = np.zeros(frames, dtype=np.int64)
+    path[-2], path[-1] = np.unravel_index(total.argmin(), total.shape)
+    for t in range(frames - 1, 1, -1):
+        path[t - 2] = back[t, path[t - 1], path[t]]
+    return path
+
+
+def _depths(
+    bones: tuple[int, ...], shown: Shown
+) -> tuple[Float[np.ndarray, "T S g"], Float[np.ndarray, "T g"]]:
+    states = sign_states(len(bones))
+    return states * shown.depth[:, None, list(bones)], shown.doubt[:, list(bones)]
+
+
+def _costs(
+    shown: Shown, breadths: Float[np.ndarray, "P"], anatomy: Anatomy
+) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S L"]]]:
+    """Cost of joint limits for every trunk state, and of every limb state given it."""
+    frames = len(shown.flat)
+    if not anatomy.trunk:
+        free = [np.zeros((frames, 1, 2 ** len(limb.bones))) for limb in anatomy.limbs]
+        return np.zeros((frames, 1)), free
+    corners = _candidates(anatomy.trunk, shown)
+    trunk = trunk_cost(corners, breadths)
+    hips, shoulders, up = trunk_axes(corners)
+    limbs = []
+    for limb in anatomy.limbs:
+        bones = _candidates(limb.bones, shown)[:, None]
+        bones = bones / np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
+        axes = hips if limb.kind == "leg" else shoulders
+        limbs.append(_limb_cost(limb, bones, axes[:, :, None], up[:, :, None]))
+    return trunk, limbs
+
+
+def _limb_cost(
+    limb: Limb,
+    bones: Float[np.ndarray, "T 1 L g 3"],
+    axis: Float[np.ndarray, "T S 1 3"],
+    up: Float[np.ndarray, "T S 1 3"],
+) -> Float[np.ndarray, "T S L"]:
+    if limb.kind == "leg":
+        return leg_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
+    if limb.kind == "arm":
+        return arm_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
+    return hinge(0.5 - (bones[..., 0, :] * up).sum(-1), 0.3)
+
+
+def _candidates(bones: tuple[int, ...], shown: Shown) -> Float[np.ndarray, "T S g 3"]:
+    """Bone vectors for every sign vector of a group."""
+    depth, _ = _depths(bones, shown)
+    flat = np.broadcast_to(shown.flat[:, None, list(bones)], (*depth.shape, 2))
+    return np.concatenate([flat, depth[..., None]], axis=-1)
+
+
+def _contradiction(
+    bones: tuple[int, ...], nearer: Int[np.ndarray, "T B"], cost: float
+) -> Float[np.ndarray, "T S"]:
+    if not bones:
+        return np.zeros((len(nearer), 1))
+    wanted = -nearer[:, None, list(bones)]
+    return cost * ((sign_states(len(bones)) * wanted) < 0).sum(-1)
+
+
+def _read(
+    best: Int[np.ndarray, "T"], cost: Float[np.ndarray, "T S"], bones: int
+) -> tuple[Int[np.ndarray, "T g"], Float[np.ndarray, "T g"]]:
+    """Signs of the chosen states, and their probability by the costs of all states."""
+    states = sign_states(bones)
+    chosen = states[best]
+    weight = np.exp(-(cost - cost.min(axis=1, keepdims=True)))
+    same = states[None] == chosen[:, None]
+    agree = (weight[..., None] * same).sum(1) / weight.sum(1)[:, None]
+    return chosen, np.maximum(agree, 0.5)

@@ -1,0 +1,42 @@
+"""Joint tracks made ready for lifting: slips rejected, gaps bridged, in units of length."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import gaussian_filter1d, median_filter
+
+MAD_TO_SIGMA = 1.4826
+
+
+def reject_spikes(
+    residual: Float[np.ndarray, "T J 2"], window: int, limit: float
+) -> Bool[np.ndarray, "T J"]:
+    """Joints whose residual leaves its running median by more than `limit` robust deviations.
+
+    The residual is the difference to any plausible motion, so that fast joints are not taken
+    for slips. Joints that were missing are not counted.
+    """
+    bridged = bridge_gaps(residual)
+    off = np.linalg.norm(residual - median_filter(bridged, (window, 1, 1), mode="nearest"), axis=-1)
+    spread = MAD_TO_SIGMA * np.nanmedian(off, axis=0) / 1.177  # median of a Rayleigh length
+    return off > limit * np.maximum(spread, 1e-6)
+
+
+def bridge_gaps(values: Float[np.ndarray, "T J D"]) -> Float[np.ndarray, "T J D"]:
+    """Missing entries replaced by straight lines over time; 0 where a joint never shows."""
+    frames = np.arange(len(values))
+    filled = values.copy()
+    for joint in range(values.shape[1]):
+        known = np.isfinite(values[:, joint, 0])
+        for axis in range(values.shape[2]):
+            column = values[known, joint, axis]
+            filled[:, joint, axis] = np.interp(frames, frames[known], column) if known.any() else 0
+    return filled
+
+
+def smooth_joints(
+    joints: Float[np.ndarray, "T J 2"],
+    guide: Float[np.ndarray, "T J 2"],
+    sigma: float,
+) -> Float[np.ndarray, "T J 2"]:
+    """Joints without gaps: the guide's motion plus the smoothed, bridged difference to it."""
+    return guide + gaussian_filter1d(bridge_gaps(joints - guide), sigma, axis=0, mode="nearest")

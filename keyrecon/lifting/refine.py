@@ -1,0 +1,91 @@
+"""The final motion: key poses bent to follow the observed joints (Section 6.2 and Fig. 9).
+
+Two ways. "paper" is projected gradient descent: joints move towards the observed ones, then
+bone lengths and a low-pass are enforced, again and again. "trajectory" minimises one cost over
+the unit directions of all bones: robust reprojection weighted by confidence, small second
+differences in time, the breadths of hips and shoulders, joint limits and a weak pull to the
+key poses. Lengths are exact in both.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting import terms
+from keyrecon.lifting.chain import bone_vectors, breadths, pose_from_directions, unit
+from keyrecon.lifting.constraints import keep_lengths, low_pass
+from keyrecon.lifting.descend import descend
+from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.solver import Smoothness, State, solve
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """How the motion follows the observed joints."""
+
+    method: Literal["trajectory", "paper"] = "trajectory"
+    """'trajectory': robust fit of bone directions; 'paper': Fig. 9 as printed."""
+    rounds: int = 12
+    """Steps of the trajectory solver at most."""
+    tolerance: float = 1e-3
+    """Relative gain below which the trajectory solver stops."""
+    acceleration: float = 0.006
+    """Expected second difference of a bone's end in 1/50 s, body heights."""
+    breadth_spread: float = 0.015
+    """How far hip and shoulder breadth may stray, body heights."""
+    step: float = 0.2
+    """lambda of Fig. 9."""
+    descents: int = 40
+    """Iterations of Fig. 9; more of them drain the depth."""
+    sigma: float = 0.5
+    """Standard deviation of the low-pass of Fig. 9, frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Joints as they are to be met, in body heights."""
+
+    joints: Float[np.ndarray, "T J 2"]
+    """NaN where missing or rejected."""
+    spread: Float[np.ndarray, "T J"]
+    """Standard deviation of each joint, body heights."""
+
+
+def refine_motion(
+    start: State,
+    observed: Observed,
+    size: BodySize,
+    skeleton: Skeleton,
+    fps: float,
+    options: RefineOptions = RefineOptions(),
+) -> State:
+    """Root and bone directions that follow the observed joints from a start near them."""
+    if options.method == "paper":
+        return _descend(start, observed, size, skeleton, options)
+    recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
+    for (left, right, _), wanted in zip(breadths(skeleton), size.breadths, strict=True):
+        recipe.append(
+            terms.breadth(
+                (left, right), float(wanted), options.breadth_spread, size.lengths, skeleton
+            )
+        )
+    expected = options.acceleration * (50.0 / fps) ** 2
+    smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
+    return solve(start, recipe, smoothness, options.rounds, options.tolerance)
+
+
+def _descend(
+    start: State, observed: Observed, size: BodySize, skeleton: Skeleton, options: RefineOptions
+) -> State:
+    root = skeleton.root
+    points = pose_from_directions(start.directions, size.lengths, skeleton)
+    points[..., :2] += start.root[:, None]
+    lengths = keep_lengths(size.lengths, skeleton)
+    fitted = descend(
+        points, observed.joints, (lengths, low_pass(options.sigma)), options.step, options.descents
+    )
+    valid = lengths(fitted)
+    return State(valid[:, root, :2], unit(bone_vectors(valid, skeleton)))

@@ -1,0 +1,178 @@
+"""Levenberg-Marquardt on unit bone directions, banded in time.
+
+Unknowns of frame t: the root (2, in units of length) and a small turn of every bone in the
+plane tangent to its direction (2 each), so bone lengths are exact by construction. Terms look
+at one frame each and add a block to the diagonal; smoothness ties a bone to itself in the next
+two frames. The normal matrix is banded, one banded Cholesky solves it, and the cost grows
+linearly with the length of the motion.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import solveh_banded
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A motion: root in the image and bone directions in space."""
+
+    root: Float[np.ndarray, "T 2"]
+    """Units of length: px over scale."""
+    directions: Float[np.ndarray, "T B 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Weighted residuals of a term and their slopes."""
+
+    residual: Float[np.ndarray, "T m"]
+    by_direction: Float[np.ndarray, "T m B 3"]
+    by_root: Float[np.ndarray, "T m 2"] | None = None
+    cost: float | None = None
+    """Value of the term where it is not half the sum of squared residuals (robust terms)."""
+
+
+Term = Callable[[State], Linear]
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothness:
+    """Penalty on second differences in time: weights of the root and of each bone's direction."""
+
+    root: float
+    bones: Float[np.ndarray, "B"]
+
+
+def solve(
+    start: State, terms: Sequence[Term], smoothness: Smoothness, rounds: int, tolerance: float
+) -> State:
+    """Lower the sum of all terms until a step gains less than the share `tolerance`."""
+    state, damping = start, 1e-3
+    lines = [term(state) for term in terms]
+    cost = _cost(state, lines, smoothness)
+    for _ in range(rounds):
+        step = _step(state, lines, smoothness, damping)
+        tried = _move(state, step)
+        tried_lines = [term(tried) for term in terms]
+        tried_cost = _cost(tried, tried_lines, smoothness)
+        if tried_cost >= cost:
+            damping *= 10
+            if damping > 1e3:
+                break
+            continue
+        gain = (cost - tried_cost) / max(cost, 1e-12)
+        state, lines, cost, damping = tried, tried_lines, tried_cost, max(damping / 5, 1e-6)
+        if gain < tolerance:
+            break
+    return state
+
+
+def tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3 2"]:
+    """Two unit vectors at right angles to every direction."""
+    helper = np.eye(3)[np.abs(directions).argmin(axis=-1)]
+    first = np.cross(directions, helper)
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(directions, first)], axis=-1)
+
+
+def _move(state: State, step: Float[np.ndarray, "T D"]) -> State:
+    turn = step[:, 2:].reshape(len(step), -1, 2)
+    moved = state.directions + np.einsum("tbik,tbk->tbi", tangents(state.directions), turn)
+    return State(state.root + step[:, :2], moved / np.linalg.norm(moved, axis=-1, keepdims=True))
+
+
+def _cost(state: State, lines: Sequence[Linear], smoothness: Smoothness) -> float:
+    total = sum(
+        0.5 * float((line.residual**2).sum()) if line.cost is None else line.cost for line in lines
+    )
+    bend = (np.diff(state.directions, 2, axis=0) ** 2).sum(axis=(0, 2)) @ smoothness.bones
+    return total + 0.5 * float(bend + smoothness.root * (np.diff(state.root, 2, axis=0) ** 2).sum())
+
+
+def _step(
+    state: State, lines: Sequence[Linear], smoothness: Smoothness, damping: float
+) -> Float[np.ndarray, "T D"]:
+    basis = tangents(state.directions)
+    hessian, gradient = _gather(lines, basis)
+    frames, size = gradient.shape
+    weights = np.concatenate([[smoothness.root] * 2, np.repeat(smoothness.bones, 2)])
+    bands = _second_difference_bands(frames)
+    flat = np.concatenate([state.root, state.directions.reshape(frames, -1)], axis=1)
+    pull = _apply_bands(bands, flat)
+    gradient[:, :2] += smoothness.root * pull[:, :2]
+    bend = np.einsum("tbik,tbi->tbk", basis, pull[:, 2:].reshape(state.directions.shape))
+    gradient[:, 2:] += (smoothness.bones[:, None] * bend).reshape(frames, -1)
+    diagonal = np.arange(size)
+    hessian[:, diagonal, diagonal] *= 1 + damping
+    hessian[:, diagonal, diagonal] += bands[0][:, None] * weights + 1e-9
+    banded = _banded(hessian, basis, bands, smoothness)
+    return -solveh_banded(banded, gradient.ravel(), lower=True, check_finite=False).reshape(
+        frames, size
+    )
+
+
+def _gather(
+    lines: Sequence[Linear], basis: Float[np.ndarray, "T B 3 2"]
+) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
+    """Sum of J'J and J'r of all terms in tangent coordinates."""
+    frames, bones = basis.shape[:2]
+    hessian = np.zeros((frames, 2 + 2 * bones, 2 + 2 * bones))
+    gradient = np.zeros((frames, 2 + 2 * bones))
+    for line in lines:
+        count = line.residual.shape[1]
+        slope = np.zeros((frames, count, 2 + 2 * bones))
+        turned = np.matmul(line.by_direction.swapaxes(1, 2), basis)  # (T, B, m, 2)
+        slope[..., 2:] = turned.swapaxes(1, 2).reshape(frames, count, -1)
+        if line.by_root is not None:
+            slope[..., :2] = line.by_root
+        across = slope.swapaxes(1, 2)
+        hessian += across @ slope
+        gradient += (across @ line.residual[..., None])[..., 0]
+    return hessian, gradient
+
+
+def _second_difference_bands(frames: int) -> tuple[Float[np.ndarray, "T"], ...]:
+    """Main, first and second diagonal of D'D for the second difference D."""
+    bands = np.zeros((3, frames))
+    for first in range(3):
+        for second in range(first, 3):
+            stencil = (1.0, -2.0, 1.0)
+            bands[second - first, first : frames - 2 + first] += stencil[first] * stencil[second]
+    return tuple(bands)
+
+
+def _apply_bands(
+    bands: tuple[Float[np.ndarray, "T"], ...], values: Float[np.ndarray, "T n"]
+) -> Float[np.ndarray, "T n"]:
+    result = bands[0][:, None] * values
+    for offset in (1, 2):
+        band = bands[offset][:-offset, None]
+        result[:-offset] += band * values[offset:]
+        result[offset:] += band * values[:-offset]
+    return result
+
+
+def _banded(
+    hessian: Float[np.ndarray, "T D D"],
+    basis: Float[np.ndarray, "T B 3 2"],
+    bands: tuple[Float[np.ndarray, "T"], ...],
+    smoothness: Smoothness,
+) -> Float[np.ndarray, "w n"]:
+    """The normal matrix in scipy's lower banded form; unknowns ordered frame by frame."""
+    frames, size, _ = hessian.shape
+    banded = np.zeros((2 * size + 2, frames, size))
+    for column in range(size):
+        banded[: size - column, :, column] = hessian[:, column:, column].T
+    for offset in (1, 2):
+        band = bands[offset][:-offset]
+        banded[offset * size, :-offset, :2] += smoothness.root * band[:, None]
+        meet = np.einsum("tbik,tbil->tbkl", basis[:-offset], basis[offset:])  # (T-k, B, 2, 2)
+        meet *= band[:, None, None, None] * smoothness.bones[:, None, None]
+        for here in range(2):
+            for there in range(2):
+                row = offset * size + there - here
+                banded[row, :-offset, 2 + here :: 2] += meet[:, :, here, there]
+    return banded.reshape(2 * size + 2, frames * size)

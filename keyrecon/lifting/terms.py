@@ -1,0 +1,82 @@
+"""What a good motion costs, one small term each: every function returns a `solver.Term`."""
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting.chain import ancestry, pose_from_directions
+from keyrecon.lifting.solver import Linear, State, Term
+
+
+def reprojection(
+    observed: Float[np.ndarray, "T J 2"],
+    spread: Float[np.ndarray, "T J"],
+    lengths: Float[np.ndarray, "B"],
+    skeleton: Skeleton,
+    knee: float = 1.5,
+) -> Term:
+    """Joints should project onto the observed ones; Huber beyond `knee` times the spread.
+
+    `observed` and `spread` in units of length (px over scale); NaN or an infinite spread where
+    nothing is known. The squared loss of Eq. 6, made robust.
+    """
+    reach = ancestry(skeleton) * lengths
+    inverse = np.where(np.isnan(observed[..., 0]) | np.isinf(spread), 0.0, 1.0 / spread)
+    target = np.nan_to_num(observed)
+    slope = np.zeros((len(skeleton.names), 2, len(lengths), 3))
+    for axis in range(2):
+        slope[:, axis, :, axis] = reach
+
+    def term(state: State) -> Linear:
+        frames = len(target)
+        points = pose_from_directions(state.directions, lengths, skeleton)[..., :2]
+        residual = inverse[..., None] * (points + state.root[:, None] - target)
+        size = np.linalg.norm(residual, axis=-1)
+        far = size > knee
+        shrink = np.sqrt(np.where(far, knee / np.maximum(size, 1e-12), 1.0))
+        cost = np.where(far, knee * size - 0.5 * knee**2, 0.5 * size**2).sum()
+        weight = inverse * shrink
+        by_direction = (weight[:, :, None, None, None] * slope).reshape(frames, -1, len(lengths), 3)
+        by_root = (weight[..., None, None] * np.eye(2)).reshape(frames, -1, 2)
+        return Linear(
+            (shrink[..., None] * residual).reshape(frames, -1), by_direction, by_root, float(cost)
+        )
+
+    return term
+
+
+def breadth(
+    pair: tuple[int, int],
+    wanted: float,
+    spread: float,
+    lengths: Float[np.ndarray, "B"],
+    skeleton: Skeleton,
+) -> Term:
+    """The distance of two joints of the trunk stays `wanted`, within `spread`."""
+    ways = ancestry(skeleton) * lengths
+    difference = ways[pair[0]] - ways[pair[1]]
+
+    def term(state: State) -> Linear:
+        across = np.einsum("b,tbi->ti", difference, state.directions)
+        size = np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+        toward = across / size / spread
+        return Linear((size - wanted) / spread, (toward[:, None, None, :] * difference[:, None]))
+
+    return term
+
+
+def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], trust: Float[np.ndarray, "T B"]) -> Term:
+    """Bone directions stay near those of the key poses, with the square root of `trust`."""
+    bones = wanted.shape[1]
+    weight = np.sqrt(trust)
+    slope = np.zeros((bones, 3, bones, 3))
+    for bone in range(bones):
+        slope[bone, :, bone] = np.eye(3)
+
+    def term(state: State) -> Linear:
+        residual = weight[..., None] * (state.directions - wanted)
+        by_direction = weight[:, :, None, None, None] * slope
+        frames = len(residual)
+        return Linear(residual.reshape(frames, -1), by_direction.reshape(frames, -1, bones, 3))
+
+    return term
