@@ -1,0 +1,119 @@
+"""Draw a pose on a picture, so that left, right, near and far can be told apart.
+
+Left, right and trunk have colours that stay distinct for the colour-blind (Okabe and Ito, "Color
+universal design", 2008). Bones are drawn far to near, each on a dark seam, so that a nearer limb
+visibly crosses over a farther one. Thickness follows the size of the player. Marker shapes tell
+where a joint comes from: a diamond was marked by a person, a disc was found in the picture, a
+ring was filled in.
+"""
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from keyrecon.body import Skeleton
+from keyrecon.records import SOURCES
+
+LEFT, RIGHT, TRUNK = (86, 180, 233), (230, 159, 0), (245, 245, 245)
+SEAM = (20, 20, 24)
+SUBPIXEL = 4
+"""OpenCV draws at 1 / 2**SUBPIXEL px."""
+BONE_SHARE = 0.016
+"""Thickness of a bone as a share of the player's height; a real forearm is about .04."""
+
+
+def joint_sides(skeleton: Skeleton) -> Int[np.ndarray, "J"]:
+    """0 left, 1 right, 2 on the midline, for every joint."""
+    sides = np.full(len(skeleton.names), 2)
+    for left, right in skeleton.mirrored:
+        sides[[left, right]] = 0, 1
+    return sides
+
+
+def drawn_bones(skeleton: Skeleton) -> Int[np.ndarray, "n 2"]:
+    """Bones to draw: those of the tree, and the line between both hips that closes the trunk."""
+    closing = [
+        pair
+        for pair in skeleton.mirrored
+        if skeleton.is_lower[pair[0]] and skeleton.parents[pair[0]] == skeleton.parents[pair[1]]
+    ]
+    return np.concatenate([skeleton.bones, np.array(closing, dtype=np.int64).reshape(-1, 2)])
+
+
+def bone_sides(skeleton: Skeleton) -> Int[np.ndarray, "n"]:
+    """0 left, 1 right, 2 trunk, for every bone of `drawn_bones`; limbs begin below the root's
+    children, so that shoulders and hips belong to the trunk.
+    """
+    sides, bones = joint_sides(skeleton), drawn_bones(skeleton)
+    at_trunk = (bones[:, 0] == skeleton.root) | (sides[bones[:, 0]] != sides[bones[:, 1]])
+    return np.where(at_trunk, 2, sides[bones[:, 1]])
+
+
+def draw_pose(
+    picture: UInt8[np.ndarray, "h w 3"],
+    points2d: Float[np.ndarray, "J 2"],
+    skeleton: Skeleton,
+    depth: Float[np.ndarray, "J"] | None = None,
+    source: Int[np.ndarray, "J"] | None = None,
+    height: float | None = None,
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A copy of the picture with the pose on it; joints that are NaN are left out.
+
+    `depth` grows away from the camera, in any unit; `source` indexes SOURCES; `height` is the
+    player's size in px, taken from the pose itself where it is not given.
+    """
+    drawn = picture.copy()
+    known = np.isfinite(points2d).all(axis=1)
+    if not known.any():
+        return drawn
+    height = height or float(np.ptp(points2d[known], axis=0).max())
+    thickness = max(1, round(BONE_SHARE * height))
+    depth = np.zeros(len(points2d)) if depth is None else np.nan_to_num(depth)
+    bones, sides = drawn_bones(skeleton), bone_sides(skeleton)
+    for bone in np.argsort(-depth[bones].mean(axis=1), kind="stable"):
+        if known[bones[bone]].all():
+            _draw_bone(drawn, points2d[bones[bone]], (LEFT, RIGHT, TRUNK)[sides[bone]], thickness)
+    for joint in np.argsort(-depth, kind="stable"):
+        if known[joint]:
+            color = (LEFT, RIGHT, TRUNK)[joint_sides(skeleton)[joint]]
+            kind = SOURCES[1 if source is None else source[joint]]
+            _draw_joint(drawn, points2d[joint], kind, color, thickness)
+    return drawn
+
+
+def _draw_bone(
+    picture: UInt8[np.ndarray, "h w 3"],
+    ends: Float[np.ndarray, "2 2"],
+    color: tuple[int, int, int],
+    thickness: int,
+) -> None:
+    start, stop = (tuple(end) for end in _fixed_point(ends).tolist())
+    for paint, width in ((SEAM, thickness + max(2, round(0.6 * thickness))), (color, thickness)):
+        cv2.line(picture, start, stop, paint, width, cv2.LINE_AA, SUBPIXEL)
+
+
+def _draw_joint(
+    picture: UInt8[np.ndarray, "h w 3"],
+    point: Float[np.ndarray, "2"],
+    kind: str,
+    color: tuple[int, int, int],
+    thickness: int,
+) -> None:
+    radius = 0.5 + 0.9 * thickness
+    if kind == "annotated":
+        corners = point + 1.5 * radius * np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])
+        shape = [_fixed_point(corners)]
+        cv2.fillPoly(picture, shape, color, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(picture, shape, True, SEAM, 1, cv2.LINE_AA, SUBPIXEL)
+        return
+    center = tuple(_fixed_point(point).tolist())
+    reach = round(radius * 2**SUBPIXEL)
+    fill = SEAM if kind == "interpolated" else color
+    edge = color if kind == "interpolated" else SEAM
+    cv2.circle(picture, center, reach, fill, -1, cv2.LINE_AA, SUBPIXEL)
+    cv2.circle(picture, center, reach, edge, max(1, thickness // 3), cv2.LINE_AA, SUBPIXEL)
+
+
+def _fixed_point(points: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
+    """Coordinates as OpenCV's fixed-point numbers, kept in the range that it can clip."""
+    return np.round(np.clip(points, -30000, 30000) * 2**SUBPIXEL).astype(np.int32)

@@ -1,0 +1,66 @@
+"""Small pieces of HTML; every text that comes from outside passes through `text`."""
+
+import base64
+import html
+import json
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+
+def text(value: object) -> str:
+    """A value as text that HTML cannot mistake for markup."""
+    return html.escape(str(value), quote=True)
+
+
+def number(value: float, form: str) -> str:
+    """A number, or a dash where it is unknown."""
+    return format(value, form) if np.isfinite(value) else "\u2013"
+
+
+def section(name: str, title: str, *parts: str) -> str:
+    """A section with an anchor."""
+    return f'<section id="{name}"><h2>{text(title)}</h2>{"".join(parts)}</section>'
+
+
+def note(sentence: str) -> str:
+    """A caption; the sentence may hold markup and must be safe."""
+    return f'<p class="note">{sentence}</p>'
+
+
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[object]], label: str, kind: str = "numbers"
+) -> str:
+    """A table whose first column names its rows; `kind` is its style; all cells are escaped."""
+    top = "".join(f'<th scope="col">{text(cell)}</th>' for cell in head)
+    body = "".join(
+        f'<tr><th scope="row">{text(first)}</th>'
+        + "".join(f"<td>{text(cell)}</td>" for cell in rest)
+        + "</tr>"
+        for first, *rest in rows
+    )
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{text(label)}">'
+        f'<table class="{kind}">'
+        f"<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def data_block(name: str, data: str) -> str:
+    """JSON that the page's script reads; it cannot end the element it stands in."""
+    safe = data.replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{safe}</script>'
+
+
+def to_json(data: object) -> str:
+    """Compact JSON."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+def pack(values: Float[np.ndarray, "*n"]) -> dict[str, object]:
+    """An array as 16-bit steps in base64, -32768 where unknown; a step is 1/32000 of the range."""
+    known = np.isfinite(values)
+    step = float(np.abs(values[known]).max(initial=1e-9)) / 32000
+    whole = np.where(known, np.round(np.where(known, values, 0) / step), -32768).astype("<i2")
+    return {"step": step, "shape": list(values.shape), "data": base64.b64encode(whole).decode()}

@@ -1,0 +1,51 @@
+"""The video with the reconstructed pose on it: the quickest way to see whether to trust it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Motion
+from keyrecon.report.drawing import SEAM, TRUNK, draw_pose
+from keyrecon.video import Video
+from keyrecon.video_writer import write_video
+
+
+def write_overlay(
+    path: Path, video: Video, motion: Motion, progress: Progress = silent
+) -> None:
+    """Write the video with the refined pose and the frame number on every frame.
+
+    The pose is the projection of the 3D joints; near limbs cross over far ones. Frames after
+    the last one of the motion are shown as they are.
+    """
+    write_video(path, overlay_frames(video, motion, progress), video.fps)
+
+
+def overlay_frames(
+    video: Video, motion: Motion, progress: Progress = silent
+) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    """The pictures of `write_overlay`, one at a time."""
+    for frame, picture in enumerate(progress(video.frames(), "Drawing the overlay", len(video))):
+        if frame < len(motion.points2d):
+            picture = draw_pose(
+                picture,
+                motion.points2d[frame],
+                motion.skeleton,
+                motion.points3d[frame, :, 2],
+                motion.source[frame],
+            )
+        _write_label(picture, f"frame {frame}   {video.time[frame]:.2f} s")
+        yield picture
+
+
+def _write_label(picture: UInt8[np.ndarray, "h w 3"], text: str) -> None:
+    """Frame number in the lower left corner; its size follows the picture's."""
+    size = picture.shape[0] / 1200
+    at = (round(16 * size) + 4, picture.shape[0] - round(18 * size) - 4)
+    for color, thickness in ((SEAM, 3), (TRUNK, 1)):
+        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, max(0.4, size), color, thickness,
+                    cv2.LINE_AA)

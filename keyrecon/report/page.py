@@ -1,0 +1,200 @@
+"""report.html: one file that tells a person what was found and how far to trust it.
+
+The file opens without a network: scripts, styles, pictures, the small video and all numbers
+stand in it, and its content security policy forbids it to load anything. Charts are drawn by
+plotly, whose script comes from the installed package; the turning figure, the distance
+matrices and the cursor that links everything are drawn by report.js.
+"""
+
+from importlib.resources import files
+from pathlib import Path
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from keyrecon import __version__
+from keyrecon.durable import write_durably
+from keyrecon.progress import Progress, silent
+from keyrecon.report import charts, sections
+from keyrecon.report.drawing import bone_sides, drawn_bones
+from keyrecon.report.markup import data_block, note, pack, section, text, to_json
+from keyrecon.report.material import ReportMaterial
+from keyrecon.report.pictures import Pictures, cut_pictures
+from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth, stature
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; media-src data: blob:"
+)
+VIEW_COUNT = 12
+"""Frames shown from elsewhere; the paper shows every 50th of 36 s."""
+
+
+def write_report(path: Path, material: ReportMaterial, progress: Progress = silent) -> None:
+    """Write the report to one HTML file; a minute of video makes it about 10 MB."""
+    pictures = cut_pictures(
+        material.video, material.track, material.annotations, material.motion, progress=progress
+    )
+    write_durably(path, build_page(material, pictures))
+
+
+def build_page(material: ReportMaterial, pictures: Pictures) -> str:
+    """The whole page as text."""
+    title = text(material.video.path.name)
+    own = files("keyrecon.report")
+    style, script = ((own / name).read_text("utf-8") for name in ("report.css", "report.js"))
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}: keyrecon report</title><style>{style}</style></head><body>"
+        f"{_navigation()}<main>{_body(material, pictures)}</main>{_transport()}"
+        f"{data_block('motion-data', to_json(_numbers(material)))}"
+        f"<script>{get_plotlyjs()}</script><script>{script}</script></body></html>"
+    )
+
+
+def _body(material: ReportMaterial, pictures: Pictures) -> str:
+    strip = list(pictures.strip)
+    chosen = strip[:: max(1, round(len(strip) / VIEW_COUNT))]
+    return "".join((
+        sections.headline(material),
+        _error_over_time(material),
+        sections.story(pictures, material.motion.time),
+        sections.keyframe_pictures(material, pictures),
+        _occurrence(material),
+        sections.matrices(material),
+        _joint_curves(material),
+        _figure_player(pictures, material.truth is not None),
+        sections.reference_views(material, chosen),
+        sections.body_tables(material),
+        _sources(material),
+        _angles(material),
+        section("making", "How it was made", sections.stage_times(dict(material.seconds)),
+                sections.option_table(material.options), note(f"keyrecon {text(__version__)}")),
+    ))
+
+
+def _chart(name: str, figure: go.Figure) -> str:
+    block = data_block(f"chart-{name}", figure.to_json())
+    height = figure.layout.height
+    return f'<div class="chart" data-chart="{name}" style="min-height:{height}px"></div>{block}'
+
+
+def _error_over_time(material: ReportMaterial) -> str:
+    motion, truth = material.motion, material.true_joints
+    if truth is None:
+        return ""
+    error = error_per_frame(motion, truth)
+    unit = "error, m" if motion.units == "m" else "error, body heights"
+    return "<h3>Error over time</h3>" + _chart(
+        "error", charts.error_chart(error, motion.keyframes, unit)
+    )
+
+
+def _occurrence(material: ReportMaterial) -> str:
+    return section(
+        "occurrence", "Which keyframe stands for which frame",
+        note("Keyframes are ordered so that similar poses lie side by side: opposite strokes show "
+             "as peaks and troughs. Diamonds are the keyframes themselves, rings are frames "
+             "farther than β from every keyframe. Press a chart to go to a frame."),
+        _chart("occurrence", charts.keyframe_chart(material.keyframes, material.comparison)),
+    )
+
+
+def _joint_curves(material: ReportMaterial) -> str:
+    names = material.motion.skeleton.names
+    options = "".join(
+        f'<option value="{joint}">{text(charts.plain_name(name))}</option>'
+        for joint, name in enumerate(names)
+    )
+    return section(
+        "curves", "Joints before and after refinement",
+        f'<label class="chooser">Joint <select id="joint">{options}</select></label>',
+        _chart("joint", charts.joint_chart(material.truth is not None)),
+    )
+
+
+def _figure_player(pictures: Pictures, has_truth: bool) -> str:
+    views = "".join(
+        f'<button type="button" data-yaw="{yaw}" data-pitch="{pitch}">{name}</button>'
+        for name, yaw, pitch in (("Camera", 0, 0), ("Right", 90, 0), ("Left", -90, 0),
+                                 ("Above", 0, 90), ("Free", 35, 18))
+    )
+    ghost = (
+        '<label><input type="checkbox" id="ghost" checked> truth in grey</label>'
+        if has_truth else ""
+    )
+    return section(
+        "figure", "The motion in 3D",
+        note("Drag to turn, arrow keys while it has the focus, Ctrl and wheel to zoom. The body is "
+             "held at its root; the grid lies at the lower foot."),
+        f'<div class="player"><div class="plate"><canvas id="figure-canvas" tabindex="0" '
+        'aria-label="Turnable 3D figure"></canvas></div>'
+        f'<video id="clip" src="{pictures.clip}" muted playsinline preload="auto" '
+        'aria-label="The player with the reconstructed pose"></video></div>'
+        f'<div class="views-bar">{views}{ghost}</div>',
+    )
+
+
+def _sources(material: ReportMaterial) -> str:
+    return section(
+        "sources", "Where the joints come from",
+        note("Every number can be traced to a mark that a person made or to a stated rule. "
+             "<em>Annotated</em>: marked on this frame. <em>Propagated</em>: carried over from a "
+             "keyframe. <em>Interpolated</em>: not found, filled in. <em>Refined</em>: found, and "
+             "replaced because it disagreed with the rest."),
+        _chart("sources", charts.source_chart(material.motion)),
+    )
+
+
+def _angles(material: ReportMaterial) -> str:
+    return section(
+        "angles", "Joint angles",
+        note("Angle between the two bones that meet at the joint, in space: 180° is straight, "
+             "smaller is more bent. It does not depend on the camera or on the units."),
+        _chart("angles", charts.angle_chart(material.motion)),
+    )
+
+
+def _navigation() -> str:
+    links = (("video", "Video"), ("keyframes", "Keyframes"), ("occurrence", "Occurrence"),
+             ("distances", "Distances"), ("curves", "Curves"), ("figure", "3D"),
+             ("views", "Views"), ("body", "Body"), ("sources", "Sources"), ("angles", "Angles"),
+             ("making", "Making"))
+    items = "".join(f'<a href="#{name}">{label}</a>' for name, label in links)
+    return f'<nav aria-label="Sections"><div>{items}</div></nav>'
+
+
+def _transport() -> str:
+    speeds = "".join(
+        f'<option value="{speed}"{" selected" if speed == 1 else ""}>{speed}&times;</option>'
+        for speed in (0.1, 0.25, 0.5, 1, 2)
+    )
+    return (
+        '<footer class="transport"><button type="button" id="play" aria-label="Play">▶</button>'
+        '<input type="range" id="frame" min="0" value="0" step="1" aria-label="Frame">'
+        f'<output id="now"></output><label>speed <select id="speed">{speeds}</select></label>'
+        "</footer><dialog id=\"large\"><button type=\"button\" autofocus>Close</button>"
+        '<img alt=""><p></p></dialog>'
+    )
+
+
+def _numbers(material: ReportMaterial) -> dict[str, object]:
+    """What the page's script draws from."""
+    motion, skeleton = material.motion, material.motion.skeleton
+    truth, marks = material.true_joints, material.annotations
+    return {
+        "fps": motion.fps,
+        "time": pack(motion.time),
+        "bones": drawn_bones(skeleton).tolist(),
+        "sides": bone_sides(skeleton).tolist(),
+        "stature": stature(motion),
+        "points3d": pack(center_on_root(motion.points3d, skeleton.root)),
+        "truth3d": None if truth is None else pack(scale_truth(motion, truth.points3d)),
+        "refined": pack(motion.points2d),
+        "raw": pack(motion.points2d_propagated),
+        "truth2d": None if truth is None else pack(truth.points2d),
+        "marked": {"frames": marks.frames.tolist(), "points": pack(marks.joints)},
+    }
+

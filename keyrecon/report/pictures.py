@@ -1,0 +1,176 @@
+"""Pictures of the report: crops that follow the player, as JPEG and PNG data in the page.
+
+The video is read once. Every frame is cropped to a window that follows the player smoothly and
+keeps the player's size; crops with the pose on them become a small video that plays beside the
+3D figure, and some of them stills: an even strip through the video, and all keyframes.
+"""
+
+import base64
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.ndimage import gaussian_filter1d
+
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Annotations, Motion, Track
+from keyrecon.report.drawing import draw_pose
+from keyrecon.video import Video
+from keyrecon.video_writer import write_video
+
+STILL, CLIP = 420, 336
+"""Side of the square stills and of the small video, px."""
+JPEG_QUALITY = 80
+CLIP_QUALITY = 27
+"""x264's crf; 27 keeps a minute of the small video under about 2 MB."""
+ROOM = 1.75
+"""Side of the window in player heights: a raised arm with a racket fits."""
+CALM = 0.2
+"""Seconds over which the window's motion is smoothed, so that the player moves, not the picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """The square around the player in every frame, px."""
+
+    center: Float[np.ndarray, "T 2"]
+    side: Float[np.ndarray, "T"]
+
+    def to_crop(
+        self, frame: int, points: Float[np.ndarray, "*n 2"], size: int
+    ) -> Float[np.ndarray, "*n 2"]:
+        """Points of the picture as points of the crop, which has `size` px to a side."""
+        corner, side = self._square(frame)
+        return (points - corner + 0.5) * (size / side) - 0.5
+
+    def cut(
+        self, frame: int, picture: UInt8[np.ndarray, "h w 3"], size: int
+    ) -> UInt8[np.ndarray, "size size 3"]:
+        """The window of one frame; its edge pixels go on where it leaves the picture."""
+        corner, side = self._square(frame)
+        height, width = picture.shape[:2]
+        columns = np.clip(corner[0] + np.arange(side), 0, width - 1)
+        rows = np.clip(corner[1] + np.arange(side), 0, height - 1)
+        x0, x1, y0, y1 = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
+        border = (y0 - corner[1], corner[1] + side - y1, x0 - corner[0], corner[0] + side - x1)
+        inner = cv2.copyMakeBorder(
+            picture[y0:y1, x0:x1], *np.maximum(border, 0).tolist(), cv2.BORDER_REPLICATE
+        )[:side, :side]
+        how = cv2.INTER_AREA if side > size else cv2.INTER_CUBIC
+        return cv2.resize(inner, (size, size), interpolation=how)
+
+    def _square(self, frame: int) -> tuple[Int[np.ndarray, "2"], int]:
+        side = max(2, round(float(self.side[frame])))
+        return np.round(self.center[frame] - side / 2).astype(np.int64), side
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """What was cut from the video; pictures as data URIs."""
+
+    strip: dict[int, str]
+    """Frame number to still with the refined pose."""
+    keyframes: dict[int, str]
+    """Frame number to still with the marks of a person."""
+    clip: str
+    """The small video, one frame per frame of the motion."""
+
+
+def follow_player(track: Track, fps: float) -> Windows:
+    """A window around the player for every frame that moves as calmly as the player allows."""
+    sigma = max(1.0, CALM * fps)
+    middle = track.box.reshape(-1, 2, 2).mean(axis=1)
+    middle = np.where(np.isfinite(middle), middle, (track.head + track.mid_feet) / 2)
+    center = gaussian_filter1d(_bridge(middle), sigma, axis=0, mode="nearest")
+    size = gaussian_filter1d(_bridge(track.height[:, None])[:, 0], 2 * sigma, mode="nearest")
+    return Windows(center, ROOM * size)
+
+
+def cut_pictures(
+    video: Video,
+    track: Track,
+    annotations: Annotations,
+    motion: Motion,
+    strip: int = 24,
+    progress: Progress = silent,
+) -> Pictures:
+    """Read the video once and cut everything that the report shows of it."""
+    windows = follow_player(track, motion.fps)
+    count = len(motion.points2d)
+    even = np.unique(np.linspace(0, count - 1, min(strip, count)).round().astype(int))
+    stills: dict[int, str] = {}
+    marked: dict[int, str] = {}
+
+    def crops() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        frames = progress(video.frames(0, count), "Cutting pictures for the report", count)
+        for frame, picture in enumerate(frames):
+            if frame in annotations.frames:
+                row = int(np.searchsorted(annotations.frames, frame))
+                marked[frame] = _jpeg(_marked_still(windows, picture, annotations, row))
+            if frame in even:
+                stills[frame] = _jpeg(_posed_crop(windows, frame, picture, motion, STILL))
+            yield _posed_crop(windows, frame, picture, motion, CLIP)
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "clip.mp4"
+        write_video(path, crops(), motion.fps, CLIP_QUALITY)
+        clip = _data_uri("video/mp4", path.read_bytes())
+    return Pictures(stills, marked, clip)
+
+
+def png_uri(picture: UInt8[np.ndarray, "h w"]) -> str:
+    """A grey picture as a PNG data URI."""
+    return _data_uri("image/png", cv2.imencode(".png", picture)[1].tobytes())
+
+
+def _posed_crop(
+    windows: Windows, frame: int, picture: UInt8[np.ndarray, "h w 3"], motion: Motion, size: int
+) -> UInt8[np.ndarray, "size size 3"]:
+    return draw_pose(
+        windows.cut(frame, picture, size),
+        windows.to_crop(frame, motion.points2d[frame], size),
+        motion.skeleton,
+        motion.points3d[frame, :, 2],
+        motion.source[frame],
+        size / ROOM,
+    )
+
+
+def _marked_still(
+    windows: Windows, picture: UInt8[np.ndarray, "h w 3"], annotations: Annotations, row: int
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Marks as a person made them; joints placed though hidden are rings."""
+    frame = int(annotations.frames[row])
+    return draw_pose(
+        windows.cut(frame, picture, STILL),
+        windows.to_crop(frame, annotations.joints[row], STILL),
+        annotations.skeleton,
+        source=np.where(annotations.visible[row], 0, 2),
+        height=STILL / ROOM,
+    )
+
+
+def _bridge(values: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
+    """Values with gaps filled linearly, so that a window exists in every frame."""
+    bridged, at = values.copy(), np.arange(len(values))
+    for column in bridged.T:
+        known: Bool[np.ndarray, "T"] = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(at[~known], at[known], column[known])
+        else:
+            column[:] = 1.0
+    return bridged
+
+
+def _jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> str:
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+    data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), quality)[1]
+    return _data_uri("image/jpeg", data.tobytes())
+
+
+def _data_uri(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
