@@ -40,6 +40,12 @@ OTHER_RADIUS = 0.08
 """The same for regions of clothing and skin, player heights."""
 CORE = 0.45
 """Share of a head's radius within which everything is head: hair beside skin."""
+NEVER_SEEN = 1e-5
+"""Density below which a colour counts as seen nowhere, and belongs to nobody."""
+EXPLAINED = 0.4
+"""Share of the head's colours found in other parts that makes it no colour of its own."""
+ALIKE = 0.2
+"""Two parts with this share of their colours in common cannot be told apart pixel by pixel."""
 REACH = 0.75
 """Nothing of the player lies farther sideways from the head-feet axis, player heights."""
 
@@ -138,17 +144,42 @@ def color_bins(lab: UInt8[np.ndarray, "*n 3"]) -> UInt16[np.ndarray, "*n"]:
 
 def posterior_tables(colors: Colors) -> Float[np.ndarray, "C bins"]:
     """Probability of each part rather than the surroundings, by colour bin."""
-    floor = 1e-5  # a colour seen nowhere belongs to nobody
-    return colors.seen / (colors.seen + colors.surroundings + floor)
+    return colors.seen / (colors.seen + colors.surroundings + NEVER_SEEN)
 
 
-def label_table(colors: Colors) -> UInt8[np.ndarray, "bins"]:
-    """Index of the part that each colour bin most likely belongs to.
+def distinct_parts(colors: Colors) -> dict[int, list[int]]:
+    """Which parts can be told apart by colour: a representative, and those that look like it.
 
-    The head is hair and skin; where those were picked as regions of their own, or bare skin was,
-    its share of such a colour is smaller than theirs and the region wins.
+    The head is hair and skin: it is left out where other parts that were picked explain it.
+    Parts that share much of their colour, blond hair and skin in the shade, count as one, since
+    the border between them would be drawn by noise.
     """
-    return colors.seen.argmax(axis=0).astype(np.uint8)
+    head = colors.names.index("head")
+    others = [c for c in range(len(colors.names)) if c != head]
+    explained = np.minimum(colors.seen[head], colors.seen[others].max(axis=0)).sum()
+    parts = others if explained > EXPLAINED else [head, *others]
+    groups: dict[int, list[int]] = {}
+    for part in parts:
+        alike = [
+            first
+            for first, members in groups.items()
+            if max(np.minimum(colors.seen[part], colors.seen[m]).sum() for m in members) > ALIKE
+        ]
+        if not alike:
+            groups[part] = [part]
+            continue
+        groups[alike[0]].append(part)
+        for other in alike[1:]:
+            groups[alike[0]] += groups.pop(other)
+    return groups
+
+
+def foot_table(colors: Colors) -> Float[np.ndarray, "bins"]:
+    """Probability of a shoe rather than the surroundings or the skin and clothes above it."""
+    foot = colors.seen[colors.names.index("foot")]
+    rest = [c for c, name in enumerate(colors.names) if name not in ("foot", "head")]
+    other = 0.5 * colors.seen[rest].max(axis=0) if rest else 0.0
+    return foot / (foot + colors.surroundings + other + NEVER_SEEN)
 
 
 def grow_patch(

@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.background import Scene
-from keyrecon.colors import BINS, color_bins, to_lab
+from keyrecon.colors import BINS, color_bins, distinct_parts, to_lab
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, Figures, Track
 from keyrecon.video import Video
@@ -60,8 +60,19 @@ class EdgeOptions:
 class _Palette:
     """Tables over colour bins, ready for looking up."""
 
-    parts: Float[np.ndarray, "bins C"]
+    parts: Float[np.ndarray, "bins G"]
+    """Colours of the parts that can be told apart."""
     surroundings: Float[np.ndarray, "bins"]
+    values: UInt8[np.ndarray, "G"]
+    """Label of each."""
+
+
+def _mix_palette(colors: Colors) -> _Palette:
+    groups = distinct_parts(colors)
+    parts = [colors.seen[members].mean(axis=0) for members in groups.values()]
+    values = np.array(list(groups), np.uint8) + 1
+    table = np.ascontiguousarray(np.stack(parts, axis=1), np.float32)
+    return _Palette(table, colors.surroundings.astype(np.float32), values)
 
 
 def find_edges(  # noqa: PLR0913
@@ -75,7 +86,7 @@ def find_edges(  # noqa: PLR0913
 ) -> Figures:
     """Label crops and directed edges of every frame; edges in px of the full picture."""
     scene = Scene(background, camera)
-    palette = _Palette(np.ascontiguousarray(colors.seen.T), colors.surroundings)
+    palette = _mix_palette(colors)
     scale = options.player / track.height
     size = (round(CROP_WIDTH * options.player), round(CROP_HEIGHT * options.player))
     center = (track.box[:, :2] + track.box[:, 2:]) / 2
@@ -132,7 +143,7 @@ def label_crop(
     )
     likely /= likely.sum(axis=2, keepdims=True) + nobody[..., None]
     likely = cv2.GaussianBlur(likely.astype(np.float32), (0, 0), SOFTEN * options.player)
-    labels = (likely.argmax(axis=2) + 1).astype(np.uint8)
+    labels = palette.values[likely.argmax(axis=2)]
     labels[likely.sum(axis=2) < 0.5] = 0
     return _clean(labels, axis, options)
 

@@ -30,7 +30,7 @@ from keyrecon.background import (
 )
 from keyrecon.background import sample_frames as sampled
 from keyrecon.camera import warp_points
-from keyrecon.colors import color_bins, posterior_tables, to_lab
+from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
@@ -103,13 +103,15 @@ def track_player(
     shrink = width / video.width
     scene = _first_scene(video, camera, width)
     tall = colors.height * shrink
-    tables = posterior_tables(colors).astype(np.float32)
+    parts = posterior_tables(colors)
+    head = parts[colors.names.index("head")]
+    tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
     found, to_picture = [], np.linalg.inv(shrinking(shrink))
     pictures = video.frames(width=width)
     for number, picture in enumerate(progress(pictures, "Following the player", len(video))):
         lab = to_lab(picture)
         foreground = scene.foreground(lab, number, to_picture)
-        evidence = _weigh(lab, tables, colors, foreground, tall)
+        evidence = _weigh(lab, tables, foreground, tall)
         found.append(_search(evidence, tall))
     return _connect(found, video, camera, (shrink, tall), options)
 
@@ -130,17 +132,16 @@ def _first_scene(video: Video, camera: CameraPath, width: int) -> Scene:
 
 def _weigh(
     lab: UInt8[np.ndarray, "h w 3"],
-    tables: Float[np.ndarray, "C bins"],
-    colors: Colors,
+    tables: Float[np.ndarray, "3 bins"],
     foreground: Float[np.ndarray, "h w"],
     tall: float,
 ) -> _Evidence:
     """Back-projection weighted by foreground, low-passed at the size of each part."""
     bins = color_bins(lab)
     weight = (STILL_WEIGHT + (1 - STILL_WEIGHT) * foreground).astype(np.float32)
-    head = tables[colors.names.index("head")][bins] * weight
-    foot = tables[colors.names.index("foot")][bins] * weight
-    any_part = tables.max(axis=0)[bins] * foreground.astype(np.float32)
+    head = tables[0][bins] * weight
+    foot = tables[1][bins] * weight
+    any_part = tables[2][bins] * foreground.astype(np.float32)
     return _Evidence(
         head=cv2.GaussianBlur(head, (0, 0), max(0.8, 0.25 * HEAD_RADIUS * tall)),
         foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
@@ -175,8 +176,8 @@ def _search_feet(
     score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOES], axis=0)
     feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below)
     leg = _mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
-    under = _mean_inside(evidence, feet, (-0.06, 0.08, 0.06, 0.25), tall)
-    strength = strength * (0.05 + leg) * (1.05 - under)
+    under = _mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall)
+    strength = strength * (0.05 + leg) * (1.05 - under.clip(0, 1)) ** 2
     order = np.argsort(-strength)[:FEET]
     return feet[order], strength[order]
 
@@ -283,10 +284,10 @@ def _pair_costs(
         return np.zeros(0)
     both = feet[pairs]
     middle = both.mean(axis=1) - head
-    short = np.maximum(0, 0.6 * height - middle[:, 1]) + np.maximum(0, middle[:, 1] - 1.1 * height)
+    short = np.maximum(0, 0.8 * height - middle[:, 1]) + np.maximum(0, middle[:, 1] - 1.1 * height)
     aside = np.maximum(0, np.abs(middle[:, 0]) - 0.5 * height)
     apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
-    off = (short**2 + aside**2 + apart**2) / (2 * (0.1 * height) ** 2)
+    off = (short**2 + aside**2 + apart**2) / (2 * (0.12 * height) ** 2)
     same = pairs[:, 0] == pairs[:, 1]
     # One place for both feet explains less of the picture than two.
     return cost[pairs].sum(axis=1) + np.where(same, 1.5, 0.0) + np.minimum(off, 12.0)
