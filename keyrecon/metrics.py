@@ -183,7 +183,7 @@ def read_truth(path: Path) -> dict[str, np.ndarray]:
     Raises KeyreconError for a file of another kind, or arrays that do not fit each other.
     """
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             truth = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, TypeError, EOFError, BadZipFile) as fault:
         raise KeyreconError(f"{path} is not a truth.npz ({fault}).") from fault

@@ -12,19 +12,21 @@ from typing import Any
 
 from keyrecon.background import BackgroundOptions, build_background
 from keyrecon.colors import ColorOptions, learn_colors
-from keyrecon.lifting.lift import LiftOptions, lift_motion
+from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
 from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes
 from keyrecon.matching.matrix import CompareOptions, compare_frames
 from keyrecon.matching.propagate import PropagateOptions, propagate_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.records import (
+    SOURCES,
     Annotations,
     Background,
     CameraPath,
     Colors,
     Comparison,
     Figures,
+    JointTracks,
     Keyframes,
     Motion,
     Pick,
@@ -142,7 +144,37 @@ def reconstruct(
         options=options.lift,
         progress=progress,
     )
-    return assemble_motion(preparation, annotations, tracks, lifted, options)
+    return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
+
+
+def assemble_motion(
+    preparation: Preparation,
+    annotations: Annotations,
+    found: tuple[JointTracks, LiftResult],
+    height: float | None,
+) -> Motion:
+    """The result with the evidence behind each joint, in metres where a height was given."""
+    tracks, lifted = found
+    video, carried = preparation.video, np.isfinite(tracks.joints).all(axis=2)
+    source = np.where(carried, SOURCES.index("propagated"), SOURCES.index("interpolated"))
+    source[carried & lifted.rejected] = SOURCES.index("refined")
+    marked = np.isfinite(annotations.joints).all(axis=2)
+    source[annotations.frames] = np.where(
+        marked, SOURCES.index("annotated"), source[annotations.frames]
+    )
+    return Motion(
+        skeleton=annotations.skeleton,
+        points3d=lifted.points3d,
+        points2d=lifted.points2d,
+        points2d_propagated=tracks.joints,
+        confidence=np.where(lifted.rejected, 0.0, tracks.confidence),
+        source=source,
+        scale=lifted.scale,
+        fps=video.fps,
+        time=video.time,
+        units="body heights" if height is None else "m",
+        keyframes=annotations.frames,
+    )
 
 
 def as_printed(options: Options = Options()) -> Options:
@@ -151,7 +183,7 @@ def as_printed(options: Options = Options()) -> Options:
         options,
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
-        lift=replace(options.lift, method="paper"),
+        lift=replace(options.lift, refine=replace(options.lift.refine, method="paper")),
     )
 
 

@@ -203,7 +203,9 @@ class JointTracks:
 
 
 SOURCES = ("annotated", "propagated", "interpolated", "refined")
-"""Legend of `Motion.source`."""
+"""Legend of `Motion.source`, the evidence behind each joint: marked by a person in this frame;
+carried from a keyframe; no evidence, filled by the motion before and after; carried, but taken
+for a slip and replaced by the refinement."""
 
 
 @dataclass(frozen=True, eq=False)

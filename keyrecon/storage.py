@@ -1,13 +1,14 @@
 """Records on disk: one npz file each, arrays beside a JSON description, no pickle.
 
-A record of `keyrecon.records` is taken apart into arrays and a tree that says where they
-belong. Tuples of records of one kind (one per frame) are stored end to end with their lengths,
+A record (a frozen dataclass of this package) is taken apart into arrays and a tree that says where
+they belong. Tuples of records of one kind (one per frame) are stored end to end with their
 so that a long video costs a handful of arrays, not thousands.
 """
 
 import json
 import os
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any
@@ -15,7 +16,6 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from keyrecon import body, records
 from keyrecon.errors import KeyreconError
 
 Tree = dict[str, Any]
@@ -43,7 +43,7 @@ def load_record(path: Path) -> Any:
         with np.load(path, allow_pickle=False) as stored:
             tree = json.loads(stored["tree"].tobytes())
             return _put_together(tree, stored)
-    except (OSError, ValueError, KeyError, TypeError, BadZipFile) as fault:
+    except (OSError, ValueError, KeyError, TypeError, ImportError, BadZipFile) as fault:
         raise KeyreconError(
             f"{path} is not a stored result ({fault}); delete it and run again."
         ) from fault
@@ -54,7 +54,7 @@ def _take_apart(value: object, arrays: Arrays) -> Tree:
         return {"array": _store(value, arrays)}
     if is_dataclass(value):
         parts = {f.name: _take_apart(getattr(value, f.name), arrays) for f in fields(value)}
-        return {"record": type(value).__name__, "fields": parts}
+        return {"record": _name_type(value), "fields": parts}
     if isinstance(value, tuple):
         if _is_ragged(value):
             return _take_apart_ragged(value, arrays)
@@ -86,7 +86,7 @@ def _take_apart_ragged(parts: tuple, arrays: Arrays) -> Tree:
             "data": _store(np.concatenate(columns), arrays),
             "lengths": _store(np.array([len(c) for c in columns]), arrays),
         }
-    return {"ragged": type(parts[0]).__name__, "count": len(parts), "fields": stored}
+    return {"ragged": _name_type(parts[0]), "count": len(parts), "fields": stored}
 
 
 def _store(array: np.ndarray, arrays: Arrays) -> str:
@@ -116,8 +116,16 @@ def _put_together(tree: Tree, stored: Any) -> Any:
     return tree["value"]
 
 
+def _name_type(value: object) -> str:
+    return f"{type(value).__module__}:{type(value).__name__}"
+
+
 def _record_type(name: str) -> type:
-    kind = body.Skeleton if name == "Skeleton" else vars(records).get(name)
-    if not (isinstance(kind, type) and is_dataclass(kind)):
+    """The record of that name; nothing but the package's own records is ever called."""
+    module, _, kind = name.partition(":")
+    if module.split(".")[0] != "keyrecon":
         raise ValueError(f"unknown record '{name}'")
-    return kind
+    found = vars(import_module(module)).get(kind)
+    if not (isinstance(found, type) and is_dataclass(found)):
+        raise ValueError(f"unknown record '{name}'")
+    return found

@@ -41,8 +41,7 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
         "printed_count": {name: half.printed_count for name, half in halves.items()},
         "nearest": {name: half.nearest.tolist() for name, half in halves.items()},
         "distance": {
-            name: np.round(half.distance.astype(float), 5).tolist()
-            for name, half in halves.items()
+            name: np.round(half.distance.astype(float), 5).tolist() for name, half in halves.items()
         },
         "represented": {name: _stretches(half.represented) for name, half in halves.items()},
     }

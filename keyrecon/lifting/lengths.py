@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import ancestry, breadths
-from keyrecon.lifting.shown import log_density
+from keyrecon.lifting.shown import LEANINGS, log_density
 from keyrecon.records import Annotations, JointTracks
 
 
@@ -150,8 +150,7 @@ def _fit(
         lengths, factor, drift = x[:kinds], x[kinds], x[kinds + 1 :]
         log_full = log_height[votes.frame] + factor + at_vote @ drift + lengths[votes.kind]
         shown = np.exp(votes.shown - log_full)
-        value, slope = log_density(shown, votes.noise / np.exp(log_full))
-        pull = slope * shown
+        value, pull = _agreement(votes, shown, votes.noise / np.exp(log_full), kinds)
         off = (lengths - log_table) / options.spread
         rough = np.diff(drift) / jump
         far = drift / options.scale_spread / 2
@@ -160,10 +159,31 @@ def _fit(
         gradient[:kinds] += np.bincount(votes.kind, pull, kinds)
         gradient[kinds] += pull.sum()
         gradient[kinds + 1 :] += at_vote.T @ pull
-        return float(-value.sum() + 0.5 * (off @ off + rough @ rough + far @ far)), gradient
+        return float(-value + 0.5 * (off @ off + rough @ rough + far @ far)), gradient
 
     best = minimize(cost, start, jac=True, method="L-BFGS-B").x
     return best[:kinds], log_height + best[kinds] + blend @ best[kinds + 1 :]
+
+
+def _agreement(
+    votes: _Votes, shown: Float[np.ndarray, "n"], noise: Float[np.ndarray, "n"], kinds: int
+) -> tuple[float, Float[np.ndarray, "n"]]:
+    """Log likelihood of shown lengths, and what it loses per unit of the log full length.
+
+    How much a bone prefers the image plane or the line of sight is not known (hips seen from
+    the side never show their breadth): all of its votes share one unknown leaning.
+    """
+    value = np.empty((len(LEANINGS), kinds))
+    slopes = []
+    for row, leaning in enumerate(LEANINGS):
+        log_p, slope = log_density(shown, noise, leaning)
+        value[row] = np.bincount(votes.kind, log_p, kinds)
+        slopes.append(slope)
+    best = value.max(axis=0)
+    weight = np.exp(value - best)
+    total = weight.sum(axis=0)
+    mean_slope = ((weight / total)[:, votes.kind] * np.array(slopes)).sum(axis=0)
+    return float((best + np.log(total)).sum()), mean_slope * shown
 
 
 def _first_factor(

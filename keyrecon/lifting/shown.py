@@ -19,33 +19,56 @@ _SLIPS = 0.03
 _LONGEST, _FINEST, _COARSEST = 2.0, 0.005, 0.8
 
 
+LEANINGS = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
+"""How a bone may prefer some directions: towards the image (negative) or the line of sight."""
+
+
+def _leaning_weight(share: Float[np.ndarray, "n"], leaning: float) -> Float[np.ndarray, "n"]:
+    """Density of the depth share: c^k for a leaning k > 0, (1 - c)^|k| for k < 0."""
+    power = abs(leaning)
+    return (power + 1) * (share if leaning > 0 else 1 - share) ** power
+
+
 @cache
-def _tables() -> tuple[RectBivariateSpline, ...]:
-    shown = np.linspace(0.0, _LONGEST, 401)
-    noise = np.geomspace(_FINEST, _COARSEST, 24)
-    share = (np.arange(600) + 0.5) / 600
+def _kernel() -> tuple[Float[np.ndarray, "..."], ...]:
+    """Blurred densities of the shown length for single depth shares on the grid."""
+    shown = np.linspace(0.0, _LONGEST, 301)
+    noise = np.geomspace(_FINEST, _COARSEST, 20)
+    share = (np.arange(400) + 0.5) / 400
     gap = (shown[:, None, None] - np.sqrt(1 - share**2)) / noise[:, None]
     exponent = -0.5 * gap**2
     peak = exponent.max(axis=-1)
-    kernel = np.exp(exponent - peak[..., None])
-    density = kernel.mean(axis=-1) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
-    mean_share = (kernel * share).mean(axis=-1) / kernel.mean(axis=-1)
-    variance = (kernel * share**2).mean(axis=-1) / kernel.mean(axis=-1) - mean_share**2
+    return shown, noise, share, peak, np.exp(exponent - peak[..., None])
+
+
+@cache
+def _density(leaning: float) -> RectBivariateSpline:
+    shown, noise, share, peak, kernel = _kernel()
+    weight = _leaning_weight(share, leaning)
+    density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
+    table = np.log(shown[:, None] * density + _SLIPS)
+    return RectBivariateSpline(shown, np.log(noise), table, kx=2, ky=1)
+
+
+@cache
+def _moments() -> tuple[RectBivariateSpline, RectBivariateSpline]:
+    shown, noise, share, _, kernel = _kernel()
+    total = kernel.sum(axis=-1)
+    mean = kernel @ share / total
+    variance = np.maximum(kernel @ share**2 / total - mean**2, 0.0)
+    grid = (shown, np.log(noise))
     return (
-        RectBivariateSpline(
-            shown, np.log(noise), np.log(shown[:, None] * density + _SLIPS), kx=2, ky=1
-        ),
-        RectBivariateSpline(shown, np.log(noise), mean_share, kx=1, ky=1),
-        RectBivariateSpline(shown, np.log(noise), np.sqrt(np.maximum(variance, 0.0)), kx=1, ky=1),
+        RectBivariateSpline(*grid, mean, kx=1, ky=1),
+        RectBivariateSpline(*grid, np.sqrt(variance), kx=1, ky=1),
     )
 
 
 def log_density(
-    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
+    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"], leaning: float = 0.0
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
     """Logarithm of the density of log q, and its derivative by q."""
-    table, _, _ = _tables()
     at = _grid(shown, noise)
+    table = _density(leaning)
     return table.ev(*at), table.ev(*at, dx=1)
 
 
@@ -53,7 +76,7 @@ def depth_share(
     shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
 ) -> Float[np.ndarray, "*n"]:
     """Expected |dz| / l of a bone that shows the share `shown` of its length."""
-    _, mean, _ = _tables()
+    mean, _ = _moments()
     return mean.ev(*_grid(shown, noise))
 
 
@@ -61,7 +84,7 @@ def depth_doubt(
     shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
 ) -> Float[np.ndarray, "*n"]:
     """Standard deviation of |dz| / l about `depth_share`."""
-    _, _, deviation = _tables()
+    _, deviation = _moments()
     return deviation.ev(*_grid(shown, noise))
 
 

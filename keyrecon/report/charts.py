@@ -33,7 +33,7 @@ def plain_name(name: str) -> str:
 
 def keyframe_chart(keyframes: Keyframes, comparison: Comparison) -> go.Figure:
     """Which keyframe stands for which frame (Fig. 6), both halves of the body."""
-    figure = _rows(("Upper body", "Lower body"))
+    figure = _rows(("Upper body", "Lower body"), len(comparison.row))
     halves = ((keyframes.upper, comparison.upper), (keyframes.lower, comparison.lower))
     for row, (half, distances) in enumerate(halves, start=1):
         _add_occurrence(figure, row, half, _between_keyframes(half, comparison, distances))
@@ -73,9 +73,9 @@ def _add_occurrence(
     )
 
 
-def joint_chart(has_truth: bool) -> go.Figure:
+def joint_chart(frames: int, has_truth: bool) -> go.Figure:
     """An empty chart of one joint's position; the page fills in the chosen joint."""
-    figure = _rows(("Across the picture (x), px", "Down the picture (y), px"))
+    figure = _rows(("Across the picture (x), px", "Down the picture (y), px"), frames)
     for row in (1, 2):
         shown = row == 1
         traces: list[dict[str, Any]] = [
@@ -101,7 +101,7 @@ def angle_chart(motion: Motion) -> go.Figure:
     joints, sides = hinges(skeleton), joint_sides(skeleton)
     degrees = np.degrees(hinge_angles(motion.points3d, skeleton)).astype(np.float32)
     titles = list(dict.fromkeys(_pair_name(skeleton, joint) for joint in joints))
-    figure = _rows(tuple(title.capitalize() for title in titles))
+    figure = _rows(tuple(title.capitalize() for title in titles), len(degrees))
     for column, joint in enumerate(joints):
         row = titles.index(_pair_name(skeleton, joint)) + 1
         figure.add_scatter(
@@ -139,28 +139,36 @@ def source_chart(motion: Motion) -> go.Figure:
     )
     figure.update_xaxes(tickformat=".0%", rangemode="tozero")
     figure.update_yaxes(autorange="reversed")
-    return _styled(figure, 420).update_layout(barmode="stack", bargap=0.25, hovermode="closest")
+    for title, axis in zip(figure.layout.annotations, ("xaxis", "xaxis2"), strict=True):
+        title.update(x=figure.layout[axis].domain[0], xanchor="left")
+    return _styled(figure, 440).update_layout(
+        barmode="stack", bargap=0.25, hovermode="closest", margin={"l": 110, "b": 70},
+        legend={"y": -0.1, "x": 0, "xanchor": "left", "yanchor": "top", "traceorder": "normal"},
+    )
 
 
-def error_chart(
-    error: Float[np.ndarray, "T"], keyframes: Int[np.ndarray, "K"], unit: str
+def trust_chart(
+    values: Float[np.ndarray, "T"], keyframes: Int[np.ndarray, "K"], title: str
 ) -> go.Figure:
-    """3D error of every frame, with the annotated frames marked."""
-    figure = _rows(("",))
-    figure.add_scatter(x=np.arange(len(error)), y=error.astype(np.float32).round(4), mode="lines",
-                       line={"width": 1.4, "color": "var(--accent)"}, name="error")
-    figure.add_scatter(x=keyframes, y=error[keyframes].round(4), mode="markers", name="annotated",
+    """One number of every frame that tells how good it is, with the annotated frames marked."""
+    figure = _rows((title,), len(values))
+    figure.add_scatter(x=np.arange(len(values)), y=values.astype(np.float32).round(4), mode="lines",
+                       line={"width": 1.4, "color": "var(--accent)"}, name="every frame")
+    figure.add_scatter(x=keyframes, y=values[keyframes].round(4), mode="markers", name="annotated",
                        marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"})
-    figure.update_yaxes(title_text=unit, rangemode="tozero")
-    return _styled(figure, 260)
+    figure.update_yaxes(rangemode="tozero")
+    return _styled(figure, 250)
 
 
-def _rows(titles: tuple[str, ...]) -> go.Figure:
+def _rows(titles: tuple[str, ...], frames: int) -> go.Figure:
+    """Charts over the same frames, one above the other."""
     count = max(1, len(titles))
     figure = make_subplots(
         rows=count, shared_xaxes=True, subplot_titles=titles,
         vertical_spacing=0.22 / max(2, count),
     )
+    figure.update_annotations(x=0, xanchor="left")
+    figure.update_xaxes(range=[-0.5, frames - 0.5])
     return figure.update_xaxes(title_text="frame", row=count, col=1)
 
 

@@ -49,6 +49,25 @@ def bone_sides(skeleton: Skeleton) -> Int[np.ndarray, "n"]:
     return np.where(at_trunk, 2, sides[bones[:, 1]])
 
 
+def trunk_outline(skeleton: Skeleton) -> list[int]:
+    """The joints around the trunk, in order: both shoulders and both hips; empty without them."""
+    at_root = [pair for pair in skeleton.mirrored if skeleton.parents[pair[0]] == skeleton.root]
+    upper = [pair for pair in at_root if not skeleton.is_lower[pair[0]]]
+    lower = [pair for pair in at_root if skeleton.is_lower[pair[0]]]
+    return [*upper[0], *lower[0][::-1]] if upper and lower else []
+
+
+def head_bone(skeleton: Skeleton) -> list[int]:
+    """The bone that holds the head: from the root to an end on the midline; empty without one."""
+    middle = joint_sides(skeleton) == 2
+    ends = [
+        joint
+        for joint, parent in enumerate(skeleton.parents)
+        if parent == skeleton.root and middle[joint] and joint not in skeleton.parents
+    ]
+    return [skeleton.root, ends[0]] if ends else []
+
+
 def draw_pose(
     picture: UInt8[np.ndarray, "h w 3"],
     points2d: Float[np.ndarray, "J 2"],

@@ -16,7 +16,7 @@ from keyrecon import __version__
 from keyrecon.durable import write_durably
 from keyrecon.progress import Progress, silent
 from keyrecon.report import charts, sections
-from keyrecon.report.drawing import bone_sides, drawn_bones
+from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
 from keyrecon.report.markup import data_block, note, pack, section, text, to_json
 from keyrecon.report.material import ReportMaterial
 from keyrecon.report.pictures import Pictures, cut_pictures
@@ -59,7 +59,7 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
     chosen = strip[:: max(1, round(len(strip) / VIEW_COUNT))]
     return "".join((
         sections.headline(material),
-        _error_over_time(material),
+        _trust_over_time(material),
         sections.story(pictures, material.motion.time),
         sections.keyframe_pictures(material, pictures),
         _occurrence(material),
@@ -81,15 +81,15 @@ def _chart(name: str, figure: go.Figure) -> str:
     return f'<div class="chart" data-chart="{name}" style="min-height:{height}px"></div>{block}'
 
 
-def _error_over_time(material: ReportMaterial) -> str:
+def _trust_over_time(material: ReportMaterial) -> str:
+    """The error of every frame where the truth is known, else how sure the method was."""
     motion, truth = material.motion, material.true_joints
     if truth is None:
-        return ""
-    error = error_per_frame(motion, truth)
-    unit = "error, m" if motion.units == "m" else "error, body heights"
-    return "<h3>Error over time</h3>" + _chart(
-        "error", charts.error_chart(error, motion.keyframes, unit)
-    )
+        values, title = motion.confidence.mean(axis=1), "Mean confidence of all joints, 0 to 1"
+    else:
+        unit = "m" if motion.units == "m" else "body heights"
+        values, title = error_per_frame(motion, truth), f"Mean error of all joints, {unit}"
+    return _chart("trust", charts.trust_chart(values, motion.keyframes, title))
 
 
 def _occurrence(material: ReportMaterial) -> str:
@@ -111,7 +111,7 @@ def _joint_curves(material: ReportMaterial) -> str:
     return section(
         "curves", "Joints before and after refinement",
         f'<label class="chooser">Joint <select id="joint">{options}</select></label>',
-        _chart("joint", charts.joint_chart(material.truth is not None)),
+        _chart("joint", charts.joint_chart(len(material.motion.time), material.truth is not None)),
     )
 
 
@@ -190,6 +190,8 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
         "bones": drawn_bones(skeleton).tolist(),
         "sides": bone_sides(skeleton).tolist(),
         "stature": stature(motion),
+        "trunk": trunk_outline(skeleton),
+        "head": head_bone(skeleton),
         "points3d": pack(center_on_root(motion.points3d, skeleton.root)),
         "truth3d": None if truth is None else pack(scale_truth(motion, truth.points3d)),
         "refined": pack(motion.points2d),

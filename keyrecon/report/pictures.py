@@ -27,7 +27,7 @@ STILL, CLIP = 420, 336
 JPEG_QUALITY = 80
 CLIP_QUALITY = 27
 """x264's crf; 27 keeps a minute of the small video under about 2 MB."""
-ROOM = 1.75
+ROOM = 1.65
 """Side of the window in player heights: a raised arm with a racket fits."""
 CALM = 0.2
 """Seconds over which the window's motion is smoothed, so that the player moves, not the picture."""

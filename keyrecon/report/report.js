@@ -237,6 +237,7 @@
     if (truth3d && ghost && ghost.checked) stroke(pen, truth3d, (p) => project(...p), () => color("--truth"), 4);
     pen.globalAlpha = 1;
     const sides = ["--left", "--right", "--trunk"].map(color);
+    drawTrunk(pen, joint, project, sides[2]);
     stroke(pen, points3d, (p) => project(...p), (bone) => sides[data.sides[bone]], 7, color("--card"));
 
     // Bones far to near; a seam lets the nearer one pass visibly over the farther one.
@@ -246,16 +247,46 @@
       for (const [a, b, bone] of lines) {
         if (!Number.isFinite(a[0] + b[0])) continue;
         const wide = thickness * ((a[3] + b[3]) / 2) ** 2 * Math.sqrt(view.zoom);
-        for (const [style, size] of seam ? [[seam, wide + 4], [paintOf(bone), wide]] : [[paintOf(bone), wide]]) {
-          pen.strokeStyle = style;
-          pen.lineWidth = size;
-          pen.beginPath();
-          pen.moveTo(a[0], a[1]);
-          pen.lineTo(b[0], b[1]);
-          pen.stroke();
-        }
+        if (seam) line(pen, a, b, 0.2, seam, wide + 5);
+        line(pen, a, b, 0, paintOf(bone), wide);
       }
     }
+  }
+
+  // A line from `a` to `b` without a share of its length at both ends.
+  function line(pen, a, b, without, style, width) {
+    const at = (share) => [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+    pen.strokeStyle = style;
+    pen.lineWidth = width;
+    pen.lineCap = without ? "butt" : "round";
+    pen.beginPath();
+    pen.moveTo(...at(without));
+    pen.lineTo(...at(1 - without));
+    pen.stroke();
+  }
+
+  // The trunk as a tinted plane and the head as a ball, so that the eye sees which way it faces.
+  function drawTrunk(pen, joint, project, style) {
+    pen.fillStyle = style;
+    pen.globalAlpha = 0.16;
+    if (data.trunk.length) {
+      pen.beginPath();
+      for (const j of data.trunk) {
+        const [x, y] = project(...joint(points3d, j));
+        pen.lineTo(x, y);
+      }
+      pen.fill();
+    }
+    if (data.head.length) {
+      const [low, high] = data.head.map((j) => joint(points3d, j));
+      const [x, y, , near] = project(...low.map((value, n) => value + 0.62 * (high[n] - value)));
+      const [left, right] = [project(...low), project(...high)];
+      const size = 0.38 * Math.max(Math.hypot(left[0] - right[0], left[1] - right[1]), 30 * near);
+      pen.beginPath();
+      pen.arc(x, y, size || 0, 0, 2 * Math.PI);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
   }
 
   function drawGrid(pen, project, level) {

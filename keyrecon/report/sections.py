@@ -219,9 +219,9 @@ def reference_views(material: ReportMaterial, frames: list[int]) -> str:
         rows.append((view, _drawings(found, frames, motion.skeleton, view, height)))
         if true is not None:
             truth_row = _drawings(true, frames, motion.skeleton, view, height)
-            rows.append((f"truth, {view}", truth_row))
+            rows.append(("truth", truth_row))
     body = "".join(
-        f'<tr{" class=true" if name.startswith("truth") else ""}><th scope="row">{name}</th>'
+        f'<tr{" class=true" if name == "truth" else ""}><th scope="row">{name}</th>'
         + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
         for name, cells in rows
     )
@@ -256,8 +256,18 @@ def body_tables(material: ReportMaterial) -> str:
     ) if len(slow) else ""
     return section(
         "body", "Bones, joints and feet",
-        "<h3>Bone lengths</h3>", _bone_table(motion),
-        "<h3>Joints</h3>", _joint_table(material), feet,
+        f'<div class="pair tables"><div><h3>Bone lengths</h3>{_bone_table(motion)}</div>',
+        f"<div><h3>Joints in the picture</h3>{_joint_table(material)}</div></div>",
+        _joint_note(), feet,
+    )
+
+
+def _joint_note() -> str:
+    return note(
+        "Bones: mean over time, its standard deviation, the longer side and the average adult "
+        "(Winter). Joints: not found, share of frames; moved by refinement and error, median in "
+        "% of the player's height; acceleration, mean in player heights per second squared: noise "
+        "shows there first."
     )
 
 
@@ -274,10 +284,9 @@ def _bone_table(motion: Motion) -> str:
         rows.append((
             f"{plain_name(skeleton.names[parent])} to {plain_name(skeleton.names[child])}",
             f"{mean[bone]:.3f}", f"{spread[bone] / mean[bone]:.2%}",
-            number(mirrored, "+.1%"), f"{mean[bone] / expected[bone] - 1:+.0%}",
+            number(mirrored, "+.1%"), f"{mean[bone] / expected[bone] - 1:+.1%}",
         ))
-    head = ("bone", f"length, {unit}", "varies by", "against the other side",
-            "against average proportions")
+    head = ("bone", f"length, {unit}", "varies", "other side", "average")
     return table(head, rows, "Bone lengths")
 
 
@@ -285,23 +294,19 @@ def _joint_table(material: ReportMaterial) -> str:
     motion, track = material.motion, material.track
     columns = [
         ("not found", missing_shares(motion), ".1%"),
-        ("moved by refinement", correction(motion, track), ".1%"),
+        ("moved", correction(motion, track), ".1%"),
         ("acceleration before", joint_acceleration(motion.points2d_propagated, track, motion.fps),
          ".1f"),
         ("acceleration after", joint_acceleration(motion.points2d, track, motion.fps), ".1f"),
     ]
     if material.true_joints is not None:
         error = truth_error_2d(motion, material.true_joints.points2d, track)
-        columns.append(("picture error", error, ".1%"))
+        columns.append(("error", error, ".1%"))
     rows = [
         (plain_name(name), *(number(float(values[joint]), form) for _, values, form in columns))
         for joint, name in enumerate(motion.skeleton.names)
     ]
-    about = note(
-        "In the picture. Shares and distances are medians in % of the player's height; "
-        "acceleration is the mean in player heights per second squared, where noise shows first."
-    )
-    return about + table(("joint", *(name for name, _, _ in columns)), rows, "Joints")
+    return table(("joint", *(name for name, _, _ in columns)), rows, "Joints")
 
 
 def stage_times(seconds: dict[str, float]) -> str:

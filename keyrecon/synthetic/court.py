@@ -14,6 +14,7 @@ from jaxtyping import Float, UInt8
 
 from keyrecon.synthetic.cameras import CameraMove
 from keyrecon.synthetic.looks import Court, Look
+from keyrecon.synthetic.props import View, add_props
 from keyrecon.synthetic.shading import make_noise
 
 NET_Z = -11.885
@@ -61,8 +62,8 @@ class Rays:
         return np.float32(self.origin[axis]) + np.where(np.isfinite(t), t, 0) * self.direction[axis]
 
 
-def draw_background(move: CameraMove, look: Look, seed: int) -> Background:
-    """Surroundings as seen in all frames of a camera move."""
+def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> Background:
+    """Surroundings as seen in all frames of a camera move; things stand `beyond` metres away."""
     middle = len(move.rotation) // 2
     rotation = move.rotation[middle]
     focal = float(move.focal.max()) * SHARPNESS
@@ -70,8 +71,14 @@ def draw_background(move: CameraMove, look: Look, seed: int) -> Background:
     shrink = min(1.0, float(np.sqrt(MOST_PIXELS / np.prod(hi - lo))))
     focal, lo, hi = focal * shrink, np.floor(lo * shrink), np.ceil(hi * shrink)
     rays = _cast(move.center, rotation, focal, (lo, hi))
-    picture = _paint(rays, look, np.random.default_rng([seed, 23]))
-    return Background(np.clip(picture, 0, 255).astype(np.uint8), rotation, focal, lo)
+    painted, surface_t = _paint(rays, look, np.random.default_rng([seed, 23]))
+    picture = np.clip(painted, 0, 255).astype(np.uint8)
+    view = View(move.center, rotation, focal, -lo, beyond)
+    behind = move.center[2] < NET_Z  # the camera looks through the net from the far side
+    add_props(picture, view, (look, seed), lambda z: (z > NET_Z) == behind)
+    _add_net(picture, rays, surface_t, look.court)
+    add_props(picture, view, (look, seed), lambda z: (z > NET_Z) != behind)
+    return Background(picture, rotation, focal, lo)
 
 
 def _extent(
@@ -101,8 +108,10 @@ def _cast(
     return Rays(origin, direction)
 
 
-def _paint(rays: Rays, look: Look, rng: np.random.Generator) -> Float[np.ndarray, "h w 3"]:
-    """Floor, walls, trees and sky, net."""
+def _paint(
+    rays: Rays, look: Look, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]:
+    """Floor, walls, trees, crowd and sky; and the ray parameter at which they are met."""
     court = look.court
     floor_t = rays.meet(1, 0.0)
     side = np.where(rays.direction[0] > 0, np.float32(WALLS[1]), np.float32(WALLS[0]))
@@ -117,8 +126,7 @@ def _paint(rays: Rays, look: Look, rng: np.random.Generator) -> Float[np.ndarray
     along = np.where(side_t < end_t, rays.at(side_t, 2), rays.at(end_t, 0) + 40)
     wall = _paint_wall(along, rays.at(wall_t, 1), court, (noise, broad))
     picture = np.where(on_floor[..., None], picture, wall)
-    surface_t = np.minimum(floor_t, wall_t)
-    return _add_net(picture, rays, surface_t, court)
+    return picture, np.minimum(floor_t, wall_t)
 
 
 def sample(tile: np.ndarray, u: np.ndarray, v: np.ndarray, texel: float) -> np.ndarray:
@@ -191,14 +199,47 @@ def _paint_wall(
     trees = np.float32(court.trees) * np.clip(leaves, 0.25, 2)[..., None]
     haze = np.clip((height - 3) / 40, 0, 1)[..., None]
     sky = np.float32(court.sky) * (1 - 0.25 * haze)
-    above = np.where((height < crown)[..., None], trees, sky)
+    foot = np.abs(np.gradient(height, axis=0)) + 1e-3
+    cover = np.clip((crown - height) / foot + 0.5, 0, 1)[..., None]
+    above = sky + cover * (trees - sky)
+    if court.crowd:
+        above = _seat_crowd(above, along, height)
     return np.where((height < WALL_HEIGHT)[..., None], screen, above).astype(np.float32)
 
 
-def _add_net(
-    picture: Float[np.ndarray, "h w 3"], rays: Rays, surface_t: np.ndarray, court: Court
+SEAT, ROW = 0.56, 0.62
+"""Metres between two spectators and between two rows of a stand."""
+
+
+def _seat_crowd(
+    picture: Float[np.ndarray, "h w 3"],
+    along: Float[np.ndarray, "h w"],
+    height: Float[np.ndarray, "h w"],
 ) -> Float[np.ndarray, "h w 3"]:
-    """The net, through which the far court is seen."""
+    """Rows of people in all colours above the wall."""
+    up = (height - WALL_HEIGHT - 0.15) / ROW
+    row = np.floor(up)
+    shifted = along / SEAT + 0.5 * row
+    seat = np.floor(shifted)
+    number = np.abs(np.sin(seat * 12.9898 + row * 78.233) * 43758.5453) % 1.0
+    x, y = (shifted - seat - 0.5) * SEAT, (up - row) * ROW
+    clothes = np.stack([(number * k) % 1.0 for k in (7.0, 13.0, 29.0)], axis=-1) * 190 + 45
+    skin = np.float32((205, 155, 122)) * (0.45 + 0.6 * ((number * 41) % 1.0))[..., None]
+    taken = (number > 0.22) & (row >= 0) & (row < 5)
+    body = taken & (np.abs(x) < 0.2) & (y < 0.36)
+    head = taken & (x**2 + (y - 0.45) ** 2 < 0.0121)
+    picture = np.where(((row >= 0) & (row < 5))[..., None], np.float32((74, 78, 84)), picture)
+    picture = np.where(body[..., None], clothes, picture)
+    return np.where(head[..., None], skin, picture)
+
+
+def _add_net(
+    picture: UInt8[np.ndarray, "h w 3"],
+    rays: Rays,
+    surface_t: Float[np.ndarray, "h w"],
+    court: Court,
+) -> None:
+    """Hang the net, through which the far court is seen."""
     t = rays.meet(2, NET_Z)
     x, y = rays.at(t, 0), rays.at(t, 1)
     top = 0.914 + 0.156 * np.abs(x) / 6.4
@@ -206,7 +247,6 @@ def _add_net(
     band = shown & (y > top - 0.06)
     post = (t < surface_t) & (np.abs(np.abs(x) - 6.4) < 0.05) & (y > 0) & (y < 1.07)
     mesh = 0.5 + 0.15 * np.sign(np.sin(x * np.pi / 0.045)) * np.sign(np.sin(y * np.pi / 0.045))
-    picture = np.where(shown[..., None], picture * (1 - mesh[..., None]) + 14, picture)
-    picture[band] = np.float32(court.line)
+    picture[shown] = (picture[shown] * (1 - mesh[shown][:, None]) + 14).astype(np.uint8)
+    picture[band] = np.round(court.line)
     picture[post] = (40, 60, 50)
-    return picture

@@ -221,8 +221,13 @@ def _add_trunk(
         body.add("shirt", (top, chest), across, (0.07 * g, 0.085 * g))
     seat = between(pelvis, neck, 0.1)
     body.add("shorts", (seat, pelvis), low, (0.142 * g, 0.15 * g), squeeze=(1.0, 0.75))
+    if build.skirt:
+        knees = (joint(points, "right_knee") + joint(points, "left_knee")) / 2
+        hem = between(pelvis, knees, 0.8 * build.leg)
+        body.add("shorts", (seat, hem), low, (0.135 * g + loose, 0.185 * g + loose),
+                 squeeze=(1.0, 0.7), cut=True)  # fmt: skip
     for hip in hips:
-        body.add("shorts", (between(hip, pelvis, 0.2), hip), low, (0.105 * g, 0.1 * g))
+        body.add("shorts", (between(hip, pelvis, 0.25), hip), low, (0.102 * g, 0.09 * g))
 
 
 def _add_head(body: _Assembly, points: np.ndarray, pointers: Pointers, build: Build) -> None:
@@ -303,12 +308,12 @@ def _add_trousers(
 ) -> None:
     hip, knee, ankle = leg
     g, loose = build.girth, 0.014 * build.looseness
-    flare = 0.05 if build.skirt else 0.0
+    flare = 0.025 if build.skirt else 0.0
     reach = min(build.leg, 1.0)
-    end = 0.1 * g + loose + flare - (0.03 * reach if not build.skirt else 0)
+    end = 0.096 * g + loose + flare - (0.03 * reach if not build.skirt else 0)
     body.add(
         "shorts", (between(hip, knee, 0.03), between(hip, knee, reach)), across,
-        (0.1 * g + 0.5 * loose, end), cut=build.leg <= 1,
+        (0.09 * g + 0.4 * loose, end), cut=build.leg <= 1,
     )  # fmt: skip
     if build.leg > 1:
         cuff = between(knee, ankle, build.leg - 1)

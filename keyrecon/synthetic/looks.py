@@ -40,6 +40,8 @@ class Court:
     board: Rgb = (30, 70, 140)
     trees: Rgb = (58, 84, 46)
     sky: Rgb = (184, 206, 228)
+    crowd: bool = False
+    """Whether a stand full of people rises above the wall."""
 
 
 @dataclass(frozen=True)
@@ -147,4 +149,5 @@ def _choose_court(seed: int, rng: np.random.Generator) -> Court:
         board=_jitter(_SHIRTS[rng.integers(len(_SHIRTS))], rng),
         trees=_jitter((60, 86, 48), rng, 10),
         sky=_jitter((190, 208, 226), rng, 10),
+        crowd=seed % 3 == 1,
     )

@@ -15,9 +15,12 @@ from jaxtyping import Bool, Float, Int, UInt8
 from keyrecon.body import LSP14
 from keyrecon.synthetic.cameras import CameraMove
 from keyrecon.synthetic.court import Background
-from keyrecon.synthetic.figure import FigureSolids, Pointers, build_solids, unit
+from keyrecon.synthetic.figure import PARTS, FigureSolids, Pointers, build_solids, unit
 from keyrecon.synthetic.looks import Look
-from keyrecon.synthetic.raster import FAR, Solids, Surface, draw_solids
+from keyrecon.synthetic.racket import MOST as RACKET_MOST
+from keyrecon.synthetic.racket import STEP as RACKET_STEP
+from keyrecon.synthetic.racket import Layer, draw_racket
+from keyrecon.synthetic.raster import Solids, Surface, draw_solids
 from keyrecon.synthetic.shading import Light, Tiles, paint_surface
 
 STEP = 5.0
@@ -34,6 +37,8 @@ class Stage:
     points: Float[np.ndarray, "T 14 3"]
     """World, metres."""
     pointers: Pointers
+    racket: Float[np.ndarray, "T 3 3"]
+    """Fist, direction to the tip, direction across; see `racket.racket_frames`."""
     move: CameraMove
     background: Background
     look: Look
@@ -60,9 +65,9 @@ def draw_frame(stage: Stage, frame: int) -> Frame:
     """Draw one frame."""
     picture = _draw_background(stage, frame).astype(np.float32)
     times = _instants(stage, frame)
-    solids, points = _pose(stage, times)
+    solids = _pose(stage, times)
     _cast_shadow(stage, frame, solids, picture)
-    drawn = _draw_figure(stage, frame, solids)
+    drawn = _draw_figure(stage, frame, times, solids)
     _lay_over(picture, drawn)
     parts, visible = _label(stage, frame, drawn, solids)
     return Frame(_develop(stage, frame, picture), parts, visible)
@@ -102,8 +107,7 @@ def _instants(stage: Stage, frame: int) -> Float[np.ndarray, "S"]:
     """Times at which the figure is drawn, in frames."""
     last = len(stage.points) - 1
     around = stage.points[[max(frame - 1, 0), min(frame + 1, last)]]
-    pixels = np.stack([stage.move.to_camera(p[None].repeat(len(stage.points), 0))[frame] if False else
-                       (p - stage.move.center) @ stage.move.rotation[frame].T for p in around])
+    pixels = (around - stage.move.center) @ stage.move.rotation[frame].T
     pixels = pixels[..., :2] / pixels[..., 2:] * stage.move.focal[frame]
     speed = np.linalg.norm(pixels[1] - pixels[0], axis=-1).max() / 2 * stage.exposure
     count = int(np.clip(np.ceil(speed / STEP), 2, MOST_INSTANTS))
@@ -111,7 +115,7 @@ def _instants(stage: Stage, frame: int) -> Float[np.ndarray, "S"]:
     return np.clip(times, 0, last)
 
 
-def _pose(stage: Stage, times: Float[np.ndarray, "S"]) -> tuple[FigureSolids, np.ndarray]:
+def _pose(stage: Stage, times: Float[np.ndarray, "S"]) -> FigureSolids:
     """Solids at times between frames."""
     low = np.minimum(times.astype(int), len(stage.points) - 2)
     share = times - low
@@ -125,15 +129,14 @@ def _pose(stage: Stage, times: Float[np.ndarray, "S"]) -> tuple[FigureSolids, np
         unit(at(p.front)), unit(at(p.face)), unit(at(p.toes)), unit(at(p.racket)),
         unit(at(p.strings)), p.stature, p.left_handed,
     )  # fmt: skip
-    points = at(stage.points)
-    return build_solids(points, pointers, stage.look.build), points
+    return build_solids(at(stage.points), pointers, stage.look.build)
 
 
 def _light(stage: Stage, frame: int) -> Light:
     rotation = stage.move.rotation[frame]
     look = stage.look
     return Light(
-        rotation @ np.array(look.sun), -rotation[:, 1] * 0 + rotation @ np.array([0, 1.0, 0]),
+        rotation @ np.array(look.sun), rotation @ np.array([0, 1.0, 0]),
         look.sun_color, look.sunshine, look.court.outside,
     )  # fmt: skip
 
@@ -152,22 +155,69 @@ def _in_camera(stage: Stage, frame: int, solids: FigureSolids, instant: int) -> 
 class _Instant:
     surface: Surface
     color: Float[np.ndarray, "h w 3"]
+    racket: Layer | None
+    """Already without what the body hides."""
 
 
-def _draw_figure(stage: Stage, frame: int, solids: FigureSolids) -> list[_Instant]:
+def _draw_figure(
+    stage: Stage, frame: int, times: Float[np.ndarray, "S"], solids: FigureSolids
+) -> list[_Instant]:
     colors = stage.look.part_colors[solids.part]
     light = _light(stage, frame)
+    focal = float(stage.move.focal[frame])
     drawn = []
-    for instant in range(len(solids.start)):
+    for instant, time in enumerate(times):
+        local = _in_camera(stage, frame, solids, instant)
         surface = draw_solids(
-            _in_camera(stage, frame, solids, instant),
-            float(stage.move.focal[frame]), stage.move.principal, stage.move.size,
-            OFFSETS[instant % len(OFFSETS)],
-        )  # fmt: skip
+            local, focal, stage.move.principal, stage.move.size, OFFSETS[instant % len(OFFSETS)]
+        )
         if surface is not None and (surface.solid >= 0).any():
             color = paint_surface(surface, solids.part, colors, light, stage.tiles)
-            drawn.append(_Instant(surface, color))
+            step = stage.exposure / len(times)
+            racket = _draw_racket(stage, frame, (time, step), focal / local.start[:, 2].mean())
+            drawn.append(_Instant(surface, color, _hide(racket, surface)))
     return drawn
+
+
+def _draw_racket(
+    stage: Stage, frame: int, span: tuple[float, float], scale: float
+) -> Layer | None:
+    """The racket, smeared over a span of time (middle, length; in frames)."""
+    time, length = span
+    focal, rotation = float(stage.move.focal[frame]), stage.move.rotation[frame]
+    last = len(stage.racket) - 1
+
+    def at(times: np.ndarray) -> np.ndarray:
+        low = np.minimum(np.clip(times, 0, last).astype(int), last - 1)
+        share = np.clip(times - low, 0, 1)[:, None, None]
+        poses = stage.racket[low] * (1 - share) + stage.racket[low + 1] * share
+        poses = poses - np.array([1.0, 0, 0])[:, None] * stage.move.center
+        return poses @ rotation.T
+
+    ends = at(time + length * np.array([-0.5, 0.5]))
+    tips = ends[:, 0] + 0.5 * ends[:, 1]
+    way = np.linalg.norm(tips[1] - tips[0]) * focal / tips[0, 2]
+    count = int(np.clip(np.ceil(way / RACKET_STEP), 1, RACKET_MOST))
+    poses = at(time + length * ((np.arange(count) + 0.5) / count - 0.5))
+    view = (focal, stage.move.principal, stage.move.size, scale)
+    return draw_racket(poses, view, np.float32(stage.look.racket))
+
+
+def _hide(racket: Layer | None, surface: Surface) -> Layer | None:
+    """Take away the pixels of a layer that lie behind the body."""
+    if racket is None:
+        return None
+    height, width = racket.depth.shape
+    y0, x0 = max(racket.top, surface.top), max(racket.left, surface.left)
+    y1 = min(racket.top + height, surface.top + surface.depth.shape[0])
+    x1 = min(racket.left + width, surface.left + surface.depth.shape[1])
+    if y1 > y0 and x1 > x0:
+        body = surface.depth[
+            y0 - surface.top : y1 - surface.top, x0 - surface.left : x1 - surface.left
+        ]
+        ours = (slice(y0 - racket.top, y1 - racket.top), slice(x0 - racket.left, x1 - racket.left))
+        racket.color[ours] *= (racket.depth[ours] < body)[..., None]
+    return racket
 
 
 def _lay_over(picture: Float[np.ndarray, "h w 3"], drawn: list[_Instant]) -> None:
@@ -175,21 +225,31 @@ def _lay_over(picture: Float[np.ndarray, "h w 3"], drawn: list[_Instant]) -> Non
     if not drawn:
         return
     left, top, right, bottom = _union(drawn, picture.shape)
-    color = np.zeros((bottom - top, right - left, 4), np.float32)
+    total = np.zeros((bottom - top, right - left, 4), np.float32)
     for one in drawn:
+        layer = np.zeros_like(total) if one.racket or len(drawn) > 1 else total
         y, x = one.surface.top - top, one.surface.left - left
         height, width = one.surface.solid.shape
-        part = color[y : y + height, x : x + width]
-        part[..., :3] += one.color
-        part[..., 3] += one.surface.solid >= 0
-    color = cv2.GaussianBlur(color / len(drawn), (3, 3), 0.55)
+        part = layer[y : y + height, x : x + width]
+        part[..., :3] = one.color
+        part[..., 3] = one.surface.solid >= 0
+        if one.racket:
+            y, x = one.racket.top - top, one.racket.left - left
+            height, width = one.racket.depth.shape
+            part = layer[y : y + height, x : x + width]
+            part *= 1 - one.racket.color[..., 3:]
+            part += one.racket.color
+        total += layer
+    total = cv2.GaussianBlur(total / len(drawn), (3, 3), 0.55)
     region = picture[top:bottom, left:right]
-    region *= 1 - color[..., 3:]
-    region += color[..., :3]
+    region *= 1 - total[..., 3:]
+    region += total[..., :3]
 
 
 def _union(drawn: list[_Instant], shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    boxes = np.array([(i.surface.left, i.surface.top, *i.surface.solid.shape[::-1]) for i in drawn])
+    boxes = [(i.surface.left, i.surface.top, *i.surface.solid.shape[::-1]) for i in drawn]
+    rackets = [i.racket for i in drawn if i.racket]
+    boxes = np.array(boxes + [(r.left, r.top, *r.depth.shape[::-1]) for r in rackets])
     left, top = boxes[:, :2].min(axis=0)
     right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
     return max(left - 2, 0), max(top - 2, 0), min(right + 2, shape[1]), min(bottom + 2, shape[0])
@@ -218,7 +278,7 @@ def _cast_shadow(
         return
     pad = 6
     x0, y0, x1, y1 = max(x - pad, 0), max(y - pad, 0), min(x + w + pad, width // 2), min(y + h + pad, height // 2)
-    soft = cv2.GaussianBlur(mask[y0:y1, x0:x1], (0, 0), 1.0 + 3 * (1 - stage.look.sunshine))
+    soft = cv2.GaussianBlur(mask[y0:y1, x0:x1], (0, 0), 0.8 + 1.6 * (1 - stage.look.sunshine))
     soft = cv2.resize(soft, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
     dark = 1 - soft[..., None].astype(np.float32) * ((0.2 + 0.35 * stage.look.sunshine) / 255)
     picture[2 * y0 : 2 * y1, 2 * x0 : 2 * x1] *= dark
@@ -238,6 +298,11 @@ def _label(
     hit = surface.solid >= 0
     region = parts[surface.top : surface.top + rows, surface.left : surface.left + columns]
     region[hit] = solids.part[surface.solid[hit]]
+    racket = drawn[len(drawn) // 2].racket
+    if racket:
+        rows_, columns_ = racket.depth.shape
+        region = parts[racket.top : racket.top + rows_, racket.left : racket.left + columns_]
+        region[racket.color[..., 3] > 0.5] = PARTS.index("racket")
     local = (stage.points[frame] - stage.move.center) @ stage.move.rotation[frame].T
     pixels = local[:, :2] / local[:, 2:] * stage.move.focal[frame] + stage.move.principal
     cell = np.round(pixels).astype(int) - (surface.left, surface.top)

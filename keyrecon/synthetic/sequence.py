@@ -22,11 +22,13 @@ from keyrecon.formats.mocap import read_mocap
 from keyrecon.formats.picks import write_picks
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Pick
-from keyrecon.synthetic.cameras import CameraOptions, plan_camera
+from keyrecon.synthetic.cameras import CameraMove, CameraOptions, plan_camera
 from keyrecon.synthetic.clips import JoinOptions, join_clips
-from keyrecon.synthetic.court import draw_background
+from keyrecon.synthetic.court import Background, draw_background
 from keyrecon.synthetic.figure import PARTS, point_figure
-from keyrecon.synthetic.looks import choose_look
+from keyrecon.synthetic.looks import Look, choose_look
+from keyrecon.synthetic.motion import MotionOptions, play_tennis
+from keyrecon.synthetic.racket import racket_frames
 from keyrecon.synthetic.render import Frame, Stage, draw_frame
 from keyrecon.synthetic.shading import make_tiles
 from keyrecon.video_writer import write_video
@@ -70,8 +72,15 @@ def synthesize(
     progress: Progress = silent,
 ) -> None:
     """Render a sequence into a folder, from motion capture or from the built-in tennis motion."""
-    points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), options.clips)
-    render_sequence(points, options.clips.fps, options.scene, out, progress)
+    scene, clips = options.scene, options.clips
+    if mocap:
+        points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), clips)
+    else:
+        play = MotionOptions(
+            clips.seconds, clips.fps, left_handed=scene.left_handed, seed=scene.seed
+        )
+        points = play_tennis(play)
+    render_sequence(points, clips.fps, scene, out, progress)
 
 
 def set_stage(
@@ -86,10 +95,17 @@ def set_stage(
     grey = rng.normal(0, options.noise, (height + 64, width + 64, 1))
     color = rng.normal(0, 0.6 * options.noise, (height + 64, width + 64, 3))
     return Stage(
-        points, pointers, move, draw_background(move, look, options.seed), look,
+        points, pointers, racket_frames(points, pointers), move, _draw_surroundings(points, move, look, options.seed), look,
         make_tiles(rng), np.round(grey + color).astype(np.int8),
         min(1.0, options.shutter * fps), options.seed,
     )  # fmt: skip
+
+
+def _draw_surroundings(
+    points: Float[np.ndarray, "T 14 3"], move: CameraMove, look: Look, seed: int
+) -> Background:
+    """The background, with nothing standing between camera and player."""
+    return draw_background(move, look, seed, float(move.to_camera(points)[..., 2].max()) + 0.8)
 
 
 def render_sequence(

@@ -85,7 +85,7 @@ def paint_surface(
     u, v = cell[:, 0], cell[:, 1]
     normal = surface.normal.astype(np.float32)
     tilt = _CLOTH[part].astype(np.float32)
-    normal = normal + 0.55 * tilt[:, None] * np.stack(
+    normal = normal + 0.34 * tilt[:, None] * np.stack(
         [tiles.folds[0][u, v], tiles.folds[1][u, v], np.zeros_like(tilt)], axis=1
     )
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -110,7 +110,7 @@ def _light(
     shine = np.clip(normal @ (half / np.linalg.norm(half)).astype(np.float32), 0, 1) ** 12
     direct = (to_sun + gloss.astype(np.float32) * shine)[:, None] * np.array(light.color, np.float32)
     share = np.float32(light.sunshine)
-    return ambient * (0.92 - 0.38 * share) + direct * (0.12 + 0.62 * share)
+    return ambient * (1.08 - 0.42 * share) + direct * (0.14 + 0.72 * share)
 
 
 def _occlusion(surface: Surface) -> Float[np.ndarray, "h w"]:
