@@ -1,0 +1,99 @@
+"""The racket: a handle, a throat and a strung oval, drawn as lines with the depth of its plane.
+
+It moves faster than anything else in the picture, so it is drawn several times between two
+instants of the figure. Size after the ITF's rule 4: 0.685 m long, head 0.33 m x 0.26 m.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.synthetic.figure import Pointers, joint, unit
+
+GRIP = 0.08
+"""Metres from the wrist to the middle of the fist."""
+STEP = 3.0
+"""px that the tip moves at most between two drawings."""
+MOST = 8
+_CIRCLE = np.linspace(0, 2 * np.pi, 28, endpoint=False)
+_OVAL = np.stack([0.43 + 0.16 * np.cos(_CIRCLE), 0.125 * np.sin(_CIRCLE)], axis=1)
+_HANDLE = np.array([[-0.07, 0.0], [0.12, 0.0]])
+_THROATS = np.array([[[0.11, 0.0], [0.30, 0.072]], [[0.11, 0.0], [0.30, -0.072]]])
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Something drawn over a part of the picture: premultiplied colour and cover."""
+
+    left: int
+    top: int
+    color: Float[np.ndarray, "h w 4"]
+    depth: Float[np.ndarray, "h w"]
+    """px at the scale of the picture, as in `raster.Surface`."""
+
+
+def racket_frames(
+    points: Float[np.ndarray, "T 14 3"], pointers: Pointers
+) -> Float[np.ndarray, "T 3 3"]:
+    """Fist, direction to the tip and direction across the strings, in the world."""
+    side = "left" if pointers.left_handed else "right"
+    wrist, elbow = joint(points, f"{side}_wrist"), joint(points, f"{side}_elbow")
+    fist = wrist + GRIP * unit(wrist - elbow)
+    across = unit(np.cross(pointers.strings, pointers.racket))
+    return np.stack([fist, pointers.racket, across], axis=1)
+
+
+def draw_racket(
+    poses: Float[np.ndarray, "n 3 3"],
+    view: tuple[float, Float[np.ndarray, "2"], tuple[int, int], float],
+    color: Float[np.ndarray, "3"],
+) -> Layer | None:
+    """Average of a racket at several poses in camera axes.
+
+    `view` is focal length, principal point, picture size, and px per metre of the depth.
+    """
+    focal, principal, size, depth_scale = view
+
+    def place(flat: np.ndarray) -> np.ndarray:
+        return poses[:, :1] + flat[:, :1] * poses[:, 1:2] + flat[:, 1:] * poses[:, 2:]
+
+    outline = place(np.concatenate([_OVAL, _HANDLE, *_THROATS]))
+    pixels = outline[..., :2] / outline[..., 2:] * focal + principal
+    lo = np.maximum(np.floor(pixels.min(axis=(0, 1))) - 4, 0).astype(int)
+    hi = np.minimum(np.ceil(pixels.max(axis=(0, 1))) + 5, size).astype(int)
+    if (hi <= lo).any():
+        return None
+    shape = (hi[1] - lo[1], hi[0] - lo[0])
+    scale = focal / poses[:, 0, 2].mean()
+    frame = np.zeros(shape, np.float32)
+    strings = np.zeros(shape, np.float32)
+    for one in np.round((pixels - lo) * 16).astype(np.int32):
+        mask = np.zeros(shape, np.uint8)
+        cv2.fillPoly(mask, [one[: len(_OVAL)]], 70, cv2.LINE_AA, 4)
+        strings += mask
+        mask[:] = 0
+        thin, thick = max(1, round(0.02 * scale)), max(1, round(0.03 * scale))
+        cv2.polylines(mask, [one[: len(_OVAL)]], True, 255, thin, cv2.LINE_AA, 4)
+        cv2.polylines(mask, [one[len(_OVAL) :][:2]], False, 255, thick, cv2.LINE_AA, 4)
+        cv2.polylines(mask, list(one[len(_OVAL) + 2 :].reshape(2, 2, 2)), False, 255, thin, cv2.LINE_AA, 4)
+        frame += mask
+    frame /= 255 * len(poses)
+    strings /= 255 * len(poses)
+    cover = np.maximum(frame, strings * (1 - frame))
+    paint = frame[..., None] * color + np.maximum(cover - frame, 0)[..., None] * np.float32(200)
+    middle = len(poses) // 2
+    depth = _plane_depth(pixels[middle] - lo, outline[middle, :, 2] * depth_scale, shape)
+    return Layer(int(lo[0]), int(lo[1]), np.dstack([paint, cover]).astype(np.float32), depth)
+
+
+def _plane_depth(
+    pixels: Float[np.ndarray, "n 2"], depth: Float[np.ndarray, "n"], shape: tuple[int, int]
+) -> Float[np.ndarray, "h w"]:
+    """Depth of the plane through the outline, kept between its nearest and farthest point."""
+    terms = np.column_stack([pixels, np.ones(len(pixels))])
+    gram = terms.T @ terms + np.diag([1.0, 1.0, 0.0])
+    a, b, c = np.linalg.solve(gram, terms.T @ depth)
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return np.clip(a * x + b * y + c, depth.min(), depth.max()).astype(np.float32)
