@@ -125,7 +125,7 @@ def find_joints(
     Raises KeyreconError when no known rig has its names in the file.
     """
     # Mixamo and others put the figure's name before each joint's: "mixamorig:Hips".
-    names = {name.split(":")[-1]: i for i, name in reversed(list(enumerate(figure.names)))}
+    names = {name.split(":")[-1]: i for i, name in enumerate(figure.names)}
     for rig in RIGS:
         points = _points(rig)
         if all(word in names for point in points for word in _words(point)):
