@@ -48,7 +48,7 @@ class CompareOptions:
     largest mean distance that any two frames of this video have, as printed."""
     symmetry: Literal["mean", "max"] = "mean"
     """How the distances from i to j and from j to i become one."""
-    cell: float = 1 / 64
+    cell: float = 1 / 40
     """Width of a position cell, player heights; smaller is slower and closer to exact."""
     directions: int = 24
     """Number of direction cells in a full turn."""
