@@ -11,8 +11,9 @@ from jaxtyping import Float
 from keyrecon.errors import KeyreconError
 from keyrecon.records import Motion
 
-UNEVEN = 0.01
-"""Frame times that stray further than this share of a frame from an even spacing are uneven."""
+UNEVEN = 0.1
+"""Frame times that stray further than this share of a frame from an even spacing are uneven.
+Some containers round times to milliseconds, 6 % of a frame at 120 fps."""
 
 
 def y_up(points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
