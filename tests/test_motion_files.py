@@ -384,6 +384,8 @@ def test_a_missing_library_is_named_with_the_way_to_install_it(
 def test_a_suffix_that_is_not_known_is_refused(tmp_path, motion):
     with pytest.raises(KeyreconError, match=r"no export to '\.fbx'"):
         export_motion(tmp_path / "a.fbx", motion, SIZE)
+    with pytest.raises(KeyreconError, match="size of the pictures"):
+        export_motion(tmp_path / "a.json", motion)
     check_suffix(tmp_path / "a.MP4", (".mp4",))
 
 

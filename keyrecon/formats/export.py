@@ -37,7 +37,7 @@ def check_suffix(path: Path, more: tuple[str, ...] = ()) -> None:
         )
 
 
-def export_motion(path: Path, motion: Motion, size: tuple[int, int]) -> None:
+def export_motion(path: Path, motion: Motion, size: tuple[int, int] | None = None) -> None:
     """Write `motion` in the format of the path's suffix; `size` is the picture's, px.
 
     Raises KeyreconError for a suffix that is not known, an optional library that is not
@@ -46,6 +46,11 @@ def export_motion(path: Path, motion: Motion, size: tuple[int, int]) -> None:
     check_suffix(path)
     suffix = path.suffix.lower()
     if suffix == ".json":
+        if size is None:
+            raise KeyreconError(
+                f"{path}: COCO states the size of the pictures; export from the project whose "
+                "video is in place."
+            )
         write_coco_motion(path, motion, size)
     else:
         WRITERS[suffix](path, motion)
