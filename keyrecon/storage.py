@@ -1,8 +1,8 @@
 """Records on disk: one npz file each, arrays beside a JSON description, no pickle.
 
-A record (a frozen dataclass of this package) is taken apart into arrays and a tree that says where
-they belong. Tuples of records of one kind (one per frame) are stored end to end with their
-so that a long video costs a handful of arrays, not thousands.
+A record (a frozen dataclass of this package) is taken apart into arrays and a tree that says
+where they belong. Tuples of records of one kind (one per frame) are stored end to end with their
+lengths, so that a long video costs a handful of arrays, not thousands.
 """
 
 import json

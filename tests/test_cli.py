@@ -1,0 +1,156 @@
+"""What the command line says to wrong input: one line, exit code 1, nothing written over."""
+
+import json
+import sys
+
+import pytest
+
+from keyrecon import cli
+
+
+@pytest.fixture
+def keyrecon(monkeypatch, capsys):
+    """Run a command line; returns (exit code, stdout, stderr)."""
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["keyrecon", *map(str, words)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code or 0
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+@pytest.fixture
+def project(tmp_path, write_numbered, keyrecon):
+    video = tmp_path / "video.mp4"
+    video.write_bytes(write_numbered("v.mp4", list(range(0, 240, 12))).read_bytes())
+    code, out, _ = keyrecon("new", video, "--project", tmp_path / "p")
+    assert code == 0
+    assert "20 frames of 128x64" in out
+    return tmp_path / "p"
+
+
+def one_line(code, err, *words):
+    assert code == 1
+    assert err.count("\n") == 1, err
+    for word in words:
+        assert word in err
+    return True
+
+
+@pytest.mark.parametrize(
+    "verb",
+    "demo new pick keyframes import run export evaluate synth relink".split(),
+)
+def test_every_command_explains_itself(keyrecon, verb):
+    code, out, _ = keyrecon(verb, "--help")
+    assert code == 0
+    assert f"keyrecon {verb}" in out
+
+
+def test_bad_usage_exits_with_2(keyrecon):
+    assert keyrecon("pick")[0] == 2
+    assert keyrecon("nonsense")[0] == 2
+
+
+def test_a_video_that_is_not_one(keyrecon, tmp_path):
+    (tmp_path / "a.mp4").write_text("text")
+    code, _, err = keyrecon("new", tmp_path / "a.mp4", "--project", tmp_path / "p")
+    assert one_line(code, err, "cannot be read as a video")
+    assert not (tmp_path / "p").exists()
+
+
+def test_no_picks_yet(keyrecon, project):
+    code, _, err = keyrecon("keyframes", project)
+    assert one_line(code, err, "no picks yet", "keyrecon pick")
+
+
+def test_a_pick_outside_the_picture_or_video_changes_nothing(keyrecon, project):
+    code, _, err = keyrecon("pick", project, "--frame", 3, "--head", "500,20")
+    assert one_line(code, err, "outside the picture of 128x64")
+    code, _, err = keyrecon("pick", project, "--frame", 99, "--head", "5,20")
+    assert one_line(code, err, "outside the video", "0 to 19")
+    code, _, err = keyrecon("pick", project, "--frame", 3, "--head", "5;20")
+    assert one_line(code, err, "X,Y")
+    assert not (project / "picks.json").exists()
+
+
+def test_picks_of_several_frames_add_up(keyrecon, project):
+    assert keyrecon("pick", project, "--frame", 0, "--head", "5,20", "--foot", "5,60")[0] == 0
+    code, out, _ = keyrecon("pick", project, "--frame", 9, "--region", "Shirt:7,30")
+    assert code == 0
+    assert "1 foot, 1 head, 1 shirt" in out
+    assert len(json.loads((project / "picks.json").read_text())["picks"]) == 3
+
+
+def test_run_before_keyframes(keyrecon, project):
+    keyrecon("pick", project, "--frame", 0, "--head", "5,20")
+    code, _, err = keyrecon("run", project)
+    assert one_line(code, err, "keyrecon keyframes")
+
+
+def test_an_impossible_height(keyrecon, project):
+    code, _, err = keyrecon("run", project, "--height", "183")
+    assert one_line(code, err, "metres", "183")
+
+
+def coco(frame, name="neck", x=10.0):
+    return {
+        "images": [
+            {"id": 1, "file_name": "f.png", "width": 128, "height": 64, "frame": frame}
+        ],
+        "annotations": [
+            {"id": 1, "image_id": 1, "category_id": 1, "keypoints": [x, 20, 2], "num_keypoints": 1}
+        ],
+        "categories": [{"id": 1, "name": "person", "keypoints": [name], "skeleton": []}],
+    }
+
+
+def test_annotations_that_do_not_fit_are_refused_by_frame_and_joint(keyrecon, project, tmp_path):
+    file = tmp_path / "marks.json"
+    for data, words in (
+        (coco(77), ("77",)),
+        (coco(3, name="tail"), ("tail",)),
+        (coco(3, x=float("nan")), ("NaN",)),
+        ({"images": []}, ("marks.json",)),
+    ):
+        file.write_text(json.dumps(data))
+        code, _, err = keyrecon("import", project, file)
+        assert one_line(code, err, *words)
+        assert not (project / "annotations.json").exists()
+
+
+def test_marks_that_differ_are_refused_unless_replaced_and_the_old_file_is_kept(
+    keyrecon, project, tmp_path
+):
+    file = tmp_path / "marks.json"
+    file.write_text(json.dumps(coco(3, x=10.0)))
+    assert keyrecon("import", project, file)[0] == 0
+    before = (project / "annotations.json").read_text()
+    file.write_text(json.dumps(coco(3, x=90.0)))
+    code, _, err = keyrecon("import", project, file)
+    assert one_line(code, err, "frame 3 neck", "nothing was changed")
+    assert (project / "annotations.json").read_text() == before
+    assert keyrecon("import", project, file, "--replace")[0] == 0
+    assert (project / "annotations.old-1.json").read_text() == before
+
+
+def test_a_moved_video_is_relinked(keyrecon, project, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "video.mp4").rename(tmp_path / "far" / "v.mp4")
+    code, _, err = keyrecon("pick", project, "--frame", 0, "--head", "5,20")
+    assert one_line(code, err, "keyrecon relink")
+    assert keyrecon("relink", project, tmp_path / "far" / "v.mp4")[0] == 0
+    assert keyrecon("pick", project, "--frame", 0, "--head", "5,20")[0] == 0
+
+
+def test_a_motion_that_is_not_there(keyrecon, project, tmp_path):
+    code, _, err = keyrecon("export", project, tmp_path / "m.bvh")
+    assert one_line(code, err, "keyrecon run")
+    code, _, err = keyrecon("evaluate", project, "--truth", tmp_path / "truth.npz")
+    assert one_line(code, err, "keyrecon run")
