@@ -86,24 +86,26 @@ def draw_pose(
     if not known.any():
         return drawn
     height = height or float(np.ptp(points2d[known], axis=0).max())
+    height = min(height, 4.0 * max(picture.shape[:2]))
     thickness = max(1, round(BONE_SHARE * height))
     depth = np.zeros(len(points2d)) if depth is None else np.nan_to_num(depth)
-    bones, sides = drawn_bones(skeleton), bone_sides(skeleton)
+    colors = np.array((LEFT, RIGHT, TRUNK))
+    bones, bone_colors = drawn_bones(skeleton), colors[bone_sides(skeleton)].tolist()
     for bone in np.argsort(-depth[bones].mean(axis=1), kind="stable"):
         if known[bones[bone]].all():
-            _draw_bone(drawn, points2d[bones[bone]], (LEFT, RIGHT, TRUNK)[sides[bone]], thickness)
+            _draw_bone(drawn, points2d[bones[bone]], bone_colors[bone], thickness)
+    joint_colors = colors[joint_sides(skeleton)].tolist()
     for joint in np.argsort(-depth, kind="stable"):
         if known[joint]:
-            color = (LEFT, RIGHT, TRUNK)[joint_sides(skeleton)[joint]]
             kind = SOURCES[1 if source is None else source[joint]]
-            _draw_joint(drawn, points2d[joint], kind, color, thickness)
+            _draw_joint(drawn, points2d[joint], kind, joint_colors[joint], thickness)
     return drawn
 
 
 def _draw_bone(
     picture: UInt8[np.ndarray, "h w 3"],
     ends: Float[np.ndarray, "2 2"],
-    color: tuple[int, int, int],
+    color: list[int],
     thickness: int,
 ) -> None:
     start, stop = (tuple(end) for end in _fixed_point(ends).tolist())
@@ -115,7 +117,7 @@ def _draw_joint(
     picture: UInt8[np.ndarray, "h w 3"],
     point: Float[np.ndarray, "2"],
     kind: str,
-    color: tuple[int, int, int],
+    color: list[int],
     thickness: int,
 ) -> None:
     radius = 0.5 + 0.9 * thickness

@@ -142,7 +142,7 @@ def _posed_crop(
 
 def _marked_still(
     windows: Windows, picture: UInt8[np.ndarray, "h w 3"], annotations: Annotations, row: int
-) -> UInt8[np.ndarray, "h w 3"]:
+) -> UInt8[np.ndarray, "side side 3"]:
     """Marks as a person made them; joints placed though hidden are rings."""
     frame = int(annotations.frames[row])
     return draw_pose(

@@ -118,7 +118,7 @@ def story(pictures: Pictures, time: Float[np.ndarray, "T"]) -> str:
     )
     key = (
         '<span class="key left">left</span> <span class="key right">right</span> '
-        '<span class="key trunk">trunk</span>; diamonds were marked by a person, discs found in '
+        '<span class="key trunk">trunk</span>. Diamonds were marked by a person, discs found in '
         "the picture, rings filled in. Choose a picture to enlarge it and to go to its frame."
     )
     return section("video", "The video", note(key), f'<div class="strip">{stills}</div>')

@@ -139,7 +139,7 @@ def joint_acceleration(
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
-def foot_speed(motion: Motion, track: Track) -> Float[np.ndarray, "T-1"]:
+def foot_speed(motion: Motion, track: Track) -> Float[np.ndarray, "steps"]:
     """Speed across the picture of the slower foot, player heights / s.
 
     A player on the ground has one foot at rest most of the time; with a camera at rest its speed
