@@ -176,6 +176,17 @@ class Keyframes:
 
 
 @dataclass(frozen=True, eq=False)
+class Survey:
+    """What was seen of the player before anything was annotated."""
+
+    figures: Figures
+    track: Track
+    camera: CameraPath
+    comparison: Comparison
+    keyframes: Keyframes
+
+
+@dataclass(frozen=True, eq=False)
 class Annotations:
     """What a person marked."""
 

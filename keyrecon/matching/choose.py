@@ -1,0 +1,155 @@
+"""Choose proposals: the cheapest path through time (Viterbi), each side of the body on its own.
+
+A side (arm or leg) may take a proposal's own side or the other one, since silhouettes do not tell
+left from right; both sides are chosen together, so that they do not both take the same limb. A
+step between proposals costs what the flow cannot explain; a proposal costs its misfit with the
+edges, how little its keyframe resembles the frame, and how long it has been carried. Annotated
+frames admit the annotation alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from keyrecon.matching.candidates import Candidates
+from keyrecon.matching.puppet import Puppets
+
+STEP_SPREAD = 0.01
+"""Error of the expected step of a joint next to the root, player heights; doubles outwards."""
+STEP_MOST = 9.0
+"""Largest cost of a joint's step: a jump happens, and it should not outweigh everything else."""
+MISFIT = 6.0
+"""Cost of a limb whose elements find nothing."""
+UNLIKE, UNLIKE_MOST = 0.5, 4.0
+"""Cost of a keyframe per usual distance to the nearest one, which counts up to so many times."""
+AGE, AGE_MOST = 0.02, 150.0
+"""Cost per frame that a proposal was carried, and the frames that count."""
+SWAP = 0.5
+"""Cost of taking left for right."""
+CLASH, CLASH_WITHIN = 2.0, 0.03
+"""Cost of both sides taking the same limb: all joints but the first this close, player heights."""
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """What a few joints may be in every frame: S states."""
+
+    joints: Complex[np.ndarray, "T S J"]
+    expected: Complex[np.ndarray, "T S J"]
+    """Where the joints go in the next frame; NaN where unknown."""
+    cost: Float[np.ndarray, "T S"]
+    spread: Float[np.ndarray, "J"]
+    """Error of a joint's step, player heights."""
+
+    def steps(self, t: int) -> Float[np.ndarray, "S S"]:
+        """Cost of going from each state of frame t - 1 to each of frame t."""
+        miss = np.abs(self.joints[t][None] - self.expected[t - 1][:, None]) / self.spread
+        return np.fmin(np.nan_to_num(miss**2, nan=STEP_MOST), STEP_MOST).mean(axis=2)
+
+
+def choose_limbs(
+    puppets: Puppets,
+    candidates: Candidates,
+    expected: Complex[np.ndarray, "T S J"],
+    distance: Float[np.ndarray, "T K"],
+) -> tuple[Complex[np.ndarray, "T J"], Int[np.ndarray, "T J"]]:
+    """(joints, puppet they come from); `expected` is where proposals go in the next frame."""
+    half, every = puppets.half, np.arange(len(distance))
+    cost = _cost(candidates, distance)
+    joints = candidates.joints[:, 0].copy()
+    which = np.broadcast_to(candidates.which[:, :1], joints.shape).copy()
+    groups = [half.middle, *half.sides]
+    states = [
+        _limb_states(puppets, candidates, expected, cost, group) for group in groups
+    ]
+    paths = [choose_one(states[0])] if half.middle else [np.zeros(len(every), int)]
+    paths += choose_two(*states[1:], _clash(puppets, *states[1:]))
+    for group, state, path in zip(groups, states, paths, strict=True):
+        joints[:, group] = state.joints[every, path]
+        which[:, group] = candidates.which[every, path % cost.shape[1]][:, None]
+    return joints, which
+
+
+def _cost(candidates: Candidates, distance: Float[np.ndarray, "T K"]) -> Float[np.ndarray, "T S"]:
+    """Of proposals as a whole."""
+    usual = max(float(np.median(distance.min(axis=1))), 1e-9)
+    unlike = np.take_along_axis(distance, candidates.which, axis=1) / usual
+    cost = np.where(
+        candidates.age > 0,
+        AGE * np.minimum(candidates.age, AGE_MOST),
+        UNLIKE * np.minimum(unlike, UNLIKE_MOST),
+    )
+    return np.where(np.isfinite(candidates.joints).all(axis=2), cost, np.inf)
+
+
+def _limb_states(
+    puppets: Puppets,
+    candidates: Candidates,
+    expected: Complex[np.ndarray, "T S J"],
+    cost: Float[np.ndarray, "T S"],
+    group: tuple[int, ...],
+) -> States:
+    """The group's own side of every proposal, then the other side."""
+    half, poses, group = puppets.half, puppets.poses, np.array(group, int)
+    twin = half.mirror[group]
+    sides = [group] if np.array_equal(group, twin) else [group, twin]
+    costs = []
+    for side in sides:
+        bones = np.isin(half.bones[:, 1], side)
+        misfit = candidates.misfit[:, :, bones].mean(axis=2) if bones.any() else 0.0
+        costs.append(cost + MISFIT * misfit + SWAP * len(costs))
+    states = np.concatenate(costs, axis=1)
+    # all states of an annotated frame are the annotation
+    states[poses.frames] = 0
+    joints = np.concatenate([candidates.joints[:, :, side] for side in sides], axis=1)
+    joints[poses.frames] = poses.joints[:, None, group]
+    onwards = np.concatenate([expected[:, :, side] for side in sides], axis=1)
+    onwards[poses.frames] = expected[poses.frames][:, -1:, group]
+    depth = np.clip(half.depth[group] - 1, 0, None)
+    return States(np.nan_to_num(joints), onwards, states, STEP_SPREAD * 2.0**depth)
+
+
+def _clash(puppets: Puppets, one: States, other: States) -> Float[np.ndarray, "T S S"]:
+    depth = puppets.half.depth[list(puppets.half.sides[0])]
+    far = np.flatnonzero(depth > depth.min())
+    apart = np.abs(one.joints[:, :, None, far] - other.joints[:, None, :, far])
+    clash = CLASH * (apart < CLASH_WITHIN).all(axis=3)
+    clash[puppets.poses.frames] = 0
+    return clash
+
+
+def choose_one(states: States) -> Int[np.ndarray, "T"]:
+    """Cheapest path of one limb."""
+    total, back = states.cost[0], []
+    for t in range(1, len(states.cost)):
+        sums = total[:, None] + states.steps(t)
+        back.append(sums.argmin(axis=0))
+        total = sums.min(axis=0) + states.cost[t]
+    path = [int(total.argmin())]
+    for came_from in reversed(back):
+        path.append(int(came_from[path[-1]]))
+    return np.array(path[::-1])
+
+
+def choose_two(
+    one: States, other: States, clash: Float[np.ndarray, "T S S"]
+) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "T"]]:
+    """Cheapest paths of both sides together; `clash` is the cost of pairs of states."""
+    total = one.cost[0][:, None] + other.cost[0] + clash[0]
+    back = []
+    for t in range(1, len(one.cost)):
+        first = one.steps(t)[:, :, None] + total[:, None, :]
+        from_one, total = first.argmin(axis=0), first.min(axis=0)
+        second = total[:, :, None] + other.steps(t)[None]
+        from_other, total = second.argmin(axis=1), second.min(axis=1)
+        total = total + one.cost[t][:, None] + other.cost[t] + clash[t]
+        back.append((from_one, from_other))
+    a, b = np.unravel_index(total.argmin(), total.shape)
+    path = [(a, b)]
+    for from_one, from_other in reversed(back):
+        b_before = from_other[a, b]
+        a, b = from_one[a, b_before], b_before
+        path.append((a, b))
+    paths = np.array(path[::-1])
+    return paths[:, 0], paths[:, 1]

@@ -1,0 +1,156 @@
+"""Bring an annotated figure onto the edges of another frame: articulated registration.
+
+Elements of the posed figure look for their counterparts in the frame, and the frame's elements for
+theirs in the figure; the joints then move so that elements come to lie on the contours they found
+(distance along the contour's normal; sliding along it is nearly free) while bones keep their shape:
+their length firmly, their direction softly. Both steps repeat, from far-reaching and stiff to near
+and supple. A local translation of each joint, the paper's way, is what one step does when limbs
+only shift; here limbs may turn. Looking both ways matters for arms: a bare forearm that the figure
+does not cover calls for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from keyrecon.matching.correspondence import ElementIndex, match_back, match_elements
+from keyrecon.matching.puppet import Posed, Puppets, bone_axes, pose_puppets
+from keyrecon.matching.rows import Normals, observe
+
+SLIDE = 0.15
+"""Weight of sliding along a contour against leaving it."""
+ELEMENT_SPREAD = 0.03
+"""How far a contour tells where an element is, player heights. Neighbours on one contour err
+together, which is why it is more than a contour's own noise of about .01."""
+JUDGE_REACH = 0.06
+"""Distance at which a fitted element counts as wrong, player heights."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round of matching and moving."""
+
+    reach: float
+    """Farthest match, player heights."""
+    length: float
+    """Spread of a bone's length, player heights."""
+    swing: float
+    """Spread of a bone's end square to it, player heights."""
+
+
+FAR_TO_NEAR = (
+    Step(0.12, 0.010, 0.015),
+    Step(0.12, 0.015, 0.04),
+    Step(0.10, 0.020, 0.08),
+    Step(0.07, 0.020, 0.08),
+    Step(0.05, 0.020, 0.08),
+)
+"""From the whole figure shifting to limbs turning by up to half a right angle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """P figures: which puppet takes which pose in which frame."""
+
+    frames: Int[np.ndarray, "P"]
+    which: Int[np.ndarray, "P"]
+    joints: Complex[np.ndarray, "P J"]
+
+    def moved(self, joints: Complex[np.ndarray, "P J"]) -> "Figures":
+        """The same in other poses."""
+        return Figures(self.frames, self.which, joints)
+
+
+def fit_figures(
+    puppets: Puppets,
+    index: ElementIndex,
+    start: Figures,
+    schedule: tuple[Step, ...] = FAR_TO_NEAR,
+    extra: Normals | None = None,
+) -> Figures:
+    """Fit figures to their frames; `extra` observations count in every step."""
+    figures = start
+    for step in schedule:
+        seen = see_edges(puppets, index, figures, step.reach)
+        seen = seen + keep_shape(puppets, figures.joints, start.joints, step)
+        figures = figures.moved((seen + extra if extra else seen).solve())
+    return figures
+
+
+def see_edges(
+    puppets: Puppets, index: ElementIndex, figures: Figures, reach: float
+) -> Normals:
+    """Observations of the joints by corresponding elements, both ways."""
+    posed = pose_puppets(puppets, figures.which, figures.joints)
+    row, found = match_elements(index, figures.frames, posed, reach)
+    there = _pull(index, row, posed.points, found * posed.weight, reach)
+    there = observe(posed.share, index.points[row] - posed.free, *there)
+    listed = puppets.listed[figures.frames]
+    hit, found = match_back(index, listed, posed, reach)
+    points, free, weight = (
+        np.take_along_axis(values, hit, axis=1)
+        for values in (posed.points, posed.free, posed.weight)
+    )
+    share = np.take_along_axis(posed.share, hit[..., None], axis=1)
+    back = _pull(index, listed, points, found * weight, reach)
+    return there + observe(share, index.points[listed] - free, *back)
+
+
+def _pull(
+    index: ElementIndex,
+    row: Int[np.ndarray, "P R"],
+    points: Complex[np.ndarray, "P R"],
+    weight: Float[np.ndarray, "P R"],
+    reach: float,
+) -> tuple[Complex[np.ndarray, "P R"], Float[np.ndarray, "P R"], Float[np.ndarray, "P R"]]:
+    """(normal, weight along it, weight along the contour); far matches count less."""
+    normal = 1j * index.tangent[row]
+    away = np.abs(((index.points[row] - points) * np.conj(normal)).real)
+    across = weight / (1 + (2 * away / reach) ** 2) ** 2 / ELEMENT_SPREAD**2
+    return normal, across, SLIDE * across
+
+
+def keep_shape(
+    puppets: Puppets,
+    joints: Complex[np.ndarray, "P J"],
+    model: Complex[np.ndarray, "P J"],
+    step: Step,
+) -> Normals:
+    """Bones keep the length and, softly, the direction that they have in the model."""
+    bones = puppets.half.bones
+    mixture = np.zeros((len(joints), len(bones), joints.shape[1]))
+    rows = np.arange(len(bones))
+    mixture[:, rows, bones[:, 1]] = 1
+    mixture[:, rows, bones[:, 0]] -= 1
+    axis = bone_axes(puppets.half, joints)
+    wanted = model[:, bones[:, 1]] - model[:, bones[:, 0]]
+    # along the present direction the length is set right, across it the direction
+    target = axis * (np.abs(wanted) + 1j * (wanted * np.conj(axis)).imag)
+    ones = np.ones(axis.shape)
+    return observe(mixture, target, axis, ones / step.length**2, ones / step.swing**2)
+
+
+def judge_figures(
+    puppets: Puppets, index: ElementIndex, figures: Figures
+) -> Float[np.ndarray, "P B"]:
+    """Misfit of every bone, 0-1: mean distance of its elements to their matches over
+    `JUDGE_REACH`; 1 where nothing matches."""
+    posed = pose_puppets(puppets, figures.which, figures.joints)
+    row, found = match_elements(index, figures.frames, posed, JUDGE_REACH)
+    gap = np.where(found, np.abs(index.points[row] - posed.points) / JUDGE_REACH, 1.0)
+    return _mean_by_bone(puppets, figures.which, posed, np.minimum(gap, 1))
+
+
+def _mean_by_bone(
+    puppets: Puppets,
+    which: Int[np.ndarray, "P"],
+    posed: Posed,
+    values: Float[np.ndarray, "P E"],
+) -> Float[np.ndarray, "P B"]:
+    count = len(puppets.half.bones)
+    slot = (np.arange(len(which))[:, None] * count + puppets.riders.bone[which]).ravel()
+    total = np.bincount(slot, (posed.weight * values).ravel(), len(which) * count)
+    share = np.bincount(slot, posed.weight.ravel(), len(which) * count)
+    mean = np.where(share > 0, total / np.maximum(share, 1e-9), 1.0)
+    return mean.reshape(len(which), count)

@@ -1,0 +1,88 @@
+"""Settle all frames at once: edges, flow, bone shape and smooth motion in one least squares.
+
+Every frame sees its edges, through the most similar annotated figure and through the average
+outline; neighbours in time are tied by the flow on the limbs and three in a row by a small
+acceleration; the chosen proposals are followed unless all of that speaks against them; annotated
+frames are held. Matches and robust weights are renewed in each round.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Int
+
+from keyrecon.matching.chain import link_frames, solve_chain
+from keyrecon.matching.correspondence import ElementIndex
+from keyrecon.matching.fit import Figures, Step, keep_shape, see_edges
+from keyrecon.matching.limbs import LimbFlow, see_flow
+from keyrecon.matching.puppet import Puppets
+from keyrecon.matching.rows import Normals, observe, observe_joints
+
+REACHES = (0.05, 0.04, 0.03)
+"""Farthest match in the first, second and later rounds, player heights."""
+LOOSE = Step(reach=0.0, length=0.03, swing=0.10)
+"""How firmly bones keep the shape of the chosen proposal."""
+FOLLOW = 0.06
+"""Distance at which a chosen proposal loses most of its pull, player heights."""
+CALM = 0.003
+"""Spread of the second difference of a joint at the root, player heights at 50 frames/s; it
+doubles with every bone outwards. Strokes of the tennis motion capture lie at half of this for
+the trunk and the same for the wrist."""
+HELD, MARKED = 1e5, 1e6
+"""Weights of joints that are known: by the other half of the body, and by a person."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Where the joints of every frame may be before they are settled."""
+
+    joints: Complex[np.ndarray, "T J"]
+    similar: Int[np.ndarray, "T"]
+    """Most similar puppet of every frame."""
+
+
+def settle_joints(
+    puppets: Puppets,
+    index: ElementIndex,
+    limbs: LimbFlow,
+    proposal: Proposal,
+    fps: float,
+    rounds: int,
+) -> Complex[np.ndarray, "T J"]:
+    """Joints of all frames; those given by the other half stay where the proposal has them."""
+    half, every = puppets.half, np.arange(len(proposal.similar))
+    average = np.full(len(every), puppets.average)
+    calm = CALM * 2.0**half.depth * (50 / fps) ** 2
+    joints = proposal.joints
+    for turn in range(rounds):
+        reach = REACHES[min(turn, len(REACHES) - 1)]
+        alone = keep_shape(puppets, joints, proposal.joints, LOOSE)
+        alone = alone + _hold(puppets, proposal, joints)
+        for which in (proposal.similar, average):
+            alone = alone + see_edges(puppets, index, Figures(every, which, joints), reach)
+        joints = solve_chain(link_frames(alone, _steps(puppets, limbs, joints), calm))
+    return joints
+
+
+def _hold(
+    puppets: Puppets, proposal: Proposal, joints: Complex[np.ndarray, "T J"]
+) -> Normals:
+    """Follow the proposal, and hold what is known."""
+    poses = puppets.poses
+    away = (np.abs(joints - proposal.joints) / FOLLOW) ** 2
+    weight = 1 / (FOLLOW * (1 + away)) ** 2
+    weight[:, puppets.half.given] = HELD
+    target = proposal.joints.copy()
+    target[poses.frames] = np.where(poses.known, poses.joints, target[poses.frames])
+    weight[poses.frames] = np.where(poses.known, MARKED, weight[poses.frames])
+    return observe_joints(target, weight)
+
+
+def _steps(puppets: Puppets, limbs: LimbFlow, joints: Complex[np.ndarray, "T J"]) -> Normals:
+    """What the flow says of the way from each frame to the next."""
+    motion, weight = see_flow(limbs, puppets, np.arange(len(joints)), joints)
+    step = np.diff(joints, axis=0, append=joints[-1:])
+    miss = np.abs(motion - step @ limbs.mixture.T) ** 2
+    weight = weight / (1 + miss * weight)
+    mixture = np.broadcast_to(limbs.mixture, (len(joints), *limbs.mixture.shape))
+    return observe(mixture, motion, np.ones(motion.shape, complex), weight, weight)
