@@ -10,7 +10,6 @@ into an interval), and darkening without a change of chroma, a shadow, counts fo
 The plate is small: the player is `player` px tall in it, which is all that tracking and edges need.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +19,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.camera import warp_points
 from keyrecon.colors import to_lab
+from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Track
 from keyrecon.video import Video
@@ -63,7 +63,7 @@ def build_background(
     width = reduced_width(video, float(np.median(track.height)), options)
     shrink = width / video.width
     frames = sample_frames(len(video), options.samples)
-    pictures = _picked(video, frames, width)
+    pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Learning the background", len(frames))]
     free = [~_body(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
     return combine_plate(lab, free, camera.to_reference[frames], shrink)
@@ -103,12 +103,6 @@ def combine_plate(
         layers.append(layer if still else cv2.warpPerspective(layer, shift @ path, size))
     plate, spread, known = _median(np.stack(layers))
     return Background(plate, spread, known, shift @ small)
-
-
-def shrinking(shrink: float) -> Float[np.ndarray, "3 3"]:
-    """Full to reduced pixels; a reduced pixel's centre is that of the block it averages."""
-    offset = (shrink - 1) / 2
-    return np.array([[shrink, 0, offset], [0, shrink, offset], [0, 0, 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,21 +169,6 @@ def _seen_through(
     return cv2.warpPerspective(
         plate, to_plate, size, flags=smooth | cv2.WARP_INVERSE_MAP, borderValue=UNKNOWN
     )
-
-
-def _picked(
-    video: Video, frames: np.ndarray, width: int
-) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-    """The numbered frames; by decoding through, unless they lie far apart."""
-    far_apart = 250  # frames between key packets as encoders usually place them
-    if len(frames) > 1 and np.diff(frames).min() > far_apart:
-        for frame in frames:
-            yield video.frame(int(frame), width)
-        return
-    wanted = set(frames.tolist())
-    for number, picture in enumerate(video.frames(width=width)):
-        if number in wanted:
-            yield picture
 
 
 def _body(

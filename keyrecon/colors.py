@@ -44,7 +44,7 @@ NEVER_SEEN = 1e-5
 """Density below which a colour counts as seen nowhere, and belongs to nobody."""
 EXPLAINED = 0.4
 """Share of the head's colours found in other parts that makes it no colour of its own."""
-ALIKE = 0.2
+ALIKE = 0.35
 """Two parts with this share of their colours in common cannot be told apart pixel by pixel."""
 REACH = 0.75
 """Nothing of the player lies farther sideways from the head-feet axis, player heights."""

@@ -22,6 +22,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.background import Scene
 from keyrecon.colors import BINS, color_bins, distinct_parts, to_lab
+from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, Figures, Track
 from keyrecon.video import Video
@@ -95,7 +96,7 @@ def find_edges(  # noqa: PLR0913
     width = min(video.width, round(video.width * 1.2 * float(np.median(scale))))
     shrink = width / video.width
     edges, labels = [], np.zeros((len(video), size[1], size[0]), np.uint8)
-    pictures = video.frames(width=width)
+    pictures = read_small(video, width)
     for t, picture in enumerate(progress(pictures, "Finding edges", len(video))):
         crop, to_picture, present = _cut_out(picture, origin[t], float(scale[t]), shrink, size)
         foreground = scene.foreground(crop, t, to_picture)
@@ -116,8 +117,7 @@ def _cut_out(
 ) -> tuple[UInt8[np.ndarray, "y x 3"], Float[np.ndarray, "3 3"], UInt8[np.ndarray, "y x"]]:
     """The crop in Lab, the way from its pixels to the full picture, and where there is one."""
     to_picture = np.array([[1 / scale, 0, origin[0]], [0, 1 / scale, origin[1]], [0, 0, 1]])
-    offset = (shrink - 1) / 2
-    to_small = np.array([[shrink, 0, offset], [0, shrink, offset], [0, 0, 1]]) @ to_picture
+    to_small = shrinking(shrink) @ to_picture
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     crop = cv2.warpAffine(picture, to_small[:2], size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
     columns = to_small[0, 0] * np.arange(size[0]) + to_small[0, 2]

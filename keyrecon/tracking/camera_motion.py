@@ -24,6 +24,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.camera import warp_points
+from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
 from keyrecon.video import Video
@@ -141,7 +142,7 @@ def follow_camera(
     width = min(options.width, video.width)
     overlay = _Overlay()
     stride = max(1, len(video) // 64)
-    pictures = (_grey(p) for p in video.frames(width=width))
+    pictures = (_grey(p) for p in read_small(video, width))
     path, trust = _follow(
         progress(pictures, "Following the camera", len(video)), options, None, (overlay, stride)
     )
@@ -150,17 +151,15 @@ def follow_camera(
         return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     forbidden = overlay.mask()
     if forbidden.any():
-        pictures = (_grey(p) for p in video.frames(width=width))
+        pictures = (_grey(p) for p in read_small(video, width))
         path, trust = _follow(
             progress(pictures, "Following the camera", len(video)), options, forbidden, None
         )
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
-    enlarge = np.diag([video.width / width, video.height / shape[0], 1.0])
-    # Pixel centres lie at integers: the reduced pixel 0 covers several pixels of the full picture.
-    enlarge[:2, 2] = (np.diag(enlarge)[:2] - 1) / 2
-    full = enlarge @ to_reference @ np.linalg.inv(enlarge)
+    small = shrinking(width / video.width)
+    full = np.linalg.inv(small) @ to_reference @ small
     return CameraPath(full / full[:, 2:, 2:], trust)
 
 

@@ -19,19 +19,19 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
-from scipy.ndimage import gaussian_filter1d, percentile_filter
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, percentile_filter
 
 from keyrecon.background import (
     BackgroundOptions,
     Scene,
     combine_plate,
     reduced_width,
-    shrinking,
+    sample_frames,
 )
-from keyrecon.background import sample_frames as sampled
 from keyrecon.camera import warp_points
 from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
+from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
@@ -50,6 +50,12 @@ STILL_WEIGHT = 0.2
 """Weight of colour where nothing differs from the background: a player may stand still."""
 HEADS, FEET = 8, 10
 """Candidates kept of each, per frame."""
+LEG_ENDS = 4
+"""Ends of legs kept beside the shoes, per frame."""
+LEG_ABOVE = 0.3
+"""Least share of the player above the end of a leg."""
+NO_SHOE = 2.5
+"""Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
 LEAST_FOUND = 0.4
 """Share of the frames in which a head must be found for a track to be believed."""
 
@@ -76,6 +82,7 @@ class _Candidates:
     head_score: Float[np.ndarray, "m"]
     feet: Float[np.ndarray, "n 2"]
     foot_score: Float[np.ndarray, "n"]
+    """NaN where only the end of a leg was seen, and no shoe."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +91,10 @@ class _Evidence:
 
     head: Float[np.ndarray, "h w"]
     foot: Float[np.ndarray, "h w"]
+    player: Float[np.ndarray, "h w"]
+    """Any part of the player."""
     inside: Float[np.ndarray, "h1 w1"]
-    """Integral of the evidence for any part of the player."""
+    """Integral of `player`."""
 
 
 def track_player(
@@ -107,7 +116,7 @@ def track_player(
     head = parts[colors.names.index("head")]
     tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
     found, to_picture = [], np.linalg.inv(shrinking(shrink))
-    pictures = video.frames(width=width)
+    pictures = read_small(video, width)
     for number, picture in enumerate(progress(pictures, "Following the player", len(video))):
         lab = to_lab(picture)
         foreground = scene.foreground(lab, number, to_picture)
@@ -118,12 +127,8 @@ def track_player(
 
 def _first_scene(video: Video, camera: CameraPath, width: int) -> Scene:
     """The median of sampled frames: the player, who moves, mostly drops out."""
-    frames = set(sampled(len(video), BackgroundOptions.samples).tolist())
-    lab, used = [], []
-    for number, picture in enumerate(video.frames(width=width)):
-        if number in frames:
-            lab.append(to_lab(picture))
-            used.append(number)
+    used = sample_frames(len(video), BackgroundOptions.samples)
+    lab = [to_lab(p) for p in read_small(video, width, set(used.tolist()))]
     shrink = width / video.width
     everywhere = [np.ones(p.shape[:2], bool) for p in lab]
     plate = combine_plate(lab, everywhere, camera.to_reference[used], shrink)
@@ -145,6 +150,7 @@ def _weigh(
     return _Evidence(
         head=cv2.GaussianBlur(head, (0, 0), max(0.8, 0.25 * HEAD_RADIUS * tall)),
         foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
+        player=any_part,
         inside=cv2.integral(any_part),
     )
 
@@ -165,21 +171,48 @@ def _search(evidence: _Evidence, tall: float) -> _Candidates:
 def _search_feet(
     evidence: _Evidence, heads: Float[np.ndarray, "m 2"], tall: float
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n"]]:
-    """Shoe-coloured ellipses that have a leg above and nothing of the player below."""
+    """Shoe-coloured ellipses with a leg above and nothing of the player below, and ends of legs."""
     below = np.zeros(evidence.foot.shape, bool)
     for x, y in heads:
         x0, x1 = max(0, round(x - 0.9 * tall)), max(0, round(x + 0.9 * tall))
         y0, y1 = max(0, round(y + 0.35 * tall)), max(0, round(y + 1.35 * tall))
         below[y0:y1, x0:x1] = True
-    slope = find_slope(np.where(below, evidence.foot, 0).astype(np.float32))
+    if not below.any():
+        return np.zeros((0, 2)), np.zeros(0)
+    rows, columns = np.flatnonzero(below.any(axis=1)), np.flatnonzero(below.any(axis=0))
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    corner = np.array([columns[0], rows[0]])
+    slope = find_slope(np.where(below, evidence.foot, 0)[window])
     radii = [max(1.0, r * SHOE_RADIUS * tall) for r in RADII]
     score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOES], axis=0)
-    feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below)
+    feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below[window])
+    ends = _leg_ends(np.where(below, evidence.player, 0)[window], tall)
+    feet = np.concatenate([feet, ends]) + corner
+    strength = np.concatenate([strength, np.full(len(ends), np.nan)])
     leg = _mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
-    under = _mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall)
-    strength = strength * (0.05 + leg) * (1.05 - under.clip(0, 1)) ** 2
-    order = np.argsort(-strength)[:FEET]
+    under = _mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
+    strength = strength * (0.05 + leg) * (1.05 - under) ** 2
+    shoes = np.argsort(-strength)[:FEET]
+    shoes = shoes[np.isfinite(strength[shoes])]
+    bare = np.flatnonzero(np.isnan(strength) & (leg > LEG_ABOVE) & (under < 0.2))[:LEG_ENDS]
+    order = np.concatenate([shoes, bare])
     return feet[order], strength[order]
+
+
+def _leg_ends(player: Float[np.ndarray, "h w"], tall: float) -> Float[np.ndarray, "n 2"]:
+    """Where the outline of the player reaches down farthest, lowest first."""
+    filled = cv2.GaussianBlur(player, (0, 0), max(0.8, 0.01 * tall)) > 0.4
+    low = np.where(filled.any(axis=0), filled.shape[0] - 1 - filled[::-1].argmax(axis=0), -1)
+    reach = max(1, round(0.07 * tall))
+    lowest = low == maximum_filter1d(low, 2 * reach + 1)
+    x = np.flatnonzero(lowest & (low >= 0))
+    # One place for each run of columns that reach equally far.
+    starts = np.flatnonzero(np.diff(x, prepend=-9) > 1)
+    ends = np.append(starts[1:], len(x)) - 1
+    middle = (x[starts] + x[ends]) // 2 if len(x) else x
+    order = np.argsort(-low[middle], kind="stable")
+    # The ankle is about that far above the lowest skin.
+    return np.stack([middle, low[middle] - 0.02 * tall], axis=1).astype(float)[order]
 
 
 def _mean_inside(
@@ -250,9 +283,10 @@ def _lost(chosen: Int[np.ndarray, "T"]) -> KeyreconError:
 
 def _costs(scores: list[Float[np.ndarray, "m"]]) -> list[Float[np.ndarray, "m"]]:
     """-log of each score against the best scores of the sequence."""
-    best = [s.max() for s in scores if len(s)]
+    best = [float(np.nanmax(s)) for s in scores if np.isfinite(s).any()]
     reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
-    return [-np.log((s / reference + 0.005) / 1.005) for s in scores]
+    costs = [-np.log((s / reference + 0.005) / 1.005) for s in scores]
+    return [np.where(np.isnan(c), NO_SHOE, c) for c in costs]
 
 
 def _trust(cost: Float[np.ndarray, "m"], state: int) -> float:
