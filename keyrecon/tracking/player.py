@@ -33,7 +33,7 @@ from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
 from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
-from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.records import Background, CameraPath, Colors, Track
 from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 from keyrecon.video import Video
@@ -56,6 +56,8 @@ LEG_ABOVE = 0.3
 """Least share of the player above the end of a leg."""
 NO_SHOE = 2.5
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
+ONE_SHOE = 2.5
+"""Cost of both feet in one place."""
 LEAST_FOUND = 0.4
 """Share of the frames in which a head must be found for a track to be believed."""
 
@@ -110,9 +112,9 @@ def track_player(
     """
     width = reduced_width(video, colors.height, BackgroundOptions(player=options.player))
     shrink = width / video.width
-    scene = _first_scene(video, camera, width)
-    tall = colors.height * shrink
     parts = posterior_tables(colors)
+    scene = _first_scene(video, camera, width, parts.max(axis=0))
+    tall = colors.height * shrink
     head = parts[colors.names.index("head")]
     tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
     found, to_picture = [], np.linalg.inv(shrinking(shrink))
@@ -125,13 +127,28 @@ def track_player(
     return _connect(found, video, camera, (shrink, tall), options)
 
 
-def _first_scene(video: Video, camera: CameraPath, width: int) -> Scene:
-    """The median of sampled frames: the player, who moves, mostly drops out."""
+def _first_scene(
+    video: Video, camera: CameraPath, width: int, player: Float[np.ndarray, "bins"]
+) -> Scene:
+    """A plate before the player is known: the median of what does not have their colours.
+
+    Where everything has, the background does, and the median of all it is.
+    """
     used = sample_frames(len(video), BackgroundOptions.samples)
     lab = [to_lab(p) for p in read_small(video, width, set(used.tolist()))]
     shrink = width / video.width
-    everywhere = [np.ones(p.shape[:2], bool) for p in lab]
-    plate = combine_plate(lab, everywhere, camera.to_reference[used], shrink)
+    paths = camera.to_reference[used]
+    window = np.ones((3, 3), np.uint8)
+    free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
+    clear = combine_plate(lab, free, paths, shrink)
+    plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
+    known = clear.known
+    plate = Background(
+        plate=np.where(known[..., None], clear.plate, plain.plate),
+        spread=np.where(known, clear.spread, plain.spread),
+        known=plain.known,
+        from_reference=plain.from_reference,
+    )
     return Scene(plate, camera)
 
 
@@ -191,7 +208,7 @@ def _search_feet(
     strength = np.concatenate([strength, np.full(len(ends), np.nan)])
     leg = _mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
     under = _mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
-    strength = strength * (0.05 + leg) * (1.05 - under) ** 2
+    strength = strength * (0.02 + leg) * (1.05 - under) ** 2
     shoes = np.argsort(-strength)[:FEET]
     shoes = shoes[np.isfinite(strength[shoes])]
     bare = np.flatnonzero(np.isnan(strength) & (leg > LEG_ABOVE) & (under < 0.2))[:LEG_ENDS]
@@ -322,9 +339,9 @@ def _pair_costs(
     aside = np.maximum(0, np.abs(middle[:, 0]) - 0.5 * height)
     apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
     off = (short**2 + aside**2 + apart**2) / (2 * (0.12 * height) ** 2)
-    same = pairs[:, 0] == pairs[:, 1]
-    # One place for both feet explains less of the picture than two.
-    return cost[pairs].sum(axis=1) + np.where(same, 1.5, 0.0) + np.minimum(off, 12.0)
+    # One shoe taken for both feet explains less of the picture than two shoes.
+    near = np.exp(-(((both[:, 0] - both[:, 1]) / (2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
+    return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
 
 
 def _fill(
