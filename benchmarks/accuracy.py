@@ -8,23 +8,20 @@ click noise, reconstructs and prints a table. Nothing is asserted.
 
 import argparse
 import resource
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from sequences import DATA, OTHER, TENNIS, Sequence, mocap_files
+from sequences import DATA, OTHER, TENNIS, Sequence, render
 
 from keyrecon.console import show
 from keyrecon.formats.picks import read_picks
-from keyrecon.metrics import evaluate_motion, median_distance, pck, read_truth
+from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, Preparation, as_printed, prepare, reconstruct, with_height
-from keyrecon.records import JointTracks, Motion
+from keyrecon.records import Motion
+from keyrecon.report.summary import annotation_cost
 from keyrecon.stages import StageStore
-from keyrecon.synthetic.cameras import CameraOptions
-from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
-from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
 from keyrecon.video import open_video
 
 CLICK_NOISE = 3.0 / 400
@@ -41,20 +38,6 @@ class Case:
     preparation: Preparation
     truth: dict[str, np.ndarray]
     store: StageStore
-
-
-def render(sequence: Sequence, work: Path, mocap: Path) -> Path:
-    """The folder of the rendered sequence; rendered if it is not there."""
-    folder = work / sequence.name
-    if not (folder / "truth.npz").is_file():
-        camera = CameraOptions(
-            sequence.camera, sequence.pan, sequence.width, sequence.height, sequence.player
-        )
-        options = SynthOptions(
-            SceneOptions(sequence.seed, camera), JoinOptions(seconds=sequence.seconds)
-        )
-        synthesize(folder, mocap_files(sequence, mocap), options, show)
-    return folder
 
 
 def prepare_case(sequence: Sequence, folder: Path, options: Options) -> Case:
@@ -92,24 +75,73 @@ def judge_track(case: Case) -> float:
     feet = np.stack([joint["left_ankle"], joint["right_ankle"]], axis=1)
     limit = 0.1 * track.height
     head_off = np.linalg.norm(track.head - head, axis=1)
-    off = [
+    one, other = (
         np.linalg.norm(track.feet - feet[:, order], axis=2).max(axis=1) for order in ([0, 1], [1, 0])
-    ]
-    return float(((head_off < limit) & (np.minimum(*off) < limit)).mean())
+    )
+    return float(((head_off < limit) & (np.minimum(one, other) < limit)).mean())
 
 
-def judge_tracks(joints: np.ndarray, truth: dict[str, np.ndarray]) -> dict[str, float]:
-    """2D accuracy before refinement: PCK@0.2 of all joints and of the wrists, median error."""
+def judge_carried(motion: Motion, truth: dict[str, np.ndarray]) -> tuple[float, float, float]:
+    """Before refinement: PCK@0.2 of all joints and of the right wrist, median error in heights.
+
+    A missing joint is no hit.
+    """
     names = [str(n) for n in truth["joint_names"]]
-    torso = (names.index("right_hip"), names.index("left_shoulder"))
-    known = truth["points2d"]
-    size = np.linalg.norm(known[:, torso[0]] - known[:, torso[1]], axis=1)
+    known, joints = truth["points2d"], motion.points2d_propagated
+    torso = known[:, names.index("right_hip")] - known[:, names.index("left_shoulder")]
     off = np.linalg.norm(joints - known, axis=2)
-    hit = off < 0.2 * size[:, None]  # a missing joint is no hit
-    wrists = [names.index("right_wrist"), names.index("left_wrist")]
-    return {
-        "pck": float(hit.mean()),
-        "wrists": float(hit[:, wrists[0]].mean()),
-        "median": float(np.nanmedian(off)),
-        "missing": float(np.isnan(off).mean()),
-    }
+    hit = off < 0.2 * np.linalg.norm(torso, axis=1)[:, None]
+    tall = np.median(np.ptp(known[..., 1], axis=1))
+    wrist = names.index("right_wrist")
+    return float(hit.mean()), float(hit[:, wrist].mean()), float(np.nanmedian(off) / tall)
+
+
+FORMS = {
+    "ours": (Options(), True),
+    "ours, automatic signs": (Options(), False),
+    "paper": (as_printed(), True),
+}
+COLUMNS = (
+    f"{'sequence':<22}{'form':<23}{'cost':>6}{'cover':>7}{'track':>7}{'PCK':>7}{'wrist':>7}"
+    f"{'median':>8}{'PA':>7}{'N':>7}{'accel':>7}{'limbs':>8}{'ms/fr':>7}"
+)
+
+
+def report(sequence: Sequence, folder: Path, forms: list[str]) -> None:
+    """Print the rows of one sequence."""
+    for form in forms:
+        options, signs = FORMS[form]
+        case = prepare_case(sequence, folder, options)
+        motion = solve(case, options, signs)
+        scores = evaluate_motion(motion, case.truth)
+        carried, wrist, median = judge_carried(motion, case.truth)
+        found, frames = case.preparation.keyframes, len(motion.time)
+        cost = annotation_cost(found, frames)
+        cover = min(found.upper.coverage, found.lower.coverage)
+        spent = sum(case.store.seconds.values()) / frames * 1000
+        print(
+            f"{sequence.name:<22}{form:<23}{cost:6.2%}{cover:7.1%}{judge_track(case):7.1%}"
+            f"{carried:7.1%}{wrist:7.1%}{median:8.2%}{scores.pa_mpjpe:7.1f}{scores.n_mpjpe:7.1f}"
+            f"{scores.acceleration:7.1f}{scores.limb_variation_max:8.4%}{spent:7.1f}",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--work", type=Path, default=Path("benchmarks/work"))
+    parser.add_argument("--mocap", type=Path, default=DATA / "mocap")
+    parser.add_argument("--only", nargs="*", help="names of sequences")
+    parser.add_argument("--form", nargs="*", default=list(FORMS), choices=list(FORMS))
+    parser.add_argument("--other", action="store_true", help="motion other than tennis")
+    words = parser.parse_args()
+    print(COLUMNS)
+    for sequence in OTHER if words.other else TENNIS:
+        if not words.only or sequence.name in words.only:
+            report(sequence, render(sequence, words.work, words.mocap), words.form)
+    print(f"Peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB.")
+
+
+if __name__ == "__main__":
+    main()

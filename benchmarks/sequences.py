@@ -7,6 +7,11 @@ and resolutions that differ in everything a user's video may differ in.
 from dataclasses import dataclass
 from pathlib import Path
 
+from keyrecon.console import show
+from keyrecon.synthetic.cameras import CameraOptions, View
+from keyrecon.synthetic.clips import JoinOptions
+from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
+
 DATA = Path(__file__).parent.parent.parent / "shared" / "data"
 
 
@@ -54,3 +59,16 @@ def mocap_files(sequence: Sequence, folder: Path = DATA / "mocap") -> list[Path]
             f"No motion capture for {sequence.name} under {folder}; give its folder with --mocap."
         )
     return found
+
+
+def render(sequence: Sequence, work: Path, mocap: Path) -> Path:
+    """The folder of the rendered sequence; rendered if it is not there."""
+    folder = work / sequence.name
+    if not (folder / "truth.npz").is_file():
+        size = sequence.width, round(sequence.width * 9 / 16)
+        camera = CameraOptions(View(sequence.camera), sequence.pan, *size, float(sequence.player))
+        options = SynthOptions(
+            SceneOptions(sequence.seed, camera), JoinOptions(seconds=sequence.seconds)
+        )
+        synthesize(folder, mocap_files(sequence, mocap), options, show)
+    return folder

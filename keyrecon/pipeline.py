@@ -30,6 +30,7 @@ from keyrecon.records import (
     Keyframes,
     Motion,
     Pick,
+    Survey,
     Track,
 )
 from keyrecon.tracking.camera_motion import CameraOptions, follow_camera
@@ -66,6 +67,11 @@ class Preparation:
     figures: Figures
     comparison: Comparison
     keyframes: Keyframes
+
+    @property
+    def survey(self) -> Survey:
+        """What is needed to carry joints over."""
+        return Survey(self.figures, self.track, self.camera, self.comparison, self.keyframes)
 
 
 def run(
@@ -126,9 +132,7 @@ def reconstruct(
         "propagate",
         propagate_joints,
         video,
-        preparation.figures,
-        Course(preparation.track, preparation.camera),
-        keyframes,
+        preparation.survey,
         annotations,
         options=options.propagate,
         progress=progress,
