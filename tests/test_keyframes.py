@@ -49,6 +49,12 @@ def comparison():
     return comparison_of(sporting_poses(seed=1), sporting_poses(seed=2))
 
 
+def test_the_whole_budget_is_spent(comparison):
+    for budget, upper, lower in ((0.02, 8, 8), (0.0163, 7, 6), (0.0025, 1, 1)):
+        chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=budget))
+        assert (len(chosen.upper.frames), len(chosen.lower.frames)) == (upper, lower)
+
+
 @pytest.mark.parametrize("method", ["coverage", "paper"])
 def test_the_budget_is_kept_and_the_coverage_reached(comparison, method):
     chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.02, method=method))
@@ -74,6 +80,12 @@ def test_a_still_clip_needs_one_keyframe():
     chosen = choose_keyframes(still, 50.0, KeyframeOptions(beta_upper=0.01, beta_lower=0.01))
     assert len(chosen.upper.frames) == len(chosen.lower.frames) == 1
     assert chosen.upper.coverage == 1
+
+
+def test_frames_that_are_all_the_same_need_no_particular_keyframe():
+    chosen = choose_keyframes(comparison_of(np.zeros((100, 2))), 50.0)
+    assert chosen.upper.coverage == 1
+    assert (chosen.upper.distance == 0).all()
 
 
 def test_choosing_for_coverage_beats_the_choice_as_printed_at_equal_beta(comparison):

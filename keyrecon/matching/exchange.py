@@ -95,6 +95,22 @@ def shrink(goal: Goal, chosen: list[int]) -> list[int]:
     return chosen
 
 
+def add_closest(
+    chosen: list[int],
+    most: int,
+    distance: Float[np.ndarray, "M M"],
+    weight: Float[np.ndarray, "M"],
+) -> list[int]:
+    """`most` keyframes: each further one brings frames nearest to their keyframes."""
+    chosen = list(chosen)
+    while len(chosen) < min(most, len(weight)):
+        nearest = distance[chosen].min(axis=0, initial=np.inf)
+        total = np.minimum(distance, nearest) @ weight
+        total[chosen] = np.inf
+        chosen.append(int(total.argmin()))
+    return chosen
+
+
 def exchange_for_closeness(
     goal: Goal,
     chosen: list[int],

@@ -23,6 +23,7 @@ from keyrecon.matching.assignment import assign_frames, find_neighborhoods
 from keyrecon.matching.coverage import choose_as_printed, choose_greedily
 from keyrecon.matching.exchange import (
     Goal,
+    add_closest,
     drop_redundant,
     exchange_for_closeness,
     exchange_for_coverage,
@@ -34,6 +35,8 @@ from keyrecon.records import Comparison, HalfKeyframes, Keyframes
 
 BETA_PRECISION = 0.01
 """Beta is searched to one part in a hundred: less than one keyframe in a hundred."""
+LEAST_BETA = 1e-4
+"""Beta is not made smaller, player heights: contours are never found to a tenth of a pixel."""
 BETA_STEP = 0.96
 """Factor on beta from one attempt of the exchange search to the next."""
 
@@ -142,6 +145,7 @@ def _choose_half(
     half: Half, most: int, beta: float | None, also: Int[np.ndarray, "K"]
 ) -> HalfKeyframes:
     """Keyframes of one half; `also` are frames that are annotated for the other half anyway."""
+    searched = beta is None
     if beta is None:
         beta, chosen = _smallest_beta(half, most)
     else:
@@ -151,7 +155,7 @@ def _choose_half(
             chosen = shrink(goal, chosen)
     goal = half.goal(beta)
     if half.options.method == "coverage":
-        chosen = _center(half, goal, chosen, also)
+        chosen = _center(half, goal, chosen, most if searched else 0, also)
     return _record(half, goal, beta, chosen)
 
 
@@ -170,7 +174,7 @@ def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
     """The smallest beta with which `most` keyframes reach the coverage, and such keyframes."""
     low, high = 0.0, 1.001 * float(max(half.matched.max(), half.detour.max())) + 1e-6
     chosen = _choose(half, half.goal(high), most)
-    while high - low > BETA_PRECISION * high:
+    while high - low > max(BETA_PRECISION * high, LEAST_BETA):
         middle = (low + high) / 2
         goal = half.goal(middle)
         found = _choose(half, goal, most)
@@ -187,27 +191,31 @@ def _lower_beta(
     half: Half, most: int, beta: float, chosen: list[int]
 ) -> tuple[float, list[int]]:
     """Exchange keyframes to do with a smaller beta still."""
-    while True:
+    while beta * BETA_STEP > LEAST_BETA:
         goal = half.goal(beta * BETA_STEP)
         start = choose_greedily(goal.hoods, goal.reach, goal.uncovered, most, goal.clarity)
         found = exchange_for_coverage(goal, start)
         if not goal.reached(found):
-            return beta, chosen
+            break
         beta, chosen = beta * BETA_STEP, found
+    return beta, chosen
 
 
 def _center(
-    half: Half, goal: Goal, chosen: list[int], also: Int[np.ndarray, "K"]
+    half: Half, goal: Goal, chosen: list[int], most: int, also: Int[np.ndarray, "K"]
 ) -> list[int]:
     """Move keyframes to the middle of what they represent, away from unclear frames.
 
-    A frame that is annotated for the other half anyway costs the person one frame less to look
-    at, which is worth half a percent of the distance.
+    What the budget still allows is spent on keyframes that lessen the distance most. A frame
+    that is annotated for the other half anyway costs the person one frame less to look at,
+    which is worth half a percent of the distance.
     """
     unclear = 2 - goal.clarity - 0.005 * np.isin(half.comparison.frames, also)
     members = np.bincount(half.comparison.row, minlength=len(goal.clarity))
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
-    return exchange_for_closeness(goal, chosen, distance, members.astype(distance.dtype))
+    weight = members.astype(distance.dtype)
+    chosen = add_closest(chosen, most, distance, weight)
+    return exchange_for_closeness(goal, chosen, distance, weight)
 
 
 def _record(half: Half, goal: Goal, beta: float, chosen: list[int]) -> HalfKeyframes:
