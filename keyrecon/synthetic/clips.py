@@ -17,9 +17,9 @@ from scipy.interpolate import CubicSpline
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.mocap import Capture
-from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, estimate_stature, joint
+from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, estimate_stature, joint
 
-Points = Float[np.ndarray, "T 14 3"]
+Points = Float[np.ndarray, "_ 14 3"]
 
 
 @dataclass(frozen=True)

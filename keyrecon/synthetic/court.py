@@ -8,7 +8,6 @@ which every frame of a turning camera is looked up by a homography.
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
@@ -86,7 +85,7 @@ def _extent(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the smallest part of the plane that holds all frames."""
     width, height = move.size
-    corners = np.array([[-3, -3, 1], [width + 2, -3, 1], [-3, height + 2, 1], [width + 2, height + 2, 1]])
+    corners = np.array([(x, y, 1) for x in (-3, width + 2) for y in (-3, height + 2)])
     planes = np.stack([move.to_plane(t, rotation, focal) for t in range(len(move.rotation))])
     moved = corners @ planes.transpose(0, 2, 1)
     moved = (moved[..., :2] / moved[..., 2:]).reshape(-1, 2)
@@ -159,7 +158,8 @@ def _lines(x: Float[np.ndarray, "h w"], z: Float[np.ndarray, "h w"]) -> Float[np
     foot_z = np.abs(np.gradient(z, axis=0)) + np.abs(np.gradient(z, axis=1)) + 1e-4
 
     def stripe(value: np.ndarray, foot: np.ndarray, at: float, width: float) -> np.ndarray:
-        return np.clip((width / 2 - np.abs(value - at)) / foot + 0.5, 0, np.minimum(1, width / foot))
+        inside = (width / 2 - np.abs(value - at)) / foot + 0.5
+        return np.clip(inside, 0, np.minimum(1, width / foot))
 
     def span(value: np.ndarray, foot: np.ndarray, lo: float, hi: float) -> np.ndarray:
         return stripe(value, foot, (lo + hi) / 2, hi - lo)
@@ -185,7 +185,8 @@ def _paint_wall(
     """Wind screen with posts and boards, trees above it, sky above them."""
     along, height = np.clip(along, -200, 200), np.clip(height, -50, 400)
     grain, broad = tiles
-    weave = 1 + 0.05 * sample(grain, along, height, 0.015) + 0.06 * sample(broad, along, height, 0.03)
+    weave = 1 + 0.05 * sample(grain, along, height, 0.015)
+    weave += 0.06 * sample(broad, along, height, 0.03)
     screen = np.float32(court.wall) * weave[..., None]
     post = (np.abs((along + 1.1) % 3.0 - 1.5) < 0.035) | (np.abs(height - WALL_HEIGHT) < 0.04)
     screen[post] *= 0.55
@@ -194,8 +195,10 @@ def _paint_wall(
     letters = board & (np.abs(height - 0.75) < 0.2) & (sample(broad, along, place, 0.006) > 0.1)
     screen[board] = np.float32(court.board) * weave[board][:, None]
     screen[letters] = np.float32(court.line) * weave[letters][:, None]
-    crown = 4.6 + 1.3 * sample(broad, along, 0 * along, 0.05) + 0.25 * sample(grain, along, height, 0.05)
-    leaves = 1 + 0.2 * sample(grain, along, height, 0.045) + 0.25 * sample(broad, along, height, 0.02)
+    crown = 4.6 + 1.3 * sample(broad, along, 0 * along, 0.05)
+    crown += 0.25 * sample(grain, along, height, 0.02)
+    leaves = 1 + 0.2 * sample(grain, along, height, 0.03)
+    leaves += 0.25 * sample(broad, along, height, 0.02)
     trees = np.float32(court.trees) * np.clip(leaves, 0.25, 2)[..., None]
     haze = np.clip((height - 3) / 40, 0, 1)[..., None]
     sky = np.float32(court.sky) * (1 - 0.25 * haze)

@@ -10,7 +10,7 @@ import numpy as np
 
 from keyrecon.synthetic.figure import Build
 
-Rgb = tuple[float, float, float]
+Rgb = tuple[float | int, float | int, float | int]
 
 _SKINS = (
     (242, 205, 180), (226, 178, 146), (203, 150, 115), (172, 118, 84), (132, 86, 60), (92, 60, 44),
@@ -80,21 +80,21 @@ def choose_look(seed: int) -> Look:
     """A look by its seed: seed 0 is plain, and surfaces take turns with the seed."""
     rng = np.random.default_rng([seed, 11])
     court = _choose_court(seed, rng)
-    skin = _jitter(_SKINS[rng.integers(len(_SKINS))], rng, 6)
+    skin = _jitter(_SKINS[rng.integers(len(_SKINS))], rng, 6.0)
     shirt = _jitter(_SHIRTS[rng.integers(len(_SHIRTS))], rng)
     shorts = _jitter(_SHORTS[rng.integers(len(_SHORTS))], rng)
     shoe = _SHOES[rng.integers(len(_SHOES))] if rng.random() < 0.5 else _SHOES[0]
     if rng.random() < 0.4:  # the wall recurs in the shorts
-        shorts = _jitter(court.wall, rng, 8)
+        shorts = _jitter(court.wall, rng, 8.0)
     return Look(
         skin=skin,
-        hair=_jitter(_HAIRS[rng.integers(len(_HAIRS))], rng, 6),
+        hair=_jitter(_HAIRS[rng.integers(len(_HAIRS))], rng, 6.0),
         shirt=shirt,
         sleeve=shirt if rng.random() < 0.7 else _jitter(_SHORTS[rng.integers(len(_SHORTS))], rng),
         shorts=shorts,
         shoe=shoe,
         sock=(235, 235, 232) if rng.random() < 0.8 else (40, 40, 44),
-        racket=_jitter((46, 46, 52), rng, 20),
+        racket=_jitter((46, 46, 52), rng, 20.0),
         trim=_jitter(_SHIRTS[rng.integers(len(_SHIRTS))], rng),
         build=_choose_build(rng),
         court=court,
@@ -104,7 +104,7 @@ def choose_look(seed: int) -> Look:
     )
 
 
-def _jitter(color: Rgb, rng: np.random.Generator, spread: float = 12) -> Rgb:
+def _jitter(color: Rgb, rng: np.random.Generator, spread: float = 12.0) -> Rgb:
     """A colour close to another."""
     return tuple(float(c) for c in np.clip(np.add(color, rng.normal(0, spread, 3)), 12, 246))
 
@@ -115,13 +115,16 @@ def _choose_sun(rng: np.random.Generator) -> tuple[float, float, float]:
     return float(flat * np.cos(azimuth)), float(np.sin(height)), float(flat * np.sin(azimuth))
 
 
+_SLEEVES = (0.55, 0.7, 1.9)
+
+
 def _choose_build(rng: np.random.Generator) -> Build:
     kind = rng.choice(["shorts", "long shorts", "skirt", "trousers"], p=[0.45, 0.25, 0.2, 0.1])
     leg = {"shorts": 0.55, "long shorts": 0.85, "skirt": 0.42, "trousers": 1.93}[kind]
     skirt = kind == "skirt"
     return Build(
         girth=float(rng.uniform(0.92, 1.02) if skirt else rng.uniform(0.96, 1.12)),
-        sleeve=float(rng.uniform(0.2, 0.5) if skirt else rng.choice([0.55, 0.7, 1.9], p=[0.5, 0.4, 0.1])),
+        sleeve=float(rng.uniform(0.2, 0.5) if skirt else rng.choice(_SLEEVES, p=[0.5, 0.4, 0.1])),
         leg=leg,
         looseness=float(rng.uniform(0.6, 1.6)),
         skirt=skirt,
@@ -130,24 +133,28 @@ def _choose_build(rng: np.random.Generator) -> Build:
     )
 
 
+_HARD = (
+    ((54, 92, 156), (62, 122, 88)), ((70, 126, 92), (150, 74, 62)), ((64, 104, 168), (52, 84, 146)),
+)  # fmt: skip
+
+
 def _choose_court(seed: int, rng: np.random.Generator) -> Court:
     surface = ("hard", "clay", "hard", "grass")[seed % 4]
     if surface == "clay":
-        inside = _jitter((186, 112, 76), rng, 7)
-        outside = _jitter((178, 104, 70), rng, 6)
+        inside = _jitter((186, 112, 76), rng, 7.0)
+        outside = _jitter((178, 104, 70), rng, 6.0)
     elif surface == "grass":
-        inside, outside = _jitter((108, 134, 70), rng, 7), _jitter((88, 120, 60), rng, 7)
+        inside, outside = _jitter((108, 134, 70), rng, 7.0), _jitter((88, 120, 60), rng, 7.0)
     else:
-        pairs = (((54, 92, 156), (62, 122, 88)), ((70, 126, 92), (150, 74, 62)), ((64, 104, 168), (52, 84, 146)))
-        inside, outside = (_jitter(c, rng, 8) for c in pairs[rng.integers(len(pairs))])
+        inside, outside = (_jitter(c, rng, 8.0) for c in _HARD[rng.integers(len(_HARD))])
     walls = ((30, 50, 42), (28, 36, 58), (38, 38, 42), (120, 124, 120), (22, 70, 54))
     return Court(
         surface=surface,
         inside=inside,
         outside=outside,
-        wall=_jitter(walls[rng.integers(len(walls))], rng, 6),
+        wall=_jitter(walls[rng.integers(len(walls))], rng, 6.0),
         board=_jitter(_SHIRTS[rng.integers(len(_SHIRTS))], rng),
-        trees=_jitter((60, 86, 48), rng, 10),
-        sky=_jitter((190, 208, 226), rng, 10),
+        trees=_jitter((60, 86, 48), rng, 10.0),
+        sky=_jitter((190, 208, 226), rng, 10.0),
         crowd=seed % 3 == 1,
     )

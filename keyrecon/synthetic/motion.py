@@ -7,7 +7,8 @@ poses of `strokes`. Bones keep their lengths by construction. The same seed play
 points; no two strokes are alike.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -15,14 +16,11 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from keyrecon.body import LSP14
-from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, unit
-from keyrecon.synthetic.strokes import (
-    BACKHAND, CHANNELS, FOREHAND, HOP, LANDED, READY, SERVE, vary,
-)  # fmt: skip
+from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, unit
+from keyrecon.synthetic.rally import Plan, ease, plan_points
+from keyrecon.synthetic.strokes import CHANNELS
 
 _LENGTH = {LSP14.names[c]: LSP14.proportions[c] for _, c in LSP14.bones}
-FOOT_SIDES = np.array([1.0, -1.0])
-"""Right and left foot, to the right of the middle."""
 
 
 @dataclass(frozen=True)
@@ -37,57 +35,10 @@ class MotionOptions:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class _Step:
-    lift: float
-    land: float
-    place: tuple[float, float]
-    """Where it lands: right, forward; metres in the world."""
-    heading: float
-    """Degrees to the right of the net."""
-
-
-@dataclass
-class _Plan:
-    """What happens when: grows while the points are played, then is read once."""
-
-    time: float = 0.0
-    place: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    moves: list[tuple[float, float, np.ndarray]] = field(default_factory=list)
-    """Start, end and way of each change of place."""
-    poses: list[tuple[float, np.ndarray]] = field(default_factory=list)
-    steps: tuple[list[_Step], list[_Step]] = field(
-        default_factory=lambda: (
-            [_Step(-1.0, -0.5, (0.2, 0.0), 12.0)],
-            [_Step(-1.0, -0.5, (-0.2, 0.0), -12.0)],
-        )
-    )
-
-    def base(self, times: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T 2"]:
-        """Where the player is between the feet: right, forward."""
-        place = np.zeros((*np.shape(times), 2))
-        for start, end, way in self.moves:
-            place += _ease((times - start) / (end - start))[..., None] * way
-        return place
-
-    def step(self, foot: int, lift: float, land: float, place: np.ndarray, heading: float) -> None:
-        """Let a foot step; a step that would start before the last one landed waits for it."""
-        lift = max(lift, self.steps[foot][-1].land + 0.02)
-        self.steps[foot].append(_Step(lift, max(land, lift + 0.12), (*place,), heading))
-
-
 def play_tennis(options: MotionOptions = MotionOptions()) -> Float[np.ndarray, "T 14 3"]:
     """Joints in the world: metres, y up, floor at 0, the net towards negative z."""
     rng = np.random.default_rng([options.seed, 41])
-    plan = _Plan()
-    plan.poses.append((-1.0, READY.numbers()))
-    shot = 0
-    while plan.time < options.seconds:
-        if shot % 5 == 0:
-            _serve(plan, rng)
-        else:
-            _rally(plan, rng, forehand=bool(rng.random() < 0.55))
-        shot += 1
+    plan = plan_points(options.seconds, rng)
     times = np.arange(round(options.seconds * options.fps)) / options.fps
     points = _place_joints(plan, times, options)
     if options.left_handed:
@@ -95,106 +46,8 @@ def play_tennis(options: MotionOptions = MotionOptions()) -> Float[np.ndarray, "
     return points
 
 
-def _ease(share: np.ndarray) -> np.ndarray:
-    """Minimum-jerk course from 0 to 1 (Flash and Hogan 1985)."""
-    s = np.clip(share, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s**2)
-
-
-def _rally(plan: _Plan, rng: np.random.Generator, forehand: bool) -> None:
-    """Split step, run to the ball, stroke, shuffle back."""
-    start = plan.time + rng.uniform(0.1, 0.5)
-    _split_step(plan, start, rng)
-    side = 1.0 if forehand else -1.0
-    way = np.array([side * rng.uniform(0.7, 2.4), rng.uniform(-0.5, 0.6)]) - plan.place * [0.6, 0.8]
-    duration = 0.35 + np.linalg.norm(way) / 2.5
-    arrive = start + 0.34 + duration
-    stance = _STANCES["forehand" if forehand else "backhand"]
-    _run(plan, (start + 0.34, arrive), way, stance)
-    contact = arrive + rng.uniform(0.34, 0.42)
-    stroke = vary(FOREHAND if forehand else BACKHAND, rng)
-    plan.poses += [(contact + t, numbers) for t, numbers in stroke]
-    plan.poses.append((contact + 0.95, READY.numbers()))
-    home = np.array([rng.normal(0, 0.25), rng.normal(0, 0.15)]) - plan.place
-    begin = contact + 0.42
-    plan.time = _shuffle(plan, begin, home)
-
-
-def _serve(plan: _Plan, rng: np.random.Generator) -> None:
-    """Serve from the place where the player is, and land in the court."""
-    stroke = vary(SERVE, rng)
-    contact = plan.time + 0.6 - stroke[0][0]
-    for foot, (offset, heading) in enumerate(_STANCES["serve"]):
-        lift = plan.time + 0.02 + 0.28 * foot
-        plan.step(foot, lift, lift + 0.26, plan.place + offset, heading)
-    plan.poses += [(contact + t, numbers) for t, numbers in stroke]
-    plan.step(0, contact - 0.14, contact + 0.34, plan.place + [0.22, 0.42], 10.0)
-    plan.step(1, contact - 0.1, contact + 0.16, plan.place + [-0.12, 0.45], 25.0)
-    plan.poses.append((contact + 1.0, READY.numbers()))
-    plan.moves.append((contact - 0.35, contact + 0.4, np.array([0.02, 0.1])))
-    plan.place = plan.place + [0.02, 0.1]
-    plan.time = _shuffle(plan, contact + 0.5, -plan.place + rng.normal(0, 0.15, 2))
-
-
-_STANCES = {  # (right, forward) from the middle and heading, of the right and the left foot
-    "forehand": ((np.array([0.28, -0.14]), 62.0), (np.array([-0.22, 0.22]), 30.0)),
-    "backhand": ((np.array([0.16, 0.26]), -34.0), (np.array([-0.28, -0.14]), -66.0)),
-    "serve": ((np.array([0.10, -0.22]), 80.0), (np.array([-0.06, 0.22]), 42.0)),
-}
-
-
-def _split_step(plan: _Plan, start: float, rng: np.random.Generator) -> None:
-    """A small hop on the spot that lands wide and deep."""
-    plan.poses.append((start - 0.08, READY.numbers()))
-    plan.poses.append((start + 0.12, HOP.numbers()))
-    plan.poses.append((start + 0.31, LANDED.numbers()))
-    for foot, side in enumerate(FOOT_SIDES):
-        place = plan.place + [side * rng.uniform(0.24, 0.3), 0.0]
-        plan.step(foot, start, start + rng.uniform(0.22, 0.26), place, side * 15.0)
-
-
-def _run(plan: _Plan, span: tuple[float, float], way: np.ndarray, stance: tuple) -> None:
-    """Run along a way and end in a stance; at least one step per foot."""
-    start, arrive = span
-    plan.moves.append((start - 0.08, arrive + 0.1, way))
-    target = plan.place + way
-    plan.place = target
-    count = max(2, round((arrive - start) / 0.23))
-    gap = (arrive - start) / count
-    heading = np.degrees(np.arctan2(way[0], max(way[1], 0.0) + 0.5 * abs(way[0])))
-    last = 0 if way[0] < 0 else 1  # the foot on the far side closes the stance
-    for index in range(count):
-        foot = (last + count - 1 - index) % 2
-        land = start + (index + 1) * gap
-        lift = land - max(0.2, min(0.34, 1.25 * gap))
-        if index >= count - 2:
-            offset, turn = stance[foot]
-            plan.step(foot, lift, land, target + offset, turn)
-            continue
-        across = np.array([way[1], -way[0]]) / np.linalg.norm(way)
-        place = plan.base(np.array(land + 0.6 * gap)) + 0.09 * FOOT_SIDES[foot] * across
-        plan.step(foot, lift, land, place, heading)
-
-
-def _shuffle(plan: _Plan, start: float, way: np.ndarray) -> float:
-    """Side steps to another place without crossing the feet; returns when ready again."""
-    pairs = max(1, int(np.ceil(np.linalg.norm(way) / 0.42)))
-    gap = 0.2
-    end = start + 2 * pairs * gap
-    plan.moves.append((start, end + 0.1, way))
-    plan.place = plan.place + way
-    leading = 0 if way[0] > 0 else 1
-    for index in range(2 * pairs):
-        foot = (leading + index) % 2
-        lift = start + index * gap
-        place = plan.base(np.array(start + (index - index % 2 + 2) * gap + 0.05))
-        place = place + [0.18 * FOOT_SIDES[foot], 0.0]
-        plan.step(foot, lift, lift + 0.18, place, 12.0 * FOOT_SIDES[foot])
-    return end + 0.1
-
-
 def _place_joints(
-    plan: _Plan, times: Float[np.ndarray, "T"], options: MotionOptions
+    plan: Plan, times: Float[np.ndarray, "T"], options: MotionOptions
 ) -> Float[np.ndarray, "T 14 3"]:
     """Turn the plan into joints, limb by limb."""
     s = options.stature / STATURE
@@ -227,7 +80,7 @@ def _place_joints(
 
 
 def _poses(
-    plan: _Plan, times: Float[np.ndarray, "T"], rate: float
+    plan: Plan, times: Float[np.ndarray, "T"], rate: float
 ) -> Float[np.ndarray, "T C"]:
     """Key poses, interpolated without overshoot and rounded off in time."""
     kept: list[tuple[float, np.ndarray]] = []
@@ -271,7 +124,7 @@ def _square(vectors: np.ndarray, to: np.ndarray) -> np.ndarray:
 
 
 def _feet(
-    plan: _Plan, times: Float[np.ndarray, "T"], scale: float
+    plan: Plan, times: Float[np.ndarray, "T"], scale: float
 ) -> tuple[Float[np.ndarray, "T 2 3"], Float[np.ndarray, "T 2"]]:
     """Ankles in the world and headings of the feet, right and left."""
     ankles = np.empty((len(times), 2, 3))
@@ -280,11 +133,11 @@ def _feet(
         place = np.tile(np.array(steps[0].place), (len(times), 1))
         turn = np.full(len(times), np.radians(steps[0].heading))
         rise = np.zeros(len(times))
-        for before, step in zip(steps, steps[1:], strict=False):
+        for before, step in pairwise(steps):
             share = np.clip((times - step.lift) / (step.land - step.lift), 0, 1)
             way = np.array(step.place) - before.place
-            place += _ease(share)[:, None] * way
-            turn += _ease(share) * np.radians(step.heading - before.heading)
+            place += ease(share)[:, None] * way
+            turn += ease(share) * np.radians(step.heading - before.heading)
             rise += (0.05 + 0.13 * min(np.linalg.norm(way), 1.5)) * np.sin(np.pi * share) ** 2
         ankles[:, foot] = np.stack(
             [place[:, 0], (ANKLE_HEIGHT + rise) * scale, -place[:, 1]], axis=1
@@ -325,7 +178,7 @@ def _place_arms(
     below = np.sqrt(_LENGTH["right_shoulder"] ** 2 - 0.129**2) * stature
     middle = neck - below * up
     for index, (side, sign) in enumerate((("right", 1), ("left", -1))):
-        wrist, elbow = wrists[:, 6 * index : 6 * index + 3], wrists[:, 6 * index + 3 : 6 * index + 6]
+        wrist, elbow = np.split(wrists[:, 6 * index : 6 * index + 6], 2, axis=1)
         goal = middle + np.einsum("tc,tcx->tx", wrist * stature / STATURE, axes)
         shoulder = middle + sign * 0.129 * stature * right
         _reach(points, (f"{side}_shoulder", shoulder), goal,

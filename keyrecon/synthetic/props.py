@@ -12,9 +12,11 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.body import LSP14
-from keyrecon.synthetic.figure import Build, build_solids, point_figure
+from keyrecon.synthetic.cones import Solids
+from keyrecon.synthetic.figure import build_solids
 from keyrecon.synthetic.looks import Look, Rgb, choose_look
-from keyrecon.synthetic.raster import Solids, draw_solids
+from keyrecon.synthetic.pointers import point_figure
+from keyrecon.synthetic.raster import draw_solids
 from keyrecon.synthetic.shading import Light, Tiles, make_tiles, paint_surface
 
 
@@ -49,6 +51,19 @@ class Box:
     color: Rgb
 
 
+@dataclass(frozen=True)
+class Person:
+    """A bystander."""
+
+    x: float
+    z: float
+    turn: float
+    """From facing the net to the right, radians."""
+    seated: bool
+    number: int
+    """Decides the clothes."""
+
+
 def add_props(
     picture: UInt8[np.ndarray, "h w 3"],
     view: View,
@@ -58,20 +73,20 @@ def add_props(
     """Draw a seed's furniture, people and balls whose z is wanted, farthest first."""
     look, seed = scene
     rng = np.random.default_rng([seed, 31])
-    things: list[tuple[float, Box | tuple]] = []
+    things: list[tuple[float, Box | Person]] = []
     for box in _choose_boxes(rng, look):
         things.append((view.depth(np.array(box.place)), box))
     for person in _choose_people(rng):
-        things.append((view.depth(np.array([person[0], 0, person[1]])), person))
+        things.append((view.depth(np.array([person.x, 0, person.z])), person))
     tiles = make_tiles(rng)
     for depth, thing in sorted(things, key=lambda t: -t[0]):
-        z = thing.place[2] if isinstance(thing, Box) else thing[1]
+        z = thing.place[2] if isinstance(thing, Box) else thing.z
         if depth < view.beyond or not wanted(z):
             continue
         if isinstance(thing, Box):
             _draw_box(picture, view, thing, look)
         else:
-            _draw_person(picture, view, thing, (look, tiles, seed))
+            _draw_person(picture, view, thing, (look, tiles))
     _draw_balls(picture, view, rng, wanted)
 
 
@@ -108,7 +123,7 @@ def _draw_box(picture: np.ndarray, view: View, box: Box, look: Look) -> None:
     _darken(picture, view.project(fallen), 1 - 0.45 * look.sunshine)
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            face = world[corners[:, axis] == max(sign, 0) if axis == 1 else corners[:, axis] == sign]
+            face = world[corners[:, axis] == (max(sign, 0) if axis == 1 else sign)]
             normal = np.eye(3)[axis] * sign
             if normal @ (face.mean(axis=0) - view.center) >= 0:
                 continue
@@ -133,18 +148,19 @@ def _darken(picture: np.ndarray, outline: Float[np.ndarray, "n 2"], factor: floa
     region[:] = (region * (1 - soft * (1 - factor))).astype(np.uint8)
 
 
-def _choose_people(rng: np.random.Generator) -> list[tuple]:
+def _choose_people(rng: np.random.Generator) -> list[Person]:
     """Place, turn and posture of people along the walls, and one that stands nearer."""
     people = []
     for _ in range(int(rng.integers(3, 9))):
         wall = rng.integers(4)
         along = rng.uniform(0, 1)
-        x, z = [(-9.4, 5 - 33 * along), (9.4, 5 - 33 * along), (18 * along - 9, -29),
+        x, z = [(-9.4, 5 - 33 * along), (9.4, 5 - 33 * along), (18 * along - 9, -29.0),
                 (18 * along - 9, 6.3)][wall]  # fmt: skip
-        turn = [np.pi / 2, -np.pi / 2, np.pi, 0][wall]
-        people.append((x, z, turn + rng.normal(0, 0.5), bool(rng.random() < 0.4), rng.integers(1000)))
-    x = float(rng.choice([-1, 1]) * rng.uniform(6.5, 8.5))
-    people.append((x, float(rng.uniform(-13, 5)), -np.sign(x) * np.pi / 2, False, rng.integers(1000)))
+        turn = [np.pi / 2, -np.pi / 2, np.pi, 0.0][wall]
+        seated = bool(rng.random() < 0.4)
+        people.append(Person(x, z, turn + rng.normal(0, 0.5), seated, int(rng.integers(1000))))
+    x, z = float(rng.choice([-1, 1]) * rng.uniform(6.5, 8.5)), float(rng.uniform(-13, 5))
+    people.append(Person(x, z, -np.sign(x) * np.pi / 2, False, int(rng.integers(1000))))
     return people
 
 
@@ -160,31 +176,32 @@ _SEATED = {
 }  # fmt: skip
 
 
-def _stand(person: tuple) -> Float[np.ndarray, "14 3"]:
-    x, z, turn, seated, _ = person
+def _stand(person: Person) -> Float[np.ndarray, "14 3"]:
+    """Joints of a bystander in the world."""
+    posture = _SEATED if person.seated else _STANDING
     rows = []
     for name in LSP14.names:
         side = -1.0 if name.startswith("left_") else 1.0
-        r, u, f = (_SEATED if seated else _STANDING)[name.removeprefix("left_").removeprefix("right_")]
+        r, u, f = posture[name.removeprefix("left_").removeprefix("right_")]
         rows.append((side * r, u, f))
     r, u, f = 1.74 * np.array(rows).T
-    c, s = np.cos(turn), np.sin(turn)
-    return np.stack([x + c * r + s * f, u, z + s * r - c * f], axis=1)
+    c, s = np.cos(person.turn), np.sin(person.turn)
+    return np.stack([person.x + c * r + s * f, u, person.z + s * r - c * f], axis=1)
 
 
 def _draw_person(
-    picture: np.ndarray, view: View, person: tuple, scene: tuple[Look, Tiles, int]
+    picture: np.ndarray, view: View, person: Person, scene: tuple[Look, Tiles]
 ) -> None:
     """A clothed bystander; one in three wears the player's shirt."""
-    look, tiles, _ = scene
+    look, tiles = scene
     points = np.repeat(_stand(person)[None], 3, axis=0)
     if min(view.depth(p) for p in points[0]) < 1:
         return
-    clothes = choose_look(int(person[4]))
-    if person[4] % 3 == 0:
+    clothes = choose_look(person.number)
+    if person.number % 3 == 0:
         clothes = replace(clothes, shirt=look.shirt, sleeve=look.shirt)
-    build = replace(clothes.build, skirt=False) if person[3] else clothes.build
-    figure = build_solids(points, point_figure(points, 50.0), build or Build())
+    build = replace(clothes.build, skirt=clothes.build.skirt and not person.seated)
+    figure = build_solids(points, point_figure(points, 50.0), build)
     solids = Solids(
         (figure.start[0] - view.center) @ view.rotation.T,
         (figure.end[0] - view.center) @ view.rotation.T,
@@ -196,13 +213,19 @@ def _draw_person(
     floor = (points[0, [0, 5]] * [1, 0, 1]).repeat(4, axis=0)
     _darken(picture, view.project(floor + 0.16 * np.array(
         [(1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)] * 2)), 0.6)  # fmt: skip
-    light = Light(view.rotation @ np.array(look.sun), view.rotation[:, 1], look.sun_color,
-                  look.sunshine, look.court.outside)  # fmt: skip
+    light = Light(
+        view.rotation @ np.array(look.sun), view.rotation[:, 1], look.sun_color, look.sunshine,
+        look.court.outside,
+    )  # fmt: skip
     color = paint_surface(surface, figure.part, clothes.part_colors[figure.part], light, tiles)
     height, width = surface.solid.shape
     region = picture[surface.top : surface.top + height, surface.left : surface.left + width]
     hit = surface.solid >= 0
     region[hit] = color[hit].astype(np.uint8)
+
+
+_BALL = ((0.7, 1.0, (40, 50, 40)), (0.0, 1.0, (196, 208, 66)), (-0.3, 0.6, (222, 232, 110)))
+"""Shadow, ball and its lit side: offset and size in radii, colour."""
 
 
 def _draw_balls(
@@ -215,6 +238,6 @@ def _draw_balls(
             continue
         x, y = view.project(ball[None])[0]
         radius = 0.033 * view.focal / view.depth(ball)
-        for dy, factor, color in ((0.7, 1.0, (40, 50, 40)), (0, 1.0, (196, 208, 66)), (-0.3, 0.6, (222, 232, 110))):
+        for dy, factor, color in _BALL:
             centre = (round(16 * x), round(16 * (y + dy * radius)))
             cv2.circle(picture, centre, round(16 * radius * factor), color, -1, cv2.LINE_AA, 4)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.synthetic.figure import Pointers, joint, unit
+from keyrecon.synthetic.pointers import Pointers, joint, unit
 
 GRIP = 0.08
 """Metres from the wrist to the middle of the fist."""
@@ -65,7 +65,7 @@ def draw_racket(
     hi = np.minimum(np.ceil(pixels.max(axis=(0, 1))) + 5, size).astype(int)
     if (hi <= lo).any():
         return None
-    shape = (hi[1] - lo[1], hi[0] - lo[0])
+    shape = (int(hi[1] - lo[1]), int(hi[0] - lo[0]))
     scale = focal / poses[:, 0, 2].mean()
     frame = np.zeros(shape, np.float32)
     strings = np.zeros(shape, np.float32)
@@ -76,8 +76,9 @@ def draw_racket(
         mask[:] = 0
         thin, thick = max(1, round(0.02 * scale)), max(1, round(0.03 * scale))
         cv2.polylines(mask, [one[: len(_OVAL)]], True, 255, thin, cv2.LINE_AA, 4)
-        cv2.polylines(mask, [one[len(_OVAL) :][:2]], False, 255, thick, cv2.LINE_AA, 4)
-        cv2.polylines(mask, list(one[len(_OVAL) + 2 :].reshape(2, 2, 2)), False, 255, thin, cv2.LINE_AA, 4)
+        handle, *throats = one[len(_OVAL) :].reshape(3, 2, 2)
+        cv2.polylines(mask, [handle], False, 255, thick, cv2.LINE_AA, 4)
+        cv2.polylines(mask, throats, False, 255, thin, cv2.LINE_AA, 4)
         frame += mask
     frame /= 255 * len(poses)
     strings /= 255 * len(poses)

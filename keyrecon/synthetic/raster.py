@@ -1,35 +1,18 @@
 """Draw rounded cones: depth, owner and surface normal of every pixel of a box.
 
-A solid is the hull of two spheres, squeezed along two axes: limbs, torso, head and shoes are all
-of this kind. Its end points are projected in true perspective; within one solid the rays count
-as parallel, so that what decides where a ray meets it is a quadratic form in pixel coordinates
-(the ray against a cone between two spheres, e.g. Quilez, "Round cone intersection"). A form is
-evaluated for a whole box with three array operations; depth, solid and place along its axis are
+Limbs, torso, head and shoes are rounded cones (see `cones`). Their forms are evaluated for a
+whole box of pixels with three array operations each; depth, solid and place along its axis are
 kept where it is nearest, and normals follow once at the end for the pixels that were hit.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
+
+from keyrecon.synthetic.cones import Forms, Solids, make_forms
 
 FAR = np.float32(1e9)
-
-
-@dataclass(frozen=True, eq=False)
-class Solids:
-    """Rounded cones in camera axes, metres; P of them."""
-
-    start: Float[np.ndarray, "*t P 3"]
-    end: Float[np.ndarray, "*t P 3"]
-    side: Float[np.ndarray, "*t P 3"]
-    """Direction across the axis along which `squeeze[..., 0]` acts."""
-    radii: Float[np.ndarray, "P 2"]
-    """At start and end, metres."""
-    squeeze: Float[np.ndarray, "P 2"]
-    """Factors on the radius along `side` and across both."""
-    open_end: Bool[np.ndarray, "P"]
-    """Cut flat at the end, as a sleeve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,25 +31,6 @@ class Surface:
     """Where on its solid: metres along the axis, metres across (for textures)."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Forms:
-    """Solids as quadratic forms over (x, y, 1), pixels counted from each solid's start."""
-
-    start: Float[np.ndarray, "P 3"]
-    to_local: Float[np.ndarray, "P 3 3"]
-    length: Float[np.ndarray, "P"]
-    radii: Float[np.ndarray, "P 2"]
-    boxes: Float[np.ndarray, "P 4"]
-    body: Float[np.ndarray, "P 3 3"]
-    balls: Float[np.ndarray, "P 2 3 3"]
-    along: Float[np.ndarray, "P 2 3"]
-    """k1 and m1 of the derivation: linear in (x, y, 1)."""
-    nearest: Float[np.ndarray, "P 2 3"]
-    """Ray parameter of the point nearest to each ball's centre, linear in (x, y, 1)."""
-    ray: Float[np.ndarray, "P 4"]
-    """Along-axis part of the ray m2, k2, slope d2, and the ray's local length per px."""
-
-
 def draw_solids(
     solids: Solids,
     focal: float,
@@ -78,7 +42,7 @@ def draw_solids(
 
     `shift` moves the point of a pixel that is sampled, px. None when nothing is in the picture.
     """
-    forms, _ = _as_forms(solids, focal, principal - np.asarray(shift))
+    forms = make_forms(solids, focal, principal - np.asarray(shift))
     width, height = size
     lo = np.maximum(np.floor(forms.boxes[:, :2].min(axis=0)), 0).astype(int)
     hi = np.minimum(np.ceil(forms.boxes[:, 2:].max(axis=0)) + 1, [width, height]).astype(int)
@@ -95,85 +59,8 @@ def draw_solids(
     return Surface(int(lo[0]), int(lo[1]), owner, depth, normal, place / np.float32(scale))
 
 
-def _as_forms(
-    solids: Solids, focal: float, principal: Float[np.ndarray, "2"]
-) -> tuple[_Forms, float]:
-    """Project the end points and set up the quadratic forms of all solids."""
-    reference = focal / solids.start[:, 2].mean()
-    ends = np.stack([solids.start, solids.end], axis=1)
-    scale = focal / ends[..., 2]
-    pixels = np.concatenate(
-        [ends[..., :2] * scale[..., None] + principal, ends[..., 2:] * reference], axis=-1
-    )
-    radii = solids.radii * scale
-    start = pixels[:, 0]
-    axis = pixels[:, 1] - start
-    length = np.linalg.norm(axis, axis=-1)
-    basis = _bases(axis / np.maximum(length, 1e-9)[:, None], solids.side)
-    stretch = np.concatenate([1 / solids.squeeze, np.ones((len(length), 1))], axis=1)
-    to_local = stretch[:, :, None] * basis
-    boxes = _boxes(pixels, radii, np.linalg.inv(to_local))
-    slope = radii[:, 0] - radii[:, 1]
-    ray = to_local[:, :, 2]
-    per_px = np.linalg.norm(ray, axis=1)
-    ray = ray / per_px[:, None]
-    plane = np.concatenate([to_local[:, :, :2], np.zeros((len(length), 3, 1))], axis=2)
-    d2 = length**2 - slope**2
-    m1 = length[:, None] * plane[:, 2]
-    m2 = length * ray[:, 2]
-    m3 = np.einsum("pi,pij->pj", ray, plane)
-    m5 = np.einsum("pij,pik->pjk", plane, plane)
-    one = np.array([0.0, 0.0, 1.0])
-    unit = np.outer(one, one)
-    lean = slope * radii[:, 0]
-    k2 = d2 - m2**2
-    k1 = d2[:, None] * m3 - m1 * m2[:, None] + (m2 * lean)[:, None] * one
-    k0 = d2[:, None, None] * m5 - _outer(m1, m1)
-    k0 += lean[:, None, None] * (_outer(m1, np.broadcast_to(one, m1.shape)) * 2)
-    k0 = (k0 + k0.transpose(0, 2, 1)) / 2 - (length * radii[:, 0])[:, None, None] ** 2 * unit
-    body = _outer(k1, k1) - k2[:, None, None] * k0
-    shifted = plane.copy()
-    shifted[:, 2, 2] -= length
-    m6 = np.einsum("pi,pij->pj", ray, shifted)
-    m7 = np.einsum("pij,pik->pjk", shifted, shifted)
-    balls = np.stack([_outer(m3, m3) - m5, _outer(m6, m6) - m7], axis=1)
-    balls += radii[:, :, None, None] ** 2 * unit
-    m1 = m1 - lean[:, None] * one
-    forms = _Forms(
-        start, to_local, length, radii, boxes, body, balls,
-        np.stack([k1, m1], axis=1), np.stack([m3, m6], axis=1),
-        np.stack([m2, k2, d2, per_px], axis=1),
-    )
-    return forms, reference
-
-
-def _outer(a: Float[np.ndarray, "P 3"], b: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3 3"]:
-    return a[:, :, None] * b[:, None, :]
-
-
-def _bases(
-    axis: Float[np.ndarray, "P 3"], side: Float[np.ndarray, "P 3"]
-) -> Float[np.ndarray, "P 3 3"]:
-    """Rows: side made square to the axis, across both, axis."""
-    across = np.cross(axis, side)
-    across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-    return np.stack([np.cross(across, axis), across, axis], axis=1)
-
-
-def _boxes(
-    pixels: Float[np.ndarray, "P 2 3"],
-    radii: Float[np.ndarray, "P 2"],
-    to_pixels: Float[np.ndarray, "P 3 3"],
-) -> Float[np.ndarray, "P 4"]:
-    """Pixel boxes around both squeezed spheres of every solid."""
-    reach = radii[:, :, None] * np.linalg.norm(to_pixels[:, :2], axis=2)[:, None]
-    lo = (pixels[..., :2] - reach).min(axis=1)
-    hi = (pixels[..., :2] + reach).max(axis=1)
-    return np.concatenate([lo, hi], axis=1)
-
-
 def _draw_one(
-    forms: _Forms,
+    forms: Forms,
     index: int,
     origin: Int[np.ndarray, "2"],
     buffers: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -182,22 +69,36 @@ def _draw_one(
     """Enter one solid where it is nearer than what the buffers hold."""
     depth, owner, along = buffers
     height, width = depth.shape
-    box = forms.boxes[index]
-    x0, y0 = np.maximum(np.floor(box[:2]).astype(int) - origin, 0)
-    x1, y1 = np.minimum(np.ceil(box[2:]).astype(int) + 1 - origin, [width, height])
+    x0, y0 = np.maximum(np.floor(forms.boxes[index, :2]).astype(int) - origin, 0)
+    x1, y1 = np.minimum(
+        np.ceil(forms.boxes[index, 2:]).astype(int) + 1 - origin, [width, height]
+    )
     if x1 <= x0 or y1 <= y0:
         return
     start = forms.start[index]
     x = (np.arange(x0, x1) + (origin[0] - start[0])).astype(np.float32)[None]
     y = (np.arange(y0, y1) + (origin[1] - start[1])).astype(np.float32)[:, None]
-    m2, k2, d2, per_px = (float(v) for v in forms.ray[index])
-    best = np.full((y1 - y0, x1 - x0), FAR, np.float32)
+    ray, place = _meet(forms, index, (x, y), open_end)
+    region = (slice(y0, y1), slice(x0, x1))
+    found = ray / np.float32(forms.ray[index, 3]) + np.float32(start[2])
+    nearer = (ray < FAR) & (found < depth[region])
+    np.copyto(depth[region], found, where=nearer)
+    np.copyto(owner[region], np.int16(index), where=nearer)
+    np.copyto(along[region], place, where=nearer)
+
+
+def _meet(
+    forms: Forms, index: int, pixels: tuple[np.ndarray, np.ndarray], open_end: bool
+) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
+    """First hit of every ray (FAR where none), and where along the axis it lies, 0-1."""
+    x, y = pixels
+    m2, k2, d2, _ = forms.ray[index].astype(np.float32)
+    best = np.full((y.size, x.size), FAR, np.float32)
     place = np.zeros_like(best)
-    if d2 > 0 and k2 > 1e-9:
+    if d2 > 0 and k2 > 0:
         inside = _quadratic(forms.body[index], x, y)
-        root = np.sqrt(np.maximum(inside, 0))
-        ray = (-root - _linear(forms.along[index, 0], x, y)) / np.float32(k2)
-        share = (_linear(forms.along[index, 1], x, y) + ray * np.float32(m2)) / np.float32(d2)
+        ray = (-np.sqrt(np.maximum(inside, 0)) - _linear(forms.advance[index], x, y)) / k2
+        share = (_linear(forms.along[index], x, y) + ray * m2) / d2
         hit = (inside > 0) & (share > 0) & (share < 1)
         np.copyto(best, ray, where=hit)
         np.copyto(place, share, where=hit)
@@ -207,13 +108,7 @@ def _draw_one(
         hit = (inside > 0) & (ray < best)
         np.copyto(best, ray, where=hit)
         np.copyto(place, np.float32(end), where=hit)
-    region = (slice(y0, y1), slice(x0, x1))
-    hit = best < FAR
-    best = best / np.float32(per_px) + np.float32(start[2])
-    hit &= best < depth[region]
-    np.copyto(depth[region], best, where=hit)
-    np.copyto(owner[region], np.int16(index), where=hit)
-    np.copyto(along[region], place, where=hit)
+    return best, place
 
 
 def _linear(
@@ -236,7 +131,7 @@ def _quadratic(
 
 
 def _normals(
-    forms: _Forms,
+    forms: Forms,
     depth: Float[np.ndarray, "h w"],
     owner: Int[np.ndarray, "h w"],
     along: Float[np.ndarray, "h w"],

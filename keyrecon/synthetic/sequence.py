@@ -25,12 +25,14 @@ from keyrecon.records import Pick
 from keyrecon.synthetic.cameras import CameraMove, CameraOptions, plan_camera
 from keyrecon.synthetic.clips import JoinOptions, join_clips
 from keyrecon.synthetic.court import Background, draw_background
-from keyrecon.synthetic.figure import PARTS, point_figure
+from keyrecon.synthetic.figure import PARTS
 from keyrecon.synthetic.looks import Look, choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
+from keyrecon.synthetic.pointers import point_figure
 from keyrecon.synthetic.racket import racket_frames
-from keyrecon.synthetic.render import Frame, Stage, draw_frame
+from keyrecon.synthetic.render import Frame, draw_frame
 from keyrecon.synthetic.shading import make_tiles
+from keyrecon.synthetic.stage import Stage
 from keyrecon.video_writer import write_video
 
 
@@ -95,7 +97,8 @@ def set_stage(
     grey = rng.normal(0, options.noise, (height + 64, width + 64, 1))
     color = rng.normal(0, 0.6 * options.noise, (height + 64, width + 64, 3))
     return Stage(
-        points, pointers, racket_frames(points, pointers), move, _draw_surroundings(points, move, look, options.seed), look,
+        points, pointers, racket_frames(points, pointers), move,
+        _draw_surroundings(points, move, look, options.seed), look,
         make_tiles(rng), np.round(grey + color).astype(np.int8),
         min(1.0, options.shutter * fps), options.seed,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.synthetic.figure import PARTS
+from keyrecon.synthetic.looks import Rgb
 from keyrecon.synthetic.raster import FAR, Surface
 
 TILE = 256
@@ -28,10 +29,11 @@ class Light:
     """Unit vector towards the sun."""
     up: Float[np.ndarray, "3"]
     """Unit vector towards the sky."""
-    color: tuple[float, float, float]
+    color: Rgb
+    """Of sunlight, 1 = full."""
     sunshine: float
     """0 overcast to 1 hard sun."""
-    floor: tuple[float, float, float]
+    floor: Rgb
     """Colour of the floor, which lights surfaces that look down, 0-255."""
 
 
@@ -108,7 +110,7 @@ def _light(
     ambient = to_sky[:, None] * sky + (1 - to_sky)[:, None] * floor
     half = light.sun - np.array([0, 0, 1.0])
     shine = np.clip(normal @ (half / np.linalg.norm(half)).astype(np.float32), 0, 1) ** 12
-    direct = (to_sun + gloss.astype(np.float32) * shine)[:, None] * np.array(light.color, np.float32)
+    direct = (to_sun + gloss.astype(np.float32) * shine)[:, None] * np.float32(light.color)
     share = np.float32(light.sunshine)
     return ambient * (1.08 - 0.42 * share) + direct * (0.14 + 0.72 * share)
 
