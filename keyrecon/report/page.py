@@ -2,8 +2,8 @@
 
 The file opens without a network: scripts, styles, pictures, the small video and all numbers
 stand in it, and its content security policy forbids it to load anything. Charts are drawn by
-plotly, whose script comes from the installed package; the turning figure, the distance
-matrices and the cursor that links everything are drawn by report.js.
+plotly, whose script comes from the installed package; the cursor that links everything, the
+distance matrices and the turning figure are small scripts of our own.
 """
 
 from importlib.resources import files
@@ -15,8 +15,9 @@ from plotly.offline import get_plotlyjs
 from keyrecon import __version__
 from keyrecon.durable import write_durably
 from keyrecon.progress import Progress, silent
-from keyrecon.report import charts, sections
+from keyrecon.report import charts, sections, tables
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
+from keyrecon.report.headline import headline
 from keyrecon.report.markup import data_block, note, pack, section, text, to_json
 from keyrecon.report.material import ReportMaterial
 from keyrecon.report.pictures import Pictures, cut_pictures
@@ -26,6 +27,8 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; media-src data: blob:"
 )
+SCRIPTS = ("cursor.js", "charts.js", "matrices.js", "figure.js")
+"""In the order in which they build on one another."""
 VIEW_COUNT = 12
 """Frames shown from elsewhere; the paper shows every 50th of 36 s."""
 
@@ -42,7 +45,8 @@ def build_page(material: ReportMaterial, pictures: Pictures) -> str:
     """The whole page as text."""
     title = text(material.video.path.name)
     own = files("keyrecon.report")
-    style, script = ((own / name).read_text("utf-8") for name in ("report.css", "report.js"))
+    style = (own / "report.css").read_text("utf-8")
+    scripts = (get_plotlyjs(), *((own / name).read_text("utf-8") for name in SCRIPTS))
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
@@ -50,7 +54,7 @@ def build_page(material: ReportMaterial, pictures: Pictures) -> str:
         f"<title>{title}: keyrecon report</title><style>{style}</style></head><body>"
         f"{_navigation()}<main>{_body(material, pictures)}</main>{_transport()}"
         f"{data_block('motion-data', to_json(_numbers(material)))}"
-        f"<script>{get_plotlyjs()}</script><script>{script}</script></body></html>"
+        f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>"
     )
 
 
@@ -58,7 +62,7 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
     strip = list(pictures.strip)
     chosen = strip[:: max(1, round(len(strip) / VIEW_COUNT))]
     return "".join((
-        sections.headline(material),
+        headline(material),
         _trust_over_time(material),
         sections.story(pictures, material.motion.time),
         sections.keyframe_pictures(material, pictures),
@@ -67,11 +71,11 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
         _joint_curves(material),
         _figure_player(pictures, material.truth is not None),
         sections.reference_views(material, chosen),
-        sections.body_tables(material),
+        tables.body_tables(material),
         _sources(material),
         _angles(material),
-        section("making", "How it was made", sections.stage_times(dict(material.seconds)),
-                sections.option_table(material.options), note(f"keyrecon {text(__version__)}")),
+        section("making", "How it was made", tables.stage_times(material.seconds),
+                tables.option_table(material.options), note(f"keyrecon {text(__version__)}")),
     ))
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d
 
+from keyrecon.pictures import reduce_picture
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Track
 from keyrecon.report.drawing import draw_pose
@@ -60,8 +61,7 @@ class Windows:
         inner = cv2.copyMakeBorder(
             picture[y0:y1, x0:x1], *np.maximum(border, 0).tolist(), cv2.BORDER_REPLICATE
         )[:side, :side]
-        how = cv2.INTER_AREA if side > size else cv2.INTER_CUBIC
-        return cv2.resize(inner, (size, size), interpolation=how)
+        return reduce_picture(inner, size)
 
     def _square(self, frame: int) -> tuple[Int[np.ndarray, "2"], int]:
         side = max(2, round(float(self.side[frame])))
