@@ -28,7 +28,7 @@ def find_neighborhoods(
     near = smoothed < beta
     np.fill_diagonal(near, True)
     n_frames = len(comparison.row)
-    served = np.flatnonzero(detour < beta)
+    served = np.flatnonzero(detour < beta).astype(np.int32)
     members = np.bincount(comparison.row[served], minlength=len(near))
     first_member = np.cumsum(members) - members
     candidate, row = np.nonzero(near)

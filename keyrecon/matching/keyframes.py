@@ -39,6 +39,9 @@ LEAST_BETA = 1e-4
 """Beta is not made smaller, player heights: contours are never found to a tenth of a pixel."""
 BETA_STEP = 0.96
 """Factor on beta from one attempt of the exchange search to the next."""
+MOST_EXCHANGED = 60
+"""More keyframes than these stay as the greedy choice has them: the time to reconsider each
+grows with the square of their number."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,8 @@ class Half:
     matched: Float[np.ndarray, "M M"]
     smoothed: Float[np.ndarray, "M M"]
     """D of method='coverage'."""
+    first_beta: float
+    """Where the search for beta starts: frames as alike as neighbours in time."""
     detour: Float[np.ndarray, "T"]
     reach: int
     uncovered: int
@@ -134,6 +139,7 @@ def _half(
         comparison=comparison,
         matched=matched,
         smoothed=smooth_distances(matched, same_pose, options.form),
+        first_beta=max(same_pose, LEAST_BETA),
         detour=comparison.detour[index],
         reach=reach,
         uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
@@ -151,7 +157,7 @@ def _choose_half(
     else:
         goal = half.goal(beta)
         chosen = _choose(half, goal, len(goal.clarity))
-        if half.options.method == "coverage":
+        if half.options.method == "coverage" and len(chosen) <= MOST_EXCHANGED:
             chosen = shrink(goal, chosen)
     goal = half.goal(beta)
     if half.options.method == "coverage":
@@ -172,8 +178,11 @@ def _choose(half: Half, goal: Goal, most: int) -> list[int]:
 
 def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
     """The smallest beta with which `most` keyframes reach the coverage, and such keyframes."""
-    low, high = 0.0, 1.001 * float(max(half.matched.max(), half.detour.max())) + 1e-6
+    low, high = 0.0, half.first_beta
     chosen = _choose(half, half.goal(high), most)
+    while not half.goal(high).reached(chosen):
+        low, high = high, 1.5 * high
+        chosen = _choose(half, half.goal(high), most)
     while high - low > max(BETA_PRECISION * high, LEAST_BETA):
         middle = (low + high) / 2
         goal = half.goal(middle)
@@ -182,7 +191,7 @@ def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
             high, chosen = middle, found
         else:
             low = middle
-    if half.options.method == "paper":
+    if half.options.method == "paper" or most > MOST_EXCHANGED:
         return high, chosen
     return _lower_beta(half, most, high, chosen)
 
@@ -215,6 +224,8 @@ def _center(
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
     weight = members.astype(distance.dtype)
     chosen = add_closest(chosen, most, distance, weight)
+    if len(chosen) > MOST_EXCHANGED:
+        return chosen
     return exchange_for_closeness(goal, chosen, distance, weight)
 
 
