@@ -191,7 +191,7 @@ def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elem
         mask = (labels == value).astype(np.uint8)
         contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
         for contour, place in zip(contours, tree[0] if contours else (), strict=True):
-            walk = _walk(contour[:, 0].astype(float), hole=place[3] >= 0)
+            walk = _walk(contour[:, 0].astype(float), hole=bool(place[3] >= 0))
             sampled = _resample(walk, step)
             if sampled is None:
                 continue

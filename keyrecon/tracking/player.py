@@ -56,6 +56,8 @@ LEG_ABOVE = 0.3
 """Least share of the player above the end of a leg."""
 NO_SHOE = 2.5
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
+KNEE_ROOM = 0.06
+"""How far a leg may bend away from the straight line from hips to foot, player heights."""
 ONE_SHOE = 2.5
 """Cost of both feet in one place."""
 LEAST_FOUND = 0.4
@@ -207,6 +209,7 @@ def _search_feet(
     feet = np.concatenate([feet, ends]) + corner
     strength = np.concatenate([strength, np.full(len(ends), np.nan)])
     leg = _mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
+    leg *= _leg_between(evidence, heads[0], feet, tall) ** 2
     under = _mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
     strength = strength * (0.02 + leg) * (1.05 - under) ** 2
     shoes = np.argsort(-strength)[:FEET]
@@ -214,6 +217,31 @@ def _search_feet(
     bare = np.flatnonzero(np.isnan(strength) & (leg > LEG_ABOVE) & (under < 0.2))[:LEG_ENDS]
     order = np.concatenate([shoes, bare])
     return feet[order], strength[order]
+
+
+def _leg_between(
+    evidence: _Evidence,
+    head: Float[np.ndarray, "2"],
+    feet: Float[np.ndarray, "n 2"],
+    tall: float,
+) -> Float[np.ndarray, "n"]:
+    """Share of the way from the hips to each foot that the player covers, knees bent or not."""
+    x0, x1 = (round(head[0] + side * 0.4 * tall) for side in (-1, 1))
+    y0, y1 = (round(head[1] + share * tall) for share in (0.35, 0.55))
+    rows, columns = evidence.player.shape
+    band = evidence.player[max(0, y0) : max(0, y1), max(0, x0) : max(0, x1)]
+    weight = band.sum(axis=0)
+    middle = (weight * np.arange(len(weight))).sum() / weight.sum() if weight.sum() > 0 else None
+    hips = np.array([head[0] if middle is None else max(0, x0) + middle, (y0 + y1) / 2])
+    share = np.linspace(0.2, 0.85, 10)[:, None, None]
+    way = hips + share * (feet - hips)
+    reach = max(1, round(KNEE_ROOM * tall))
+    wide = cv2.blur(evidence.player, (2 * reach + 1, 2 * reach + 1))
+    x = np.rint(way[..., 0]).astype(int).clip(0, columns - 1)
+    y = np.rint(way[..., 1]).astype(int).clip(0, rows - 1)
+    # A limb a third as wide as the window covers it; the widest gaps tell, not the mean.
+    cover = np.sort(np.minimum(1.0, 3 * wide[y, x]), axis=0)
+    return cover[:3].mean(axis=0)
 
 
 def _leg_ends(player: Float[np.ndarray, "h w"], tall: float) -> Float[np.ndarray, "n 2"]:
@@ -298,7 +326,7 @@ def _lost(chosen: Int[np.ndarray, "T"]) -> KeyreconError:
     )
 
 
-def _costs(scores: list[Float[np.ndarray, "m"]]) -> list[Float[np.ndarray, "m"]]:
+def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]:
     """-log of each score against the best scores of the sequence."""
     best = [float(np.nanmax(s)) for s in scores if np.isfinite(s).any()]
     reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
@@ -340,12 +368,15 @@ def _pair_costs(
     apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
     off = (short**2 + aside**2 + apart**2) / (2 * (0.12 * height) ** 2)
     # One shoe taken for both feet explains less of the picture than two shoes.
-    near = np.exp(-(((both[:, 0] - both[:, 1]) / (2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
+    near = np.exp(-(((both[:, 0] - both[:, 1]) / (1.2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
+    # A foot may be lifted, yet a racket or a knee is at its height more often.
+    lifted = np.maximum(0, 0.8 * height - (both[..., 1] - head[1]))
+    off += (lifted**2).sum(axis=1) / (2 * (0.12 * height) ** 2)
     return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
 
 
 def _fill(
-    places: list[Float[np.ndarray, "m d"]], chosen: Int[np.ndarray, "T"]
+    places: list[Float[np.ndarray, "_ d"]], chosen: Int[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T d"]:
     """The chosen places, linearly interpolated where none was."""
     seen = np.flatnonzero(chosen >= 0)

@@ -33,8 +33,8 @@ class Motion:
 
 
 def cheapest_path(
-    costs: Sequence[Float[np.ndarray, "m"]],
-    points: Sequence[Float[np.ndarray, "m p 2"]],
+    costs: Sequence[Float[np.ndarray, "_"]],
+    points: Sequence[Float[np.ndarray, "_ p 2"]],
     motion: Motion,
 ) -> Int[np.ndarray, "T"]:
     """State taken in each frame, -1 where none; m differs from frame to frame.
