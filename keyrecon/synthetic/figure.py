@@ -110,9 +110,10 @@ def _add_trunk(
         squeeze=(1.0, 0.72), cut=True,
     )  # fmt: skip
     tops = [between(s, neck, 0.12) for s in shoulders]
-    collar = between(pelvis, neck, 1.02)
+    collar, blades = between(pelvis, neck, 0.98), between(pelvis, neck, 0.83)
+    body.add("shirt", (blades, chest), across, (0.112 * g, 0.14 * g), squeeze=(1.15, 0.78))
     for top in tops:
-        body.add("shirt", (collar, top), pointers.front, (0.056 * g, 0.064 * g))
+        body.add("shirt", (collar, top), pointers.front, (0.05 * g, 0.062 * g))
         body.add("shirt", (top, chest), across, (0.07 * g, 0.085 * g))
     seat = between(pelvis, neck, 0.1)
     body.add("shorts", (seat, pelvis), low, (0.142 * g, 0.15 * g), squeeze=(1.0, 0.75))

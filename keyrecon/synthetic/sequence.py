@@ -48,7 +48,7 @@ class SceneOptions:
     noise: float = 2.2
     """Spread of the sensor noise, grey levels."""
     left_handed: bool = False
-    """Which hand holds the racket."""
+    """Mirror the motion and put the racket into the left hand."""
     crf: int = 23
     """Constant quality of the video, 18 very good to 28 coarse."""
     workers: int = 0
@@ -77,6 +77,8 @@ def synthesize(
     scene, clips = options.scene, options.clips
     if mocap:
         points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), clips)
+        if scene.left_handed:
+            points = points[:, LSP14.mirror] * np.array([-1.0, 1, 1])
     else:
         play = MotionOptions(
             clips.seconds, clips.fps, left_handed=scene.left_handed, seed=scene.seed
