@@ -39,9 +39,9 @@ LEAST_BETA = 1e-4
 """Beta is not made smaller, player heights: contours are never found to a tenth of a pixel."""
 BETA_STEP = 0.96
 """Factor on beta from one attempt of the exchange search to the next."""
-MOST_EXCHANGED = 60
-"""More keyframes than these stay as the greedy choice has them: the time to reconsider each
-grows with the square of their number."""
+EXCHANGES = 100_000
+"""Keyframes times candidates up to which keyframes are reconsidered one by one: 50 keyframes of
+a 2000-frame video. Larger choices stay as the greedy choice has them, for the sake of time."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def _choose_half(
     else:
         goal = half.goal(beta)
         chosen = _choose(half, goal, len(goal.clarity))
-        if half.options.method == "coverage" and len(chosen) <= MOST_EXCHANGED:
+        if half.options.method == "coverage" and len(chosen) * len(half.matched) <= EXCHANGES:
             chosen = shrink(goal, chosen)
     goal = half.goal(beta)
     if half.options.method == "coverage":
@@ -191,7 +191,7 @@ def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
             high, chosen = middle, found
         else:
             low = middle
-    if half.options.method == "paper" or most > MOST_EXCHANGED:
+    if half.options.method == "paper" or most * len(half.matched) > EXCHANGES:
         return high, chosen
     return _lower_beta(half, most, high, chosen)
 
@@ -224,7 +224,7 @@ def _center(
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
     weight = members.astype(distance.dtype)
     chosen = add_closest(chosen, most, distance, weight)
-    if len(chosen) > MOST_EXCHANGED:
+    if len(chosen) * len(half.matched) > EXCHANGES:
         return chosen
     return exchange_for_closeness(goal, chosen, distance, weight)
 
