@@ -9,7 +9,7 @@ from jaxtyping import UInt8
 
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
-from keyrecon.report.drawing import SEAM, TRUNK, draw_pose
+from keyrecon.report.drawing import TRUNK, draw_pose
 from keyrecon.video import Video
 from keyrecon.video_writer import write_video
 
@@ -43,9 +43,11 @@ def overlay_frames(
 
 
 def _write_label(picture: UInt8[np.ndarray, "h w 3"], text: str) -> None:
-    """Frame number in the lower left corner; its size follows the picture's."""
-    size = picture.shape[0] / 1200
-    at = (round(16 * size) + 4, picture.shape[0] - round(18 * size) - 4)
-    for color, thickness in ((SEAM, 3), (TRUNK, 1)):
-        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, max(0.4, size), color, thickness,
-                    cv2.LINE_AA)
+    """Frame number on a darkened strip in the lower left corner; its size follows the picture's."""
+    size = max(0.4, picture.shape[0] / 1200)
+    (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+    edge = height // 2 + 2
+    strip = picture[-(height + below + 2 * edge) :, : width + 2 * edge]
+    strip //= 3
+    at = (edge, picture.shape[0] - below - edge)
+    cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, TRUNK, 1, cv2.LINE_AA)
