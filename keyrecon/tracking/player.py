@@ -58,7 +58,7 @@ NO_SHOE = 2.5
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
 KNEE_ROOM = 0.06
 """How far a leg may bend away from the straight line from hips to foot, player heights."""
-ONE_SHOE = 2.5
+ONE_SHOE = 1.2
 """Cost of both feet in one place."""
 LEAST_FOUND = 0.4
 """Share of the frames in which a head must be found for a track to be believed."""
@@ -370,8 +370,8 @@ def _pair_costs(
     # One shoe taken for both feet explains less of the picture than two shoes.
     near = np.exp(-(((both[:, 0] - both[:, 1]) / (1.2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
     # A foot may be lifted, yet a racket or a knee is at its height more often.
-    lifted = np.maximum(0, 0.8 * height - (both[..., 1] - head[1]))
-    off += (lifted**2).sum(axis=1) / (2 * (0.12 * height) ** 2)
+    lifted = np.maximum(0, 0.82 * height - (both[..., 1] - head[1]))
+    off += (lifted**2).sum(axis=1) / (2 * (0.1 * height) ** 2)
     return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
 
 
