@@ -59,7 +59,7 @@ def _bone_table(motion: Motion) -> str:
         rows.append((
             f"{plain_name(skeleton.names[parent])} to {plain_name(skeleton.names[child])}",
             f"{mean[bone]:.3f}", f"{spread[bone] / mean[bone]:.2%}",
-            number(mirrored, "+.1%"), f"{mean[bone] / expected[bone] - 1:+.1%}",
+            number(mirrored, "+z.1%"), f"{mean[bone] / expected[bone] - 1:+z.1%}",
         ))
     head = ("bone", f"length, {unit}", "varies", "other side", "average")
     return table(head, rows, "Bone lengths")
