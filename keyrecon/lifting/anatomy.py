@@ -28,7 +28,7 @@ class Limb:
 
     bones: tuple[int, ...]
     kind: str
-    """'leg', 'arm' or 'free'."""
+    """'leg', 'arm', 'head' or 'free'."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,12 @@ def anatomy_of(skeleton: Skeleton) -> Anatomy:
             if trunk and all(name in bone_of for name in members):
                 limbs.append(Limb(tuple(bone_of[name] for name in members), kind))
     taken = {*trunk, *(bone for limb in limbs for bone in limb.bones)}
-    limbs += [Limb((b,), "free") for b in range(len(skeleton.bones)) if b not in taken]
+    head = bone_of.get("head_top") if trunk else None
+    limbs += [
+        Limb((bone,), "head" if bone == head else "free")
+        for bone in range(len(skeleton.bones))
+        if bone not in taken
+    ]
     return Anatomy(trunk, tuple(limbs))
 
 
@@ -93,28 +98,50 @@ def trunk_cost(
     return cost
 
 
+POSTURE = {"upper arm": 0.25, "forearm": 0.55, "head": 0.1}
+"""Forward part of each bone's direction in an athlete at work: the hands are before the body.
+Rounded means over running, jumping, dancing and racket strokes."""
+_POSTURE_SPREAD = 0.4
+
+
+def posture_cost(
+    bone: Float[np.ndarray, "*n 3"], forward: Float[np.ndarray, "*m 3"], kind: str
+) -> Float[np.ndarray, "*n"]:
+    """Squared distance of a bone's forward part from the usual one."""
+    off = ((bone * forward).sum(-1) - POSTURE[kind]) / _POSTURE_SPREAD
+    return np.minimum(0.5 * off**2, CAP)
+
+
 def leg_cost(
     hips: Float[np.ndarray, "*n 3"],
     up: Float[np.ndarray, "*n 3"],
-    thigh: Float[np.ndarray, "*n 3"],
-    shank: Float[np.ndarray, "*n 3"],
+    thigh: Float[np.ndarray, "*m 3"],
+    shank: Float[np.ndarray, "*m 3"],
 ) -> Float[np.ndarray, "*n"]:
     """Knees bend backwards; the thigh goes further forward than backward."""
     bend = (np.cross(thigh, shank) * hips).sum(-1)
     forward = np.cross(up, hips)
-    return hinge(bend - 0.05, 0.1) + hinge(-(thigh * forward).sum(-1) - 0.4, 0.2)
+    return hinge(bend + 0.05, 0.1) + hinge(-(thigh * forward).sum(-1) - 0.2, 0.2)
 
 
 def arm_cost(
     shoulders: Float[np.ndarray, "*n 3"],
     up: Float[np.ndarray, "*n 3"],
-    upper: Float[np.ndarray, "*n 3"],
-    forearm: Float[np.ndarray, "*n 3"],
+    upper: Float[np.ndarray, "*m 3"],
+    forearm: Float[np.ndarray, "*m 3"],
 ) -> Float[np.ndarray, "*n"]:
     """Hands work in front of the chest; a bent elbow lifts the forearm forward or up."""
     forward = np.cross(up, shoulders)
-    behind = -(upper * forward).sum(-1)
     bend = (np.cross(upper, forearm) * shoulders).sum(-1)
-    return (
-        hinge(behind - 0.4, 0.2) + hinge(-bend, 0.2) + hinge(0.5 - (forearm * forward).sum(-1), 0.4)
-    )
+    usual = posture_cost(upper, forward, "upper arm") + posture_cost(forearm, forward, "forearm")
+    return hinge(-bend, 0.2) + usual
+
+
+def head_cost(
+    shoulders: Float[np.ndarray, "*n 3"],
+    up: Float[np.ndarray, "*n 3"],
+    head: Float[np.ndarray, "*m 3"],
+) -> Float[np.ndarray, "*n"]:
+    """The head continues the trunk."""
+    forward = np.cross(up, shoulders)
+    return hinge(0.9 - (head * up).sum(-1), 0.2) + posture_cost(head, forward, "head")

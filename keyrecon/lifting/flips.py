@@ -21,11 +21,14 @@ from keyrecon.lifting.anatomy import (
     Limb,
     anatomy_of,
     arm_cost,
-    hinge,
+    head_cost,
     leg_cost,
     trunk_axes,
     trunk_cost,
 )
+
+_MOST_ALIKE = 24
+"""Key poses that are asked per frame; those further away weigh nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +39,11 @@ class FlipOptions:
     """Cost of contradicting the annotated sign of a bone, nats."""
     limits: float = 0.3
     """Weight of joint limits per frame; errors stay alike over several frames."""
-    votes: float = 0.3
+    votes: float = 1.0
     """Weight of the key poses per frame."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
-    jerk: float = 0.02
+    jerk: float = 0.1
     """Second difference of depth between frames to be expected, statures."""
     reach: float = 6.0
     """Largest cost of one jump, nats."""
@@ -141,27 +144,52 @@ class Votes:
     vectors: Float[np.ndarray, "K B 3"]
     """Bone vectors of the key poses, statures."""
     frames: Int[np.ndarray, "K"]
+    """Row of each key pose among the frames; others vote too."""
+    trust: Float[np.ndarray, "K B"]
+    """0-1: how sure the sign of each bone is."""
     skeleton: Skeleton
 
     def cost(
         self, bones: tuple[int, ...], shown: Shown, options: FlipOptions
     ) -> Float[np.ndarray, "T S"]:
         """Cost of each sign vector of a group of bones in each frame, nats."""
+        members = list(bones)
+        alike, apart = self._most_alike(members, shown, options)
+        states = sign_states(len(bones))
+        depth = (states * shown.depth[:, None, members])[:, :, None]  # (T, S, 1, g)
+        wanted = self.vectors[:, members, 2][alike][:, None]  # (T, 1, n, g)
+        spread = options.alike**2 + shown.doubt[:, members] ** 2
+        trust = self.trust[:, members][alike][:, None]
+        off = (trust * (depth - wanted) ** 2 / (2 * spread[:, None, None])).sum(-1)
+        likelihood = np.exp(-apart[:, None] - off).sum(-1)
+        cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
+        return cost + self._confirmed(members, shown, options)
+
+    def _most_alike(
+        self, bones: list[int], shown: Shown, options: FlipOptions
+    ) -> tuple[Int[np.ndarray, "T n"], Float[np.ndarray, "T n"]]:
+        """The key poses in which a group and the trunk look most like each frame's."""
         context = sorted({*bones, *anatomy_of(self.skeleton).trunk})
         flat = shown.flat[:, context].reshape(len(shown.flat), -1)
         keys = self.vectors[:, context, :2].reshape(len(self.vectors), -1)
-        apart = ((flat[:, None] - keys[None]) ** 2).sum(-1) / (2 * options.alike**2)
+        apart = (flat**2).sum(-1)[:, None] + (keys**2).sum(-1) - 2 * flat @ keys.T
+        most = min(_MOST_ALIKE, len(keys))
+        alike = np.argpartition(apart, most - 1, axis=1)[:, :most]
+        near = np.maximum(np.take_along_axis(apart, alike, axis=1), 0.0)
+        return alike, near / (2 * options.alike**2)
+
+    def _confirmed(
+        self, bones: list[int], shown: Shown, options: FlipOptions
+    ) -> Float[np.ndarray, "T S"]:
+        """Cost of contradicting a keyframe at its own frame."""
         states = sign_states(len(bones))
-        depth = states * shown.depth[:, None, list(bones)]  # (T, S, g)
-        wanted = self.vectors[:, list(bones), 2]
-        spread = options.alike**2 + shown.doubt[:, list(bones)] ** 2
-        off = (depth[:, :, None] - wanted) ** 2 / (2 * spread[:, None, None])
-        likelihood = np.exp(-apart[:, None] - off.sum(-1)).sum(-1)
-        cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
-        held = np.isin(self.frames, np.arange(len(shown.flat)))
-        cost[self.frames[held]] += options.confirmed * np.minimum(
-            off[self.frames[held], :, np.flatnonzero(held)].sum(-1), 1.0
-        )
+        cost = np.zeros((len(shown.flat), len(states)))
+        for row, frame in enumerate(self.frames):
+            if 0 <= frame < len(cost):
+                wanted = self.vectors[row, bones, 2]
+                wrong = self.trust[row, bones] * (states * wanted < 0)
+                deep = np.minimum(np.abs(shown.depth[frame, bones]) / options.alike, 1.0)
+                cost[frame] = options.confirmed * (wrong * deep).sum(-1)
         return cost
 
 
@@ -228,7 +256,9 @@ def _limb_cost(
         return leg_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
     if limb.kind == "arm":
         return arm_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
-    return hinge(0.5 - (bones[..., 0, :] * up).sum(-1), 0.3)
+    if limb.kind == "head":
+        return head_cost(axis, up, bones[..., 0, :])
+    return np.zeros((*axis.shape[:2], bones.shape[2]))
 
 
 def _candidates(bones: tuple[int, ...], shown: Shown) -> Float[np.ndarray, "T S g 3"]:

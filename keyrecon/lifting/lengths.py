@@ -28,13 +28,13 @@ class LengthOptions:
 
     spread: float = 0.15
     """Standard deviation of a bone length about the table, relative."""
-    scale_spread: float = 0.04
+    scale_spread: float = 0.03
     """Standard deviation of the scale about the tracked height, relative."""
     knot: float = 0.5
     """Seconds between the knots of the scale's deviation from the tracked height."""
     click_noise: float = 0.007
     """Standard deviation of an annotated joint, in player heights."""
-    track_noise: float = 0.02
+    track_noise: float = 0.025
     """Standard deviation of a propagated joint, in player heights."""
     correlation: float = 0.15
     """Seconds over which errors of propagated joints stay alike; they count once."""

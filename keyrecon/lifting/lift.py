@@ -5,22 +5,28 @@ frame, refinement; then slips are rejected once more against the refined motion 
 refined again.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import pose_from_directions
-from keyrecon.lifting.flips import FlipOptions, Votes, choose_signs, follow_signs
+from keyrecon.lifting.flips import FlipOptions
+from keyrecon.lifting.follow import Figure, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
 from keyrecon.lifting.lengths import BodySize, LengthOptions, estimate_lengths, marked_joints
-from keyrecon.lifting.observe import reject_spikes, smooth_joints
-from keyrecon.lifting.refine import Observed, RefineOptions, refine_motion
+from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
+from keyrecon.lifting.refine import RefineOptions, descend_motion
 from keyrecon.lifting.solver import State
-from keyrecon.lifting.taylor import lift_shown, show_bones
+from keyrecon.lifting.taylor import lift_keyframes
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, JointTracks, Keyframes
+
+_SPIKE_FRAMES = 9
+"""A joint that slips comes back within half of this."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,8 @@ class LiftOptions:
 
     height: float | None = None
     """Stature of the player, metres; None gives a motion in body heights."""
+    method: Literal["trajectory", "paper"] = "trajectory"
+    """'trajectory': robust fit of bone directions; 'paper': projected gradient descent (Fig. 9)."""
     lengths: LengthOptions = field(default_factory=LengthOptions)
     flips: FlipOptions = field(default_factory=FlipOptions)
     refine: RefineOptions = field(default_factory=RefineOptions)
@@ -61,7 +69,7 @@ class LiftResult:
     lower_controls: Int[np.ndarray, "l"]
 
 
-def lift_motion(
+def lift_motion(  # noqa: PLR0913
     tracks: JointTracks,
     annotations: Annotations,
     keyframes: Keyframes,
@@ -78,11 +86,19 @@ def lift_motion(
     skeleton = annotations.skeleton
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths)
     observed = _observe(tracks, annotations, size, options)
-    key_directions, signs, margin = lift_keyframes(observed, annotations, size, options)
+    keys = lift_keyframes(observed, annotations, size, options.flips)
     slerped = interpolate_poses(
-        key_directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
+        keys.directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
     )
-    state, rejected = _fit(observed, slerped, key_directions, size, annotations, fps, options)
+    guide = _place(slerped.directions, observed, size, skeleton)
+    slips = reject_spikes(observed.joints - _flat(guide, size, skeleton), _SPIKE_FRAMES, 4.0)
+    slips[annotations.frames] = False
+    clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
+    if options.method == "paper":
+        state = descend_motion(guide, clean, size, skeleton, options.refine)
+    else:
+        figure = Figure(skeleton, size, keys, annotations.frames)
+        state = follow_motion(guide, clean, figure, fps, options, progress)
     points = pose_from_directions(state.directions, size.lengths, skeleton)
     points[..., :2] += state.root[:, None]
     unit = 1.0 if options.height is None else options.height
@@ -92,58 +108,36 @@ def lift_motion(
         scale=size.scale / unit,
         offset=np.zeros((len(points), 2)),
         lengths=size.lengths * unit,
-        key_poses=pose_from_directions(key_directions, size.lengths, skeleton) * unit,
-        signs=-signs,
-        sign_margin=margin,
-        rejected=rejected,
+        key_poses=pose_from_directions(keys.directions, size.lengths, skeleton) * unit,
+        signs=np.where(keys.directions[..., 2] > 0, -1, 1),
+        sign_margin=keys.probability,
+        rejected=slips,
         upper_controls=slerped.upper,
         lower_controls=slerped.lower,
     )
 
 
-def lift_keyframes(
-    observed: Observed, annotations: Annotations, size: BodySize, options: LiftOptions
-) -> tuple[Float[np.ndarray, "K B 3"], Int[np.ndarray, "K B"], Float[np.ndarray, "K B"]]:
-    """Bone directions of the annotated frames, signs of dz, and how sure these are."""
-    frames = annotations.frames
-    shown = show_bones(
-        observed.joints[frames], observed.spread[frames], size.lengths, annotations.skeleton
-    )
-    signs = choose_signs(
-        shown, annotations.nearer, size.breadths, annotations.skeleton, options.flips
-    )
-    return lift_shown(shown, signs.sign), signs.sign, signs.probability
+def _place(
+    directions: Float[np.ndarray, "T B 3"], observed: Observed, size: BodySize, skeleton: Skeleton
+) -> State:
+    """Poses shifted onto the observed joints, frame by frame (step 1 of Fig. 9)."""
+    flat = pose_from_directions(directions, size.lengths, skeleton)[..., :2]
+    shift = np.full((len(flat), 1, 2), np.nan)
+    offset = observed.joints - flat
+    known = np.isfinite(offset[..., 0]).any(axis=1)
+    shift[known, 0] = np.nanmedian(offset[known], axis=1)
+    return State(bridge_gaps(shift)[:, 0], directions)
 
 
-def _fit(
-    observed: Observed,
-    slerped,
-    key_directions: Float[np.ndarray, "K B 3"],
-    size: BodySize,
-    annotations: Annotations,
-    fps: float,
-    options: LiftOptions,
-) -> tuple[State, Bool[np.ndarray, "T J"]]:
-    skeleton = annotations.skeleton
-    guide = pose_from_directions(slerped.directions, size.lengths, skeleton)[..., :2]
-    guide = guide + _root(observed.joints - guide)[:, None]
-    rejected = reject_spikes(observed.joints - guide, 9, 4.0)
-    rejected[annotations.frames] = False
-    clean = _without(observed, rejected)
-    if options.refine.method == "paper":
-        start = State(guide[:, skeleton.root], slerped.directions)
-        return refine_motion(start, clean, size, skeleton, fps, options.refine), rejected
-    smooth = smooth_joints(clean.joints, guide, 1.5)
-    shown = show_bones(smooth, np.minimum(observed.spread, 0.02), size.lengths, skeleton)
-    votes = Votes(size.lengths[:, None] * key_directions, annotations.frames, skeleton)
-    signs = follow_signs(shown, votes, size.breadths, skeleton, options.flips)
-    start = State(smooth[:, skeleton.root], lift_shown(shown, signs.sign))
-    return refine_motion(start, clean, size, skeleton, fps, options.refine), rejected
+def _flat(state: State, size: BodySize, skeleton: Skeleton) -> Float[np.ndarray, "T J 2"]:
+    poses = pose_from_directions(state.directions, size.lengths, skeleton)
+    return poses[..., :2] + state.root[:, None]
 
 
 def _observe(
     tracks: JointTracks, annotations: Annotations, size: BodySize, options: LiftOptions
 ) -> Observed:
+    """Joints and their spread in body heights; annotated ones are sharper."""
     joints = marked_joints(tracks, annotations) / size.scale[:, None, None]
     spread = options.lengths.track_noise / np.sqrt(np.clip(tracks.confidence, 0.05, 1.0))
     marked = np.isfinite(annotations.joints[..., 0])
@@ -151,20 +145,6 @@ def _observe(
         marked, options.lengths.click_noise, spread[annotations.frames]
     )
     return Observed(joints, spread)
-
-
-def _without(observed: Observed, rejected: Bool[np.ndarray, "T J"]) -> Observed:
-    return Observed(np.where(rejected[..., None], np.nan, observed.joints), observed.spread)
-
-
-def _root(offset: Float[np.ndarray, "T J 2"]) -> Float[np.ndarray, "T 2"]:
-    """Median shift of all joints, bridged where none is known."""
-    with np.errstate(all="ignore"):
-        known = np.isfinite(offset[..., 0]).any(axis=1)
-    shift = np.full((len(offset), 2), np.nan)
-    shift[known] = np.nanmedian(offset[known], axis=1)
-    frames = np.arange(len(offset))
-    return np.stack([np.interp(frames, frames[known], shift[known, i]) for i in range(2)], axis=1)
 
 
 def _check(tracks: JointTracks, annotations: Annotations) -> None:

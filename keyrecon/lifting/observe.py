@@ -1,10 +1,22 @@
 """Joint tracks made ready for lifting: slips rejected, gaps bridged, in units of length."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 MAD_TO_SIGMA = 1.4826
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Joints as they are to be met, in body heights."""
+
+    joints: Float[np.ndarray, "T J 2"]
+    """NaN where missing or rejected."""
+    spread: Float[np.ndarray, "T J"]
+    """Standard deviation of each joint, body heights."""
 
 
 def reject_spikes(

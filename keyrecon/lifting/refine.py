@@ -1,17 +1,13 @@
 """The final motion: key poses bent to follow the observed joints (Section 6.2 and Fig. 9).
 
-Two ways. "paper" is projected gradient descent: joints move towards the observed ones, then
-bone lengths and a low-pass are enforced, again and again. "trajectory" minimises one cost over
-the unit directions of all bones: robust reprojection weighted by confidence, small second
-differences in time, the breadths of hips and shoulders, joint limits and a weak pull to the
-key poses. Lengths are exact in both.
+Two ways. `descend_motion` is the paper's projected gradient descent: joints move towards the
+observed ones, then bone lengths and a low-pass are enforced, again and again. `refine_motion`
+minimises one cost over the unit directions of all bones: robust reprojection weighted by
+confidence, small second differences in time, and the breadths of hips and shoulders. Lengths
+are exact in both.
 """
 
 from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
-from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
@@ -19,6 +15,7 @@ from keyrecon.lifting.chain import bone_vectors, breadths, pose_from_directions,
 from keyrecon.lifting.constraints import keep_lengths, low_pass
 from keyrecon.lifting.descend import descend
 from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.solver import Smoothness, State, solve
 
 
@@ -26,8 +23,6 @@ from keyrecon.lifting.solver import Smoothness, State, solve
 class RefineOptions:
     """How the motion follows the observed joints."""
 
-    method: Literal["trajectory", "paper"] = "trajectory"
-    """'trajectory': robust fit of bone directions; 'paper': Fig. 9 as printed."""
     rounds: int = 12
     """Steps of the trajectory solver at most."""
     tolerance: float = 1e-3
@@ -44,16 +39,6 @@ class RefineOptions:
     """Standard deviation of the low-pass of Fig. 9, frames."""
 
 
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Joints as they are to be met, in body heights."""
-
-    joints: Float[np.ndarray, "T J 2"]
-    """NaN where missing or rejected."""
-    spread: Float[np.ndarray, "T J"]
-    """Standard deviation of each joint, body heights."""
-
-
 def refine_motion(
     start: State,
     observed: Observed,
@@ -63,8 +48,6 @@ def refine_motion(
     options: RefineOptions = RefineOptions(),
 ) -> State:
     """Root and bone directions that follow the observed joints from a start near them."""
-    if options.method == "paper":
-        return _descend(start, observed, size, skeleton, options)
     recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
     for (left, right, _), wanted in zip(breadths(skeleton), size.breadths, strict=True):
         recipe.append(
@@ -77,9 +60,14 @@ def refine_motion(
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
 
 
-def _descend(
-    start: State, observed: Observed, size: BodySize, skeleton: Skeleton, options: RefineOptions
+def descend_motion(
+    start: State,
+    observed: Observed,
+    size: BodySize,
+    skeleton: Skeleton,
+    options: RefineOptions = RefineOptions(),
 ) -> State:
+    """Projected gradient descent from the slerped key poses (Fig. 9)."""
     root = skeleton.root
     points = pose_from_directions(start.directions, size.lengths, skeleton)
     points[..., :2] += start.root[:, None]

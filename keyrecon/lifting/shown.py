@@ -19,7 +19,7 @@ _SLIPS = 0.03
 _LONGEST, _FINEST, _COARSEST = 2.0, 0.005, 0.8
 
 
-LEANINGS = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
+LEANINGS = (-1.0, 0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
 """How a bone may prefer some directions: towards the image (negative) or the line of sight."""
 
 

@@ -5,13 +5,54 @@ sign. Near the image plane the square root magnifies every error, so the depth t
 its expected value given the marking noise (see `shown`); without noise it is Taylor's.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import bone_vectors, unit
-from keyrecon.lifting.flips import Shown
+from keyrecon.lifting.flips import FlipOptions, Shown, choose_signs
+from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.shown import depth_doubt, depth_share
+from keyrecon.records import Annotations
+
+_GUESS = 0.3
+"""Weight of the sign of a bone that was neither marked nor confirmed, against one that was."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPoses:
+    """Poses of the annotated frames."""
+
+    directions: Float[np.ndarray, "K B 3"]
+    """Unit bone directions."""
+    probability: Float[np.ndarray, "K B"]
+    """How likely the depth sign of each bone is, 0.5-1."""
+    trust: Float[np.ndarray, "K B"]
+    """0-1: weight of each bone when other frames are compared with this pose."""
+    nearer: Int[np.ndarray, "K B"]
+    """Signs that a person confirmed, as in `Annotations`."""
+
+
+def lift_keyframes(
+    observed: Observed,
+    annotations: Annotations,
+    size: BodySize,
+    options: FlipOptions = FlipOptions(),
+) -> KeyPoses:
+    """Poses of the annotated frames, with confirmed depth signs where there are any.
+
+    Joints that were not marked on a keyframe are taken from the tracks.
+    """
+    frames, skeleton = annotations.frames, annotations.skeleton
+    shown = show_bones(observed.joints[frames], observed.spread[frames], size.lengths, skeleton)
+    signs = choose_signs(shown, annotations.nearer, size.breadths, skeleton, options)
+    marked = np.isfinite(annotations.joints[:, skeleton.bones, 0]).all(axis=-1)
+    sure = marked | (annotations.nearer != 0)
+    trust = np.where(sure, 1.0, _GUESS * (2 * signs.probability - 1))
+    return KeyPoses(lift_shown(shown, signs.sign), signs.probability, trust, annotations.nearer)
 
 
 def show_bones(

@@ -1,0 +1,128 @@
+"""A motion that follows tracked joints, signs and all.
+
+Depth signs of every frame come from a Viterbi path, the trajectory from the solver. Two
+passes: the first starts from smoothed tracks, the second from what the first found, where noise
+is lower and key poses agree with their neighbours in time. Long motions are cut into
+overlapping windows that are blended, so memory stays bounded and cost linear.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting.chain import pose_from_directions, unit
+from keyrecon.lifting.flips import FlipOptions, Votes, follow_signs
+from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.observe import Observed, smooth_joints
+from keyrecon.lifting.refine import RefineOptions, refine_motion
+from keyrecon.lifting.solver import State
+from keyrecon.lifting.taylor import KeyPoses, lift_shown, show_bones
+from keyrecon.progress import Progress, silent
+
+WINDOW, OVERLAP = 2000, 100
+"""Frames solved together, and shared by neighbours."""
+_SMOOTH_SECONDS = 0.03
+"""Smoothing of the tracks that signs are read from; half of the fastest stroke's rise."""
+_SMOOTHED, _FOLLOWED = 0.02, 0.015
+"""Standard deviation of smoothed and of once followed joints, body heights."""
+
+
+class FollowOptions(Protocol):
+    """What `follow_motion` reads from its options."""
+
+    flips: FlipOptions
+    refine: RefineOptions
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """Who moves: body, size and known poses."""
+
+    skeleton: Skeleton
+    size: BodySize
+    keys: KeyPoses
+    frames: Int[np.ndarray, "K"]
+    """Frames of the key poses."""
+
+
+def follow_motion(
+    guide: State,
+    observed: Observed,
+    figure: Figure,
+    fps: float,
+    options: FollowOptions,
+    progress: Progress = silent,
+) -> State:
+    """Root and bone directions in every frame; `guide` bridges what was not observed."""
+    frames = len(guide.root)
+    root = np.zeros_like(guide.root)
+    directions = np.zeros_like(guide.directions)
+    windows = list(_windows(frames))
+    for first, last, weight in progress(windows, "Lifting to 3D", len(windows)):
+        part = slice(first, last)
+        solved = _follow_window(
+            State(guide.root[part], guide.directions[part]),
+            Observed(observed.joints[part], observed.spread[part]),
+            replace(figure, frames=figure.frames - first),
+            fps,
+            options,
+        )
+        root[part] += weight[:, None] * solved.root
+        directions[part] += weight[:, None, None] * solved.directions
+    return State(root, unit(directions))
+
+
+def _windows(frames: int) -> Iterator[tuple[int, int, Float[np.ndarray, "n"]]]:
+    """First and last frame of each window, and weights that add up to 1 over all windows."""
+    first = 0
+    while True:
+        last = frames if frames - first <= WINDOW + OVERLAP else first + WINDOW
+        weight = np.ones(last - first)
+        ramp = (np.arange(OVERLAP) + 0.5) / OVERLAP
+        if first > 0:
+            weight[:OVERLAP] = ramp
+        if last < frames:
+            weight[-OVERLAP:] = 1 - ramp
+        yield first, last, weight
+        if last == frames:
+            return
+        first = last - OVERLAP
+
+
+def _follow_window(
+    guide: State, observed: Observed, figure: Figure, fps: float, options: FollowOptions
+) -> State:
+    skeleton, lengths = figure.skeleton, figure.size.lengths
+    bridge = _flat(guide, figure)
+    joints = smooth_joints(observed.joints, bridge, _SMOOTH_SECONDS * fps)
+    keys = figure.keys.directions
+    noise = _SMOOTHED
+    for _ in range(2):
+        shown = show_bones(joints, np.full(joints.shape[:2], noise), lengths, skeleton)
+        votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, skeleton)
+        signs = follow_signs(shown, votes, figure.size.breadths, skeleton, options.flips)
+        start = State(joints[:, skeleton.root], lift_shown(shown, signs.sign))
+        state = refine_motion(start, observed, figure.size, skeleton, fps, options.refine)
+        joints, noise = _flat(state, figure), _FOLLOWED
+        keys = _settled_keys(figure, state)
+    return state
+
+
+def _settled_keys(figure: Figure, state: State) -> Float[np.ndarray, "K B 3"]:
+    """Key poses as the motion passes through them, with the signs that a person confirmed."""
+    inside = (figure.frames >= 0) & (figure.frames < len(state.root))
+    keys = figure.keys.directions.copy()
+    settled = state.directions[figure.frames[inside]]
+    nearer = figure.keys.nearer[inside]
+    settled[..., 2] = np.where(nearer != 0, -nearer * np.abs(settled[..., 2]), settled[..., 2])
+    keys[inside] = settled
+    return keys
+
+
+def _flat(state: State, figure: Figure) -> Float[np.ndarray, "T J 2"]:
+    poses = pose_from_directions(state.directions, figure.size.lengths, figure.skeleton)
+    return poses[..., :2] + state.root[:, None]
