@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from keyrecon.background import BackgroundOptions, build_background
 from keyrecon.colors import ColorOptions, learn_colors
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion

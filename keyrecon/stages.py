@@ -19,7 +19,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.storage import load_record, save_record
 from keyrecon.video import Video
 
-SHARED_CODE = ("background", "body", "camera", "colors", "records", "video")
+SHARED_CODE = ("background", "body", "camera", "colors", "pictures", "records", "video")
 """Modules whose change makes the results of every stage anew."""
 KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""

@@ -15,20 +15,20 @@ from jaxtyping import Complex, Float, Int
 from keyrecon.matching.candidates import Candidates
 from keyrecon.matching.puppet import Puppets
 
-STEP_SPREAD = 0.01
+STEP_SPREAD = 0.03
 """Error of the expected step of a joint next to the root, player heights; doubles outwards."""
-STEP_MOST = 9.0
+STEP_MOST = 20.0
 """Largest cost of a joint's step: a jump happens, and it should not outweigh everything else."""
-MISFIT = 6.0
+MISFIT = 3.0
 """Cost of a limb whose elements find nothing."""
 UNLIKE, UNLIKE_MOST = 0.5, 4.0
 """Cost of a keyframe per usual distance to the nearest one, which counts up to so many times."""
 AGE, AGE_MOST = 0.02, 150.0
 """Cost per frame that a proposal was carried, and the frames that count."""
-SWAP = 0.5
+SWAP = 1.0
 """Cost of taking left for right."""
-CLASH, CLASH_WITHIN = 2.0, 0.03
-"""Cost of both sides taking the same limb: all joints but the first this close, player heights."""
+UNEXPLAINED = 48.0
+"""Cost of leaving all of the frame's elements unexplained."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +63,17 @@ def choose_limbs(
     states = [
         _limb_states(puppets, candidates, expected, cost, group) for group in groups
     ]
-    paths = [choose_one(states[0])] if half.middle else [np.zeros(len(every), int)]
-    paths += choose_two(*states[1:], _clash(puppets, *states[1:]))
+    paths = [choose_one(states[0]) if half.middle else cost_of_trunk(candidates, half)]
+    paths += choose_two(*states[1:], _unexplained(puppets, candidates, paths[0]))
     for group, state, path in zip(groups, states, paths, strict=True):
         joints[:, group] = state.joints[every, path]
         which[:, group] = candidates.which[every, path % cost.shape[1]][:, None]
     return joints, which
+
+
+def cost_of_trunk(candidates, half):
+    bones = half.limb == 0
+    return np.where(np.isfinite(candidates.joints[:, :, 0]), candidates.misfit[:, :, bones].mean(axis=2), 9).argmin(axis=1)
 
 
 def _cost(candidates: Candidates, distance: Float[np.ndarray, "T K"]) -> Float[np.ndarray, "T S"]:
@@ -110,13 +115,18 @@ def _limb_states(
     return States(np.nan_to_num(joints), onwards, states, STEP_SPREAD * 2.0**depth)
 
 
-def _clash(puppets: Puppets, one: States, other: States) -> Float[np.ndarray, "T S S"]:
-    depth = puppets.half.depth[list(puppets.half.sides[0])]
-    far = np.flatnonzero(depth > depth.min())
-    apart = np.abs(one.joints[:, :, None, far] - other.joints[:, None, :, far])
-    clash = CLASH * (apart < CLASH_WITHIN).all(axis=3)
-    clash[puppets.poses.frames] = 0
-    return clash
+def _unexplained(
+    puppets: Puppets, candidates: Candidates, trunk: Int[np.ndarray, "T"]
+) -> Float[np.ndarray, "T P P"]:
+    """Cost of what a pair of states of the sides, and the trunk, leave of the frame's elements."""
+    every = np.arange(len(trunk))
+    count = np.maximum((puppets.listed >= 0).sum(axis=1), 1)
+    middle = candidates.far[every, trunk, 0]
+    one = np.concatenate([candidates.far[:, :, 1], candidates.far[:, :, 2]], axis=1)
+    other = np.concatenate([candidates.far[:, :, 2], candidates.far[:, :, 1]], axis=1)
+    left = (one * middle[:, None]) @ other.transpose(0, 2, 1)
+    left[puppets.poses.frames] = 0
+    return UNEXPLAINED * left / count[:, None, None]
 
 
 def choose_one(states: States) -> Int[np.ndarray, "T"]:

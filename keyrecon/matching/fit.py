@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.matching.correspondence import ElementIndex, match_back, match_elements
-from keyrecon.matching.puppet import Posed, Puppets, bone_axes, pose_puppets
+from keyrecon.matching.puppet import Puppets, bone_axes, pose_puppets
 from keyrecon.matching.rows import Normals, observe
 
 SLIDE = 0.15
@@ -23,8 +23,6 @@ SLIDE = 0.15
 ELEMENT_SPREAD = 0.03
 """How far a contour tells where an element is, player heights. Neighbours on one contour err
 together, which is why it is more than a contour's own noise of about .01."""
-JUDGE_REACH = 0.06
-"""Distance at which a fitted element counts as wrong, player heights."""
 
 
 @dataclass(frozen=True)
@@ -129,28 +127,3 @@ def keep_shape(
     target = axis * (np.abs(wanted) + 1j * (wanted * np.conj(axis)).imag)
     ones = np.ones(axis.shape)
     return observe(mixture, target, axis, ones / step.length**2, ones / step.swing**2)
-
-
-def judge_figures(
-    puppets: Puppets, index: ElementIndex, figures: Figures
-) -> Float[np.ndarray, "P B"]:
-    """Misfit of every bone, 0-1: mean distance of its elements to their matches over
-    `JUDGE_REACH`; 1 where nothing matches."""
-    posed = pose_puppets(puppets, figures.which, figures.joints)
-    row, found = match_elements(index, figures.frames, posed, JUDGE_REACH)
-    gap = np.where(found, np.abs(index.points[row] - posed.points) / JUDGE_REACH, 1.0)
-    return _mean_by_bone(puppets, figures.which, posed, np.minimum(gap, 1))
-
-
-def _mean_by_bone(
-    puppets: Puppets,
-    which: Int[np.ndarray, "P"],
-    posed: Posed,
-    values: Float[np.ndarray, "P E"],
-) -> Float[np.ndarray, "P B"]:
-    count = len(puppets.half.bones)
-    slot = (np.arange(len(which))[:, None] * count + puppets.riders.bone[which]).ravel()
-    total = np.bincount(slot, (posed.weight * values).ravel(), len(which) * count)
-    share = np.bincount(slot, posed.weight.ravel(), len(which) * count)
-    mean = np.where(share > 0, total / np.maximum(share, 1e-9), 1.0)
-    return mean.reshape(len(which), count)

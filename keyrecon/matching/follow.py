@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.matching.candidates import Candidates, carry_figures, fit_similar, join_candidates
+from keyrecon.matching.candidates import Candidates, borrow_limbs, carry_figures, fit_similar, join_candidates
 from keyrecon.matching.choose import choose_limbs
 from keyrecon.matching.correspondence import ElementIndex
-from keyrecon.matching.fit import Figures, judge_figures
+from keyrecon.matching.fit import Figures
+from keyrecon.matching.judge import judge_figures
 from keyrecon.matching.flow import Flow
 from keyrecon.matching.limbs import LimbFlow, place_samples, predict_joints
 from keyrecon.matching.puppet import Puppets
@@ -56,8 +57,10 @@ def follow_half(
     half = puppets.half
     limbs = place_samples(scene.flow, puppets)
     ranked = np.argsort(start.distance, axis=1, kind="stable")[:, :similar]
+    similar = fit_similar(puppets, scene.index, ranked, start.shift)
     candidates = join_candidates(
-        fit_similar(puppets, scene.index, ranked, start.shift),
+        similar,
+        borrow_limbs(puppets, scene.index, similar),
         *(carry_figures(puppets, scene.index, limbs, ranked[:, 0], step) for step in (1, -1)),
     )
     expected = _expect(puppets, limbs, candidates)

@@ -1,6 +1,7 @@
 """The two halves of the body that are matched apart, with their own joints and bones."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -28,6 +29,13 @@ class Half:
     """Bones between each joint and the root of the skeleton."""
     sides: tuple[tuple[int, ...], tuple[int, ...]]
     """Own joints of the one side of the body, and their mirror images in the same order."""
+
+    @cached_property
+    def limb(self) -> Int[np.ndarray, "B"]:
+        """Which part each bone belongs to: 0 the trunk, 1 and 2 the sides."""
+        child = self.bones[:, 1]
+        hanging = self.bone_mirror != np.arange(len(self.bones))
+        return hanging * (np.isin(child, self.sides[0]) + 2 * np.isin(child, self.sides[1]))
 
     @property
     def middle(self) -> tuple[int, ...]:

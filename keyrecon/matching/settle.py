@@ -24,7 +24,7 @@ LOOSE = Step(reach=0.0, length=0.03, swing=0.10)
 """How firmly bones keep the shape of the chosen proposal."""
 FOLLOW = 0.06
 """Distance at which a chosen proposal loses most of its pull, player heights."""
-CALM = 0.003
+CALM = 0.002
 """Spread of the second difference of a joint at the root, player heights at 50 frames/s; it
 doubles with every bone outwards. Strokes of the tennis motion capture lie at half of this for
 the trunk and the same for the wrist."""

@@ -1,6 +1,6 @@
 """Where the player is: head, feet, size and box in every frame (Section 4.1).
 
-In pictures reduced so that the player is about 128 px tall, every frame is searched whole:
+In pictures reduced so that the player is about 96 px tall, every frame is searched whole:
 
     colour back-projection x foreground -> Gaussian low-pass -> radial symmetry -> candidates,
 
@@ -54,11 +54,13 @@ LEG_ENDS = 4
 """Ends of legs kept beside the shoes, per frame."""
 LEG_ABOVE = 0.3
 """Least share of the player above the end of a leg."""
-NO_SHOE = 2.5
+NO_SHOE = 2.0
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
 KNEE_ROOM = 0.06
 """How far a leg may bend away from the straight line from hips to foot, player heights."""
-ONE_SHOE = 1.2
+FAIR = 0.15
+"""Share of the best scores that is as good as half sure."""
+ONE_SHOE = 1.8
 """Cost of both feet in one place."""
 LEAST_FOUND = 0.4
 """Share of the frames in which a head must be found for a track to be believed."""
@@ -68,7 +70,7 @@ LEAST_FOUND = 0.4
 class TrackOptions:
     """How the player is followed."""
 
-    player: float = 128.0
+    player: float = 96.0
     """Height of the player in the searched pictures, px; smaller is faster and less exact."""
     head_speed: float = 3.0
     """Usual speed of the head, player heights per second."""
@@ -330,7 +332,8 @@ def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]
     """-log of each score against the best scores of the sequence."""
     best = [float(np.nanmax(s)) for s in scores if np.isfinite(s).any()]
     reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
-    costs = [-np.log((s / reference + 0.005) / 1.005) for s in scores]
+    # Shoes differ in contrast; beyond a fair score more of it says little.
+    costs = [-np.log((s + 0.001 * reference) / (s + FAIR * reference)) for s in scores]
     return [np.where(np.isnan(c), NO_SHOE, c) for c in costs]
 
 
@@ -371,7 +374,8 @@ def _pair_costs(
     near = np.exp(-(((both[:, 0] - both[:, 1]) / (1.2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
     # A foot may be lifted, yet a racket or a knee is at its height more often.
     lifted = np.maximum(0, 0.82 * height - (both[..., 1] - head[1]))
-    off += (lifted**2).sum(axis=1) / (2 * (0.1 * height) ** 2)
+    uneven = np.maximum(0, np.abs(both[:, 0, 1] - both[:, 1, 1]) - 0.1 * height)
+    off += ((lifted**2).sum(axis=1) + uneven**2) / (2 * (0.1 * height) ** 2)
     return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
 
 
