@@ -50,6 +50,8 @@ STILL_WEIGHT = 0.2
 """Weight of colour where nothing differs from the background: a player may stand still."""
 HEADS, FEET = 8, 10
 """Candidates kept of each, per frame."""
+PAIRS = 30
+"""Pairs of feet kept, per frame."""
 LEG_ENDS = 4
 """Ends of legs kept beside the shoes, per frame."""
 LEG_ABOVE = 0.3
@@ -302,11 +304,14 @@ def _connect(
     if (chosen >= 0).mean() < LEAST_FOUND:
         raise _lost(chosen)
     head = _fill(heads, chosen)
-    pairs = [_pairs(len(f)) for f in feet]
     foot_cost = _costs([c.foot_score for c in found])
-    costs = [
-        _pair_costs(foot_cost[t], pairs[t], feet[t], head[t], height) for t in range(len(found))
-    ]
+    pairs, costs = [], []
+    for t, places in enumerate(feet):
+        every = _pairs(len(places))
+        cost = _pair_costs(foot_cost[t], every, places, head[t], height)
+        best = np.argsort(cost)[:PAIRS]
+        pairs.append(every[best])
+        costs.append(cost[best])
     stable = [_stabilise(f, camera, t)[p] for t, (f, p) in enumerate(zip(feet, pairs, strict=True))]
     taken = cheapest_path(costs, stable, Motion(options.foot_speed * speed, gap=12, miss=7.0))
     both = _order(_fill([f[p].reshape(-1, 4) for f, p in zip(feet, pairs, strict=True)], taken))

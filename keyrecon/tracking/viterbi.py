@@ -67,11 +67,19 @@ def _movement(
     before: Float[np.ndarray, "l p 2"], after: Float[np.ndarray, "m p 2"]
 ) -> Float[np.ndarray, "l m"]:
     """Mean squared movement of a state's points, under the cheaper assignment of a pair."""
-    direct = ((before[:, None] - after[None]) ** 2).sum(axis=-1).mean(axis=-1)
+    direct = _squares(before, after)
     if before.shape[1] == 1:
         return direct
-    crossed = ((before[:, None] - after[None, :, ::-1]) ** 2).sum(axis=-1).mean(axis=-1)
-    return np.minimum(direct, crossed)
+    return np.minimum(direct, _squares(before, after[:, ::-1]))
+
+
+def _squares(
+    before: Float[np.ndarray, "l p 2"], after: Float[np.ndarray, "m p 2"]
+) -> Float[np.ndarray, "l m"]:
+    """Mean squared distance of corresponding points, as |a|^2 + |b|^2 - 2 a b."""
+    a, b = before.reshape(len(before), -1), after.reshape(len(after), -1)
+    square = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T
+    return np.maximum(square, 0.0) / before.shape[1]
 
 
 def _trace_back(
