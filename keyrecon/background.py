@@ -32,10 +32,26 @@ SHADOW = 0.35
 """Weight of a darkening: a shadow takes up to half of the light and leaves the chroma."""
 DEEPEST_SHADOW = 0.45
 """Share of the light that a cast shadow leaves, at least."""
-BODY_HALF_WIDTH = 0.33
-"""Around the head-feet axis, player heights: nothing there is used for the plate."""
+GENEROUS = (0.7, 0.5)
+"""Widths of trunk and legs, player heights: what lies outside is background for sure."""
+TIGHT = (0.34, 0.18)
+"""The same where a player who hardly moves leaves nothing else to learn from."""
+HIPS = 0.45
+"""Where trunk becomes legs, share of the way from head to mid-feet."""
 UNKNOWN = 255
 """Spread of what was never seen."""
+FREE, COVERED = 255, 128
+"""Marks of pixels of a sampled frame away from the player, and near or on the player."""
+RECURRENCE = 5
+"""Two looks at the same background differ by no more, grey levels (video noise, compression)."""
+RESEMBLANCE = 40.0
+"""How far the background behind the player may be from that around, grey levels."""
+FEWEST_LOOKS = 3
+"""Times that a colour must recur behind the player to be taken for the background."""
+LEAST_SHARE = 0.08
+"""The same as a share of the sampled frames: a player may cover a place nearly all the time."""
+CANDIDATES = 24
+"""Sampled frames whose colours are tried."""
 CHROMA = 1.6
 """Weight of a and b against L: chroma varies less with light."""
 
@@ -65,8 +81,23 @@ def build_background(
     frames = sample_frames(len(video), options.samples)
     pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Learning the background", len(frames))]
-    free = [~_body(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
-    return combine_plate(lab, free, camera.to_reference[frames], shrink)
+    paths = camera.to_reference[frames]
+    clear, close = (
+        combine_plate(lab, [~_body(track, int(t), shrink, lab[0].shape[:2], w) for t in frames],
+                      paths, shrink)
+        for w in (GENEROUS, TIGHT)
+    )  # fmt: skip
+    return fill_plate(clear, close)
+
+
+def fill_plate(plate: Background, other: Background) -> Background:
+    """A plate, filled in from another one of the same extent where it is unknown."""
+    return Background(
+        plate=np.where(plate.known[..., None], plate.plate, other.plate),
+        spread=np.where(plate.known, plate.spread, other.spread),
+        known=plate.known | other.known,
+        from_reference=plate.from_reference,
+    )
 
 
 def reduced_width(video: Video, height: float, options: BackgroundOptions) -> int:
@@ -98,10 +129,12 @@ def combine_plate(
     still = size == (columns, rows) and np.allclose(paths, np.eye(3), atol=1e-9)
     layers = []
     for picture, clear, path in zip(lab, free, paths, strict=True):
-        alpha = clear.astype(np.uint8) * 255
+        alpha = np.where(clear, FREE, COVERED).astype(np.uint8)
         layer = np.dstack([picture, alpha])
         layers.append(layer if still else cv2.warpPerspective(layer, shift @ path, size))
-    plate, spread, known = _median(np.stack(layers))
+    stack = np.stack(layers)
+    plate, spread, known = _median(stack)
+    _look_behind(stack, plate, spread, known)
     return Background(plate, spread, known, shift @ small)
 
 
@@ -172,15 +205,16 @@ def _seen_through(
 
 
 def _body(
-    track: Track, frame: int, shrink: float, shape: tuple[int, int]
+    track: Track, frame: int, shrink: float, shape: tuple[int, int], widths: tuple[float, float]
 ) -> Bool[np.ndarray, "h w"]:
-    """Where the player is, generously: a thick line from above the head to the feet."""
+    """Where the player is: lines from above the head to the hips and on to each foot."""
     mask = np.zeros(shape, np.uint8)
     head, feet, height = track.head[frame], track.feet[frame], track.height[frame]
-    width = max(2, round(2 * BODY_HALF_WIDTH * height * shrink))
-    for foot in feet:
-        ends = (np.array([head, foot]) * shrink).round().astype(int)
-        cv2.line(mask, tuple(map(int, ends[0])), tuple(map(int, ends[1])), 1, width)
+    hips = head + HIPS * (track.mid_feet[frame] - head)
+    top = head - (0.0, 0.05 * height)
+    for start, end, width in ((top, hips, widths[0]), *((hips, foot, widths[1]) for foot in feet)):
+        x0, y0, x1, y1 = (int(round(c * shrink)) for c in (*start, *end))
+        cv2.line(mask, (x0, y0), (x1, y1), 1, max(2, round(width * height * shrink)))
     return mask > 0
 
 
@@ -203,7 +237,7 @@ def _median(
     layers: UInt8[np.ndarray, "n h w 4"],
 ) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
     """Median, spread and presence over layers whose fourth channel says where they count."""
-    counts = layers[..., 3] > 250
+    counts = layers[..., 3] > (FREE + COVERED) // 2
     number = counts.sum(axis=0)
     plate = np.empty((*number.shape, 3), np.uint8)
     spread = np.zeros(number.shape, np.float32)
@@ -216,6 +250,48 @@ def _median(
         if c == 0:
             spread = _deviation(ranked, middle)
     return plate, spread, number >= 3
+
+
+def _look_behind(
+    layers: UInt8[np.ndarray, "n h w 4"],
+    plate: UInt8[np.ndarray, "h w 3"],
+    spread: Float[np.ndarray, "h w"],
+    known: Bool[np.ndarray, "h w"],
+) -> None:
+    """Fill in, where the player always is nearby, what shows between the moving limbs.
+
+    A player who stays in one place covers it in every sampled frame, but never all of it: behind
+    the limbs the same colour comes back again and again, and it resembles the scene around. Every
+    sampled colour is weighed by how often it recurs and how near it is to that scene.
+    """
+    hidden = ~known & ((layers[..., 3] > COVERED // 2).sum(axis=0) >= FEWEST_LOOKS)
+    if not hidden.any() or not known.any():
+        return
+    around = cv2.inpaint(plate, (~known).astype(np.uint8), 5, cv2.INPAINT_TELEA)[hidden]
+    seen = layers[:, hidden]
+    values, valid = seen[..., :3], seen[..., 3] > COVERED // 2
+    best = np.zeros(len(around), np.float32)
+    color, looks = np.zeros_like(around), np.zeros(len(around), np.int64)
+    most = looks
+    for index in np.linspace(0, len(values) - 1, min(CANDIDATES, len(values))).astype(int):
+        candidate = values[index]
+        near = np.where(values > candidate, values - candidate, candidate - values)
+        again = (near <= RECURRENCE).all(axis=2) & valid & valid[index]
+        count = again.sum(axis=0)
+        most = np.maximum(most, count)
+        strange = (candidate.astype(np.float32) - around) / RESEMBLANCE
+        score = count * np.exp(-0.5 * np.square(strange).sum(axis=1))
+        total = np.einsum("npc,np->pc", values, again, dtype=np.float32)
+        mean = total / np.maximum(count, 1)[:, None]
+        better = score > best
+        best[better], looks[better] = score[better], count[better]
+        color[better] = mean[better].round()
+    # A colour that recurs far more often is the scene, or a trunk that never leaves: nobody knows.
+    found = looks >= np.maximum(0.5 * most, max(FEWEST_LOOKS, LEAST_SHARE * len(layers)))
+    where = np.argwhere(hidden)[found]
+    plate[where[:, 0], where[:, 1]] = color[found]
+    spread[where[:, 0], where[:, 1]] = RECURRENCE / 2
+    known[where[:, 0], where[:, 1]] = True
 
 
 def _deviation(

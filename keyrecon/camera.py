@@ -61,8 +61,8 @@ def look_at(
 
 
 def warp_points(
-    homography: Float[np.ndarray, "*n 3 3"], points: Float[np.ndarray, "*n 2"]
-) -> Float[np.ndarray, "*n 2"]:
+    homography: Float[np.ndarray, "*#n 3 3"], points: Float[np.ndarray, "*#n 2"]
+) -> Float[np.ndarray, "... 2"]:
     """Points moved by homographies, one each or one for all."""
     moved = np.einsum("...ij,...j->...i", homography[..., :, :2], points) + homography[..., :, 2]
     return moved[..., :2] / moved[..., 2:]

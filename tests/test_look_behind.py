@@ -1,0 +1,39 @@
+import cv2
+import numpy as np
+
+from keyrecon.background import combine_plate
+from keyrecon.colors import to_lab
+
+
+def scene_with_limb(shift, rng):
+    """A floor with a line across, and a limb in front of its middle."""
+    picture = np.full((60, 80, 3), (150, 90, 60), np.uint8)
+    picture[40:43] = 230
+    bare = picture.copy()
+    cv2.line(picture, (30 + 2 * shift, 10), (45 + 2 * shift, 55), (190, 130, 100 + 2 * shift), 6)
+    noise = rng.normal(0, 1.0, picture.shape)
+    return (picture + noise).round().astype(np.uint8), bare
+
+
+def test_what_shows_between_moving_limbs_completes_the_background():
+    rng = np.random.default_rng(0)
+    views = [scene_with_limb(int(s), rng) for s in rng.integers(-8, 9, 40)]
+    free = np.ones((60, 80), bool)
+    free[5:58, 15:65] = False  # the player never leaves
+    paths = np.tile(np.eye(3), (40, 1, 1))
+    background = combine_plate([to_lab(v) for v, _ in views], [free] * 40, paths, 1.0)
+    off = np.abs(background.plate.astype(int) - to_lab(views[0][1]).astype(int)).max(axis=2)
+    assert background.known[~free].mean() > 0.9
+    assert np.percentile(off[background.known], 99) <= 6
+
+
+def test_what_the_player_always_covers_stays_unknown():
+    rng = np.random.default_rng(0)
+    picture = rng.integers(0, 255, (40, 40, 40, 3), np.uint8)
+    picture[:, :, :10] = 120
+    free = np.zeros((40, 40), bool)
+    free[:, :10] = True
+    paths = np.tile(np.eye(3), (40, 1, 1))
+    background = combine_plate([to_lab(p) for p in picture], [free] * 40, paths, 1.0)
+    assert background.known[:, :10].all()
+    assert not background.known[:, 12:].any()
