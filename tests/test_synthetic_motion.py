@@ -108,6 +108,13 @@ def test_joined_clips_face_the_net(captures):
     assert -front[2] > 3 * abs(front[0])
 
 
+def test_one_short_clip_is_repeated_as_often_as_needed(captures):
+    short = Capture(captures[0].joints[:100], FPS)
+    joined = join_clips([short], JoinOptions(seconds=14.0))
+    assert joined.shape == (700, 14, 3)
+    assert speeds(joined).max() < 20
+
+
 def test_a_clip_too_short_to_join_is_refused():
     with pytest.raises(KeyreconError, match="needs"):
         join_clips([Capture(np.zeros((10, 14, 3)), 100.0)])

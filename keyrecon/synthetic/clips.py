@@ -19,6 +19,8 @@ from keyrecon.errors import KeyreconError
 from keyrecon.formats.mocap import Capture
 from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, estimate_stature, joint
 
+SHORTEST = 18
+"""Frames that a clip has at least."""
 Points = Float[np.ndarray, "_ 14 3"]
 
 
@@ -39,22 +41,24 @@ class JoinOptions:
 def join_clips(captures: Sequence[Capture], options: JoinOptions = JoinOptions()) -> Points:
     """One motion in the world: metres, y up, floor at 0, the net at negative z.
 
-    Raises KeyreconError when a clip is shorter than two blends.
+    Short clips are searched and blended over a third and a sixth of their length. Raises
+    KeyreconError when a clip is too short even for that.
     """
     clips = [_prepare(capture, options) for capture in captures]
     lengths = bone_lengths(clips[0])
     clips = [clips[0]] + [_fit_body(clip, lengths) for clip in clips[1:]]
     wanted = round(options.seconds * options.fps)
     turn = wanted // min(len(clips), max(1, round(options.seconds / 8))) + 1
-    blend = max(2, round(options.blend * options.fps))
-    reach = max(blend + 1, round(options.search * options.fps))
+    shortest = min(len(clip) for clip in clips)
+    blend = min(shortest // 6, max(2, round(options.blend * options.fps)))
+    reach = min(shortest // 3, max(blend + 1, round(options.search * options.fps)))
     motion = clips[0][: turn + reach]
     starts = [len(motion)] + [0] * (len(clips) - 1)
     index = 0
     while len(motion) < wanted + reach:
         index = (index + 1) % len(clips)
         clip = clips[index]
-        first = starts[index] if len(clip) - starts[index] > turn // 2 + reach else 0
+        first = starts[index] if len(clip) - starts[index] > 3 * reach else 0
         piece = clip[first : first + turn + 2 * reach]
         starts[index] = first + len(piece)
         motion = _append(motion, piece, blend, reach)
@@ -72,9 +76,9 @@ def bone_lengths(points: Points) -> Float[np.ndarray, "B"]:
 def _prepare(capture: Capture, options: JoinOptions) -> Points:
     """Resample a clip, stand it on the floor and turn it to the net."""
     seconds = (len(capture.joints) - 1) / capture.fps
-    if seconds < 2 * options.blend or len(capture.joints) < 4:
+    if seconds * options.fps < SHORTEST or len(capture.joints) < 4:
         raise KeyreconError(
-            f"A clip lasts {seconds:.2f} s; it needs {2 * options.blend:.2f} s to be joined."
+            f"A clip lasts {seconds:.2f} s; it needs {SHORTEST / options.fps:.2f} s to be joined."
         )
     times = np.arange(int(seconds * options.fps) + 1) / options.fps
     spline = CubicSpline(np.arange(len(capture.joints)) / capture.fps, capture.joints)
