@@ -21,6 +21,8 @@ from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, estimate_stature,
 
 SHORTEST = 18
 """Frames that a clip has at least."""
+SPELL = 3.0
+"""Seconds that every clip gets at least, as long as there is time for all."""
 Points = Float[np.ndarray, "_ 14 3"]
 
 
@@ -48,7 +50,7 @@ def join_clips(captures: Sequence[Capture], options: JoinOptions = JoinOptions()
     lengths = bone_lengths(clips[0])
     clips = [clips[0]] + [_fit_body(clip, lengths) for clip in clips[1:]]
     wanted = round(options.seconds * options.fps)
-    turn = wanted // min(len(clips), max(1, round(options.seconds / 8))) + 1
+    turn = wanted // min(len(clips), max(1, round(options.seconds / SPELL))) + 1
     shortest = min(len(clip) for clip in clips)
     blend = min(shortest // 6, max(2, round(options.blend * options.fps)))
     reach = min(shortest // 3, max(blend + 1, round(options.search * options.fps)))
