@@ -105,19 +105,19 @@ _POSTURE_SPREAD = 0.4
 
 
 def posture_cost(
-    bone: Float[np.ndarray, "*n 3"], forward: Float[np.ndarray, "*m 3"], kind: str
-) -> Float[np.ndarray, "*n"]:
+    bone: Float[np.ndarray, "*#n 3"], forward: Float[np.ndarray, "*#n 3"], kind: str
+) -> Float[np.ndarray, "..."]:
     """Squared distance of a bone's forward part from the usual one."""
     off = ((bone * forward).sum(-1) - POSTURE[kind]) / _POSTURE_SPREAD
     return np.minimum(0.5 * off**2, CAP)
 
 
 def leg_cost(
-    hips: Float[np.ndarray, "*n 3"],
-    up: Float[np.ndarray, "*n 3"],
-    thigh: Float[np.ndarray, "*m 3"],
-    shank: Float[np.ndarray, "*m 3"],
-) -> Float[np.ndarray, "*n"]:
+    hips: Float[np.ndarray, "*#n 3"],
+    up: Float[np.ndarray, "*#n 3"],
+    thigh: Float[np.ndarray, "*#n 3"],
+    shank: Float[np.ndarray, "*#n 3"],
+) -> Float[np.ndarray, "..."]:
     """Knees bend backwards; the thigh goes further forward than backward."""
     bend = (np.cross(thigh, shank) * hips).sum(-1)
     forward = np.cross(up, hips)
@@ -125,11 +125,11 @@ def leg_cost(
 
 
 def arm_cost(
-    shoulders: Float[np.ndarray, "*n 3"],
-    up: Float[np.ndarray, "*n 3"],
-    upper: Float[np.ndarray, "*m 3"],
-    forearm: Float[np.ndarray, "*m 3"],
-) -> Float[np.ndarray, "*n"]:
+    shoulders: Float[np.ndarray, "*#n 3"],
+    up: Float[np.ndarray, "*#n 3"],
+    upper: Float[np.ndarray, "*#n 3"],
+    forearm: Float[np.ndarray, "*#n 3"],
+) -> Float[np.ndarray, "..."]:
     """Hands work in front of the chest; a bent elbow lifts the forearm forward or up."""
     forward = np.cross(up, shoulders)
     bend = (np.cross(upper, forearm) * shoulders).sum(-1)
@@ -138,10 +138,10 @@ def arm_cost(
 
 
 def head_cost(
-    shoulders: Float[np.ndarray, "*n 3"],
-    up: Float[np.ndarray, "*n 3"],
-    head: Float[np.ndarray, "*m 3"],
-) -> Float[np.ndarray, "*n"]:
+    shoulders: Float[np.ndarray, "*#n 3"],
+    up: Float[np.ndarray, "*#n 3"],
+    head: Float[np.ndarray, "*#n 3"],
+) -> Float[np.ndarray, "..."]:
     """The head continues the trunk."""
     forward = np.cross(up, shoulders)
     return hinge(0.9 - (head * up).sum(-1), 0.2) + posture_cost(head, forward, "head")

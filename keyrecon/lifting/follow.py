@@ -7,8 +7,7 @@ overlapping windows that are blended, so memory stays bounded and cost linear.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -31,11 +30,12 @@ _SMOOTHED, _FOLLOWED = 0.02, 0.015
 """Standard deviation of smoothed and of once followed joints, body heights."""
 
 
-class FollowOptions(Protocol):
-    """What `follow_motion` reads from its options."""
+@dataclass(frozen=True)
+class FollowOptions:
+    """Options of the two things done in turn."""
 
-    flips: FlipOptions
-    refine: RefineOptions
+    flips: FlipOptions = field(default_factory=FlipOptions)
+    refine: RefineOptions = field(default_factory=RefineOptions)
 
 
 @dataclass(frozen=True, eq=False)

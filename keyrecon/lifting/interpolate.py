@@ -119,7 +119,7 @@ def slerp_between(
 def slerp(
     first: Float[np.ndarray, "*n 3"],
     second: Float[np.ndarray, "*n 3"],
-    share: Float[np.ndarray, "*m"],
+    share: Float[np.ndarray, "*#n"],
 ) -> Float[np.ndarray, "*n 3"]:
     """Unit vectors on the shortest arc from `first` to `second`.
 
@@ -141,7 +141,7 @@ def slerp(
 def _through_image(
     first: Float[np.ndarray, "*n 3"],
     second: Float[np.ndarray, "*n 3"],
-    part: Float[np.ndarray, "*n 1"],
+    part: Float[np.ndarray, "*#n 1"],
 ) -> Float[np.ndarray, "*n 3"]:
     """Two arcs that meet in the image plane, at right angles to `first` as far as possible."""
     middle = np.stack([-first[..., 1], first[..., 0], np.zeros_like(first[..., 0])], axis=-1)

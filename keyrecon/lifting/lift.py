@@ -15,7 +15,7 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import pose_from_directions
 from keyrecon.lifting.flips import FlipOptions
-from keyrecon.lifting.follow import Figure, follow_motion
+from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
 from keyrecon.lifting.lengths import BodySize, LengthOptions, estimate_lengths, marked_joints
 from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
@@ -97,8 +97,9 @@ def lift_motion(  # noqa: PLR0913
     if options.method == "paper":
         state = descend_motion(guide, clean, size, skeleton, options.refine)
     else:
+        follow = FollowOptions(options.flips, options.refine)
         figure = Figure(skeleton, size, keys, annotations.frames)
-        state = follow_motion(guide, clean, figure, fps, options, progress)
+        state = follow_motion(guide, clean, figure, fps, follow, progress)
     points = pose_from_directions(state.directions, size.lengths, skeleton)
     points[..., :2] += state.root[:, None]
     unit = 1.0 if options.height is None else options.height

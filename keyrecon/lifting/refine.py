@@ -29,7 +29,7 @@ class RefineOptions:
     """Relative gain below which the trajectory solver stops."""
     acceleration: float = 0.006
     """Expected second difference of a bone's end in 1/50 s, body heights."""
-    breadth_spread: float = 0.015
+    breadth_spread: float = 0.03
     """How far hip and shoulder breadth may stray, body heights."""
     step: float = 0.2
     """lambda of Fig. 9."""
