@@ -28,14 +28,12 @@ LARGEST_MOSAIC = 4.0
 """Sides of the mosaic, pictures: a camera that turns far enough leaves any plane."""
 NOISE = 4
 """Deviation of video noise and compression, grey levels; the least spread assumed."""
-SHADOW = 0.35
+SHADOW = 0.5
 """Weight of a darkening: a shadow takes up to half of the light and leaves the chroma."""
 DEEPEST_SHADOW = 0.45
 """Share of the light that a cast shadow leaves, at least."""
-GENEROUS = (0.7, 0.5)
-"""Widths of trunk and legs, player heights: what lies outside is background for sure."""
-TIGHT = (0.34, 0.18)
-"""The same where a player who hardly moves leaves nothing else to learn from."""
+TRUNK, LEGS = 0.7, 0.5
+"""Widths of the player, arms close and knees bent, in heights: beyond it is background."""
 HIPS = 0.45
 """Where trunk becomes legs, share of the way from head to mid-feet."""
 UNKNOWN = 255
@@ -64,7 +62,7 @@ class BackgroundOptions:
     """Frames that the median is taken over."""
     player: float = 128.0
     """Height of the player in the plate, px."""
-    sure: float = 4.0
+    sure: float = 2.5
     """A pixel this many deviations off is as likely the player as not."""
 
 
@@ -81,13 +79,8 @@ def build_background(
     frames = sample_frames(len(video), options.samples)
     pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Learning the background", len(frames))]
-    paths = camera.to_reference[frames]
-    clear, close = (
-        combine_plate(lab, [~_body(track, int(t), shrink, lab[0].shape[:2], w) for t in frames],
-                      paths, shrink)
-        for w in (GENEROUS, TIGHT)
-    )  # fmt: skip
-    return fill_plate(clear, close)
+    free = [~_body(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
+    return combine_plate(lab, free, camera.to_reference[frames], shrink)
 
 
 def fill_plate(plate: Background, other: Background) -> Background:
@@ -205,15 +198,15 @@ def _seen_through(
 
 
 def _body(
-    track: Track, frame: int, shrink: float, shape: tuple[int, int], widths: tuple[float, float]
+    track: Track, frame: int, shrink: float, shape: tuple[int, int]
 ) -> Bool[np.ndarray, "h w"]:
     """Where the player is: lines from above the head to the hips and on to each foot."""
     mask = np.zeros(shape, np.uint8)
     head, feet, height = track.head[frame], track.feet[frame], track.height[frame]
     hips = head + HIPS * (track.mid_feet[frame] - head)
     top = head - (0.0, 0.05 * height)
-    for start, end, width in ((top, hips, widths[0]), *((hips, foot, widths[1]) for foot in feet)):
-        x0, y0, x1, y1 = (int(round(c * shrink)) for c in (*start, *end))
+    for start, end, width in ((top, hips, TRUNK), *((hips, foot, LEGS) for foot in feet)):
+        x0, y0, x1, y1 = (round(float(c) * shrink) for c in (*start, *end))
         cv2.line(mask, (x0, y0), (x1, y1), 1, max(2, round(width * height * shrink)))
     return mask > 0
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from tyro.conf import Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from keyrecon import demo as demonstration
 from keyrecon import project as work
@@ -21,8 +21,8 @@ from keyrecon.synthetic.sequence import SynthOptions, synthesize
 from keyrecon.workspace import Workspace
 
 Advanced = Annotated[Options, arg(name="")]
-Points = UseAppendAction[tuple[Annotated[str, arg(metavar="X,Y")], ...]]
-Regions = UseAppendAction[tuple[Annotated[str, arg(metavar="NAME:X,Y")], ...]]
+Points = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="X,Y")]
+Regions = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME:X,Y")]
 
 app = tyro.extras.SubcommandApp()
 
@@ -77,8 +77,7 @@ def pick(
     Adds to the picks there are; several frames make the colours surer. Give both feet and each
     part of the clothing, for example:
 
-        keyrecon pick rally --frame 0 --head 640,210 --foot 610,540 --foot 668,548 \
-            --region shirt:640,290 --region shorts:640,390 --region skin:655,450
+        keyrecon pick rally --frame 0 --head 640,210 --foot 610,540 --region shirt:640,290
 
     Args:
         project: Project folder.
@@ -184,7 +183,7 @@ def evaluate(motion: Positional[Path], truth: Path) -> None:
 def synth(
     out: Path,
     mocap: UseAppendAction[tuple[Path, ...]] = (),
-    options: Annotated[SynthOptions, arg(name="")] = SynthOptions(),
+    options: OmitArgPrefixes[Annotated[SynthOptions, arg(name="")]] = SynthOptions(),
 ) -> None:
     """Render a sequence whose truth is known, from motion capture or built-in tennis.
 

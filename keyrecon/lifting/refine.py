@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
+from keyrecon.lifting.anatomy import anatomy_of
 from keyrecon.lifting.chain import bone_vectors, breadths, pose_from_directions, unit
 from keyrecon.lifting.constraints import keep_lengths, low_pass
 from keyrecon.lifting.descend import descend
@@ -55,6 +56,9 @@ def refine_motion(
                 (left, right), float(wanted), options.breadth_spread, size.lengths, skeleton
             )
         )
+    trunk, head = anatomy_of(skeleton).trunk, _head(skeleton)
+    if head is not None and HEAD:
+        recipe.append(terms.follow_trunk(head, trunk[:2], HEAD, len(size.lengths)))
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
@@ -77,3 +81,8 @@ def descend_motion(
     )
     valid = lengths(fitted)
     return State(valid[:, root, :2], unit(bone_vectors(valid, skeleton)))
+
+HEAD=.35
+def _head(skeleton):
+    l=[l for l in anatomy_of(skeleton).limbs if l.kind=="head"]
+    return l[0].bones[0] if l else None

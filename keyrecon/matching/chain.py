@@ -1,8 +1,8 @@
 """Least squares along a chain of frames.
 
-The unknowns are the joints of all frames. Each frame has observations of its own, each step to the
-next frame has some, and the acceleration of every joint is small. The matrix has blocks on three
-diagonals, so the work grows with the number of frames only.
+The unknowns are the joints of all frames. Each frame has observations of its own, and the second
+difference of every joint is small. The matrix has blocks on three diagonals, so the work grows with
+the number of frames only.
 """
 
 from dataclasses import dataclass
@@ -24,20 +24,13 @@ class Chain:
     right: Float[np.ndarray, "T N"]
 
 
-def link_frames(alone: Normals, steps: Normals, calm: Float[np.ndarray, "J"]) -> Chain:
-    """Join observations of frames, of steps from each frame to the next, and smoothness.
+def link_frames(alone: Normals, calm: Float[np.ndarray, "J"]) -> Chain:
+    """Join observations of single frames and smoothness.
 
-    `calm` is the spread of each joint's second difference, player heights. The last row of `steps`
-    leads nowhere and counts for nothing.
+    `calm` is the spread of each joint's second difference, player heights.
     """
-    here, right = alone.matrix.copy(), alone.right.copy()
+    here = alone.matrix.copy()
     beside, beyond = np.zeros_like(here), np.zeros_like(here)
-    pull, shift = steps.matrix[:-1], steps.right[:-1]
-    here[:-1] += pull
-    here[1:] += pull
-    beside[:-1] -= pull
-    right[:-1] -= shift
-    right[1:] += shift
     if len(here) > 2:
         weight = np.diag(np.tile(1 / calm**2, 2))
         here[:-2] += weight
@@ -46,7 +39,7 @@ def link_frames(alone: Normals, steps: Normals, calm: Float[np.ndarray, "J"]) ->
         beside[:-2] -= 2 * weight
         beside[1:-1] -= 2 * weight
         beyond[:-2] += weight
-    return Chain(here, beside, beyond, right)
+    return Chain(here, beside, beyond, alone.right)
 
 
 def solve_chain(chain: Chain) -> Complex[np.ndarray, "T J"]:

@@ -36,32 +36,29 @@ class States:
     """What a few joints may be in every frame: S states."""
 
     joints: Complex[np.ndarray, "T S J"]
-    expected: Complex[np.ndarray, "T S J"]
-    """Where the joints go in the next frame; NaN where unknown."""
     cost: Float[np.ndarray, "T S"]
     spread: Float[np.ndarray, "J"]
     """Error of a joint's step, player heights."""
 
     def steps(self, t: int) -> Float[np.ndarray, "S S"]:
         """Cost of going from each state of frame t - 1 to each of frame t."""
-        miss = np.abs(self.joints[t][None] - self.expected[t - 1][:, None]) / self.spread
-        return np.fmin(np.nan_to_num(miss**2, nan=STEP_MOST), STEP_MOST).mean(axis=2)
+        miss = np.abs(self.joints[t][None] - self.joints[t - 1][:, None]) / self.spread
+        return np.minimum(miss**2, STEP_MOST).mean(axis=2)
 
 
 def choose_limbs(
     puppets: Puppets,
     candidates: Candidates,
-    expected: Complex[np.ndarray, "T S J"],
     distance: Float[np.ndarray, "T K"],
 ) -> tuple[Complex[np.ndarray, "T J"], Int[np.ndarray, "T J"]]:
-    """(joints, puppet they come from); `expected` is where proposals go in the next frame."""
+    """(joints, puppet they come from)."""
     half, every = puppets.half, np.arange(len(distance))
     cost = _cost(candidates, distance)
     joints = candidates.joints[:, 0].copy()
     which = np.broadcast_to(candidates.which[:, :1], joints.shape).copy()
     groups = [half.middle, *half.sides]
     states = [
-        _limb_states(puppets, candidates, expected, cost, group) for group in groups
+        _limb_states(puppets, candidates, cost, group) for group in groups
     ]
     paths = [choose_one(states[0]) if half.middle else cost_of_trunk(candidates, half)]
     paths += choose_two(*states[1:], _unexplained(puppets, candidates, paths[0]))
@@ -91,7 +88,6 @@ def _cost(candidates: Candidates, distance: Float[np.ndarray, "T K"]) -> Float[n
 def _limb_states(
     puppets: Puppets,
     candidates: Candidates,
-    expected: Complex[np.ndarray, "T S J"],
     cost: Float[np.ndarray, "T S"],
     group: tuple[int, ...],
 ) -> States:
@@ -109,10 +105,8 @@ def _limb_states(
     states[poses.frames] = 0
     joints = np.concatenate([candidates.joints[:, :, side] for side in sides], axis=1)
     joints[poses.frames] = poses.joints[:, None, group]
-    onwards = np.concatenate([expected[:, :, side] for side in sides], axis=1)
-    onwards[poses.frames] = expected[poses.frames][:, -1:, group]
     depth = np.clip(half.depth[group] - 1, 0, None)
-    return States(np.nan_to_num(joints), onwards, states, STEP_SPREAD * 2.0**depth)
+    return States(np.nan_to_num(joints), states, STEP_SPREAD * 2.0**depth)
 
 
 def _unexplained(

@@ -82,16 +82,32 @@ def match_back(
     index: ElementIndex, listed: Int[np.ndarray, "P F"], placed: Placed, reach: float
 ) -> tuple[Int[np.ndarray, "P F"], Bool[np.ndarray, "P F"]]:
     """For each of the frame's elements, the figure's element it belongs to, likewise."""
+    hit, found = match_parts(index, listed, placed, np.zeros(placed.color.shape, int), 1, reach)
+    return hit[:, 0], found[:, 0]
+
+
+def match_parts(
+    index: ElementIndex,
+    listed: Int[np.ndarray, "P F"],
+    placed: Placed,
+    part: Int[np.ndarray, "P E"],
+    parts: int,
+    reach: float,
+) -> tuple[Int[np.ndarray, "P N F"], Bool[np.ndarray, "P N F"]]:
+    """For each of the frame's elements, the element it belongs to in each part of the figure."""
     count, room = placed.points.shape
-    figure = np.arange(count)[:, None]
-    key = np.where(placed.color < 0, -1, figure * index.n_colors + placed.color)
-    lifted = _lift(placed.points, placed.tangent, key).reshape(-1, 5)
-    tree = cKDTree(lifted, balanced_tree=False, compact_nodes=False)
-    wanted = np.where(listed < 0, -2, figure * index.n_colors + index.color[listed])
-    lifted = _lift(index.points[listed], index.tangent[listed], wanted)
-    _, hit = tree.query(lifted, distance_upper_bound=reach)
-    found = (hit < count * room) & (listed >= 0)
-    return np.where(found, hit - figure * room, 0), found
+    figure = np.arange(count)
+    key = (figure[:, None] * parts + part) * index.n_colors + placed.color
+    lifted = _lift(placed.points, placed.tangent, np.where(placed.color < 0, -1, key))
+    tree = cKDTree(lifted.reshape(-1, 5), balanced_tree=False, compact_nodes=False)
+    keys = (figure[:, None] * parts + np.arange(parts)) * index.n_colors
+    keys = keys[:, :, None] + index.color[listed][:, None]
+    wanted = np.empty((*keys.shape, 5))
+    wanted[...] = _lift(index.points[listed], index.tangent[listed], np.zeros(1))[:, None]
+    wanted[..., 4] = APART * np.where(listed[:, None] < 0, -2, keys)
+    _, hit = tree.query(wanted, distance_upper_bound=reach)
+    found = (hit < count * room) & (listed >= 0)[:, None]
+    return np.where(found, hit - figure[:, None, None] * room, 0), found
 
 
 def spread_choice(count: int, most: int) -> Int[np.ndarray, "N"]:

@@ -3,12 +3,12 @@
 Every frame is cut out around the player and brought to a common player height. A pixel of the crop
 belongs to part c of the player with
 
-    P(c) ~ f q_c(colour),   P(background) ~ (1 - f) b(colour),   P(something else) ~ f u,
+    P(c) = f q_c(colour) / (sum of q + u),
 
-f the probability that it differs from the background, q and b the colour histograms, u a uniform
-colour: a racket differs from the background and yet is none of the player's colours. The maps are
-low-passed, the most likely one names the pixel, and components that are small or hang on nothing
-are dropped. Contours of each region, inner borders between two colours included, are walked so
+f the probability that it differs from the background, q the colour histograms, u a uniform colour:
+a racket differs from the background and yet is none of the player's colours. Where the background
+was never seen, the histogram of the surroundings stands in for it. The maps are low-passed, the
+most likely one names the pixel, and components that are small or hang on nothing are dropped. Contours of each region, inner borders between two colours included, are walked so
 that the region lies on the left as seen on the picture, and sampled at regular arc length: each
 sample is an edge element, a point with a unit tangent.
 """
@@ -29,10 +29,12 @@ from keyrecon.video import Video
 
 CROP_WIDTH, CROP_HEIGHT = 1.75, 1.5
 """Size of the crop, player heights: a lunge with an arm stretched out; a raised arm."""
-UNIFORM = 4.0
+UNIFORM = 16.0
 """Weight of a colour that is none of the player's, against all colours being equally likely."""
 SOFTEN = 0.008
 """Low-pass of the maps, player heights: an edge stays where it is, noise goes."""
+GROWTH = 0.05
+"""How far a region grows into unknown colours, player heights."""
 LEAST_AREA = 0.0015
 """Smaller components are dropped and smaller holes filled, squared player heights."""
 NEARBY = 0.06
@@ -137,15 +139,28 @@ def label_crop(
     """0 background, 1 + c part c; `axis` runs from head to mid-feet in crop pixels."""
     bins = color_bins(lab)
     count = palette.parts.shape[1]
-    likely = palette.parts[bins] * (foreground[..., None] / count)
-    nobody = foreground * (UNIFORM / np.prod(BINS)) + (1 - foreground) * (
-        palette.surroundings[bins] + 1e-6
-    )
-    likely /= likely.sum(axis=2, keepdims=True) + nobody[..., None]
+    likely = palette.parts[bins] / count
+    known = likely.sum(axis=2) + UNIFORM / np.prod(BINS)
+    scene = np.where(foreground == 0.5, palette.surroundings[bins], known)
+    likely *= (foreground / (foreground * known + (1 - foreground) * scene))[..., None]
     likely = cv2.GaussianBlur(likely.astype(np.float32), (0, 0), SOFTEN * options.player)
     labels = palette.values[likely.argmax(axis=2)]
     labels[likely.sum(axis=2) < 0.5] = 0
-    return _clean(labels, axis, options)
+    differs = cv2.GaussianBlur(foreground, (0, 0), SOFTEN * options.player) > 0.5
+    return _clean(_fill(labels, differs, options), axis, options)
+
+
+def _fill(
+    labels: UInt8[np.ndarray, "h w"], differs: Bool[np.ndarray, "h w"], options: EdgeOptions
+) -> UInt8[np.ndarray, "h w"]:
+    """Let regions grow a little into what differs from the background without a known colour.
+
+    Folds, prints and deep shade are closed; a racket keeps out, but for what the hand holds.
+    """
+    for _ in range(round(GROWTH * options.player / 2)):
+        grown = cv2.dilate(labels, np.ones((5, 5), np.uint8))
+        labels = np.where((labels == 0) & differs, grown, labels)
+    return labels
 
 
 def _clean(

@@ -5,18 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.matching.candidates import Candidates, borrow_limbs, carry_figures, fit_similar, join_candidates
+from keyrecon.matching.borrow import borrow_limbs
+from keyrecon.matching.candidates import carry_figures, fit_similar, join_candidates
 from keyrecon.matching.choose import choose_limbs
 from keyrecon.matching.correspondence import ElementIndex
 from keyrecon.matching.fit import Figures
 from keyrecon.matching.judge import judge_figures
-from keyrecon.matching.flow import Flow
-from keyrecon.matching.limbs import LimbFlow, place_samples, predict_joints
 from keyrecon.matching.puppet import Puppets
 from keyrecon.matching.settle import FOLLOW, Proposal, settle_joints
-
-BLOCK = 1024
-"""Figures whose next step is predicted at a time, to bound memory."""
+BORROWED = 3
+"""Limbs of other figures that are fitted on each side: as many as there may be places for one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +22,6 @@ class Scene:
     """What both halves of the body look at."""
 
     index: ElementIndex
-    flow: Flow
     fps: float
 
 
@@ -55,36 +52,19 @@ def follow_half(
 ) -> Followed:
     """Joints of one half in all frames from `similar` annotated figures each."""
     half = puppets.half
-    limbs = place_samples(scene.flow, puppets)
     ranked = np.argsort(start.distance, axis=1, kind="stable")[:, :similar]
-    similar = fit_similar(puppets, scene.index, ranked, start.shift)
+    fitted = fit_similar(puppets, scene.index, ranked, start.shift)
     candidates = join_candidates(
-        similar,
-        borrow_limbs(puppets, scene.index, similar),
-        *(carry_figures(puppets, scene.index, limbs, ranked[:, 0], step) for step in (1, -1)),
+        fitted,
+        borrow_limbs(puppets, scene.index, fitted, BORROWED),
+        *(carry_figures(puppets, scene.index, ranked[:, 0], step) for step in (1, -1)),
     )
-    expected = _expect(puppets, limbs, candidates)
-    chosen, which = choose_limbs(puppets, candidates, expected, start.distance)
+    chosen, which = choose_limbs(puppets, candidates, start.distance)
     chosen[:, half.given] = start.given
     proposal = Proposal(chosen, ranked[:, 0])
-    joints = settle_joints(puppets, scene.index, limbs, proposal, scene.fps, rounds)
+    joints = settle_joints(puppets, scene.index, proposal, scene.fps, rounds)
     confidence = _confidence(puppets, scene.index, proposal, joints)
     return Followed(joints, confidence, which)
-
-
-def _expect(
-    puppets: Puppets, limbs: LimbFlow, candidates: Candidates
-) -> Complex[np.ndarray, "T S J"]:
-    """Where every proposal's joints are in the next frame, by the flow."""
-    count, states, _ = candidates.joints.shape
-    flat = candidates.joints.reshape(count * states, -1)
-    frames = np.repeat(np.arange(count), states)
-    expected = np.full_like(flat, np.nan)
-    there = np.flatnonzero(np.isfinite(flat).all(axis=1))
-    for at in range(0, len(there), BLOCK):
-        part = there[at : at + BLOCK]
-        expected[part] = predict_joints(limbs, puppets, frames[part], flat[part])
-    return expected.reshape(candidates.joints.shape)
 
 
 def _confidence(

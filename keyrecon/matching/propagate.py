@@ -8,8 +8,7 @@ the body, the lower first, it
 1. brings several annotated figures onto every frame, limbs turning as they must, and carries the
    annotated figures through time from both sides (`candidates.py`);
 2. chooses among these proposals by the cheapest path through time (`choose.py`);
-3. settles all frames in one least squares over edges, optical flow, bone shape and smooth motion,
-   in which the annotated frames are held (`settle.py`).
+3. settles all frames in one least squares over edges, bone shape and smooth motion, in which the annotated frames are held (`settle.py`).
 """
 
 from dataclasses import dataclass
@@ -21,7 +20,6 @@ from jaxtyping import Bool, Complex, Float, Int
 from keyrecon.errors import KeyreconError
 from keyrecon.matching.correspondence import index_elements
 from keyrecon.matching.distance import Half as HalfName
-from keyrecon.matching.flow import measure_flow
 from keyrecon.matching.follow import Scene, Start, follow_half
 from keyrecon.matching.halves import Half, split_body
 from keyrecon.matching.puppet import Poses, make_puppets
@@ -46,8 +44,6 @@ class PropagateOptions:
     """Keyframes brought onto each frame; more take longer."""
     elements: int = 96
     """Edge elements per frame and half of the body at most; more take longer."""
-    resolution: int = 110
-    """Height of the player in the pictures that flow is measured on, px."""
     rounds: int = 3
     """Times that edges are matched anew in the final least squares."""
 
@@ -91,8 +87,7 @@ def _fuse(
     """Both halves of the body over the whole video."""
     window = follow_player(survey.track, survey.camera)
     edges = survey.figures.edges
-    flow = measure_flow(video, window, options.resolution, progress)
-    scene = Scene(index_elements(edges, window), flow, video.fps)
+    scene = Scene(index_elements(edges, window), video.fps)
     count, every = len(edges), np.arange(len(edges))
     joints = np.full((count, len(annotations.skeleton.names)), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)

@@ -1,8 +1,7 @@
-"""Settle all frames at once: edges, flow, bone shape and smooth motion in one least squares.
+"""Settle all frames at once: edges, bone shape and smooth motion in one least squares.
 
 Every frame sees its edges, through the most similar annotated figure and through the average
-outline; neighbours in time are tied by the flow on the limbs and three in a row by a small
-acceleration; the chosen proposals are followed unless all of that speaks against them; annotated
+outline; three frames in a row are tied by a small acceleration; the chosen proposals are followed unless all of that speaks against them; annotated
 frames are held. Matches and robust weights are renewed in each round.
 """
 
@@ -14,9 +13,8 @@ from jaxtyping import Complex, Int
 from keyrecon.matching.chain import link_frames, solve_chain
 from keyrecon.matching.correspondence import ElementIndex
 from keyrecon.matching.fit import Figures, Step, keep_shape, see_edges
-from keyrecon.matching.limbs import LimbFlow, see_flow
 from keyrecon.matching.puppet import Puppets
-from keyrecon.matching.rows import Normals, observe, observe_joints
+from keyrecon.matching.rows import Normals, observe_joints
 
 REACHES = (0.05, 0.04, 0.03)
 """Farthest match in the first, second and later rounds, player heights."""
@@ -44,7 +42,6 @@ class Proposal:
 def settle_joints(
     puppets: Puppets,
     index: ElementIndex,
-    limbs: LimbFlow,
     proposal: Proposal,
     fps: float,
     rounds: int,
@@ -60,7 +57,7 @@ def settle_joints(
         alone = alone + _hold(puppets, proposal, joints)
         for which in (proposal.similar, average):
             alone = alone + see_edges(puppets, index, Figures(every, which, joints), reach)
-        joints = solve_chain(link_frames(alone, _steps(puppets, limbs, joints), calm))
+        joints = solve_chain(link_frames(alone, calm))
     return joints
 
 
@@ -76,13 +73,3 @@ def _hold(
     target[poses.frames] = np.where(poses.known, poses.joints, target[poses.frames])
     weight[poses.frames] = np.where(poses.known, MARKED, weight[poses.frames])
     return observe_joints(target, weight)
-
-
-def _steps(puppets: Puppets, limbs: LimbFlow, joints: Complex[np.ndarray, "T J"]) -> Normals:
-    """What the flow says of the way from each frame to the next."""
-    motion, weight = see_flow(limbs, puppets, np.arange(len(joints)), joints)
-    step = np.diff(joints, axis=0, append=joints[-1:])
-    miss = np.abs(motion - step @ limbs.mixture.T) ** 2
-    weight = weight / (1 + miss * weight)
-    mixture = np.broadcast_to(limbs.mixture, (len(joints), *limbs.mixture.shape))
-    return observe(mixture, motion, np.ones(motion.shape, complex), weight, weight)

@@ -25,6 +25,7 @@ from keyrecon.background import (
     BackgroundOptions,
     Scene,
     combine_plate,
+    fill_plate,
     reduced_width,
     sample_frames,
 )
@@ -33,7 +34,7 @@ from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
 from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Background, CameraPath, Colors, Track
+from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 from keyrecon.video import Video
@@ -148,14 +149,7 @@ def _first_scene(
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
     clear = combine_plate(lab, free, paths, shrink)
     plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
-    known = clear.known
-    plate = Background(
-        plate=np.where(known[..., None], clear.plate, plain.plate),
-        spread=np.where(known, clear.spread, plain.spread),
-        known=plain.known,
-        from_reference=plain.from_reference,
-    )
-    return Scene(plate, camera)
+    return Scene(fill_plate(clear, plain), camera)
 
 
 def _weigh(
