@@ -28,7 +28,7 @@ LARGEST_MOSAIC = 4.0
 """Sides of the mosaic, pictures: a camera that turns far enough leaves any plane."""
 NOISE = 4
 """Deviation of video noise and compression, grey levels; the least spread assumed."""
-SHADOW = 0.5
+SHADOW = 0.35
 """Weight of a darkening: a shadow takes up to half of the light and leaves the chroma."""
 DEEPEST_SHADOW = 0.45
 """Share of the light that a cast shadow leaves, at least."""
@@ -62,7 +62,7 @@ class BackgroundOptions:
     """Frames that the median is taken over."""
     player: float = 128.0
     """Height of the player in the plate, px."""
-    sure: float = 2.5
+    sure: float = 3.0
     """A pixel this many deviations off is as likely the player as not."""
 
 

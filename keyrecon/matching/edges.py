@@ -8,9 +8,10 @@ belongs to part c of the player with
 f the probability that it differs from the background, q the colour histograms, u a uniform colour:
 a racket differs from the background and yet is none of the player's colours. Where the background
 was never seen, the histogram of the surroundings stands in for it. The maps are low-passed, the
-most likely one names the pixel, and components that are small or hang on nothing are dropped. Contours of each region, inner borders between two colours included, are walked so
-that the region lies on the left as seen on the picture, and sampled at regular arc length: each
-sample is an edge element, a point with a unit tangent.
+most likely one names the pixel, and components that are small or hang on nothing are dropped.
+Contours of each region, inner borders between two colours included, are walked so that the region
+lies on the left as seen on the picture, and sampled at regular arc length: each sample is an edge
+element, a point with a unit tangent.
 """
 
 from dataclasses import dataclass
@@ -146,7 +147,7 @@ def label_crop(
     likely = cv2.GaussianBlur(likely.astype(np.float32), (0, 0), SOFTEN * options.player)
     labels = palette.values[likely.argmax(axis=2)]
     labels[likely.sum(axis=2) < 0.5] = 0
-    differs = cv2.GaussianBlur(foreground, (0, 0), SOFTEN * options.player) > 0.5
+    differs = cv2.GaussianBlur(foreground, (0, 0), SOFTEN * options.player) > 0.7
     return _clean(_fill(labels, differs, options), axis, options)
 
 
