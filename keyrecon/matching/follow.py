@@ -13,6 +13,7 @@ from keyrecon.matching.fit import Figures
 from keyrecon.matching.judge import judge_figures
 from keyrecon.matching.puppet import Puppets
 from keyrecon.matching.settle import FOLLOW, Proposal, settle_joints
+
 BORROWED = 3
 """Limbs of other figures that are fitted on each side: as many as there may be places for one."""
 

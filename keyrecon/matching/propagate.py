@@ -8,7 +8,8 @@ the body, the lower first, it
 1. brings several annotated figures onto every frame, limbs turning as they must, and carries the
    annotated figures through time from both sides (`candidates.py`);
 2. chooses among these proposals by the cheapest path through time (`choose.py`);
-3. settles all frames in one least squares over edges, bone shape and smooth motion, in which the annotated frames are held (`settle.py`).
+3. settles all frames in one least squares over edges, bone shape and smooth motion, in which the
+   annotated frames are held (`settle.py`).
 """
 
 from dataclasses import dataclass
