@@ -136,6 +136,7 @@ def run(
     project: Positional[Path],
     height: float | None = None,
     method: Literal["best", "paper"] | None = None,
+    partial: bool = False,
     force: bool = False,
     options: Advanced = Options(),
 ) -> None:
@@ -147,11 +148,12 @@ def run(
         project: Project folder.
         height: The athlete's height in metres; without it lengths are in body heights.
         method: 'paper' uses the forms printed in the paper, 'best' ours (default).
+        partial: Go on although keyframes are not annotated yet.
         force: Make every stage again.
     """
     workspace = Workspace(project, force)
     chosen = work.settings(workspace.options(options), height, method)
-    print(work.run(workspace, chosen, show))
+    print(work.run(workspace, chosen, show, partial))
 
 
 @app.command

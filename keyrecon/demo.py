@@ -9,11 +9,9 @@ noise of a careful person, and the demo says so.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from keyrecon.body import LSP14
 from keyrecon.formats.coco import read_coco, write_coco
@@ -49,8 +47,7 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     say(find_keyframes(workspace, Options(), {}, progress).split("\nNext")[0])
     say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
     options = settings(Options(), round(float(truth["height_m"]), 2), None)
-    known = KnownJoints(truth["points3d"], truth["points2d"])
-    say(run(workspace, options, progress, known))
+    say(run(workspace, options, progress, truth=truth))
     say("\nAccuracy against the truth")
     say(evaluate(workspace.folder, sequence / "truth.npz"))
     spent = {"rendering": rendered, **workspace.stages.seconds}
@@ -58,14 +55,6 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     say("\n".join(f"{stage:<24}{seconds:>10.1f}" for stage, seconds in spent.items()))
     say(f"{'everything':<24}{time.perf_counter() - began:>10.1f}")
     say(f"\nReport: {workspace.report_file}")
-
-
-@dataclass(frozen=True, eq=False)
-class KnownJoints:
-    """The truth for the report."""
-
-    points3d: Float[np.ndarray, "T J 3"]
-    points2d: Float[np.ndarray, "T J 2"]
 
 
 def _project(video_file: Path, folder: Path) -> Workspace:

@@ -14,11 +14,12 @@ import numpy as np
 
 from keyrecon.background import BackgroundOptions, build_background
 from keyrecon.colors import ColorOptions, learn_colors
+from keyrecon.errors import KeyreconError
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
-from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes
+from keyrecon.matching.keyframes import KeyframeOptions, adopt_keyframes, choose_keyframes
 from keyrecon.matching.matrix import CompareOptions, compare_frames
-from keyrecon.matching.propagate import PropagateOptions, propagate_joints
+from keyrecon.matching.propagate import LEAST_MARKED, PropagateOptions, propagate_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.records import (
     SOURCES,
@@ -129,6 +130,7 @@ def reconstruct(
     Lengths are in metres where `options.lift.height` is given, else in body heights. Raises
     KeyreconError when keyframes are not annotated.
     """
+    preparation = _with_annotated(preparation, annotations, options, progress)
     video, keyframes = preparation.video, preparation.keyframes
     tracks = keep(
         "propagate",
@@ -151,6 +153,27 @@ def reconstruct(
         progress=progress,
     )
     return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
+
+
+def _with_annotated(
+    preparation: Preparation, annotations: Annotations, options: Options, progress: Progress
+) -> Preparation:
+    """The keyframes that were annotated, where these are not just the ones asked for."""
+    asked, lower = preparation.keyframes, annotations.skeleton.is_lower
+    marked = np.isfinite(annotations.joints).all(axis=2)
+    served = [marked[:, half].mean(axis=1) >= LEAST_MARKED for half in (~lower, lower)]
+    frames = tuple(annotations.frames[rows] for rows in served)
+    if not all(len(f) for f in frames):
+        name = "upper" if not len(frames[0]) else "lower"
+        raise KeyreconError(f"No frame has most joints of the {name} body annotated.")
+    if np.array_equal(frames[0], asked.upper.frames) and np.array_equal(
+        frames[1], asked.lower.frames
+    ):
+        return preparation
+    adopted = adopt_keyframes(
+        preparation.comparison, asked, frames, options.keyframes, progress=progress
+    )
+    return replace(preparation, keyframes=adopted)
 
 
 def assemble_motion(

@@ -1,9 +1,11 @@
 """What the commands do to a project folder; each returns the text to show."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.durable import write_durably
@@ -22,7 +24,7 @@ from keyrecon.records import Annotations, Motion, Pick
 from keyrecon.report.material import ReportMaterial
 from keyrecon.report.overlay import write_overlay
 from keyrecon.report.page import write_report
-from keyrecon.report.summary import Truth, annotation_cost
+from keyrecon.report.summary import annotation_cost
 from keyrecon.video import Video, open_video
 from keyrecon.video_writer import write_picture
 from keyrecon.workspace import Workspace
@@ -178,12 +180,19 @@ def settings(options: Options, height: float | None, method: str | None) -> Opti
 
 
 def run(
-    workspace: Workspace, options: Options, progress: Progress, truth: Truth | None = None
+    workspace: Workspace,
+    options: Options,
+    progress: Progress,
+    partial: bool = False,
+    truth: Mapping[str, np.ndarray] | None = None,
 ) -> str:
-    """Everything after annotation; writes motion.npz and report.html."""
+    """Everything after annotation; writes motion.npz and report.html.
+
+    `partial` goes on with what is annotated, `truth` is for the report.
+    """
     started = time.perf_counter()
     preparation = prepared(workspace, options, progress)
-    annotations = annotated(workspace, preparation)
+    annotations = annotated(workspace, preparation, partial)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     write_motion(workspace.motion_file, motion)
     material = ReportMaterial(
@@ -223,18 +232,21 @@ def prepared(workspace: Workspace, options: Options, progress: Progress) -> Prep
     return replace(preparation, keyframes=asked)
 
 
-def annotated(workspace: Workspace, preparation: Preparation) -> Annotations:
+def annotated(
+    workspace: Workspace, preparation: Preparation, partial: bool = False
+) -> Annotations:
     """The project's annotations; KeyreconError names the keyframes that lack theirs."""
     file = workspace.annotations_file
     annotations = load_annotations(workspace, preparation.video) if file.is_file() else None
     found = preparation.keyframes
     missing = missing_marks(annotations, found.upper.frames, found.lower.frames)
-    if annotations is None or missing:
+    if annotations is None or (missing and not partial):
         named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
         listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
         raise KeyreconError(
             f"{len(missing)} of {len(found.frames)} keyframes are not annotated: frame {listed}. "
-            f"Mark them and add the file with: keyrecon import {workspace.folder} FILE"
+            f"Mark them and add the file with: keyrecon import {workspace.folder} FILE, or go on "
+            "with what is annotated: keyrecon run --partial"
         )
     return annotations
 

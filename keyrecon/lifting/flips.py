@@ -31,10 +31,6 @@ _MOST_ALIKE = 24
 """Key poses that are asked per frame; those further away weigh nothing."""
 
 
-_TURNS = (0.0, 0.25, -0.25, 0.5, -0.5)
-"""Headings under which key poses vote, radians; about the spread of two poses that look alike."""
-
-
 @dataclass(frozen=True)
 class FlipOptions:
     """What speaks for a sign, and how loudly."""
@@ -47,8 +43,6 @@ class FlipOptions:
     """Weight of the key poses per frame."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
-    turn: float = 0.4
-    """Standard deviation of a key pose's heading from frame to frame it stands for, radians."""
     jerk: float = 0.1
     """Second difference of depth between frames to be expected, statures."""
     reach: float = 6.0
@@ -160,33 +154,29 @@ class Votes:
     ) -> Float[np.ndarray, "T S"]:
         """Cost of each sign vector of a group of bones in each frame, nats."""
         members = list(bones)
-        wanted, trust, apart = self._most_alike(members, shown, options)
+        alike, apart = self._most_alike(members, shown, options)
         states = sign_states(len(bones))
         depth = (states * shown.depth[:, None, members])[:, :, None]  # (T, S, 1, g)
+        wanted = self.vectors[:, members, 2][alike][:, None]  # (T, 1, n, g)
         spread = options.alike**2 + shown.doubt[:, members] ** 2
-        off = trust[:, None] * (depth - wanted[:, None]) ** 2 / (2 * spread[:, None, None])
-        likelihood = np.exp(-apart[:, None] - off.sum(-1)).sum(-1)
+        trust = self.trust[:, members][alike][:, None]
+        off = (trust * (depth - wanted) ** 2 / (2 * spread[:, None, None])).sum(-1)
+        likelihood = np.exp(-apart[:, None] - off).sum(-1)
         cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
         return cost + self._confirmed(members, shown, options)
 
     def _most_alike(
         self, bones: list[int], shown: Shown, options: FlipOptions
-    ) -> tuple[Float[np.ndarray, "T n g"], Float[np.ndarray, "T n g"], Float[np.ndarray, "T n"]]:
-        """Depths, their trust and the unlikeness of the key poses that look most like a frame.
-
-        The same pose is also met under another heading, so key poses vote turned as well.
-        """
+    ) -> tuple[Int[np.ndarray, "T n"], Float[np.ndarray, "T n"]]:
+        """The key poses in which a group and the trunk look most like each frame's."""
         context = sorted({*bones, *anatomy_of(self.skeleton).trunk})
-        turned = np.concatenate([turn_about_vertical(self.vectors, yaw) for yaw in _TURNS])
-        price = np.repeat(0.5 * (np.array(_TURNS) / options.turn) ** 2, len(self.vectors))
         flat = shown.flat[:, context].reshape(len(shown.flat), -1)
-        keys = turned[:, context, :2].reshape(len(turned), -1)
+        keys = self.vectors[:, context, :2].reshape(len(self.vectors), -1)
         apart = (flat**2).sum(-1)[:, None] + (keys**2).sum(-1) - 2 * flat @ keys.T
-        apart = np.maximum(apart, 0.0) / (2 * options.alike**2) + price
         most = min(_MOST_ALIKE, len(keys))
         alike = np.argpartition(apart, most - 1, axis=1)[:, :most]
-        trust = np.tile(self.trust[:, bones], (len(_TURNS), 1))
-        return turned[:, bones, 2][alike], trust[alike], np.take_along_axis(apart, alike, axis=1)
+        near = np.maximum(np.take_along_axis(apart, alike, axis=1), 0.0)
+        return alike, near / (2 * options.alike**2)
 
     def _confirmed(
         self, bones: list[int], shown: Shown, options: FlipOptions
@@ -201,14 +191,6 @@ class Votes:
                 deep = np.minimum(np.abs(shown.depth[frame, bones]) / options.alike, 1.0)
                 cost[frame] = options.confirmed * (wrong * deep).sum(-1)
         return cost
-
-
-def turn_about_vertical(
-    vectors: Float[np.ndarray, "*n 3"], yaw: float
-) -> Float[np.ndarray, "*n 3"]:
-    """Vectors turned about the picture's vertical."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return vectors @ np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
 
 
 def second_order_path(

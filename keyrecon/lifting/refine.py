@@ -9,6 +9,8 @@ are exact in both.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
 from keyrecon.lifting.anatomy import anatomy_of
@@ -56,9 +58,7 @@ def refine_motion(
                 (left, right), float(wanted), options.breadth_spread, size.lengths, skeleton
             )
         )
-    trunk, head = anatomy_of(skeleton).trunk, _head(skeleton)
-    if head is not None and HEAD:
-        recipe.append(terms.follow_trunk(head, trunk[:2], HEAD, len(size.lengths)))
+    recipe += _trunk_terms(size, skeleton)
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
@@ -82,7 +82,23 @@ def descend_motion(
     valid = lengths(fitted)
     return State(valid[:, root, :2], unit(bone_vectors(valid, skeleton)))
 
-HEAD=.35
-def _head(skeleton):
-    l=[l for l in anatomy_of(skeleton).limbs if l.kind=="head"]
-    return l[0].bones[0] if l else None
+
+HEAD=.35;TWIST=0.;LINE=0.
+def _trunk_terms(size,skeleton):
+    anatomy=anatomy_of(skeleton); tr=anatomy.trunk
+    if not tr: return []
+    out=[]
+    l=[l for l in anatomy.limbs if l.kind=="head"]
+    n=len(size.lengths)
+    up=np.zeros(n); up[list(tr[:2])]=.5/.95
+    if l and HEAD:
+        sh=up.copy(); sh[l[0].bones[0]]=1; out.append(terms.alignment(sh,HEAD))
+    if TWIST:
+        sh=np.zeros(n); 
+        for k,(a,b) in enumerate((tr[:2],tr[2:])):
+            w=size.lengths[a]/size.breadths[k]*(1,-1)[k]
+            sh[a]=w; sh[b]=-w
+        out.append(terms.alignment(sh,TWIST))
+    if LINE:
+        sh=np.zeros(n); sh[list(tr[2:])]=.5; out.append(terms.alignment(sh,LINE))
+    return out

@@ -82,14 +82,9 @@ def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], trust: Float[np.ndarray, 
     return term
 
 
-def follow_trunk(
-    bone: int, opposite: tuple[int, ...], spread: float, bones: int
-) -> Term:
-    """A bone continues the trunk: its direction is opposite to the mean of the trunk's bones."""
-    share = np.zeros(bones)
-    share[list(opposite)] = 1 / len(opposite) / 0.95  # hips spread by 17 degrees to either side
-    share[bone] = 1.0
-    slope = np.zeros((3, bones, 3))
+def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
+    """A weighted sum of bone directions stays near zero: parts of the trunk move together."""
+    slope = np.zeros((3, len(share), 3))
     slope[np.arange(3), :, np.arange(3)] = share / spread
 
     def term(state: State) -> Linear:

@@ -243,3 +243,25 @@ def _record(half: Half, goal: Goal, beta: float, chosen: list[int]) -> HalfKeyfr
         distance=distance,
         printed_count=len(printed),
     )
+
+
+def adopt_keyframes(
+    comparison: Comparison,
+    asked: Keyframes,
+    annotated: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
+
+    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
+    """
+    halves = []
+    names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
+    for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
+        half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
+        beta = getattr(asked, name).beta
+        rows = np.unique(comparison.row[frames])
+        rows = rows[np.isin(comparison.frames[rows], frames)]
+        halves.append(_record(half, half.goal(beta), beta, rows.tolist()))
+    return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)
