@@ -212,7 +212,7 @@ def as_printed(options: Options = Options()) -> Options:
         options,
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
-        lift=replace(options.lift, refine=replace(options.lift.refine, method="paper")),
+        lift=replace(options.lift, method="paper"),
     )
 
 
