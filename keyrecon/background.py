@@ -80,7 +80,7 @@ def build_background(
     pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Learning the background", len(frames))]
     free = [~_body(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
-    return combine_plate(lab, free, camera.to_reference[frames], shrink)
+    return combine_plate(lab, free, camera.to_reference[frames], shrink, look_behind=True)
 
 
 def fill_plate(plate: Background, other: Background) -> Background:
@@ -108,10 +108,12 @@ def combine_plate(
     free: list[Bool[np.ndarray, "h w"]],
     to_reference: Float[np.ndarray, "n 3 3"],
     shrink: float,
+    look_behind: bool = False,
 ) -> Background:
     """Median of Lab pictures where they are free of the player, in reference coordinates.
 
-    `shrink` tells how many pixels of these pictures a pixel of the full picture has.
+    `shrink` tells how many pixels of these pictures a pixel of the full picture has;
+    `look_behind` fills in places that are never free from what recurs there.
     """
     small = shrinking(shrink)
     rows, columns = lab[0].shape[:2]
@@ -127,7 +129,8 @@ def combine_plate(
         layers.append(layer if still else cv2.warpPerspective(layer, shift @ path, size))
     stack = np.stack(layers)
     plate, spread, known = _median(stack)
-    _look_behind(stack, plate, spread, known)
+    if look_behind:
+        _look_behind(stack, plate, spread, known)
     return Background(plate, spread, known, shift @ small)
 
 
