@@ -3,8 +3,8 @@
 Two ways. `descend_motion` is the paper's projected gradient descent: joints move towards the
 observed ones, then bone lengths and a low-pass are enforced, again and again. `refine_motion`
 minimises one cost over the unit directions of all bones: robust reprojection weighted by
-confidence, small second differences in time, and the breadths of hips and shoulders. Lengths
-are exact in both.
+confidence, small second differences in time, the breadths of hips and shoulders, and a head
+that continues the trunk. Lengths are exact in both.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,9 @@ from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.solver import Smoothness, State, solve
 
+_HIPS_ALONG = 0.95
+"""Part of the bones from neck to hips that goes along the spine."""
+
 
 @dataclass(frozen=True)
 class RefineOptions:
@@ -34,6 +37,8 @@ class RefineOptions:
     """Expected second difference of a bone's end in 1/50 s, body heights."""
     breadth_spread: float = 0.03
     """How far hip and shoulder breadth may stray, body heights."""
+    head_spread: float = 0.35
+    """How far the head may lean out of the trunk's line, radians."""
     step: float = 0.2
     """lambda of Fig. 9."""
     descents: int = 40
@@ -52,13 +57,7 @@ def refine_motion(
 ) -> State:
     """Root and bone directions that follow the observed joints from a start near them."""
     recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
-    for (left, right, _), wanted in zip(breadths(skeleton), size.breadths, strict=True):
-        recipe.append(
-            terms.breadth(
-                (left, right), float(wanted), options.breadth_spread, size.lengths, skeleton
-            )
-        )
-    recipe += _trunk_terms(size, skeleton)
+    recipe += _trunk_terms(size, skeleton, options)
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
@@ -83,22 +82,18 @@ def descend_motion(
     return State(valid[:, root, :2], unit(bone_vectors(valid, skeleton)))
 
 
-HEAD=.35;TWIST=0.;LINE=0.
-def _trunk_terms(size,skeleton):
-    anatomy=anatomy_of(skeleton); tr=anatomy.trunk
-    if not tr: return []
-    out=[]
-    l=[l for l in anatomy.limbs if l.kind=="head"]
-    n=len(size.lengths)
-    up=np.zeros(n); up[list(tr[:2])]=.5/.95
-    if l and HEAD:
-        sh=up.copy(); sh[l[0].bones[0]]=1; out.append(terms.alignment(sh,HEAD))
-    if TWIST:
-        sh=np.zeros(n); 
-        for k,(a,b) in enumerate((tr[:2],tr[2:])):
-            w=size.lengths[a]/size.breadths[k]*(1,-1)[k]
-            sh[a]=w; sh[b]=-w
-        out.append(terms.alignment(sh,TWIST))
-    if LINE:
-        sh=np.zeros(n); sh[list(tr[2:])]=.5; out.append(terms.alignment(sh,LINE))
-    return out
+def _trunk_terms(size: BodySize, skeleton: Skeleton, options: RefineOptions) -> list[terms.Term]:
+    """What holds the trunk together: breadths, and the head above it."""
+    lengths = size.lengths
+    recipe = [
+        terms.breadth((left, right), float(wanted), options.breadth_spread, lengths, skeleton)
+        for (left, right, _), wanted in zip(breadths(skeleton), size.breadths, strict=True)
+    ]
+    anatomy = anatomy_of(skeleton)
+    for limb in anatomy.limbs:
+        if limb.kind == "head":
+            share = np.zeros(len(lengths))
+            share[list(anatomy.trunk[:2])] = 0.5 / _HIPS_ALONG
+            share[list(limb.bones)] = 1.0
+            recipe.append(terms.alignment(share, options.head_spread))
+    return recipe

@@ -65,23 +65,6 @@ def breadth(
     return term
 
 
-def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], trust: Float[np.ndarray, "T B"]) -> Term:
-    """Bone directions stay near those of the key poses, with the square root of `trust`."""
-    bones = wanted.shape[1]
-    weight = np.sqrt(trust)
-    slope = np.zeros((bones, 3, bones, 3))
-    for bone in range(bones):
-        slope[bone, :, bone] = np.eye(3)
-
-    def term(state: State) -> Linear:
-        residual = weight[..., None] * (state.directions - wanted)
-        by_direction = weight[:, :, None, None, None] * slope
-        frames = len(residual)
-        return Linear(residual.reshape(frames, -1), by_direction.reshape(frames, -1, bones, 3))
-
-    return term
-
-
 def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
     """A weighted sum of bone directions stays near zero: parts of the trunk move together."""
     slope = np.zeros((3, len(share), 3))
