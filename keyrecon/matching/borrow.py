@@ -16,7 +16,11 @@ from keyrecon.matching.fit import Figures, Step
 from keyrecon.matching.judge import judge_limb
 from keyrecon.matching.puppet import Puppets
 
-SCHEDULE = (Step(0.08, 0.02, 0.05), Step(0.06, 0.02, 0.08), Step(0.05, 0.02, 0.08))
+SCHEDULE = (
+    Step(0.08, 0.02, 0.05, every=2),
+    Step(0.06, 0.02, 0.08, every=2),
+    Step(0.05, 0.02, 0.08),
+)
 """A borrowed limb starts nearer to its place than a whole figure."""
 DIFFERENT = 0.06
 """Joints of limbs that count as different are this far apart, player heights."""

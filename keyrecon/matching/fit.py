@@ -35,13 +35,14 @@ class Step:
     """Spread of a bone's length, player heights."""
     swing: float
     """Spread of a bone's end square to it, player heights."""
+    every: int = 1
+    """Only each n-th element is looked up: enough while the figure is far off."""
 
 
 FAR_TO_NEAR = (
-    Step(0.12, 0.010, 0.015),
-    Step(0.12, 0.015, 0.04),
-    Step(0.10, 0.020, 0.08),
-    Step(0.07, 0.020, 0.08),
+    Step(0.12, 0.010, 0.015, every=2),
+    Step(0.12, 0.015, 0.04, every=2),
+    Step(0.10, 0.020, 0.08, every=2),
     Step(0.05, 0.020, 0.08),
 )
 """From the whole figure shifting to limbs turning by up to half a right angle."""
@@ -70,21 +71,21 @@ def fit_figures(
     """Fit figures to their frames; `extra` observations count in every step."""
     figures = start
     for step in schedule:
-        seen = see_edges(puppets, index, figures, step.reach)
+        seen = see_edges(puppets, index, figures, step.reach, step.every)
         seen = seen + keep_shape(puppets, figures.joints, start.joints, step)
         figures = figures.moved((seen + extra if extra else seen).solve())
     return figures
 
 
 def see_edges(
-    puppets: Puppets, index: ElementIndex, figures: Figures, reach: float
+    puppets: Puppets, index: ElementIndex, figures: Figures, reach: float, every: int = 1
 ) -> Normals:
-    """Observations of the joints by corresponding elements, both ways."""
-    posed = pose_puppets(puppets, figures.which, figures.joints)
+    """Observations of the joints by corresponding elements, both ways; only each n-th is used."""
+    posed = pose_puppets(puppets, figures.which, figures.joints, every)
     row, found = match_elements(index, figures.frames, posed, reach)
     there = _pull(index, row, posed.points, found * posed.weight, reach)
     there = observe(posed.share, index.points[row] - posed.free, *there)
-    listed = puppets.listed[figures.frames]
+    listed = puppets.listed[figures.frames, ::every]
     hit, found = match_back(index, listed, posed, reach)
     points, free, weight = (
         np.take_along_axis(values, hit, axis=1)
@@ -92,7 +93,8 @@ def see_edges(
     )
     share = np.take_along_axis(posed.share, hit[..., None], axis=1)
     back = _pull(index, listed, points, found * weight, reach)
-    return there + observe(share, index.points[listed] - free, *back)
+    seen = there + observe(share, index.points[listed] - free, *back)
+    return Normals(every * seen.matrix, every * seen.right)
 
 
 def _pull(

@@ -38,7 +38,7 @@ class Riders:
     """-1 for padding."""
     weight: Float[np.ndarray, "*n"]
 
-    def take(self, rows: np.ndarray) -> "Riders":
+    def take(self, rows: np.ndarray | tuple | int) -> "Riders":
         """Some of them."""
         return Riders(*(getattr(self, field.name)[rows] for field in fields(self)))
 

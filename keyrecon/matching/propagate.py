@@ -41,7 +41,7 @@ class PropagateOptions:
     method: Literal["fused", "paper"] = "fused"
     """'paper': from the assigned keyframe alone; joints hidden there are missing. 'fused': from
     several keyframes and both neighbours in time; every joint gets a place and a confidence."""
-    similar: int = 4
+    similar: int = 3
     """Keyframes brought onto each frame; more take longer."""
     elements: int = 96
     """Edge elements per frame and half of the body at most; more take longer."""

@@ -102,17 +102,18 @@ class Posed:
 
 
 def pose_puppets(
-    puppets: Puppets, which: Int[np.ndarray, "P"], joints: Complex[np.ndarray, "P J"]
+    puppets: Puppets,
+    which: Int[np.ndarray, "P"],
+    joints: Complex[np.ndarray, "P J"],
+    every: int = 1,
 ) -> Posed:
-    """Puppets `which` with their joints at `joints`."""
-    riders = puppets.riders
-    axis = np.take_along_axis(bone_axes(puppets.half, joints), riders.bone[which], axis=1)
-    free = riders.offset[which] * axis
-    share = puppets.share[which]
+    """Each n-th element of puppets `which` with their joints at `joints`."""
+    riders = puppets.riders.take(np.s_[which, ::every])
+    share = puppets.share[which, ::every]
+    axis = np.take_along_axis(bone_axes(puppets.half, joints), riders.bone, axis=1)
+    free = riders.offset * axis
     points = (share @ joints[..., None])[..., 0] + free
-    return Posed(
-        share, free, points, riders.turn[which] * axis, riders.color[which], riders.weight[which]
-    )
+    return Posed(share, free, points, riders.turn * axis, riders.color, riders.weight)
 
 
 def bone_axes(half: Half, joints: Complex[np.ndarray, "P J"]) -> Complex[np.ndarray, "P B"]:
