@@ -109,11 +109,13 @@ def combine_plate(
     to_reference: Float[np.ndarray, "n 3 3"],
     shrink: float,
     look_behind: bool = False,
+    least: float = 0.0,
 ) -> Background:
     """Median of Lab pictures where they are free of the player, in reference coordinates.
 
     `shrink` tells how many pixels of these pictures a pixel of the full picture has;
-    `look_behind` fills in places that are never free from what recurs there.
+    `look_behind` fills in places that are never free from what recurs there; places that are free
+    in less than the share `least` of their pictures, or in fewer than three, count as unknown.
     """
     small = shrinking(shrink)
     rows, columns = lab[0].shape[:2]
@@ -128,7 +130,7 @@ def combine_plate(
         layer = np.dstack([picture, alpha])
         layers.append(layer if still else cv2.warpPerspective(layer, shift @ path, size))
     stack = np.stack(layers)
-    plate, spread, known = _median(stack)
+    plate, spread, known = _median(stack, least)
     if look_behind:
         _look_behind(stack, plate, spread, known)
     return Background(plate, spread, known, shift @ small)
@@ -230,7 +232,7 @@ def _extent(
 
 
 def _median(
-    layers: UInt8[np.ndarray, "n h w 4"],
+    layers: UInt8[np.ndarray, "n h w 4"], least: float
 ) -> tuple[UInt8[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
     """Median, spread and presence over layers whose fourth channel says where they count."""
     counts = layers[..., 3] > (FREE + COVERED) // 2
@@ -245,7 +247,8 @@ def _median(
         plate[..., c] = np.take_along_axis(ranked, middle[None], axis=0)[0]
         if c == 0:
             spread = _deviation(ranked, middle)
-    return plate, spread, number >= 3
+    seen = (layers[..., 3] > COVERED // 2).sum(axis=0)
+    return plate, spread, number >= np.maximum(FEWEST_LOOKS, least * seen)
 
 
 def _look_behind(

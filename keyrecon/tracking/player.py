@@ -49,6 +49,9 @@ SHOES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
 """Shoes from the side and pointing to or from the camera."""
 STILL_WEIGHT = 0.2
 """Weight of colour where nothing differs from the background: a player may stand still."""
+LEAST_CLEAR = 0.15
+"""Share of the frames in which a place must lack the player's colours to be judged by those:
+a racket or a shadow passes more rarely than that, even where the scene has the colours itself."""
 HEADS, FEET = 8, 10
 """Candidates kept of each, per frame."""
 PAIRS = 30
@@ -65,6 +68,8 @@ FAIR = 0.15
 """Share of the best scores that is as good as half sure."""
 ONE_SHOE = 1.8
 """Cost of both feet in one place."""
+LEAST_BODY = 0.05
+"""Share of the player's colours beneath a head, at least; a trunk fills about a third."""
 LEAST_FOUND = 0.4
 """Share of the frames in which a head must be found for a track to be believed."""
 
@@ -147,7 +152,7 @@ def _first_scene(
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
-    clear = combine_plate(lab, free, paths, shrink)
+    clear = combine_plate(lab, free, paths, shrink, least=LEAST_CLEAR)
     plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
     return Scene(fill_plate(clear, plain), camera)
 
@@ -180,6 +185,7 @@ def _search(evidence: _Evidence, tall: float) -> _Candidates:
     body = _mean_inside(evidence, heads, (-0.15, 0.12, 0.15, 0.65), tall)
     strength = strength * (0.02 + body)
     order = np.argsort(-strength)[:HEADS]
+    order = order[body[order] > LEAST_BODY]
     heads, strength = heads[order], strength[order]
     feet, foot_strength = _search_feet(evidence, heads[:4], tall)
     return _Candidates(heads, strength, feet, foot_strength)
@@ -310,8 +316,8 @@ def _connect(
     taken = cheapest_path(costs, stable, Motion(options.foot_speed * speed, gap=12, miss=7.0))
     both = _order(_fill([f[p].reshape(-1, 4) for f, p in zip(feet, pairs, strict=True)], taken))
     standing = standing_height(head, both.mean(axis=1), zoom(camera, video), video, options)
-    head_trust = np.array([_trust(c, s) for c, s in zip(head_cost, chosen, strict=True)])
-    feet_trust = np.array([_trust(c / 2, s) for c, s in zip(costs, taken, strict=True)])
+    head_trust = np.array([_trust(c, int(s)) for c, s in zip(head_cost, chosen, strict=True)])
+    feet_trust = np.array([_trust(c / 2, int(s)) for c, s in zip(costs, taken, strict=True)])
     trust = np.sqrt(head_trust * feet_trust)
     return Track(head, both, standing, _boxes(head, both, standing), trust)
 

@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+from drawn_player import HEIGHT, corners, film, heads, picks
+
+from keyrecon.background import Scene, build_background
+from keyrecon.camera import warp_points
+from keyrecon.colors import learn_colors, to_lab
+from keyrecon.errors import KeyreconError
+from keyrecon.matching.edges import find_edges
+from keyrecon.pictures import read_small
+from keyrecon.records import CameraPath, Pick
+from keyrecon.tracking.camera_motion import follow_camera
+from keyrecon.tracking.player import track_player, zoom
+
+COUNT = 40
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["static", "panning"])
+def found(request, tmp_path_factory):
+    """(panning, video, camera, colors, track) of one filmed player."""
+    video = film(tmp_path_factory.mktemp("film") / "player.mp4", COUNT, request.param)
+    camera = follow_camera(video)
+    colors = learn_colors(video, picks(COUNT, request.param))
+    return request.param, video, camera, colors, track_player(video, colors, camera)
+
+
+def test_a_camera_on_a_tripod_has_the_identity_for_a_path_and_a_panning_one_its_pan(found):
+    panning, _, camera, _, _ = found
+    if not panning:
+        assert (camera.to_reference == np.eye(3)).all()
+        return
+    there = corners(COUNT, panning)
+    expected = there - there[COUNT // 2]
+    center = np.array([160.0, 90.0])
+    moved = np.array([warp_points(h, center[None])[0] for h in camera.to_reference]) - center
+    assert np.abs(moved - expected).max() < 1.0
+
+
+def test_head_and_feet_are_found_in_every_frame(found):
+    panning, _, _, _, track = found
+    truth = heads(COUNT) - corners(COUNT, panning)
+    assert np.linalg.norm(track.head - truth, axis=1).max() < 0.05 * HEIGHT
+    assert np.linalg.norm(track.mid_feet - truth - (0, HEIGHT), axis=1).max() < 0.06 * HEIGHT
+
+
+def test_the_standing_height_is_that_of_the_player(found):
+    assert found[4].height == pytest.approx(HEIGHT, rel=0.06)
+
+
+def test_the_box_holds_head_and_feet(found):
+    track = found[4]
+    for spots in (track.head, track.feet[:, 0], track.feet[:, 1]):
+        assert (spots > track.box[:, :2]).all()
+        assert (spots < track.box[:, 2:]).all()
+
+
+def test_the_player_and_nobody_else_is_foreground(found):
+    panning, video, camera, _, track = found
+    scene = Scene(build_background(video, camera, track), camera)
+    number = COUNT // 4
+    picture = next(iter(read_small(video, video.width, {number})))
+    likely = scene.foreground(to_lab(picture), number, np.eye(3))
+    x, y = (heads(COUNT) - corners(COUNT, panning))[number].round().astype(int)
+    assert likely[y + 15 : y + 35, x - 6 : x + 6].min() > 0.8
+    assert np.median(np.delete(likely, np.s_[x - 30 : x + 30], axis=1)) < 0.05
+
+
+def test_edges_lie_on_the_outline_of_the_player(found):
+    panning, video, camera, colors, track = found
+    background = build_background(video, camera, track)
+    figures = find_edges(video, track, camera, background, colors)
+    assert len(figures.edges) == COUNT
+    shirt = colors.names.index("shirt")
+    head = (heads(COUNT) - corners(COUNT, panning))[COUNT // 2]
+    edges = figures.edges[COUNT // 2]
+    outline = edges.points[edges.color == shirt] - head
+    assert len(outline) > 20
+    assert np.abs(outline[:, 0]).max() < 14
+    assert outline[:, 1].min() > 4
+    assert outline[:, 1].max() < 43
+    assert np.linalg.norm(edges.tangent, axis=1) == pytest.approx(1)
+    assert (edges.upper | edges.lower).all()
+
+
+def test_zoom_is_the_ratio_of_focal_lengths(found):
+    video = found[1]
+    factor = np.linspace(1, 1.5, 10)
+    center = np.array([video.width / 2, video.height / 2])
+    to_first = np.tile(np.eye(3), (10, 1, 1))
+    to_first[:, 0, 0] = to_first[:, 1, 1] = 1 / factor
+    to_first[:, :2, 2] = center - center / factor[:, None]
+    assert zoom(CameraPath(to_first, np.ones(10)), video) == pytest.approx(factor)
+
+
+def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):
+    video, camera = found[1], found[2]
+    grass = [Pick(0, "head", 20.0, 20.0), Pick(0, "foot", 20.0, 108.0)]
+    colors = learn_colors(video, grass)
+    with pytest.raises(KeyreconError, match=r"pick .* again"):
+        track_player(video, colors, camera)
