@@ -53,13 +53,14 @@ def corners(count: int, panning: bool) -> np.ndarray:
     return np.stack([x.round(), np.full(count, 30.0)], axis=1)
 
 
-def film(path: Path, count: int, panning: bool = False) -> Video:
-    """A video of the player in front of a camera that stands still or pans."""
+def film(path: Path, count: int, panning: bool = False, empty: bool = False) -> Video:
+    """A video of the player (or of the empty scene); the camera stands still or pans."""
 
     def frames():
         for head, corner in zip(heads(count), corners(count, panning), strict=True):
             picture = scene()
-            draw_player(picture, *head)
+            if not empty:
+                draw_player(picture, *head)
             x, y = corner.astype(int)
             yield picture[y : y + SIZE[0], x : x + SIZE[1]]
 

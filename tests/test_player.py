@@ -8,7 +8,7 @@ from keyrecon.colors import learn_colors, to_lab
 from keyrecon.errors import KeyreconError
 from keyrecon.matching.edges import find_edges
 from keyrecon.pictures import read_small
-from keyrecon.records import CameraPath, Pick
+from keyrecon.records import CameraPath
 from keyrecon.tracking.camera_motion import follow_camera
 from keyrecon.tracking.player import track_player, zoom
 
@@ -93,8 +93,7 @@ def test_zoom_is_the_ratio_of_focal_lengths(found):
 
 
 def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):
-    video, camera = found[1], found[2]
-    grass = [Pick(0, "head", 20.0, 20.0), Pick(0, "foot", 20.0, 108.0)]
-    colors = learn_colors(video, grass)
-    with pytest.raises(KeyreconError, match=r"pick .* again"):
-        track_player(video, colors, camera)
+    panning, _, camera, colors, _ = found
+    empty = film(tmp_path / "empty.mp4", COUNT, panning, empty=True)
+    with pytest.raises(KeyreconError, match=r"0 of 40 frames; pick .* again"):
+        track_player(empty, colors, camera)
