@@ -24,6 +24,8 @@ SCHEDULE = (
 """A borrowed limb starts nearer to its place than a whole figure."""
 DIFFERENT = 0.06
 """Joints of limbs that count as different are this far apart, player heights."""
+STRANGE = 1.0
+"""Doubt in a borrowed limb: without edges that speak for it, the figure keeps its own."""
 LIBRARY = 24
 """Limbs tried; of more, those that differ most."""
 
@@ -50,7 +52,9 @@ def borrow_limbs(
     average = np.full(len(frames), puppets.average)
     start = Figures(frames, average, joints.reshape(len(frames), -1))
     fitted = fit_candidates(puppets, index, start, SCHEDULE)
-    return replace(fitted, which=np.repeat(which[:, None], count, axis=1))
+    doubt = candidates.doubt[every, best] + STRANGE
+    rows = np.ones((1, count), int)
+    return replace(fitted, which=which[:, None] * rows, doubt=doubt[:, None] * rows)
 
 
 def _collect_limbs(puppets: Puppets) -> Complex[np.ndarray, "L j"]:

@@ -27,6 +27,10 @@ HOLD = (Step(0.05, 0.006, 0.02), Step(0.03, 0.006, 0.02))
 """Corrections of a figure that was carried from the neighbouring frame."""
 LIKENESS = Step(0.0, 0.04, 1.0)
 """How firmly its bones keep the lengths of the most similar annotated figure."""
+UNLIKE, UNLIKE_MOST = 0.5, 4.0
+"""Doubt per usual distance to the nearest keyframe, which counts up to so many times."""
+AGE, AGE_MOST = 0.02, 150.0
+"""Doubt per frame that a figure was carried, and the frames that count."""
 MOMENTUM = 0.9
 """Share of its last step that a joint is expected to repeat: at 50 frames/s the joints of a tennis
 stroke change their step by a tenth of it or so."""
@@ -34,7 +38,7 @@ stroke change their step by a tenth of it or so."""
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """S proposals for each frame; NaN where there is none."""
+    """S proposals for each frame."""
 
     joints: Complex[np.ndarray, "T S J"]
     misfit: Float[np.ndarray, "T S B"]
@@ -42,8 +46,8 @@ class Candidates:
     """How far each of the frame's elements is from each part of the figure (`judge.py`)."""
     which: Int[np.ndarray, "T S"]
     """Annotated figure that it comes from, or that is most similar."""
-    age: Float[np.ndarray, "T S"]
-    """Frames since the annotated frame it was carried from; 0 for a fitted figure."""
+    doubt: Float[np.ndarray, "T S"]
+    """Cost of taking it before its edges are looked at; infinite where there is none."""
 
 
 def join_candidates(*parts: Candidates) -> Candidates:
@@ -55,13 +59,18 @@ def join_candidates(*parts: Candidates) -> Candidates:
 def fit_similar(
     puppets: Puppets,
     index: ElementIndex,
-    ranked: Int[np.ndarray, "T M"],
+    distance: Float[np.ndarray, "T K"],
     shift: Complex[np.ndarray, "T K"],
+    most: int,
 ) -> Candidates:
-    """Fit the ranked puppets to every frame; `shift` aligns puppet and frame to begin with."""
+    """Fit the `most` similar figures to every frame; `shift` aligns figure and frame at first."""
+    ranked = np.argsort(distance, axis=1, kind="stable")[:, :most]
     frames, which = np.repeat(np.arange(len(ranked)), ranked.shape[1]), ranked.ravel()
     start = puppets.poses.joints[which] + shift[frames, which][:, None]
-    return fit_candidates(puppets, index, Figures(frames, which, start), FAR_TO_NEAR)
+    fitted = fit_candidates(puppets, index, Figures(frames, which, start), FAR_TO_NEAR)
+    usual = max(float(np.median(distance.min(axis=1))), 1e-9)
+    unlike = np.take_along_axis(distance, ranked, axis=1) / usual
+    return replace(fitted, doubt=UNLIKE * np.minimum(unlike, UNLIKE_MOST))
 
 
 def fit_candidates(
@@ -120,4 +129,6 @@ def carry_figures(
     every = np.arange(count)
     carried = Figures(every, np.full(count, puppets.average), np.nan_to_num(joints))
     judged = fit_candidates(puppets, index, carried, ())
-    return replace(judged, joints=joints[:, None], which=similar[:, None], age=age[:, None])
+    doubt = np.where(np.isfinite(age), AGE * np.minimum(age, AGE_MOST), np.inf)
+    joints[np.isinf(age)] = 0
+    return replace(judged, joints=joints[:, None], which=similar[:, None], doubt=doubt[:, None])

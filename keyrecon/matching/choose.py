@@ -3,8 +3,8 @@
 A side (arm or leg) may take a proposal's own side or the other one, since silhouettes do not tell
 left from right. Both sides are chosen together: what counts most is how much of the frame's edges
 they and the trunk leave unexplained, so that they do not both take the same limb. Besides, a step
-costs its length, and a proposal its misfit with the edges, how little its keyframe resembles the
-frame, and how long it has been carried. Annotated frames admit the annotation alone.
+costs its length, and a proposal its misfit with the edges and the doubt it comes with. Annotated
+frames admit the annotation alone.
 
 The weights were tried at half and twice their values on rendered strokes and serves; none of
 them moves the share of joints that are right by more than half a percent.
@@ -25,10 +25,6 @@ STEP_MOST = 20.0
 """Largest cost of a joint's step: a jump happens, and it should not outweigh everything else."""
 MISFIT = 3.0
 """Cost of a limb whose elements find nothing."""
-UNLIKE, UNLIKE_MOST = 0.5, 4.0
-"""Cost of a keyframe per usual distance to the nearest one, which counts up to so many times."""
-AGE, AGE_MOST = 0.02, 150.0
-"""Cost per frame that a proposal was carried, and the frames that count."""
 SWAP = 1.0
 """Cost of taking left for right."""
 UNEXPLAINED = 48.0
@@ -51,48 +47,31 @@ class States:
 
 
 def choose_limbs(
-    puppets: Puppets,
-    candidates: Candidates,
-    distance: Float[np.ndarray, "T K"],
+    puppets: Puppets, candidates: Candidates
 ) -> tuple[Complex[np.ndarray, "T J"], Int[np.ndarray, "T J"]]:
     """(joints, puppet they come from)."""
-    half, every = puppets.half, np.arange(len(distance))
-    cost = _cost(candidates, distance)
+    half, every = puppets.half, np.arange(len(candidates.which))
     joints = candidates.joints[:, 0].copy()
     which = np.broadcast_to(candidates.which[:, :1], joints.shape).copy()
     groups = [half.middle, *half.sides]
-    states = [_limb_states(puppets, candidates, cost, group) for group in groups]
+    states = [_limb_states(puppets, candidates, group) for group in groups]
     paths = [choose_one(states[0]) if half.middle else _best_trunk(candidates, half)]
     paths += choose_two(*states[1:], _unexplained(puppets, candidates, paths[0]))
     for group, state, path in zip(groups, states, paths, strict=True):
         joints[:, group] = state.joints[every, path]
-        which[:, group] = candidates.which[every, path % cost.shape[1]][:, None]
+        which[:, group] = candidates.which[every, path % candidates.doubt.shape[1]][:, None]
     return joints, which
 
 
 def _best_trunk(candidates: Candidates, half: Half) -> Int[np.ndarray, "T"]:
     """Proposals by the misfit of what lies between the sides."""
     misfit = candidates.misfit[:, :, half.limb == 0].mean(axis=2)
-    misfit[~np.isfinite(candidates.joints[:, :, 0])] = np.inf
-    return misfit.argmin(axis=1)
-
-
-def _cost(candidates: Candidates, distance: Float[np.ndarray, "T K"]) -> Float[np.ndarray, "T S"]:
-    """Of proposals as a whole."""
-    usual = max(float(np.median(distance.min(axis=1))), 1e-9)
-    unlike = np.take_along_axis(distance, candidates.which, axis=1) / usual
-    cost = np.where(
-        candidates.age > 0,
-        AGE * np.minimum(candidates.age, AGE_MOST),
-        UNLIKE * np.minimum(unlike, UNLIKE_MOST),
-    )
-    return np.where(np.isfinite(candidates.joints).all(axis=2), cost, np.inf)
+    return np.where(np.isinf(candidates.doubt), np.inf, misfit).argmin(axis=1)
 
 
 def _limb_states(
     puppets: Puppets,
     candidates: Candidates,
-    cost: Float[np.ndarray, "T S"],
     group: tuple[int, ...],
 ) -> States:
     """The group's own side of every proposal, then the other side."""
@@ -103,14 +82,14 @@ def _limb_states(
     for side in sides:
         bones = np.isin(half.bones[:, 1], side)
         misfit = candidates.misfit[:, :, bones].mean(axis=2) if bones.any() else 0.0
-        costs.append(cost + MISFIT * misfit + SWAP * len(costs))
+        costs.append(candidates.doubt + MISFIT * misfit + SWAP * len(costs))
     states = np.concatenate(costs, axis=1)
     # all states of an annotated frame are the annotation
     states[poses.frames] = 0
     joints = np.concatenate([candidates.joints[:, :, side] for side in sides], axis=1)
     joints[poses.frames] = poses.joints[:, None, group]
     depth = np.clip(half.depth[group] - 1, 0, None)
-    return States(np.nan_to_num(joints), states, STEP_SPREAD * 2.0**depth)
+    return States(joints, states, STEP_SPREAD * 2.0**depth)
 
 
 def _unexplained(

@@ -53,16 +53,16 @@ def follow_half(
 ) -> Followed:
     """Joints of one half in all frames from `similar` annotated figures each."""
     half = puppets.half
-    ranked = np.argsort(start.distance, axis=1, kind="stable")[:, :similar]
-    fitted = fit_similar(puppets, scene.index, ranked, start.shift)
+    fitted = fit_similar(puppets, scene.index, start.distance, start.shift, similar)
+    nearest = fitted.which[:, 0]
     candidates = join_candidates(
         fitted,
         borrow_limbs(puppets, scene.index, fitted, BORROWED),
-        *(carry_figures(puppets, scene.index, ranked[:, 0], step) for step in (1, -1)),
+        *(carry_figures(puppets, scene.index, nearest, step) for step in (1, -1)),
     )
-    chosen, which = choose_limbs(puppets, candidates, start.distance)
+    chosen, which = choose_limbs(puppets, candidates)
     chosen[:, half.given] = start.given
-    proposal = Proposal(chosen, ranked[:, 0])
+    proposal = Proposal(chosen, nearest)
     joints = settle_joints(puppets, scene.index, proposal, scene.fps, rounds)
     confidence = _confidence(puppets, scene.index, proposal, joints)
     return Followed(joints, confidence, which)
