@@ -10,7 +10,8 @@ from keyrecon.matching.edges import find_edges
 from keyrecon.pictures import read_small
 from keyrecon.records import CameraPath
 from keyrecon.tracking.camera_motion import follow_camera
-from keyrecon.tracking.player import track_player, zoom
+from keyrecon.tracking.player import track_player
+from keyrecon.tracking.scale import standing_height, zoom
 
 COUNT = 40
 
@@ -90,6 +91,13 @@ def test_zoom_is_the_ratio_of_focal_lengths(found):
     to_first[:, 0, 0] = to_first[:, 1, 1] = 1 / factor
     to_first[:, :2, 2] = center - center / factor[:, None]
     assert zoom(CameraPath(to_first, np.ones(10)), video) == pytest.approx(factor)
+
+
+def test_a_crouch_does_not_change_the_standing_height():
+    head = np.zeros((200, 2))
+    feet = np.tile([0.0, 100.0], (200, 1))
+    head[80:110, 1] = 30.0
+    assert standing_height(head, feet, np.ones(200), 150) == pytest.approx(100)
 
 
 def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):

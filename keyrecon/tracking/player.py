@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d, percentile_filter
+from scipy.ndimage import maximum_filter1d
 
 from keyrecon.background import (
     BackgroundOptions,
@@ -35,6 +35,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 from keyrecon.video import Video
@@ -315,11 +316,12 @@ def _connect(
     stable = [_stabilise(f, camera, t)[p] for t, (f, p) in enumerate(zip(feet, pairs, strict=True))]
     taken = cheapest_path(costs, stable, Motion(options.foot_speed * speed, gap=12, miss=7.0))
     both = _order(_fill([f[p].reshape(-1, 4) for f, p in zip(feet, pairs, strict=True)], taken))
-    standing = standing_height(head, both.mean(axis=1), zoom(camera, video), video, options)
+    frames = round(options.envelope * video.fps)
+    standing = standing_height(head, both.mean(axis=1), zoom(camera, video), frames)
     head_trust = np.array([_trust(c, int(s)) for c, s in zip(head_cost, chosen, strict=True)])
     feet_trust = np.array([_trust(c / 2, int(s)) for c, s in zip(costs, taken, strict=True)])
     trust = np.sqrt(head_trust * feet_trust)
-    return Track(head, both, standing, _boxes(head, both, standing), trust)
+    return Track(head, both, standing, player_boxes(head, both, standing), trust)
 
 
 def _lost(chosen: Int[np.ndarray, "T"]) -> KeyreconError:
@@ -409,43 +411,3 @@ def _order(pairs: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 2 2"]:
         if np.linalg.norm(both[t][::-1] - both[t - 1], axis=1).sum() < direct:
             both[t] = both[t][::-1]
     return both
-
-
-def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
-    """Magnification of each frame against the first.
-
-    Accumulated from frame to frame at the centre of the picture, where turning the camera does
-    not magnify.
-    """
-    center = np.array([video.width / 2, video.height / 2])
-    step = np.linalg.inv(camera.to_reference[1:]) @ camera.to_reference[:-1]
-    weight = step[:, 2, :2] @ center + step[:, 2, 2]
-    area = np.linalg.det(step) / weight**3
-    return np.concatenate([[1.0], np.exp(np.cumsum(0.5 * np.log(np.maximum(area, 1e-6))))])
-
-
-def standing_height(
-    head: Float[np.ndarray, "T 2"],
-    mid_feet: Float[np.ndarray, "T 2"],
-    magnification: Float[np.ndarray, "T"],
-    video: Video,
-    options: TrackOptions,
-) -> Float[np.ndarray, "T"]:
-    """Upper envelope of the distance from head to mid-feet over time, px, zoom undone."""
-    length = np.linalg.norm(mid_feet - head, axis=1) / magnification
-    window = min(len(length), max(3, round(options.envelope * video.fps)) | 1)
-    envelope = percentile_filter(length, 80, size=window, mode="nearest")
-    return gaussian_filter1d(envelope, window / 4, mode="nearest") * magnification
-
-
-def _boxes(
-    head: Float[np.ndarray, "T 2"],
-    feet: Float[np.ndarray, "T 2 2"],
-    height: Float[np.ndarray, "T"],
-) -> Float[np.ndarray, "T 4"]:
-    """x0, y0, x1, y1 around head and feet, with room for a raised racket arm."""
-    spots = np.concatenate([head[:, None], feet], axis=1)
-    low, high = spots.min(axis=1), spots.max(axis=1)
-    room = height[:, None]
-    return np.concatenate([low - room * (0.5, 0.35), high + room * (0.5, 0.08)], axis=1)
-

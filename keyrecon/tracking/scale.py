@@ -1,0 +1,56 @@
+"""How large the player is: the unit of length of everything that follows.
+
+Players crouch, lunge and jump, so the standing height from head to mid-feet is an upper envelope
+over time of the distance between them. A zooming camera changes it faster than any player can; its
+magnification is taken out first.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d, percentile_filter
+
+from keyrecon.records import CameraPath
+from keyrecon.video import Video
+
+
+def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
+    """Magnification of each frame against the first.
+
+    Accumulated from frame to frame at the centre of the picture, where turning the camera does
+    not magnify.
+    """
+    center = np.array([video.width / 2, video.height / 2])
+    step = np.linalg.inv(camera.to_reference[1:]) @ camera.to_reference[:-1]
+    weight = step[:, 2, :2] @ center + step[:, 2, 2]
+    area = np.linalg.det(step) / weight**3
+    return np.concatenate([[1.0], np.exp(np.cumsum(0.5 * np.log(np.maximum(area, 1e-6))))])
+
+
+def standing_height(
+    head: Float[np.ndarray, "T 2"],
+    mid_feet: Float[np.ndarray, "T 2"],
+    magnification: Float[np.ndarray, "T"],
+    frames: int,
+) -> Float[np.ndarray, "T"]:
+    """Upper envelope of the distance from head to mid-feet over about `frames` frames, px.
+
+    The zoom is undone before and done again after. A crouch longer than that passes for a change
+    of distance.
+    """
+    length = np.linalg.norm(mid_feet - head, axis=1) / magnification
+    window = min(len(length), max(3, frames) | 1)
+    envelope = percentile_filter(length, 80, size=window, mode="nearest")
+    return gaussian_filter1d(envelope, window / 4, mode="nearest") * magnification
+
+
+def player_boxes(
+    head: Float[np.ndarray, "T 2"],
+    feet: Float[np.ndarray, "T 2 2"],
+    height: Float[np.ndarray, "T"],
+) -> Float[np.ndarray, "T 4"]:
+    """x0, y0, x1, y1 around head and feet, with room for a raised racket arm."""
+    spots = np.concatenate([head[:, None], feet], axis=1)
+    low, high = spots.min(axis=1), spots.max(axis=1)
+    room = height[:, None]
+    return np.concatenate([low - room * (0.5, 0.35), high + room * (0.5, 0.08)], axis=1)
+
