@@ -35,6 +35,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.pictures import read_small, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.tracking.feet import SHOE_RADIUS, foot_pairs, pair_costs
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
 from keyrecon.tracking.viterbi import Motion, cheapest_path
@@ -42,8 +43,6 @@ from keyrecon.video import Video
 
 HEAD_RADIUS = 0.062
 """Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
-SHOE_RADIUS = 0.045
-"""Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
 RADII = (0.8, 1.0, 1.25)
 """Shares of a part's radius that are searched."""
 SHOES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
@@ -67,8 +66,6 @@ KNEE_ROOM = 0.06
 """How far a leg may bend away from the straight line from hips to foot, player heights."""
 FAIR = 0.15
 """Share of the best scores that is as good as half sure."""
-ONE_SHOE = 1.8
-"""Cost of both feet in one place."""
 LEAST_BODY = 0.05
 """Share of the player's colours beneath a head, at least; a trunk fills about a third."""
 LEAST_FOUND = 0.4
@@ -308,8 +305,8 @@ def _connect(
     foot_cost = _costs([c.foot_score for c in found])
     pairs, costs = [], []
     for t, places in enumerate(feet):
-        every = _pairs(len(places))
-        cost = _pair_costs(foot_cost[t], every, places, head[t], height)
+        every = foot_pairs(len(places))
+        cost = pair_costs(foot_cost[t], every, places, head[t], height)
         best = np.argsort(cost)[:PAIRS]
         pairs.append(every[best])
         costs.append(cost[best])
@@ -353,37 +350,6 @@ def _stabilise(
     places: Float[np.ndarray, "m 2"], camera: CameraPath, frame: int
 ) -> Float[np.ndarray, "m 2"]:
     return warp_points(camera.to_reference[frame], places)
-
-
-def _pairs(count: int) -> Int[np.ndarray, "s 2"]:
-    """All unordered pairs, a place paired with itself included: one foot behind the other."""
-    first, second = np.triu_indices(count)
-    return np.stack([first, second], axis=1)
-
-
-def _pair_costs(
-    cost: Float[np.ndarray, "n"],
-    pairs: Int[np.ndarray, "s 2"],
-    feet: Float[np.ndarray, "n 2"],
-    head: Float[np.ndarray, "2"],
-    height: float,
-) -> Float[np.ndarray, "s"]:
-    """Cost of two feet together: their own, and their place below the head."""
-    if not len(pairs):
-        return np.zeros(0)
-    both = feet[pairs]
-    middle = both.mean(axis=1) - head
-    short = np.maximum(0, 0.8 * height - middle[:, 1]) + np.maximum(0, middle[:, 1] - 1.1 * height)
-    aside = np.maximum(0, np.abs(middle[:, 0]) - 0.5 * height)
-    apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
-    off = (short**2 + aside**2 + apart**2) / (2 * (0.12 * height) ** 2)
-    # One shoe taken for both feet explains less of the picture than two shoes.
-    near = np.exp(-(((both[:, 0] - both[:, 1]) / (1.2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
-    # A foot may be lifted, yet a racket or a knee is at its height more often.
-    lifted = np.maximum(0, 0.82 * height - (both[..., 1] - head[1]))
-    uneven = np.maximum(0, np.abs(both[:, 0, 1] - both[:, 1, 1]) - 0.1 * height)
-    off += ((lifted**2).sum(axis=1) + uneven**2) / (2 * (0.1 * height) ** 2)
-    return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
 
 
 def _fill(
