@@ -41,6 +41,9 @@ class FlipOptions:
     """Weight of joint limits per frame; errors stay alike over several frames."""
     votes: float = 1.0
     """Weight of the key poses per frame."""
+    guide: float = 0.5
+    """Weight of the slerped key poses per frame, for limbs; the trunk's corners belong to both
+    halves of the body, which are slerped apart."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
     jerk: float = 0.1
@@ -131,6 +134,7 @@ def follow_signs(
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         given = options.limits * cost[rows, best % cost.shape[1]]
         given += votes.cost(limb.bones, shown, options)
+        given += votes.guided(limb.bones, shown, options)
         path = second_order_path(given, *_depths(limb.bones, shown), options)
         bones = list(limb.bones)
         sign[:, bones], probability[:, bones] = _read(path, given, len(bones))
@@ -147,6 +151,8 @@ class Votes:
     """Row of each key pose among the frames; others vote too."""
     trust: Float[np.ndarray, "K B"]
     """0-1: how sure the sign of each bone is."""
+    guide: Float[np.ndarray, "T B"]
+    """Depth of the slerped key poses in each frame, statures."""
     skeleton: Skeleton
 
     def cost(
@@ -164,6 +170,15 @@ class Votes:
         likelihood = np.exp(-apart[:, None] - off).sum(-1)
         cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
         return cost + self._confirmed(members, shown, options)
+
+    def guided(
+        self, bones: tuple[int, ...], shown: Shown, options: FlipOptions
+    ) -> Float[np.ndarray, "T S"]:
+        """Cost of leaving the slerped key poses, nats."""
+        depth, doubt = _depths(bones, shown)
+        off = (depth - self.guide[:, None, list(bones)]) ** 2
+        off = off / (2 * (options.alike**2 + doubt[:, None] ** 2))
+        return options.guide * np.minimum(off.sum(-1), options.reach)
 
     def _most_alike(
         self, bones: list[int], shown: Shown, options: FlipOptions

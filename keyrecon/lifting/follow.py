@@ -101,9 +101,10 @@ def _follow_window(
     joints = smooth_joints(observed.joints, bridge, _SMOOTH_SECONDS * fps)
     keys = figure.keys.directions
     noise = _SMOOTHED
+    guided = lengths * guide.directions[..., 2]
     for _ in range(2):
         shown = show_bones(joints, np.full(joints.shape[:2], noise), lengths, skeleton)
-        votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, skeleton)
+        votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, guided, skeleton)
         signs = follow_signs(shown, votes, figure.size.breadths, skeleton, options.flips)
         start = State(joints[:, skeleton.root], lift_shown(shown, signs.sign))
         state = refine_motion(start, observed, figure.size, skeleton, fps, options.refine)

@@ -26,8 +26,10 @@ from keyrecon.records import Annotations, JointTracks
 class LengthOptions:
     """How far the body may differ from the table, and how well joints are known."""
 
-    spread: float = 0.15
+    spread: float = 0.12
     """Standard deviation of a bone length about the table, relative."""
+    tie_spread: float = 0.07
+    """The same for the ratio of thigh to shank and of shoulder bone to shoulder breadth."""
     scale_spread: float = 0.03
     """Standard deviation of the scale about the tracked height, relative."""
     knot: float = 0.5
@@ -81,7 +83,9 @@ def estimate_lengths(
     kind_of, table = _kinds(skeleton)
     votes = _collect(tracks, annotations, height_px, fps, options)
     knots = np.linspace(0, len(height_px) - 1, 2 + int(len(height_px) / fps / options.knot))
-    log_lengths, log_scale = _fit(votes, np.log(table), np.log(height_px), knots, options)
+    log_lengths, log_scale = _fit(
+        votes, np.log(table), _ties(skeleton), np.log(height_px), knots, options
+    )
     bones = len(skeleton.bones)
     lengths = np.exp(log_lengths)[kind_of]
     size = _standing(lengths[:bones], skeleton) / _standing(skeleton.lengths, skeleton)
@@ -105,6 +109,24 @@ def _kinds(skeleton: Skeleton) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, 
     kind_of = np.concatenate([kind, len(names) + np.arange(len(pairs))])
     table = np.concatenate([skeleton.lengths[names], [breadth for *_, breadth in pairs]])
     return kind_of, table
+
+
+def _ties(skeleton: Skeleton) -> Float[np.ndarray, "r m"]:
+    """Pairs of lengths that grow together: one row each, 1 and -1."""
+    kind_of, table = _kinds(skeleton)
+    bone_of = {skeleton.names[child]: bone for bone, (_, child) in enumerate(skeleton.bones)}
+    pairs = [
+        (bone_of[first], bone_of[second])
+        for first, second in (("left_knee", "left_ankle"),)
+        if first in bone_of and second in bone_of
+    ]
+    for place, (left, _, _) in enumerate(breadths(skeleton)):
+        if skeleton.names[left] == "left_shoulder" and "left_shoulder" in bone_of:
+            pairs.append((bone_of["left_shoulder"], len(skeleton.bones) + place))
+    ties = np.zeros((len(pairs), len(table)))
+    for row, (first, second) in enumerate(pairs):
+        ties[row, kind_of[first]], ties[row, kind_of[second]] = 1.0, -1.0
+    return ties
 
 
 def _collect(
@@ -134,6 +156,7 @@ def _collect(
 def _fit(
     votes: _Votes,
     log_table: Float[np.ndarray, "m"],
+    ties: Float[np.ndarray, "r m"],
     log_height: Float[np.ndarray, "T"],
     knots: Float[np.ndarray, "k"],
     options: LengthOptions,
@@ -144,25 +167,36 @@ def _fit(
     blend = np.stack([np.interp(frames, knots, row) for row in np.eye(len(knots))], axis=1)
     at_vote = blend[votes.frame]
     start = np.concatenate([log_table, [_first_factor(votes, log_table, log_height)], 0 * knots])
-    jump = options.scale_spread * np.sqrt(2 * (1 - np.exp(-0.5)))  # correlated over two knots
+    prior = _prior(ties, len(knots), options)
+    wanted = prior[:, :kinds] @ log_table
 
     def cost(x: Float[np.ndarray, "n"]) -> tuple[float, Float[np.ndarray, "n"]]:
         lengths, factor, drift = x[:kinds], x[kinds], x[kinds + 1 :]
         log_full = log_height[votes.frame] + factor + at_vote @ drift + lengths[votes.kind]
         shown = np.exp(votes.shown - log_full)
         value, pull = _agreement(votes, shown, votes.noise / np.exp(log_full), kinds)
-        off = (lengths - log_table) / options.spread
-        rough = np.diff(drift) / jump
-        far = drift / options.scale_spread / 2
-        gradient = np.concatenate([off / options.spread, [0.0], far / options.scale_spread / 2])
-        gradient[kinds + 1 :] += (np.append(0, rough) - np.append(rough, 0)) / jump
-        gradient[:kinds] += np.bincount(votes.kind, pull, kinds)
-        gradient[kinds] += pull.sum()
-        gradient[kinds + 1 :] += at_vote.T @ pull
-        return float(-value + 0.5 * (off @ off + rough @ rough + far @ far)), gradient
+        off = prior @ x - wanted
+        by_kind = np.bincount(votes.kind, pull, kinds)
+        gradient = np.concatenate([by_kind, [pull.sum()], at_vote.T @ pull]) + prior.T @ off
+        return float(-value + 0.5 * off @ off), gradient
 
     best = minimize(cost, start, jac=True, method="L-BFGS-B").x
     return best[:kinds], log_height + best[kinds] + blend @ best[kinds + 1 :]
+
+
+def _prior(
+    ties: Float[np.ndarray, "r m"], knots: int, options: LengthOptions
+) -> Float[np.ndarray, "q n"]:
+    """Rows of what is expected to be small: (lengths, factor, drift of the scale) -> nats^0.5."""
+    kinds = ties.shape[1]
+    still = np.eye(knots)
+    jump = options.scale_spread * np.sqrt(2 * (1 - np.exp(-0.5)))  # alike over two knots
+    drift = np.concatenate([still / (2 * options.scale_spread), np.diff(still, axis=0) / jump])
+    lengths = np.concatenate([np.eye(kinds) / options.spread, ties / options.tie_spread])
+    rows = np.zeros((len(lengths) + len(drift), kinds + 1 + knots))
+    rows[: len(lengths), :kinds] = lengths
+    rows[len(lengths) :, kinds + 1 :] = drift
+    return rows
 
 
 def _agreement(

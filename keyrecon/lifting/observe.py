@@ -29,7 +29,9 @@ def reject_spikes(
     """
     bridged = bridge_gaps(residual)
     off = np.linalg.norm(residual - median_filter(bridged, (window, 1, 1), mode="nearest"), axis=-1)
-    spread = MAD_TO_SIGMA * np.nanmedian(off, axis=0) / 1.177  # median of a Rayleigh length
+    known = np.isfinite(off).any(axis=0)
+    spread = np.ones(off.shape[1])
+    spread[known] = MAD_TO_SIGMA * np.nanmedian(off[:, known], axis=0) / 1.177  # of a 2D length
     return off > limit * np.maximum(spread, 1e-6)
 
 

@@ -8,7 +8,7 @@ further axis on which different values are out of reach.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -57,6 +57,7 @@ def _lift(
     return lifted
 
 
+@runtime_checkable
 class Placed(Protocol):
     """Elements of P figures: where they are, where they point, what colour they have."""
 

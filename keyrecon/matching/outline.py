@@ -54,10 +54,12 @@ def seat_elements(
     """The elements of a frame that outline a bone; none ride on bones with an unknown end."""
     point = window.from_pixels(edges.points, frame)[:, None]
     tangent = to_complex(edges.tangent)[:, None]
-    start, bone = pose[half.bones[:, 0]], np.diff(pose[half.bones], axis=1)[:, 0]
+    known = np.isfinite(pose)[half.bones].all(axis=1)
+    ends = np.nan_to_num(pose)[half.bones]
+    start, bone = ends[:, 0], ends[:, 1] - ends[:, 0]
     length = np.maximum(np.abs(bone), 1e-6)
     axis = bone / length
-    local = (point - start) / axis
+    local = (point - start) * np.conj(axis)
     on_bone = np.clip(local.real, 0, length)
     offset = local - on_bone
     distance = np.abs(offset)
@@ -65,7 +67,7 @@ def seat_elements(
     way = -offset * axis / np.maximum(distance, 1e-9)
     facing = (way * np.conj(-1j * tangent)).real
     cost = distance + ALONG_COST * np.abs((tangent * np.conj(axis)).imag)
-    cost[~((facing > FACING) & (distance < WIDEST))] = np.inf
+    cost[~((facing > FACING) & (distance < WIDEST) & known)] = np.inf
     best = cost.argmin(axis=1)
     rows = np.flatnonzero(np.isfinite(cost[np.arange(len(best)), best]))
     best = best[rows]

@@ -41,8 +41,8 @@ class Puppets:
     poses: Poses
     riders: Riders
     """Arrays of K + 1 rows and E elements."""
-    share: Float[np.ndarray, "K+1 E J"]
-    """Share of every joint in every element's place."""
+    share: Float[np.ndarray, "N E J"]
+    """Share of every joint in the place of every element; N = K + 1."""
     listed: Int[np.ndarray, "T F"]
     """The half's own elements in every frame (rows of the index), -1 for none."""
 

@@ -28,13 +28,13 @@ class Window:
     """px"""
 
     def from_pixels(
-        self, points: Float[np.ndarray, "*n 2"], frames: Int[np.ndarray, "..."]
+        self, points: Float[np.ndarray, "*n 2"], frames: int | Int[np.ndarray, "..."]
     ) -> Complex[np.ndarray, "*n"]:
         """Pixels to player coordinates; `frames` broadcasts against the points."""
         return (to_complex(points) - self.origin[frames]) / self.height[frames]
 
     def to_pixels(
-        self, points: Complex[np.ndarray, "*n"], frames: Int[np.ndarray, "..."]
+        self, points: Complex[np.ndarray, "*n"], frames: int | Int[np.ndarray, "..."]
     ) -> Float[np.ndarray, "*n 2"]:
         """Player coordinates to pixels."""
         return from_complex(points * self.height[frames] + self.origin[frames])
