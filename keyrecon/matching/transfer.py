@@ -28,8 +28,8 @@ NEAR = 0.06
 """Spread of the weight of elements around a joint, player heights."""
 LEAST_ELEMENTS, LEAST_SHARE = 5, 0.3
 """Matched elements, and weighted share of the elements around, below which a joint is missing."""
-ROUNDS = 8
-"""Of Weiszfeld's iteration, which converges to a hundredth of the spread by then."""
+ROUNDS = 20
+"""Of Weiszfeld's iteration, which has converged to a hundredth of the spread by then."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,148 @@
+"""Outlines that ride on bones, their correspondence, and least squares over them."""
+
+import numpy as np
+from capsule_player import scene, standing, turned
+
+from keyrecon.body import LSP14
+from keyrecon.matching.chain import link_frames, solve_chain
+from keyrecon.matching.choose import States, choose_two
+from keyrecon.matching.correspondence import index_elements, match_elements
+from keyrecon.matching.fit import Figures, fit_figures
+from keyrecon.matching.halves import split_body
+from keyrecon.matching.judge import find_unexplained, judge_figures
+from keyrecon.matching.outline import seat_elements
+from keyrecon.matching.puppet import Poses, make_puppets, pose_puppets
+from keyrecon.matching.rows import observe, observe_joints
+from keyrecon.matching.window import follow_player
+
+LOWER, UPPER = split_body(LSP14)
+
+
+def puppets_of(survey, truth, frames, half):
+    """Puppets of the truth on some frames, and the index of all elements."""
+    window = follow_player(survey.track, survey.camera)
+    rows = np.array(frames)
+    joints = window.from_pixels(truth[rows][:, half.joints], rows[:, None])
+    poses = Poses(half, rows, joints, np.ones(joints.shape, bool))
+    edges = survey.figures.edges
+    return make_puppets(edges, window, poses, 400), index_elements(edges, window), window
+
+
+def test_the_halves_share_out_all_joints_and_mirror_each_other():
+    own = [half.joints[half.own] for half in (LOWER, UPPER)]
+    assert sorted(np.concatenate(own)) == list(range(14))
+    for half in (LOWER, UPPER):
+        one, other = (half.joints[list(side)] for side in half.sides)
+        np.testing.assert_array_equal(LSP14.mirror[one], other)
+        assert (half.bone_mirror[half.bone_mirror] == np.arange(len(half.bones))).all()
+
+
+def test_elements_ride_on_the_bone_they_outline():
+    survey, truth = scene([standing()], (0,))
+    window = follow_player(survey.track, survey.camera)
+    pose = window.from_pixels(truth[0][UPPER.joints], 0)
+    riders = seat_elements(survey.figures.edges[0], window, 0, pose, UPPER)
+    wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
+    forearm = np.isin(UPPER.joints[UPPER.bones[riders.bone, 1]], wrists)
+    assert forearm[riders.color == 2].mean() > 0.9
+    widths = np.abs(riders.offset[forearm & (riders.color == 2)])
+    np.testing.assert_allclose(np.median(widths), 0.025 / 0.98, rtol=0.05)
+
+
+def test_a_puppet_in_its_own_pose_lies_on_its_own_elements():
+    survey, truth = scene([standing()], (0,))
+    puppets, index, _ = puppets_of(survey, truth, (0,), UPPER)
+    every = np.zeros(1, int)
+    figures = Figures(every, every, puppets.poses.joints)
+    posed = pose_puppets(puppets, every, puppets.poses.joints)
+    row, found = match_elements(index, every, posed, 0.05)
+    own = posed.color >= 0
+    assert found[own].mean() > 0.9
+    assert np.abs(index.points[row] - posed.points)[found].max() < 0.02
+    assert judge_figures(puppets, index, figures).max() < 0.35
+
+
+def test_matches_have_the_same_colour_and_direction():
+    survey, truth = scene([standing()], (0,))
+    puppets, index, _ = puppets_of(survey, truth, (0,), LOWER)
+    every = np.zeros(1, int)
+    posed = pose_puppets(puppets, every, puppets.poses.joints + 0.03j)
+    row, found = match_elements(index, every, posed, 0.06)
+    assert (index.color[row] == posed.color)[found].all()
+    turn = np.abs(np.angle(index.tangent[row] / posed.tangent))[found]
+    assert turn.max() < np.pi / 2
+
+
+def test_a_fit_turns_a_limb_back_onto_its_edges():
+    bent = turned(standing(), "left_elbow", ("left_wrist",), -0.35)
+    survey, truth = scene([standing(), bent], (0,))
+    puppets, index, window = puppets_of(survey, truth, (0,), UPPER)
+    one = np.ones(1, int)
+    found = fit_figures(puppets, index, Figures(one, one - 1, puppets.poses.joints)).joints
+    away = np.abs(found[0] - window.from_pixels(truth[1][UPPER.joints], 1))
+    assert away[UPPER.own].max() < 0.02
+
+
+def test_an_arm_elsewhere_leaves_edges_unexplained():
+    bent = turned(standing(), "left_shoulder", ("left_elbow", "left_wrist"), -1.2)
+    survey, truth = scene([standing(), bent], (0,))
+    puppets, index, _ = puppets_of(survey, truth, (0, 1), UPPER)
+    first = np.zeros(2, int)
+    far = find_unexplained(puppets, index, Figures(first, first, puppets.poses.joints))
+    left = far.min(axis=1).sum(axis=1)
+    assert left[0] < 0.5 * left[1]
+
+
+def test_sides_are_chosen_for_continuity():
+    # two limbs cross; each proposal names them the wrong way round half of the time
+    path = np.linspace(-1, 1, 21)
+    one, other = path + 0.3j, -path - 0.3j
+    swapped = np.arange(21) % 2 == 1
+    first, second = np.where(swapped, other, one), np.where(swapped, one, other)
+    joints = np.stack([first, second], axis=1)[:, :, None]
+    cost = np.zeros((21, 2))
+    cost[0] = [0, 5]
+    spread = np.array([0.2])
+    clash = 9 * np.tile(np.eye(2), (21, 1, 1))
+    a, b = choose_two(
+        States(joints, cost, spread), States(joints, cost[:, ::-1].copy(), spread), clash
+    )
+    np.testing.assert_array_equal(a, swapped)
+    np.testing.assert_array_equal(b, ~swapped)
+
+
+def test_weighted_rows_are_least_squares():
+    rng = np.random.default_rng(1)
+    mixture = rng.normal(size=(1, 9, 3))
+    target = rng.normal(size=(1, 9)) + 1j * rng.normal(size=(1, 9))
+    axis = np.exp(1j * rng.uniform(0, 6, (1, 9)))
+    along, across = rng.uniform(0.1, 2, (2, 1, 9))
+    found = observe(mixture, target, axis, along, across).solve()[0]
+    rows, right = [], []
+    for m, q, n, strong, weak in zip(
+        mixture[0], target[0], axis[0], along[0], across[0], strict=True
+    ):
+        for direction, weight in ((n, strong), (1j * n, weak)):
+            rows.append(np.sqrt(weight) * np.concatenate([direction.real * m, direction.imag * m]))
+            right.append(np.sqrt(weight) * (q * np.conj(direction)).real)
+    slow = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    np.testing.assert_allclose(found, slow[:3] + 1j * slow[3:], atol=1e-6)
+
+
+def test_the_chain_equals_dense_least_squares():
+    rng = np.random.default_rng(2)
+    target = rng.normal(size=(7, 2)) + 1j * rng.normal(size=(7, 2))
+    weight, calm = rng.uniform(0.5, 2, (7, 2)), np.array([0.5, 2.0])
+    found = solve_chain(link_frames(observe_joints(target, weight), calm))
+    second = np.diff(np.eye(7), 2, axis=0)
+    for joint in range(2):
+        matrix = np.diag(weight[:, joint]) + second.T @ second / calm[joint] ** 2
+        slow = np.linalg.solve(matrix, weight[:, joint] * target[:, joint])
+        np.testing.assert_allclose(found[:, joint], slow, atol=1e-6)
+
+
+def test_the_window_follows_a_panning_camera():
+    survey, truth = scene([standing()] * 9, (0,), origin=(600 + 30.0 * np.arange(9))[:, None])
+    window = follow_player(survey.track, survey.camera)
+    back = window.to_pixels(window.from_pixels(truth, np.arange(9)[:, None]), np.arange(9)[:, None])
+    np.testing.assert_allclose(back, truth)
