@@ -1,0 +1,151 @@
+"""The whole job on a small rendered clip: what a user types, and what comes out."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from keyrecon import cli, project
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.formats.coco import write_coco
+from keyrecon.formats.keyframes import keyframes_from_json
+from keyrecon.formats.npz import read_motion
+from keyrecon.formats.picks import read_picks
+from keyrecon.metrics import evaluate_motion, read_truth
+from keyrecon.pipeline import Options
+from keyrecon.progress import silent
+from keyrecon.synthetic.cameras import CameraOptions
+from keyrecon.synthetic.clips import JoinOptions
+from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
+from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
+from keyrecon.workspace import Workspace
+
+SIZE = (480, 270)
+FRAMES = 120
+
+
+def keyrecon(*words):
+    """Run the command line in this process; returns its exit code."""
+    before, sys.argv = sys.argv, ["keyrecon", *map(str, words)]
+    try:
+        cli.main()
+    except SystemExit as stop:
+        return stop.code or 0
+    finally:
+        sys.argv = before
+    return 0
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """A rendered clip, its project with keyframes, and marks from the truth."""
+    folder = tmp_path_factory.mktemp("clip")
+    camera = CameraOptions(width=SIZE[0], height=SIZE[1], player_px=150.0)
+    scene = SceneOptions(seed=2, camera=camera, workers=1)
+    synthesize(folder, (), SynthOptions(scene, JoinOptions(seconds=FRAMES / 30, fps=30.0)))
+    made = folder / "project"
+    assert keyrecon("new", folder / "video.mp4", "--project", made) == 0
+    Workspace(made).add_picks(read_picks(folder / "picks.json"))
+    assert keyrecon("keyframes", made, "--budget", "0.06") == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def solved(clip):
+    """The motion after annotation."""
+    made = clip / "project"
+    truth = read_truth(clip / "truth.npz")
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    marks = mark_from_truth(
+        asked, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(noise=1.0)
+    )
+    write_coco(clip / "marks.json", marks, SIZE)
+    assert keyrecon("import", made, clip / "marks.json") == 0
+    assert keyrecon("run", made, "--height", f"{float(truth['height_m']):.2f}") == 0
+    return read_motion(made / "motion.npz"), truth
+
+
+def test_keyframes_meet_the_budget_and_are_pictured(clip):
+    data = json.loads((clip / "project" / "keyframes.json").read_text())
+    assert data["n_frames"] == FRAMES
+    assert (len(data["upper"]) + len(data["lower"])) / 2 / FRAMES <= 0.06
+    assert data["frames"] == sorted({*data["upper"], *data["lower"]})
+    pictures = {p.name for p in (clip / "project" / "keyframes").iterdir()}
+    assert pictures == {f"frame_{n:06d}.png" for n in data["frames"]}
+
+
+def test_the_motion_is_near_the_truth(solved):
+    motion, truth = solved
+    scores = evaluate_motion(motion, truth)
+    assert motion.units == "m"
+    assert scores.pck >= 0.9
+    assert scores.pa_mpjpe <= 90
+    assert scores.limb_variation_max <= 1e-3
+
+
+def test_every_joint_tells_where_it_comes_from(solved):
+    motion, _ = solved
+    assert set(np.unique(motion.source)) <= {0, 1, 2, 3}
+    assert (motion.source == 0).any(axis=1).sum() == len(motion.keyframes)
+    assert np.isfinite(motion.points3d).all()
+    assert ((motion.confidence >= 0) & (motion.confidence <= 1)).all()
+
+
+def test_the_report_and_exports_are_written(clip, solved, tmp_path):
+    assert "<html" in (clip / "project" / "report.html").read_text()[:400]
+    names = ["m.bvh", "m.trc", "m.csv", "m.glb", "m.json", "m.npz", "m.mp4", "m.c3d", "m.nc"]
+    assert keyrecon("export", clip / "project", *(tmp_path / n for n in names)) == 0
+    assert all((tmp_path / n).stat().st_size > 1000 for n in names)
+
+
+def test_a_second_run_makes_no_stage_again(clip, solved):
+    workspace = Workspace(clip / "project")
+    chosen = project.settings(workspace.options(Options()), float(1.7), None)
+    project.run(workspace, chosen, silent)
+    assert set(workspace.stages.seconds) <= {"lift"}
+
+
+def test_the_paper_form_runs_too(clip, solved, tmp_path):
+    _, truth = solved
+    assert keyrecon("run", clip / "project", "--method", "paper") == 0
+    scores = evaluate_motion(read_motion(clip / "project" / "motion.npz"), truth)
+    assert scores.scaled
+    assert scores.pa_mpjpe <= 250
+
+
+def test_keyframes_without_marks_are_named(clip, solved):
+    workspace = Workspace(clip / "project")
+    data = json.loads(workspace.annotations_file.read_text())
+    gone = data["annotations"].pop(0)["image_id"]
+    workspace.annotations_file.rename(clip / "aside.json")
+    try:
+        workspace.annotations_file.write_text(json.dumps(data))
+        with pytest.raises(KeyreconError, match=rf"1 of .* not annotated: frame {gone} "):
+            project.run(workspace, workspace.options(Options()), silent)
+        workspace.annotations_file.unlink()
+        with pytest.raises(KeyreconError, match="not annotated"):
+            project.run(workspace, workspace.options(Options()), silent)
+    finally:
+        (clip / "aside.json").rename(workspace.annotations_file)
+
+
+def test_a_budget_that_cannot_be_met_says_what_would_do(clip, capsys):
+    assert keyrecon("keyframes", clip / "project", "--budget", "0.001") == 1
+    assert "--budget" in capsys.readouterr().err
+
+
+def test_a_player_who_is_not_there_is_not_found(clip, tmp_path, capsys):
+    made = tmp_path / "p"
+    keyrecon("new", clip / "video.mp4", "--project", made)
+    keyrecon("pick", made, "--frame", 0, "--head", "5,5", "--foot", "8,120")
+    code = keyrecon("keyframes", made, "--budget", "0.06")
+    assert code in (0, 1)
+    if code:
+        assert "pick" in capsys.readouterr().err
+
+
+def test_joints_of_the_skeleton_are_all_there(solved):
+    motion, _ = solved
+    assert motion.skeleton.names == LSP14.names
