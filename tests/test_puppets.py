@@ -7,6 +7,7 @@ from keyrecon.body import LSP14
 from keyrecon.matching.chain import link_frames, solve_chain
 from keyrecon.matching.choose import States, choose_two
 from keyrecon.matching.correspondence import index_elements, match_elements
+from keyrecon.matching.feet import learn_feet, see_feet
 from keyrecon.matching.fit import Figures, fit_figures
 from keyrecon.matching.halves import split_body
 from keyrecon.matching.judge import find_unexplained, judge_figures
@@ -146,3 +147,16 @@ def test_the_window_follows_a_panning_camera():
     window = follow_player(survey.track, survey.camera)
     back = window.to_pixels(window.from_pixels(truth, np.arange(9)[:, None]), np.arange(9)[:, None])
     np.testing.assert_allclose(back, truth)
+
+
+def test_each_foot_speaks_to_the_leg_it_fits():
+    ankles = np.array([[-0.2 + 1j, 0.2 + 1j], [0.1 + 1j, -0.1 + 1j]])
+    joints = np.zeros((2, 6), complex)
+    ends = np.array([max(side, key=lambda j: LOWER.depth[j]) for side in LOWER.sides])
+    joints[:, ends] = ankles
+    tracked = np.array([[0.23 + 1.02j, -0.17 + 1.02j], [0.13 + 1.02j, -0.07 + 1.02j]])
+    feet = learn_feet(LOWER, np.arange(2), joints, tracked)
+    seen = see_feet(feet, np.arange(2), joints + 0.02).solve()[:, ends]
+    np.testing.assert_allclose(seen, ankles, atol=1e-6)
+    far = see_feet(feet, np.arange(2), joints + 0.5j).matrix
+    assert far.max() < 0.01 * see_feet(feet, np.arange(2), joints).matrix.max()

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.matching.candidates import Candidates
+from keyrecon.matching.feet import miss_feet
 from keyrecon.matching.halves import Half
 from keyrecon.matching.puppet import Puppets
 
@@ -25,6 +26,8 @@ STEP_MOST = 20.0
 """Largest cost of a joint's step: a jump happens, and it should not outweigh everything else."""
 MISFIT = 3.0
 """Cost of a limb whose elements find nothing."""
+ASTRAY = 2.0
+"""Cost of a leg that ends where no foot was tracked."""
 SWAP = 1.0
 """Cost of taking left for right."""
 UNEXPLAINED = 48.0
@@ -79,10 +82,13 @@ def _limb_states(
     twin = half.mirror[group]
     sides = [group] if np.array_equal(group, twin) else [group, twin]
     costs = []
+    astray = None if puppets.feet is None else miss_feet(puppets.feet, candidates.joints)
     for side in sides:
         bones = np.isin(half.bones[:, 1], side)
         misfit = candidates.misfit[:, :, bones].mean(axis=2) if bones.any() else 0.0
         costs.append(candidates.doubt + MISFIT * misfit + SWAP * len(costs))
+        if astray is not None:
+            costs[-1] += ASTRAY * astray[:, :, side].sum(axis=2)
     states = np.concatenate(costs, axis=1)
     # all states of an annotated frame are the annotation
     states[poses.frames] = 0

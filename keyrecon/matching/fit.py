@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.matching.correspondence import ElementIndex, match_back, match_elements
+from keyrecon.matching.feet import see_feet
 from keyrecon.matching.puppet import Puppets, bone_axes, pose_puppets
 from keyrecon.matching.rows import Normals, observe
 
@@ -80,7 +81,10 @@ def fit_figures(
 def see_edges(
     puppets: Puppets, index: ElementIndex, figures: Figures, reach: float, every: int = 1
 ) -> Normals:
-    """Observations of the joints by corresponding elements, both ways; only each n-th is used."""
+    """Observations of the joints by corresponding elements, both ways, and by tracked feet.
+
+    Only each n-th element is used.
+    """
     posed = pose_puppets(puppets, figures.which, figures.joints, every)
     row, found = match_elements(index, figures.frames, posed, reach)
     there = _pull(index, row, posed.points, found * posed.weight, reach)
@@ -94,7 +98,10 @@ def see_edges(
     share = np.take_along_axis(posed.share, hit[..., None], axis=1)
     back = _pull(index, listed, points, found * weight, reach)
     seen = there + observe(share, index.points[listed] - free, *back)
-    return Normals(every * seen.matrix, every * seen.right)
+    seen = Normals(every * seen.matrix, every * seen.right)
+    if puppets.feet is None:
+        return seen
+    return seen + see_feet(puppets.feet, figures.frames, figures.joints)
 
 
 def _pull(

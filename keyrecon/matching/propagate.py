@@ -12,7 +12,7 @@ the body, the lower first, it
    annotated frames are held (`settle.py`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from jaxtyping import Bool, Complex, Float, Int
 from keyrecon.errors import KeyreconError
 from keyrecon.matching.correspondence import index_elements
 from keyrecon.matching.distance import Half as HalfName
+from keyrecon.matching.feet import learn_feet
 from keyrecon.matching.follow import Scene, Start, follow_half
 from keyrecon.matching.halves import Half, split_body
 from keyrecon.matching.puppet import Poses, make_puppets
@@ -97,6 +98,9 @@ def _fuse(
         settled = joints[:, half.joints[half.given]]
         poses = _gather_poses(annotations, window, half, settled)
         puppets = make_puppets(edges, window, poses, options.elements)
+        if half.name == "lower":
+            tracked = window.from_pixels(survey.track.feet, every[:, None])
+            puppets = replace(puppets, feet=learn_feet(half, poses.frames, poses.joints, tracked))
         distance = distances_to(survey.comparison, half.name, poses.frames)
         anchor = survey.track.head if half.name == "upper" else survey.track.mid_feet
         at = window.from_pixels(anchor, every)

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.matching.correspondence import list_elements, spread_choice
+from keyrecon.matching.feet import Feet
 from keyrecon.matching.halves import Half
 from keyrecon.matching.outline import Riders, average_outline, complete_outline, seat_elements
 from keyrecon.matching.window import Window
@@ -45,6 +46,8 @@ class Puppets:
     """Share of every joint in the place of every element; N = K + 1."""
     listed: Int[np.ndarray, "T F"]
     """The half's own elements in every frame (rows of the index), -1 for none."""
+    feet: Feet | None = None
+    """For the lower body."""
 
     @property
     def half(self) -> Half:
