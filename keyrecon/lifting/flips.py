@@ -37,13 +37,12 @@ class FlipOptions:
 
     confirmed: float = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
-    limits: float = 0.3
+    limits: float = 0.15
     """Weight of joint limits per frame; errors stay alike over several frames."""
-    votes: float = 1.0
+    votes: float = 0.3
     """Weight of the key poses per frame."""
-    guide: float = 0.5
-    """Weight of the slerped key poses per frame, for limbs; the trunk's corners belong to both
-    halves of the body, which are slerped apart."""
+    guide: float = 1.0
+    """Weight of the slerped key poses per frame."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
     jerk: float = 0.1
@@ -128,6 +127,7 @@ def follow_signs(
     if anatomy.trunk:
         total = options.limits * (trunk + sum(cost.min(axis=-1) for cost in limbs))
         total += votes.cost(anatomy.trunk, shown, options)
+        total += votes.guided(anatomy.trunk, shown, options)
         best = second_order_path(total, *_depths(anatomy.trunk, shown), options)
         bones = list(anatomy.trunk)
         sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
