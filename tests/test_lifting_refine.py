@@ -119,13 +119,14 @@ def test_descent_filters_as_one_pass_whose_gain_follows_the_923_rule():
     assert loss == pytest.approx(0.707, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["reprojection", "breadth"])
+@pytest.mark.parametrize("name", ["reprojection", "breadth", "alignment"])
 def test_slopes_agree_with_finite_differences(name):
     state = smooth_state(4)
     rng = np.random.default_rng(3)
     observed = positions(state)[..., :2] + rng.normal(0, 0.01, (4, 14, 2))
     term = {
         "reprojection": terms.reprojection(observed, np.full((4, 14), 0.02), LENGTHS, LSP14, 1e9),
+        "alignment": terms.alignment(np.linspace(0, 1, 13), 0.3),
         "breadth": terms.breadth((2, 3), 0.2, 0.01, LENGTHS, LSP14),
     }[name]
     line, step = term(state), 1e-6
@@ -139,6 +140,18 @@ def test_slopes_agree_with_finite_differences(name):
     if line.by_root is not None:
         moved = term(State(state.root + np.array([step, 0.0]), state.directions)).residual
         np.testing.assert_allclose((moved - line.residual) / step, line.by_root[..., 0], atol=1e-3)
+
+
+def test_the_pull_to_key_poses_is_the_slope_of_its_cost():
+    state, wanted = smooth_state(3), smooth_state(3, seed=8).directions
+    term, step = terms.key_pose_prior(wanted, 0.4), 1e-6
+    line = term(state)
+    slope = np.einsum("tm,tmbi->tbi", line.residual, line.by_direction)
+    for bone in (0, 7):
+        nudged = state.directions.copy()
+        nudged[1, bone, 2] += step
+        change = (term(State(state.root, nudged)).cost - line.cost) / step
+        assert change == pytest.approx(slope[1, bone, 2], abs=1e-3)
 
 
 def test_the_solver_returns_to_the_truth_from_a_disturbed_start():

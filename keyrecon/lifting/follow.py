@@ -107,7 +107,9 @@ def _follow_window(
         votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, guided, skeleton)
         signs = follow_signs(shown, votes, figure.size.breadths, skeleton, options.flips)
         start = State(joints[:, skeleton.root], lift_shown(shown, signs.sign))
-        state = refine_motion(start, observed, figure.size, skeleton, fps, options.refine)
+        state = refine_motion(
+            start, observed, guide.directions, figure.size, skeleton, fps, options.refine
+        )
         joints, noise = _flat(state, figure), _FOLLOWED
         keys = _settled_keys(figure, state)
     return state

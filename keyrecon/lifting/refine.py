@@ -3,13 +3,14 @@
 Two ways. `descend_motion` is the paper's projected gradient descent: joints move towards the
 observed ones, then bone lengths and a low-pass are enforced, again and again. `refine_motion`
 minimises one cost over the unit directions of all bones: robust reprojection weighted by
-confidence, small second differences in time, the breadths of hips and shoulders, and a head
-that continues the trunk. Lengths are exact in both.
+confidence, small second differences in time, a pull to the slerped key poses, the breadths of
+hips and shoulders, and a head that continues the trunk. Lengths are exact in both.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
@@ -39,6 +40,8 @@ class RefineOptions:
     """How far hip and shoulder breadth may stray, body heights."""
     head_spread: float = 0.35
     """How far the head may lean out of the trunk's line, radians."""
+    key_spread: float = 0.4
+    """How far a bone may turn away from the slerped key poses at no great cost, radians."""
     step: float = 0.2
     """lambda of Fig. 9."""
     descents: int = 40
@@ -47,17 +50,22 @@ class RefineOptions:
     """Standard deviation of the low-pass of Fig. 9, frames."""
 
 
-def refine_motion(
+def refine_motion(  # noqa: PLR0913
     start: State,
     observed: Observed,
+    guide: Float[np.ndarray, "T B 3"],
     size: BodySize,
     skeleton: Skeleton,
     fps: float,
     options: RefineOptions = RefineOptions(),
 ) -> State:
-    """Root and bone directions that follow the observed joints from a start near them."""
+    """Root and bone directions that follow the observed joints from a start near them.
+
+    `guide` holds the directions of the slerped key poses.
+    """
     recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
     recipe += _trunk_terms(size, skeleton, options)
+    recipe.append(terms.key_pose_prior(guide, options.key_spread))
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)

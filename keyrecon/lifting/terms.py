@@ -75,3 +75,25 @@ def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
         return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
 
     return term
+
+
+def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], spread: float) -> Term:
+    """Bone directions stay near those of the slerped key poses.
+
+    Quadratic within `spread`, linear beyond (pseudo-Huber), so a pose that does not fit lets go.
+    """
+    bones = wanted.shape[1]
+    identity = np.zeros((bones, 3, bones, 3))
+    for bone in range(bones):
+        identity[bone, :, bone] = np.eye(3) / spread
+
+    def term(state: State) -> Linear:
+        frames = len(wanted)
+        off = (state.directions - wanted) / spread
+        size = np.sqrt(1 + (off**2).sum(axis=-1, keepdims=True))
+        weight = 1 / np.sqrt(size)
+        by_direction = (weight[..., None, None] * identity).reshape(frames, -1, bones, 3)
+        cost = float((size - 1).sum())
+        return Linear((weight * off).reshape(frames, -1), by_direction, None, cost)
+
+    return term
