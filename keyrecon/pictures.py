@@ -1,13 +1,18 @@
-"""Frames of a video made small, read ahead of the work on them.
+"""Frames of a video made small, read ahead of the work on them, and worked on side by side.
 
-Reading and reducing a picture costs as much as the work on the small one. A thread does it ahead:
-decoders and OpenCV let go of Python's lock, so two cores share the load.
+Reading and reducing a picture costs as much as the work on the small one. A thread does it ahead,
+and others work on several frames at a time: decoders, OpenCV and NumPy let go of Python's lock, so
+the cores share the load.
 """
 
-from collections.abc import Callable, Iterator
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from queue import Full, Queue
 from threading import Event, Thread
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -15,6 +20,11 @@ from jaxtyping import Float, UInt8
 
 from keyrecon.video import Video
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+MOST_THREADS = 4
+"""Frames worked on at a time: beyond it the reading thread is what all wait for."""
 AHEAD = 4
 """Pictures that wait for their turn."""
 POLL = 0.1
@@ -27,17 +37,45 @@ def read_small(
     """The frames (or the wanted ones) of a video, reduced to a width, in order."""
 
     def small() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-        last = len(video) if wanted is None else max(wanted) + 1
-        for number, picture in enumerate(video.frames(stop=last)):
-            if wanted is None or number in wanted:
-                yield reduce_picture(picture, width)
+        pictures = video.frames() if wanted is None else video.chosen_frames(wanted, max(wanted))
+        for picture in pictures:
+            yield reduce_picture(picture, width)
 
     return _ahead(small)
 
 
+def read_grey(video: Video, width: int) -> Iterator[UInt8[np.ndarray, "h w"]]:
+    """The brightness of all frames of a video, reduced to a width, in order."""
+
+    def small() -> Iterator[UInt8[np.ndarray, "h w"]]:
+        for picture in video.grey_frames():
+            yield np.ascontiguousarray(reduce_picture(picture, width))
+
+    return _ahead(small)
+
+
+def side_by_side(
+    work: Callable[[Item], Result], items: Iterable[Item], threads: int | None = None
+) -> Iterator[Result]:
+    """`work` done on every item, in order, a few at a time; by default one thread per core."""
+    threads = threads or min(MOST_THREADS, os.cpu_count() or 1)
+    pending: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for item in items:
+                pending.append(pool.submit(work, item))
+                if len(pending) > threads:
+                    yield pending.popleft().result()
+            while pending:
+                yield pending.popleft().result()
+        finally:
+            for future in pending:
+                future.cancel()
+
+
 def reduce_picture(
-    picture: UInt8[np.ndarray, "h w 3"], width: int
-) -> UInt8[np.ndarray, "y x 3"]:
+    picture: UInt8[np.ndarray, "h w *c"], width: int
+) -> UInt8[np.ndarray, "y x *c"]:
     """A picture reduced to a width; halved by averaging first, so that nothing aliases."""
     height = max(1, round(picture.shape[0] * width / picture.shape[1]))
     while picture.shape[1] >= 2 * width and picture.shape[0] >= 2 * height:

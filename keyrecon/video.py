@@ -10,7 +10,7 @@ that times are those of the world.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +24,8 @@ from keyrecon.errors import KeyreconError
 if TYPE_CHECKING:
     import av
 
+LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12")
+"""Pixel formats whose first plane is the brightness, a byte each."""
 VARIABLE_RATE = 0.25
 """Frame spacing that differs by more than this share from its median counts as variable."""
 
@@ -64,6 +66,28 @@ class Video:
         self, start: int = 0, stop: int | None = None, width: int | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         """Frames start..stop-1 in order, one in memory at a time; reduced to `width` if given."""
+        for frame in self._decoded(start, stop):
+            yield self._picture(frame, width)
+
+    def chosen_frames(self, numbers: Container[int], last: int) -> Iterator[np.ndarray]:
+        """The frames with these numbers up to `last`; the others are decoded but not converted."""
+        for number, frame in enumerate(self._decoded(0, last + 1)):
+            if number in numbers:
+                yield self._picture(frame, None)
+
+    def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
+        """The brightness of all frames in order, in the range that the file stores."""
+        for frame in self._decoded(0, None):
+            if frame.format.name in LUMA_FIRST:
+                plane = frame.planes[0]
+                rows = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
+                grey = rows[:, : plane.width]
+            else:
+                grey = frame.to_ndarray(format="gray")
+            yield np.ascontiguousarray(np.rot90(grey, self.turns)) if self.turns else grey
+
+    def _decoded(self, start: int, stop: int | None) -> Iterator[av.VideoFrame]:
+        """Frames start..stop-1 as they are stored, not turned."""
         stop = len(self) if stop is None else min(stop, len(self))
         if start >= stop:
             return
@@ -75,7 +99,7 @@ class Video:
                     continue
                 if frame.pts != wanted[found]:
                     break
-                yield self._picture(frame, width)
+                yield frame
                 found += 1
                 if found == len(wanted):
                     return

@@ -23,7 +23,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.background import Scene
 from keyrecon.colors import BINS, color_bins, distinct_parts, to_lab
-from keyrecon.pictures import read_small, shrinking
+from keyrecon.pictures import read_small, shrinking, side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, Figures, Track
 from keyrecon.video import Video
@@ -98,17 +98,20 @@ def find_edges(  # noqa: PLR0913
     # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
     width = min(video.width, round(video.width * 1.2 * float(np.median(scale))))
     shrink = width / video.width
-    edges, labels = [], np.zeros((len(video), size[1], size[0]), np.uint8)
-    pictures = read_small(video, width)
-    for t, picture in enumerate(progress(pictures, "Finding edges", len(video))):
+    labels = np.zeros((len(video), size[1], size[0]), np.uint8)
+
+    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Edges:
+        t, picture = entry
         crop, to_picture, present = _cut_out(picture, origin[t], float(scale[t]), shrink, size)
         foreground = scene.foreground(crop, t, to_picture)
         spots = (track.head[t], track.mid_feet[t])
         axis = np.stack([(p - origin[t]) * scale[t] for p in spots])
         labels[t] = label_crop(crop, foreground * present, palette, axis, options)
         found = trace_edges(labels[t], options)
-        edges.append(_place(found, origin[t], float(scale[t]), track, t))
-    return Figures(tuple(edges), labels, origin, scale)
+        return _place(found, origin[t], float(scale[t]), track, t)
+
+    pictures = progress(read_small(video, width), "Finding edges", len(video))
+    return Figures(tuple(side_by_side(look, enumerate(pictures))), labels, origin, scale)
 
 
 def _cut_out(

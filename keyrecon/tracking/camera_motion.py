@@ -24,7 +24,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.camera import warp_points
-from keyrecon.pictures import read_small, shrinking
+from keyrecon.pictures import read_grey, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
 from keyrecon.video import Video
@@ -42,6 +42,10 @@ CLEARLY_BETTER = 0.8
 PERSISTENT = 0.85
 """An edge that keeps its place and direction to this degree all along is laid over the picture
 (or the camera is static)."""
+
+
+FEW = 0.05
+"""Share of the corners that may lie on overlays: so few are outvoted with the player."""
 
 
 @dataclass(frozen=True)
@@ -142,19 +146,15 @@ def follow_camera(
     width = min(options.width, video.width)
     overlay = _Overlay()
     stride = max(1, len(video) // 64)
-    pictures = (_grey(p) for p in read_small(video, width))
-    path, trust = _follow(
-        progress(pictures, "Following the camera", len(video)), options, None, (overlay, stride)
-    )
+    pictures = progress(read_grey(video, width), "Following the camera", len(video))
+    path, trust, keys = _follow(pictures, options, None, (overlay, stride))
     shape = (round(video.height * width / video.width), width)
     if _is_static(path, shape, options):
         return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     forbidden = overlay.mask()
-    if forbidden.any():
-        pictures = (_grey(p) for p in read_small(video, width))
-        path, trust = _follow(
-            progress(pictures, "Following the camera", len(video)), options, forbidden, None
-        )
+    if _hold(keys, forbidden) > FEW:
+        pictures = progress(read_grey(video, width), "Following the camera", len(video))
+        path, trust, _ = _follow(pictures, options, forbidden, None)
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
@@ -163,8 +163,10 @@ def follow_camera(
     return CameraPath(full / full[:, 2:, 2:], trust)
 
 
-def _grey(picture: UInt8[np.ndarray, "h w 3"]) -> Grey:
-    return cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+def _hold(keys: list[_Key], forbidden: Bool[np.ndarray, "h w"]) -> float:
+    """Share of the corners of all key pictures that lie on something laid over the picture."""
+    x, y = np.concatenate([k.corners for k in keys]).astype(int).T
+    return float(forbidden[y, x].mean()) if len(x) else 0.0
 
 
 def _follow(
@@ -172,7 +174,7 @@ def _follow(
     options: CameraOptions,
     forbidden: Bool[np.ndarray, "h w"] | None,
     watch: tuple[_Overlay, int] | None,
-) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"]]:
+) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"], list[_Key]]:
     """Homographies to frame 0 in reduced pixels; `watch` collects evidence of overlays."""
     follower = _Follower(options, forbidden)
     guess, path, trust = np.eye(3), [], []
@@ -182,7 +184,7 @@ def _follow(
         guess, agreed = follower.register(grey, guess)
         path.append(guess)
         trust.append(agreed)
-    return np.array(path), np.array(trust)
+    return np.array(path), np.array(trust), follower.keys
 
 
 def _corners(

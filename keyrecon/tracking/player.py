@@ -32,7 +32,7 @@ from keyrecon.background import (
 from keyrecon.camera import warp_points
 from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
-from keyrecon.pictures import read_small, shrinking
+from keyrecon.pictures import read_small, shrinking, side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.feet import SHOE_RADIUS, foot_pairs, pair_costs
@@ -127,13 +127,15 @@ def track_player(
     tall = colors.height * shrink
     head = parts[colors.names.index("head")]
     tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
-    found, to_picture = [], np.linalg.inv(shrinking(shrink))
-    pictures = read_small(video, width)
-    for number, picture in enumerate(progress(pictures, "Following the player", len(video))):
-        lab = to_lab(picture)
-        foreground = scene.foreground(lab, number, to_picture)
-        evidence = _weigh(lab, tables, foreground, tall)
-        found.append(_search(evidence, tall))
+    to_picture = np.linalg.inv(shrinking(shrink))
+
+    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> _Candidates:
+        lab = to_lab(entry[1])
+        foreground = scene.foreground(lab, entry[0], to_picture)
+        return _search(_weigh(lab, tables, foreground, tall), tall)
+
+    pictures = progress(read_small(video, width), "Following the player", len(video))
+    found = list(side_by_side(look, enumerate(pictures)))
     return _connect(found, video, camera, (shrink, tall), options)
 
 
