@@ -75,9 +75,8 @@ def judge_track(case: Case) -> float:
     feet = np.stack([joint["left_ankle"], joint["right_ankle"]], axis=1)
     limit = 0.1 * track.height
     head_off = np.linalg.norm(track.head - head, axis=1)
-    one, other = (
-        np.linalg.norm(track.feet - feet[:, order], axis=2).max(axis=1) for order in ([0, 1], [1, 0])
-    )
+    orders = [0, 1], [1, 0]
+    one, other = (np.linalg.norm(track.feet - feet[:, o], axis=2).max(axis=1) for o in orders)
     return float(((head_off < limit) & (np.minimum(one, other) < limit)).mean())
 
 

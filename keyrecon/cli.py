@@ -49,6 +49,7 @@ def new(
     start: int = 0,
     end: int | None = None,
     slowmo: float = 1.0,
+    skeleton: Path | None = None,
 ) -> None:
     """Start a project for a video.
 
@@ -60,8 +61,9 @@ def new(
         start: First frame to use.
         end: Frame after the last one to use.
         slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
+        skeleton: A JSON file with joints and bones of your own.
     """
-    print(work.start(video, project, start, end, slowmo))
+    print(work.start(video, project, (start, end), slowmo, skeleton))
 
 
 @app.command

@@ -60,7 +60,7 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
 def _project(video_file: Path, folder: Path) -> Workspace:
     """The demo's project, begun if it is not there."""
     if not (folder / "project.toml").is_file():
-        start(video_file, folder, 0, None, 1.0)
+        start(video_file, folder)
     return Workspace(folder)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.body import LSP14
+from keyrecon.body import read_skeleton
 from keyrecon.durable import write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.annotations import read_annotations
@@ -30,12 +30,23 @@ from keyrecon.video_writer import write_picture
 from keyrecon.workspace import Workspace
 
 
-def start(video: Path, folder: Path, first: int, end: int | None, slow_motion: float) -> str:
-    """Make a project folder for a video."""
+def start(
+    video: Path,
+    folder: Path,
+    trim: tuple[int, int | None] = (0, None),
+    slow_motion: float = 1.0,
+    skeleton: Path | None = None,
+) -> str:
+    """Make a project folder for a video; `trim` is the first frame and the one after the last."""
+    first, end = trim
     opened = open_video(video, first, end, slow_motion)
-    trim = {"start": first or None, "end": end}
-    trim["slow_motion"] = None if slow_motion == 1 else slow_motion
-    Workspace.create(folder, opened, video, trim)
+    if skeleton is not None:
+        read_skeleton(skeleton)
+    told = {"start": first or None, "end": end}
+    told["slow_motion"] = None if slow_motion == 1 else slow_motion
+    Workspace.create(folder, opened, video, told)
+    if skeleton is not None:
+        write_durably(folder / "skeleton.json", skeleton.read_bytes())
     text = (
         f"{folder}: {len(opened)} frames of {opened.width}x{opened.height} at "
         f"{opened.fps:.4g} frames per second."
@@ -137,7 +148,7 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
     """Add marks from a file to the project's annotations."""
     video = workspace.video()
     size = (video.width, video.height)
-    merged = read_annotations(file, LSP14, len(video), size)
+    merged = read_annotations(file, workspace.skeleton, len(video), size)
     if workspace.annotations_file.is_file():
         merged = _merge(workspace, load_annotations(workspace, video), merged, replacing)
     write_coco(workspace.annotations_file, merged, size)
@@ -168,7 +179,8 @@ def _merge(
 
 def load_annotations(workspace: Workspace, video: Video) -> Annotations:
     """The project's annotations, checked."""
-    return read_coco(workspace.annotations_file, LSP14, len(video), (video.width, video.height))
+    size = (video.width, video.height)
+    return read_coco(workspace.annotations_file, workspace.skeleton, len(video), size)
 
 
 def settings(options: Options, height: float | None, method: str | None) -> Options:

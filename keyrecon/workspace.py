@@ -4,6 +4,7 @@
     picks.json         colours that a person clicked
     keyframes.json     frames to annotate, with a picture of each in keyframes/
     annotations.json   what a person marked
+    skeleton.json      joints and bones, where they are not the default ones
     motion.npz, report.html
     cache/             results of the stages; safe to delete
 
@@ -18,6 +19,7 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.durable import write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.picks import read_picks, write_picks
@@ -78,6 +80,12 @@ class Workspace:
     def report_file(self) -> Path:
         """report.html"""
         return self.folder / "report.html"
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The joints to mark: those of skeleton.json where the project has one."""
+        file = self.folder / "skeleton.json"
+        return read_skeleton(file) if file.is_file() else LSP14
 
     @property
     def pictures(self) -> Path:

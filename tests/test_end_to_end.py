@@ -149,3 +149,34 @@ def test_a_player_who_is_not_there_is_not_found(clip, tmp_path, capsys):
 def test_joints_of_the_skeleton_are_all_there(solved):
     motion, _ = solved
     assert motion.skeleton.names == LSP14.names
+
+
+def test_a_skeleton_of_ones_own_goes_through(clip, tmp_path):
+    toes = [("right_toe", "right_ankle", 0.11), ("left_toe", "left_ankle", 0.11)]
+    joints = [
+        {"name": n, "parent": None if p < 0 else LSP14.names[p], "length": length}
+        for n, p, length in zip(LSP14.names, LSP14.parents, LSP14.proportions, strict=True)
+    ]
+    joints += [{"name": n, "parent": p, "length": length} for n, p, length in toes]
+    lower = [LSP14.names[i] for i in LSP14.lower] + [n for n, _, _ in toes]
+    (tmp_path / "toes.json").write_text(json.dumps({"joints": joints, "lower": lower}))
+    made = tmp_path / "p"
+    words = ("--project", made, "--skeleton", tmp_path / "toes.json")
+    assert keyrecon("new", clip / "video.mp4", *words) == 0
+    Workspace(made).add_picks(read_picks(clip / "picks.json"))
+    assert keyrecon("keyframes", made, "--budget", "0.06") == 0
+    truth = read_truth(clip / "truth.npz")
+    ankles = [0, 5]
+    points3d, points2d = (
+        np.concatenate([truth[name], truth[name][:, ankles] + step], axis=1)
+        for name, step in (("points3d", [0.1, 0.03, 0.0]), ("points2d", [10.0, 3.0]))
+    )
+    skeleton = Workspace(made).skeleton
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    marks = mark_from_truth(asked, points2d, points3d, None, MarkOptions(noise=1.0), skeleton)
+    write_coco(tmp_path / "marks.json", marks, SIZE)
+    assert keyrecon("import", made, tmp_path / "marks.json") == 0
+    assert keyrecon("run", made) == 0
+    motion = read_motion(made / "motion.npz")
+    assert motion.skeleton.names[-2:] == ("right_toe", "left_toe")
+    assert np.median(np.abs(motion.points2d - points2d)[:, -2:]) < 0.03 * 150
