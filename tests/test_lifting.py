@@ -120,13 +120,45 @@ def price_of_body(vectors):
     directions = unit(vectors)
     cost = anatomy.trunk_cost(trunk, BREADTHS)
     cost += anatomy.head_cost(shoulders, up, directions[:, bone["head_top"]])
-    for side in ("right", "left"):
+    for side, sign in (("right", 1), ("left", -1)):
         thigh, shank, upper, forearm = (
             directions[:, bone[f"{side}_{name}"]] for name in ("knee", "ankle", "elbow", "wrist")
         )
-        cost += anatomy.leg_cost(hips, up, thigh, shank)
-        cost += anatomy.arm_cost(shoulders, up, upper, forearm)
+        cost += anatomy.leg_cost(hips, up, thigh, shank, sign)
+        cost += anatomy.arm_cost(shoulders, up, upper, forearm, sign)
     return cost
+
+
+def test_a_hanging_arm_bends_its_forearm_forward_rather_than_back():
+    right, up, forward = (sign * np.eye(3)[[axis]] for axis, sign in ((0, 1), (1, -1), (2, 1)))
+    forwards, backwards = unit(-up + forward), unit(-up - forward)
+    usual = anatomy.arm_cost(right, up, -up, forwards, 1)
+    assert (usual < anatomy.arm_cost(right, up, -up, backwards, 1) - 1).all()
+
+
+def test_left_and_right_limbs_cost_the_same_in_the_mirror():
+    rng = np.random.default_rng(5)
+    upper, lower = unit(rng.normal(size=(2, 20, 3)))
+    right, up, flip = np.eye(3)[0], -np.eye(3)[1], np.array([-1.0, 1.0, 1.0])
+    for price in (anatomy.arm_cost, anatomy.leg_cost):
+        here = price(right, up, upper, lower, 1)
+        there = price(right, up, upper * flip, lower * flip, -1)
+        assert np.allclose(here, there)
+
+
+def test_a_trunk_that_leans_forward_is_likelier_than_its_mirror_image():
+    right, down = np.eye(3)[[0]], np.eye(3)[[1]]
+    toward_camera = np.array([[0.0, 0.0, -1.0]])
+    ahead, back = unit(-down + 0.3 * toward_camera), unit(-down - 0.3 * toward_camera)
+    assert (anatomy.lean_cost(-right, ahead) < anatomy.lean_cost(-right, back)).all()
+
+
+def test_keyframes_take_their_signs_from_the_frames_around_them():
+    truth, tracks, marks, keyframes = scene(signs=False)
+    lifted = lift_motion(tracks, marks, keyframes, np.full(len(truth), SCALE), 50.0)
+    depth = bone_vectors(truth, LSP14)[marks.frames][..., 2]
+    deep = np.abs(depth) > 0.4 * LSP14.lengths
+    assert (lifted.signs == -np.sign(depth))[deep].mean() > 0.85
 
 
 def test_signs_are_the_cheapest_of_all_sign_vectors():

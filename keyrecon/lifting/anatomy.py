@@ -17,9 +17,19 @@ from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import unit
+from keyrecon.lifting.posture import posture_cost
 
 CAP = 8.0
 """Largest cost of one broken limit, nats."""
+TILT = 0.1
+"""Depth that an upright line gains per unit downwards: the camera looks 6 degrees down, between
+a tripod at chest height and a stand."""
+UPRIGHT = np.array([0.0, -1.0, -TILT]) / np.hypot(1.0, TILT)
+"""Away from the ground, camera axes."""
+_LEAN_FORWARD, _LEAN_SPREAD, _LEAN_ASIDE = 0.13, 0.2, 0.14
+"""How far a trunk of length 1 leans, and how much that varies, with room for unknown tilt: its
+mean is 0.09-0.20 and its deviation 0.08-0.26 in running, dancing, jumping and golf alike (CMU
+motion capture, see `posture`)."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +39,8 @@ class Limb:
     bones: tuple[int, ...]
     kind: str
     """'leg', 'arm', 'head' or 'free'."""
+    side: int = 0
+    """1 on the person's right, -1 on the left, 0 on the midline."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +62,11 @@ def anatomy_of(skeleton: Skeleton) -> Anatomy:
     )
     trunk = tuple(bone_of[name] for name in corners) if joined else ()
     limbs = []
-    for side in ("right", "left"):
+    for side, sign in (("right", 1), ("left", -1)):
         for kind, names in (("leg", ("knee", "ankle")), ("arm", ("elbow", "wrist"))):
             members = [f"{side}_{name}" for name in names]
             if trunk and all(name in bone_of for name in members):
-                limbs.append(Limb(tuple(bone_of[name] for name in members), kind))
+                limbs.append(Limb(tuple(bone_of[name] for name in members), kind, sign))
     taken = {*trunk, *(bone for limb in limbs for bone in limb.bones)}
     head = bone_of.get("head_top") if trunk else None
     limbs += [
@@ -95,21 +107,22 @@ def trunk_cost(
     cost += hinge(np.cos(np.radians(50)) - (hips * shoulders).sum(-1), 0.3)
     for axis in (hips, shoulders):
         cost += hinge(np.abs((axis * up).sum(-1)) - 0.5, 0.2)
-    return cost
+    return cost + lean_cost(unit(hips + shoulders), up)
 
 
-POSTURE = {"upper arm": 0.25, "forearm": 0.55, "head": 0.1}
-"""Forward part of each bone's direction in an athlete at work: the hands are before the body.
-Rounded means over running, jumping, dancing and racket strokes."""
-_POSTURE_SPREAD = 0.4
+def lean_cost(
+    across: Float[np.ndarray, "*n 3"], up: Float[np.ndarray, "*n 3"]
+) -> Float[np.ndarray, "*n"]:
+    """People at work lean forward a little, and rarely back or to the side."""
+    right = unit(across - (across * UPRIGHT).sum(-1, keepdims=True) * UPRIGHT)
+    forward = np.cross(UPRIGHT, right)
+    ahead = ((up * forward).sum(-1) - _LEAN_FORWARD) / _LEAN_SPREAD
+    aside = (up * right).sum(-1) / _LEAN_ASIDE
+    return np.minimum(0.5 * (ahead**2 + aside**2), CAP)
 
 
-def posture_cost(
-    bone: Float[np.ndarray, "*#n 3"], forward: Float[np.ndarray, "*#n 3"], kind: str
-) -> Float[np.ndarray, "..."]:
-    """Squared distance of a bone's forward part from the usual one."""
-    off = ((bone * forward).sum(-1) - POSTURE[kind]) / _POSTURE_SPREAD
-    return np.minimum(0.5 * off**2, CAP)
+_HEAD_FORWARD, _HEAD_SPREAD = 0.1, 0.4
+"""Forward part of the head's direction, and its spread."""
 
 
 def leg_cost(
@@ -117,11 +130,12 @@ def leg_cost(
     up: Float[np.ndarray, "*#n 3"],
     thigh: Float[np.ndarray, "*#n 3"],
     shank: Float[np.ndarray, "*#n 3"],
+    side: int,
 ) -> Float[np.ndarray, "..."]:
-    """Knees bend backwards; the thigh goes further forward than backward."""
+    """Knees bend backwards; the rest is habit. `side` is 1 for the right leg, -1 for the left."""
     bend = (np.cross(thigh, shank) * hips).sum(-1)
-    forward = np.cross(up, hips)
-    return hinge(bend + 0.05, 0.1) + hinge(-(thigh * forward).sum(-1) - 0.2, 0.2)
+    axes = _square_axes(hips, up, side)
+    return hinge(bend + 0.05, 0.1) + posture_cost(thigh, shank, axes, "leg")
 
 
 def arm_cost(
@@ -129,12 +143,18 @@ def arm_cost(
     up: Float[np.ndarray, "*#n 3"],
     upper: Float[np.ndarray, "*#n 3"],
     forearm: Float[np.ndarray, "*#n 3"],
+    side: int,
 ) -> Float[np.ndarray, "..."]:
-    """Hands work in front of the chest; a bent elbow lifts the forearm forward or up."""
-    forward = np.cross(up, shoulders)
-    bend = (np.cross(upper, forearm) * shoulders).sum(-1)
-    usual = posture_cost(upper, forward, "upper arm") + posture_cost(forearm, forward, "forearm")
-    return hinge(-bend, 0.2) + usual
+    """Habit alone: shoulder and elbow together leave an arm nearly free."""
+    return posture_cost(upper, forearm, _square_axes(shoulders, up, side), "arm")
+
+
+def _square_axes(
+    across: Float[np.ndarray, "*#n 3"], up: Float[np.ndarray, "*#n 3"], side: int
+) -> tuple[Float[np.ndarray, "*#n 3"], ...]:
+    """Outward on one side, up, forward; at right angles."""
+    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
+    return side * right, up, np.cross(up, right)
 
 
 def head_cost(
@@ -144,4 +164,5 @@ def head_cost(
 ) -> Float[np.ndarray, "..."]:
     """The head continues the trunk."""
     forward = np.cross(up, shoulders)
-    return hinge(0.9 - (head * up).sum(-1), 0.2) + posture_cost(head, forward, "head")
+    off = ((head * forward).sum(-1) - _HEAD_FORWARD) / _HEAD_SPREAD
+    return hinge(0.9 - (head * up).sum(-1), 0.2) + np.minimum(0.5 * off**2, CAP)

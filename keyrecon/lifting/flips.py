@@ -268,9 +268,9 @@ def _limb_cost(
     up: Float[np.ndarray, "T S 1 3"],
 ) -> Float[np.ndarray, "T S L"]:
     if limb.kind == "leg":
-        return leg_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
+        return leg_cost(axis, up, bones[..., 0, :], bones[..., 1, :], limb.side)
     if limb.kind == "arm":
-        return arm_cost(axis, up, bones[..., 0, :], bones[..., 1, :])
+        return arm_cost(axis, up, bones[..., 0, :], bones[..., 1, :], limb.side)
     if limb.kind == "head":
         return head_cost(axis, up, bones[..., 0, :])
     return np.zeros((*axis.shape[:2], bones.shape[2]))

@@ -1,8 +1,8 @@
 """From joints in the picture to a motion in space: the recipe of Section 6.
 
-Lengths and scale, key poses, slerp between them, rejection of slips, signs of depth in every
-frame, refinement; then slips are rejected once more against the refined motion and it is
-refined again.
+Lengths and scale, depth signs of the keyframes from all frames, key poses, slerp between them,
+rejection of slips, signs of depth in every frame, refinement. Slips that remain are left to the
+robust loss of the refinement.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,6 +17,7 @@ from keyrecon.lifting.chain import pose_from_directions
 from keyrecon.lifting.flips import FlipOptions
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
+from keyrecon.lifting.keysigns import follow_key_signs
 from keyrecon.lifting.lengths import BodySize, LengthOptions, estimate_lengths, marked_joints
 from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
 from keyrecon.lifting.refine import RefineOptions, descend_motion
@@ -86,7 +87,8 @@ def lift_motion(  # noqa: PLR0913
     skeleton = annotations.skeleton
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths)
     observed = _observe(tracks, annotations, size, options)
-    keys = lift_keyframes(observed, annotations, size, options.flips)
+    signs = follow_key_signs(observed, annotations, size, fps, options.flips)
+    keys = lift_keyframes(observed, annotations, size, options.flips, signs)
     slerped = interpolate_poses(
         keys.directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
     )

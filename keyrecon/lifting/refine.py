@@ -4,7 +4,8 @@ Two ways. `descend_motion` is the paper's projected gradient descent: joints mov
 observed ones, then bone lengths and a low-pass are enforced, again and again. `refine_motion`
 minimises one cost over the unit directions of all bones: robust reprojection weighted by
 confidence, small second differences in time, a pull to the slerped key poses, the breadths of
-hips and shoulders, and a head that continues the trunk. Lengths are exact in both.
+hips and shoulders, a head that continues the trunk, and balance: people at work stand over their
+feet, which holds the trunk's lean along the line of sight. Lengths are exact in both.
 """
 
 from dataclasses import dataclass
@@ -14,14 +15,16 @@ from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
-from keyrecon.lifting.anatomy import anatomy_of
-from keyrecon.lifting.chain import bone_vectors, breadths, pose_from_directions, unit
+from keyrecon.lifting.anatomy import TILT, anatomy_of
+from keyrecon.lifting.chain import ancestry, bone_vectors, breadths, pose_from_directions, unit
 from keyrecon.lifting.constraints import keep_lengths, low_pass
 from keyrecon.lifting.descend import descend
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.solver import Smoothness, State, solve
 
+_UPRIGHT_FROM = 0.3
+"""Height of the trunk's middle above the ankles from which the tilt of the camera is read."""
 _HIPS_ALONG = 0.95
 """Part of the bones from neck to hips that goes along the spine."""
 
@@ -40,6 +43,11 @@ class RefineOptions:
     """How far hip and shoulder breadth may stray, body heights."""
     head_spread: float = 0.35
     """How far the head may lean out of the trunk's line, radians."""
+    balance_spread: float = 0.055
+    """How far the middle of the trunk may be from above the feet along the line of sight, body
+    heights; 0.03-0.08 in every activity."""
+    balance_correlation: float = 0.15
+    """Seconds over which a lack of balance lasts; it counts once."""
     key_spread: float = 0.4
     """How far a bone may turn away from the slerped key poses at no great cost, radians."""
     step: float = 0.2
@@ -65,6 +73,7 @@ def refine_motion(  # noqa: PLR0913
     """
     recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
     recipe += _trunk_terms(size, skeleton, options)
+    recipe += _balance_terms(start, size, skeleton, fps, options)
     recipe.append(terms.key_pose_prior(guide, options.key_spread))
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
@@ -105,3 +114,20 @@ def _trunk_terms(size: BodySize, skeleton: Skeleton, options: RefineOptions) -> 
             share[list(limb.bones)] = 1.0
             recipe.append(terms.alignment(share, options.head_spread))
     return recipe
+
+
+def _balance_terms(
+    start: State, size: BodySize, skeleton: Skeleton, fps: float, options: RefineOptions
+) -> list[terms.Term]:
+    """The middle of the trunk stays over the point between the ankles."""
+    corners = [f"{side}_{name}" for name in ("hip", "ankle") for side in ("right", "left")]
+    if not set(corners) <= set(skeleton.names):
+        return []
+    ways = ancestry(skeleton) * size.lengths
+    hips, ankles = ways[[skeleton.index(name) for name in corners]].reshape(2, 2, -1).mean(axis=1)
+    share = 0.5 * (ways[skeleton.root] + hips) - ankles
+    stance = np.einsum("b,tbi->ti", share, start.directions)
+    high = stance[stance[:, 1] < -_UPRIGHT_FROM]
+    slope = float(np.median(high[:, 2] / high[:, 1])) if len(high) else TILT
+    spread = options.balance_spread * np.sqrt(max(options.balance_correlation * fps, 1.0))
+    return [terms.balance(share, 0.5 * (slope + TILT), spread)]

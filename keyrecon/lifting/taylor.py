@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import bone_vectors, unit
-from keyrecon.lifting.flips import FlipOptions, Shown, choose_signs
+from keyrecon.lifting.flips import FlipOptions, Shown, Signs, choose_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.shown import depth_doubt, depth_share
@@ -41,14 +41,17 @@ def lift_keyframes(
     annotations: Annotations,
     size: BodySize,
     options: FlipOptions = FlipOptions(),
+    signs: Signs | None = None,
 ) -> KeyPoses:
     """Poses of the annotated frames, with confirmed depth signs where there are any.
 
-    Joints that were not marked on a keyframe are taken from the tracks.
+    Joints that were not marked on a keyframe are taken from the tracks. Without `signs` every
+    picture is judged by itself.
     """
     frames, skeleton = annotations.frames, annotations.skeleton
     shown = show_bones(observed.joints[frames], observed.spread[frames], size.lengths, skeleton)
-    signs = choose_signs(shown, annotations.nearer, size.breadths, skeleton, options)
+    if signs is None:
+        signs = choose_signs(shown, annotations.nearer, size.breadths, skeleton, options)
     marked = np.isfinite(annotations.joints[:, skeleton.bones, 0]).all(axis=-1)
     sure = marked | (annotations.nearer != 0)
     trust = np.where(sure, 1.0, _GUESS * (2 * signs.probability - 1))

@@ -77,6 +77,19 @@ def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
     return term
 
 
+def balance(share: Float[np.ndarray, "B"], tilt: float, spread: float) -> Term:
+    """A weighted sum of bones stands upright: its depth is `tilt` times its way down."""
+    slope = np.zeros((1, len(share), 3))
+    slope[0, :, 2] = share / spread
+    slope[0, :, 1] = -tilt * share / spread
+
+    def term(state: State) -> Linear:
+        residual = np.einsum("mbi,tbi->tm", slope, state.directions)
+        return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
+
+    return term
+
+
 def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], spread: float) -> Term:
     """Bone directions stay near those of the slerped key poses.
 

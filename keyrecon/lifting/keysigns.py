@@ -1,0 +1,73 @@
+"""Depth signs of the keyframes, read from the frames around them.
+
+A single picture often fits two poses that are each other's mirror image. Over time one of them
+becomes absurd: the signs of a whole sequence are followed first, by what bodies do and by how
+depth moves, with the person's signs pinned, and the keyframes adopt what they passed through
+(automatic default A: continuity first, then key poses). Long motions are taken in pieces, with
+frames on both sides that are only looked at.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.lifting.flips import FlipOptions, Shown, Signs, Votes, follow_signs
+from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.observe import Observed, smooth_joints
+from keyrecon.lifting.taylor import show_bones
+from keyrecon.records import Annotations
+
+_SMOOTH_SECONDS = 0.03
+_SMOOTHED = 0.02
+"""Standard deviation of smoothed joints, body heights; marked joints are sharper."""
+_PIECE, _ASIDE = 2000, 100
+"""Frames decided together, and frames looked at on both sides of them."""
+
+
+def follow_key_signs(
+    observed: Observed,
+    annotations: Annotations,
+    size: BodySize,
+    fps: float,
+    options: FlipOptions = FlipOptions(),
+) -> Signs:
+    """Signs of every bone in every keyframe; those that the person confirmed stay."""
+    frames, nearer = annotations.frames, annotations.nearer
+    shown = _show_all(observed, annotations, size, fps)
+    vectors = np.concatenate([shown.flat, shown.depth[..., None]], axis=-1)[frames]
+    vectors[..., 2] *= -nearer
+    alone = replace(options, votes=0.0, guide=0.0)
+    sign = np.ones(nearer.shape, dtype=np.int64)
+    probability = np.ones(nearer.shape)
+    for first in range(0, len(shown.flat), _PIECE):
+        inside = (frames >= first) & (frames < first + _PIECE)
+        if not inside.any():
+            continue
+        start = max(first - _ASIDE, 0)
+        piece = slice(start, first + _PIECE + _ASIDE)
+        seen = Shown(shown.flat[piece], shown.depth[piece], shown.doubt[piece])
+        votes = Votes(
+            vectors,
+            frames - start,
+            np.abs(nearer).astype(float),
+            np.zeros(seen.depth.shape),
+            annotations.skeleton,
+        )
+        signs = follow_signs(seen, votes, size.breadths, annotations.skeleton, alone)
+        sign[inside] = signs.sign[frames[inside] - start]
+        probability[inside] = signs.probability[frames[inside] - start]
+    confirmed = nearer != 0
+    return Signs(np.where(confirmed, -nearer, sign), np.where(confirmed, 1.0, probability))
+
+
+def _show_all(observed: Observed, annotations: Annotations, size: BodySize, fps: float) -> Shown:
+    """All frames, smoothed; keyframes as they were marked."""
+    frames = annotations.frames
+    still = np.zeros_like(observed.joints)
+    joints = smooth_joints(observed.joints, still, _SMOOTH_SECONDS * fps)
+    noise: Float[np.ndarray, "T J"] = np.full(joints.shape[:2], _SMOOTHED)
+    marked = np.isfinite(annotations.joints[..., 0])
+    joints[frames] = np.where(marked[..., None], observed.joints[frames], joints[frames])
+    noise[frames] = np.where(marked, observed.spread[frames], _SMOOTHED)
+    return show_bones(joints, noise, size.lengths, annotations.skeleton)
