@@ -62,6 +62,8 @@ LEG_ABOVE = 0.3
 """Least share of the player above the end of a leg."""
 NO_SHOE = 2.0
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
+ONE_PLACE = 0.07
+"""Candidates nearer to one another are parts of one shoe, player heights: half its length."""
 KNEE_ROOM = 0.06
 """How far a leg may bend away from the straight line from hips to foot, player heights."""
 FAIR = 0.15
@@ -219,8 +221,19 @@ def _search_feet(
     shoes = np.argsort(-strength)[:FEET]
     shoes = shoes[np.isfinite(strength[shoes])]
     bare = np.flatnonzero(np.isnan(strength) & (leg > LEG_ABOVE) & (under < 0.2))[:LEG_ENDS]
-    order = np.concatenate([shoes, bare])
+    order = _apart(feet, np.concatenate([shoes, bare]), ONE_PLACE * tall)
     return feet[order], strength[order]
+
+
+def _apart(
+    places: Float[np.ndarray, "n 2"], order: Int[np.ndarray, "m"], least: float
+) -> Int[np.ndarray, "k"]:
+    """The places of an order, but those too near an earlier one: heel and toe of one shoe."""
+    kept: list[int] = []
+    for place in order:
+        if not kept or np.linalg.norm(places[kept] - places[place], axis=1).min() >= least:
+            kept.append(int(place))
+    return np.array(kept, int)
 
 
 def _leg_between(
