@@ -9,7 +9,14 @@ from keyrecon.body import HIP_BREADTH, LSP14, SHOULDER_BREADTH
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting import anatomy
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
-from keyrecon.lifting.flips import FlipOptions, Shown, choose_signs, second_order_path, sign_states
+from keyrecon.lifting.flips import (
+    FlipOptions,
+    Shown,
+    at_rate,
+    choose_signs,
+    second_order_path,
+    sign_states,
+)
 from keyrecon.lifting.lengths import estimate_lengths
 from keyrecon.lifting.lift import LiftOptions, lift_motion
 from keyrecon.lifting.taylor import lift_shown, show_bones
@@ -159,6 +166,12 @@ def test_keyframes_take_their_signs_from_the_frames_around_them():
     depth = bone_vectors(truth, LSP14)[marks.frames][..., 2]
     deep = np.abs(depth) > 0.4 * LSP14.lengths
     assert (lifted.signs == -np.sign(depth))[deep].mean() > 0.85
+
+
+def test_half_the_frame_rate_gives_a_frame_twice_the_say_and_four_times_the_jump():
+    once, slow = FlipOptions(), at_rate(FlipOptions(), 25.0)
+    assert at_rate(once, 50.0) == once
+    assert slow.limits == 2 * once.limits and slow.jerk == 4 * once.jerk
 
 
 def test_signs_are_the_cheapest_of_all_sign_vectors():

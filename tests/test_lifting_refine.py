@@ -201,3 +201,13 @@ def test_long_shown_lengths_are_likelier_than_short_ones_up_to_the_full_length()
     assert value[0] < value[1] < value[2] and value[3] < value[0]
     nudged, _ = log_density(shown + 1e-5, np.full(4, 0.03))
     np.testing.assert_allclose((nudged - value) / 1e-5, slope, rtol=0.02, atol=0.02)
+
+
+def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
+    share = LENGTHS / LENGTHS.sum()
+    leaning = np.tile(unit(np.array([0.0, -1.0, 0.3])), (5, 13, 1))
+    upright = np.tile(unit(np.array([0.0, -1.0, -0.1])), (5, 13, 1))
+    term = terms.balance(share, 0.1, 0.05)
+    assert np.abs(term(State(np.zeros((5, 2)), upright)).residual).max() < 1e-9
+    solved = solve(State(np.zeros((5, 2)), leaning), [term], Smoothness(1.0, LENGTHS), 20, 1e-9)
+    assert np.abs(term(solved).residual).max() < 0.01

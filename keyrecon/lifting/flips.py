@@ -9,7 +9,7 @@ plane, which a first-order one would take for a bounce. The key poses vote, wher
 alike in the picture, for the depths that the person confirmed there.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -33,7 +33,7 @@ _MOST_ALIKE = 24
 
 @dataclass(frozen=True)
 class FlipOptions:
-    """What speaks for a sign, and how loudly."""
+    """What speaks for a sign, and how loudly; per frame at 50 frames a second."""
 
     confirmed: float = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
@@ -49,6 +49,18 @@ class FlipOptions:
     """Second difference of depth between frames to be expected, statures."""
     reach: float = 6.0
     """Largest cost of one jump, nats."""
+
+
+def at_rate(options: FlipOptions, fps: float) -> FlipOptions:
+    """The same evidence per second, and the same accelerations, at another frame rate."""
+    step = 50.0 / fps
+    return replace(
+        options,
+        limits=options.limits * step,
+        votes=options.votes * step,
+        guide=options.guide * step,
+        jerk=options.jerk * step**2,
+    )
 
 
 @dataclass(frozen=True, eq=False)

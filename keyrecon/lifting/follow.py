@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import pose_from_directions, unit
-from keyrecon.lifting.flips import FlipOptions, Votes, follow_signs
+from keyrecon.lifting.flips import FlipOptions, Votes, at_rate, follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
 from keyrecon.lifting.refine import RefineOptions, refine_motion
@@ -100,12 +100,12 @@ def _follow_window(
     bridge = _flat(guide, figure)
     joints = smooth_joints(observed.joints, bridge, _SMOOTH_SECONDS * fps)
     keys = figure.keys.directions
-    noise = _SMOOTHED
+    noise, flips = _SMOOTHED, at_rate(options.flips, fps)
     guided = lengths * guide.directions[..., 2]
     for _ in range(2):
         shown = show_bones(joints, np.full(joints.shape[:2], noise), lengths, skeleton)
         votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, guided, skeleton)
-        signs = follow_signs(shown, votes, figure.size.breadths, skeleton, options.flips)
+        signs = follow_signs(shown, votes, figure.size.breadths, skeleton, flips)
         start = State(joints[:, skeleton.root], lift_shown(shown, signs.sign))
         state = refine_motion(
             start, observed, guide.directions, figure.size, skeleton, fps, options.refine

@@ -12,7 +12,14 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.lifting.flips import FlipOptions, Shown, Signs, Votes, follow_signs
+from keyrecon.lifting.flips import (
+    FlipOptions,
+    Shown,
+    Signs,
+    Votes,
+    at_rate,
+    follow_signs,
+)
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
 from keyrecon.lifting.taylor import show_bones
@@ -37,7 +44,7 @@ def follow_key_signs(
     shown = _show_all(observed, annotations, size, fps)
     vectors = np.concatenate([shown.flat, shown.depth[..., None]], axis=-1)[frames]
     vectors[..., 2] *= -nearer
-    alone = replace(options, votes=0.0, guide=0.0)
+    alone = replace(at_rate(options, fps), votes=0.0, guide=0.0)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
     for first in range(0, len(shown.flat), _PIECE):

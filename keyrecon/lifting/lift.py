@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.chain import pose_from_directions
+from keyrecon.lifting.chain import bone_vectors, pose_from_directions
 from keyrecon.lifting.flips import FlipOptions
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
@@ -97,6 +97,8 @@ def lift_motion(  # noqa: PLR0913
     slips[annotations.frames] = False
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
     if options.method == "paper":
+        upright = _rolled(guide.directions, clean, size, skeleton)
+        guide = _place(upright, clean, size, skeleton)
         state = descend_motion(guide, clean, size, skeleton, options.refine)
     else:
         follow = FollowOptions(options.flips, options.refine)
@@ -123,13 +125,26 @@ def lift_motion(  # noqa: PLR0913
 def _place(
     directions: Float[np.ndarray, "T B 3"], observed: Observed, size: BodySize, skeleton: Skeleton
 ) -> State:
-    """Poses shifted onto the observed joints, frame by frame (step 1 of Fig. 9)."""
+    """Poses shifted onto the observed joints, frame by frame (translation, step 1 of Fig. 9)."""
     flat = pose_from_directions(directions, size.lengths, skeleton)[..., :2]
     shift = np.full((len(flat), 1, 2), np.nan)
     offset = observed.joints - flat
     known = np.isfinite(offset[..., 0]).any(axis=1)
     shift[known, 0] = np.nanmedian(offset[known], axis=1)
     return State(bridge_gaps(shift)[:, 0], directions)
+
+
+def _rolled(
+    directions: Float[np.ndarray, "T B 3"], observed: Observed, size: BodySize, skeleton: Skeleton
+) -> Float[np.ndarray, "T B 3"]:
+    """Poses turned in the image by the one angle that suits all frames (rotation, step 1)."""
+    shown = np.nan_to_num(bone_vectors(observed.joints, skeleton))
+    flat = size.lengths[:, None] * directions[..., :2]
+    along = (flat * shown).sum()
+    across = (flat[..., 0] * shown[..., 1] - flat[..., 1] * shown[..., 0]).sum()
+    turn = np.exp(1j * np.arctan2(across, along))
+    turned = (directions[..., 0] + 1j * directions[..., 1]) * turn
+    return np.stack([turned.real, turned.imag, directions[..., 2]], axis=-1)
 
 
 def _flat(state: State, size: BodySize, skeleton: Skeleton) -> Float[np.ndarray, "T J 2"]:
