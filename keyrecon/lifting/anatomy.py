@@ -28,7 +28,7 @@ UPRIGHT = np.array([0.0, -1.0, -TILT]) / np.hypot(1.0, TILT)
 """Away from the ground, camera axes."""
 _LEAN_FORWARD, _LEAN_SPREAD, _LEAN_ASIDE = 0.13, 0.2, 0.14
 """How far a trunk of length 1 leans, and how much that varies, with room for unknown tilt: its
-mean is 0.09-0.20 and its deviation 0.08-0.26 in running, dancing, jumping and golf alike (CMU
+mean is 0.09-0.20 and its deviation 0.08-0.26 in dancing, kicking, jumping and golf alike (CMU
 motion capture, see `posture`)."""
 
 
