@@ -4,9 +4,10 @@ Joint limits alone leave most depth signs open. How limbs are usually held says 
 before the body, elbows hang beside and behind it, a forward thigh goes with a bent knee. The
 directions of a limb's two bones in the axes of the trunk, taken together, have a mean and a
 covariance, which are tabled here: rounded values over a dance, a kick at a ball, jumping jacks
-with squats and a jog, a forward jump and a golf swing, all weighing the same (CMU motion capture, mocap.cs.cmu.edu:
-05_12, 10_06, 13_30, 13_32, 64_07), left limbs mirrored, spreads widened by 0.2 for other people
-and unsure trunks. Heavy tails (Student) keep rare poses possible.
+with squats and a jog, a forward jump and a golf swing, all weighing the same (CMU
+motion capture, mocap.cs.cmu.edu: 05_12, 10_06, 13_30, 13_32, 64_07), left limbs mirrored,
+spreads widened by 0.2 for other people and unsure trunks. Heavy tails
+(Student) keep rare poses possible.
 """
 
 from typing import Literal
