@@ -102,7 +102,7 @@ def test_the_report_and_exports_are_written(clip, solved, tmp_path):
 
 def test_a_second_run_makes_no_stage_again(clip, solved):
     workspace = Workspace(clip / "project")
-    chosen = project.settings(workspace.options(Options()), float(1.7), None)
+    chosen = project.settings(workspace.options(Options()), 1.7, None)
     project.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
 

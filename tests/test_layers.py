@@ -8,7 +8,8 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "matching", "lifting"}
 OUTER = {"cli", "pipeline", "workspace", "report", "synthetic"}
-BASE = {"records", "body", "camera", "video", "metrics", "errors", "colors", "background", "pictures"}
+BASE = {"records", "body", "camera", "video", "metrics", "errors"}
+BASE |= {"colors", "background", "pictures"}
 
 
 def imported(path):

@@ -211,3 +211,10 @@ def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
     assert np.abs(term(State(np.zeros((5, 2)), upright)).residual).max() < 1e-9
     solved = solve(State(np.zeros((5, 2)), leaning), [term], Smoothness(1.0, LENGTHS), 20, 1e-9)
     assert np.abs(term(solved).residual).max() < 0.01
+
+
+def test_a_step_of_a_foot_that_rests_is_no_slip():
+    residual = np.random.default_rng(0).normal(0, 1e-4, (200, 1, 2))
+    residual[90:96, 0, 1] -= 0.03 * np.sin(np.linspace(0, np.pi, 6))
+    residual[150, 0] += 0.3
+    assert np.flatnonzero(reject_spikes(residual, 9, 4.0, 0.0125)[:, 0]).tolist() == [150]

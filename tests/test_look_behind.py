@@ -21,7 +21,8 @@ def test_what_shows_between_moving_limbs_completes_the_background():
     free = np.ones((60, 80), bool)
     free[5:58, 15:65] = False  # the player never leaves
     paths = np.tile(np.eye(3), (40, 1, 1))
-    background = combine_plate([to_lab(v) for v, _ in views], [free] * 40, paths, 1.0, look_behind=True)
+    looks = [to_lab(v) for v, _ in views]
+    background = combine_plate(looks, [free] * 40, paths, 1.0, look_behind=True)
     off = np.abs(background.plate.astype(int) - to_lab(views[0][1]).astype(int)).max(axis=2)
     assert background.known[~free].mean() > 0.9
     assert np.percentile(off[background.known], 99) <= 6
@@ -34,6 +35,7 @@ def test_what_the_player_always_covers_stays_unknown():
     free = np.zeros((40, 40), bool)
     free[:, :10] = True
     paths = np.tile(np.eye(3), (40, 1, 1))
-    background = combine_plate([to_lab(p) for p in picture], [free] * 40, paths, 1.0, look_behind=True)
+    looks = [to_lab(p) for p in picture]
+    background = combine_plate(looks, [free] * 40, paths, 1.0, look_behind=True)
     assert background.known[:, :10].all()
     assert not background.known[:, 12:].any()

@@ -93,7 +93,8 @@ def lift_motion(  # noqa: PLR0913
         keys.directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
     )
     guide = _place(slerped.directions, observed, size, skeleton)
-    slips = reject_spikes(observed.joints - _flat(guide, size, skeleton), _SPIKE_FRAMES, 4.0)
+    residual = observed.joints - _flat(guide, size, skeleton)
+    slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, options.lengths.track_noise / 2)
     slips[annotations.frames] = False
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
     if options.method == "paper":

@@ -20,19 +20,20 @@ class Observed:
 
 
 def reject_spikes(
-    residual: Float[np.ndarray, "T J 2"], window: int, limit: float
+    residual: Float[np.ndarray, "T J 2"], window: int, limit: float, least: float = 1e-6
 ) -> Bool[np.ndarray, "T J"]:
     """Joints whose residual leaves its running median by more than `limit` robust deviations.
 
     The residual is the difference to any plausible motion, so that fast joints are not taken
-    for slips. Joints that were missing are not counted.
+    for slips. A deviation is at least `least`: a foot that rests most of the time deviates by
+    next to nothing, and its steps are no slips. Joints that were missing are not counted.
     """
     bridged = bridge_gaps(residual)
     off = np.linalg.norm(residual - median_filter(bridged, (window, 1, 1), mode="nearest"), axis=-1)
     known = np.isfinite(off).any(axis=0)
     spread = np.ones(off.shape[1])
     spread[known] = MAD_TO_SIGMA * np.nanmedian(off[:, known], axis=0) / 1.177  # of a 2D length
-    return off > limit * np.maximum(spread, 1e-6)
+    return off > limit * np.maximum(spread, least)
 
 
 def bridge_gaps(values: Float[np.ndarray, "T J D"]) -> Float[np.ndarray, "T J D"]:
