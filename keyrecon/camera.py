@@ -1,36 +1,12 @@
 """Cameras: perspective for rendering, scaled orthography for reconstruction.
 
 Both map points in camera axes (x right, y down, z away) to pixels (x right, y down). Scaled
-orthography, u = s X + o, is what a distant player looks like and what Taylor's method assumes
+orthography, u = s X, is what a distant player looks like and what Taylor's method assumes
 (CVIU 80, 2000); it leaves the depth of the whole body open.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
-
-
-@dataclass(frozen=True, eq=False)
-class PerspectiveCamera:
-    """A pinhole camera."""
-
-    rotation: Float[np.ndarray, "3 3"]
-    """World to camera axes."""
-    center: Float[np.ndarray, "3"]
-    """Position in the world, metres."""
-    focal: float
-    """px"""
-    principal: Float[np.ndarray, "2"]
-    """Principal point, px."""
-
-    def to_camera(self, world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-        """World points in camera axes."""
-        return (world - self.center) @ self.rotation.T
-
-    def project(self, world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 2"]:
-        """Pixels of world points."""
-        return project_perspective(self.to_camera(world), self.focal, self.principal)
 
 
 def project_perspective(
@@ -42,12 +18,13 @@ def project_perspective(
 
 
 def project_orthographic(
-    points: Float[np.ndarray, "T J 3"],
-    scale: Float[np.ndarray, "T"],
-    offset: Float[np.ndarray, "T 2"],
+    points: Float[np.ndarray, "T J 3"], scale: Float[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T J 2"]:
-    """Pixels of points in camera axes under scaled orthography; scale in px per unit."""
-    return scale[:, None, None] * points[..., :2] + offset[:, None]
+    """Pixels of points in camera axes under scaled orthography; scale in px per unit.
+
+    The origin of space projects to pixel (0, 0): where the body is in the picture is in `points`.
+    """
+    return scale[:, None, None] * points[..., :2]
 
 
 def look_at(

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from keyrecon.synthetic.cameras import CameraOptions
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
+from keyrecon.video import open_video
+from keyrecon.video_writer import write_video
 from keyrecon.workspace import Workspace
 
 SIZE = (480, 270)
@@ -136,14 +139,26 @@ def test_a_budget_that_cannot_be_met_says_what_would_do(clip, capsys):
     assert "--budget" in capsys.readouterr().err
 
 
-def test_a_player_who_is_not_there_is_not_found(clip, tmp_path, capsys):
+def test_a_video_without_the_player_is_told_apart(clip, tmp_path, capsys):
+    """The player is there to be clicked on frame 0 and gone for the rest."""
+    with_player = open_video(clip / "video.mp4").frame(0)
+    rng = np.random.default_rng(0)
+    empty = np.full_like(with_player, 90) + rng.integers(0, 6, with_player.shape, np.uint8)
+    write_video(tmp_path / "gone.mp4", [with_player, *[empty] * 39], 30.0)
+    picks = [p for p in read_picks(clip / "picks.json") if p.frame == 12]
     made = tmp_path / "p"
-    keyrecon("new", clip / "video.mp4", "--project", made)
-    keyrecon("pick", made, "--frame", 0, "--head", "5,5", "--foot", "8,120")
-    code = keyrecon("keyframes", made, "--budget", "0.06")
-    assert code in (0, 1)
-    if code:
-        assert "pick" in capsys.readouterr().err
+    assert keyrecon("new", tmp_path / "gone.mp4", "--project", made) == 0
+    shift = known_joints(clip)[0].mean(axis=0) - known_joints(clip)[12].mean(axis=0)
+    Workspace(made).add_picks(
+        [replace(p, frame=0, x=p.x + float(shift[0]), y=p.y + float(shift[1])) for p in picks]
+    )
+    assert keyrecon("keyframes", made, "--budget", "0.06") == 1
+    assert "head" in capsys.readouterr().err
+    assert not (made / "keyframes.json").exists()
+
+
+def known_joints(clip):
+    return read_truth(clip / "truth.npz")["points2d"]
 
 
 def test_joints_of_the_skeleton_are_all_there(solved):

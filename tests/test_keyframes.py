@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.keyframes import keyframes_from_json, keyframes_to_json
-from keyrecon.matching.assignment import find_neighborhoods, find_runs
+from keyrecon.matching.assignment import find_neighborhoods
 from keyrecon.matching.exchange import Goal, exchange_for_coverage
 from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes
 from keyrecon.records import Comparison
@@ -156,10 +156,6 @@ def test_exemplars_choose_as_their_frames_would():
     assert len(by_exemplars.upper.nearest) == 400
     assert (by_exemplars.upper.frames % 2 == 0).all()
     assert by_exemplars.upper.coverage >= 0.95
-
-
-def test_runs_are_the_longest_stretches_of_one_keyframe():
-    assert find_runs(np.array([4, 4, 7, 7, 7, 4])) == [(0, 2), (2, 5), (5, 6)]
 
 
 def test_keyframes_json_gives_back_what_was_written(comparison):

@@ -251,7 +251,7 @@ def test_a_motion_is_lifted_from_keyframes_and_tracks():
     truth, tracks, marks, keys = scene(frames=150, noise=0.005)
     found = lift_motion(tracks, marks, keys, np.full(150, 0.88 * SCALE), 50.0)
     assert aligned_error(found.points3d, truth) < 0.035
-    back = found.scale[:, None, None] * found.points3d[..., :2] + found.offset[:, None]
+    back = found.scale[:, None, None] * found.points3d[..., :2]
     np.testing.assert_allclose(back, found.points2d, atol=1e-6)
 
 

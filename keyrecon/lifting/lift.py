@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
+from keyrecon.camera import project_orthographic
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions
 from keyrecon.lifting.flips import FlipOptions
@@ -53,8 +54,6 @@ class LiftResult:
     """Projection of `points3d`, px."""
     scale: Float[np.ndarray, "T"]
     """px per unit"""
-    offset: Float[np.ndarray, "T 2"]
-    """Where the origin of `points3d` projects, px."""
     lengths: Float[np.ndarray, "B"]
     """Bone lengths, metres or body heights."""
     key_poses: Float[np.ndarray, "K J 3"]
@@ -110,9 +109,8 @@ def lift_motion(  # noqa: PLR0913
     unit = 1.0 if options.height is None else options.height
     return LiftResult(
         points3d=points * unit,
-        points2d=points[..., :2] * size.scale[:, None, None],
+        points2d=project_orthographic(points, size.scale),
         scale=size.scale / unit,
-        offset=np.zeros((len(points), 2)),
         lengths=size.lengths * unit,
         key_poses=pose_from_directions(keys.directions, size.lengths, skeleton) * unit,
         signs=np.where(keys.directions[..., 2] > 0, -1, 1),

@@ -5,8 +5,6 @@ those nearer than beta count as represented (W), and short gaps between these ca
 interpolation (J).
 """
 
-from itertools import pairwise
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -52,10 +50,3 @@ def assign_frames(
     to_keyframes = smoothed[rows]
     nearest, distance = rows[to_keyframes.argmin(axis=0)], to_keyframes.min(axis=0)
     return nearest[comparison.row], np.maximum(distance[comparison.row], detour)
-
-
-def find_runs(nearest: Int[np.ndarray, "T"]) -> list[tuple[int, int]]:
-    """(start, stop) of the longest stretches of frames assigned to the same keyframe."""
-    cuts = np.flatnonzero(np.diff(nearest)) + 1
-    bounds = [0, *cuts.tolist(), len(nearest)]
-    return list(pairwise(bounds))
