@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
-STAGES = {"tracking", "matching", "lifting"}
+STAGES = {"tracking", "matching", "lifting", "golf"}
 OUTER = {"cli", "pipeline", "workspace", "report", "synthetic"}
 BASE = {"records", "body", "camera", "video", "metrics", "errors"}
 BASE |= {"colors", "background", "pictures"}

@@ -1,0 +1,195 @@
+"""What the parts of the swing model hand to one another.
+
+Axis letters: T frames, P segments, N samples of a motion, C components, n rows of residuals.
+Swing axes: origin on the floor midway between the ankles at address, x to the player's right,
+y up, z to the player's back, so that the player looks along -z. The model is right-handed; a
+left-handed player is mirrored on the way in and out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.records import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera that stands still; rough values do."""
+
+    focal: float
+    """px"""
+    principal: Float[np.ndarray, "2"]
+    """Where the optical axis meets the picture, px."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """One captured swing of a right-handed player, in swing axes, metres."""
+
+    name: str
+    joints: Float[np.ndarray, "T 14 3"]
+    """In the order of LSP14."""
+    toes: Float[np.ndarray, "T 2 3"]
+    """Right, left."""
+    club: Float[np.ndarray, "T 2 3"]
+    """Grip between the hands, and club head."""
+    keys: Int[np.ndarray, "4"]
+    """Frames of the key postures: beginning of the upswing, top, ball hit, finish."""
+    fps: float
+    stature: float
+    """Metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionModel:
+    """Swings as mean + sum of alpha_i times component i (CVPR 2005, Eq. 2).
+
+    A posture is one turn per segment relative to its parent, written as a rotation vector about
+    `centre`, and the pelvis's place in swing axes in statures.
+    """
+
+    version: int
+    centre: Float[np.ndarray, "P 3 3"]
+    """Turn about which each segment's rotation vectors are taken."""
+    mean: Float[np.ndarray, "N D"]
+    """D = 3 P + 3: rotation vectors, then the pelvis's place."""
+    components: Float[np.ndarray, "C N D"]
+    """Scaled by their standard deviation: every alpha has unit variance."""
+    keys: Float[np.ndarray, "4"]
+    """Normalised times of the key postures, from 0 to 1."""
+    explained: Float[np.ndarray, "C"]
+    """Share of the variance that the first 1, 2, ... C components explain."""
+    provenance: str
+    """What the model was learnt from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """Local turns of all segments over T frames, with their rates."""
+
+    turns: Float[np.ndarray, "T P 3 3"]
+    """From segment axes to the parent's; the pelvis's parent are the swing axes."""
+    place: Float[np.ndarray, "T 3"]
+    """Pelvis in swing axes, statures."""
+    turn_rates: Float[np.ndarray, "T P 3 K"]
+    """Rotation velocity in the parent's axes by alpha_1 ... alpha_m and mu; K = m + 1."""
+    place_rates: Float[np.ndarray, "T 3 K"]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Sizes of a player, metres; `segments` gives the names and parents."""
+
+    stature: float
+    offsets: Float[np.ndarray, "P 3"]
+    """Origin of each segment in its parent's axes."""
+    joint_segment: Int[np.ndarray, "14"]
+    """Segment that carries each joint of LSP14."""
+    joint_place: Float[np.ndarray, "14 3"]
+    """Joints in the axes of their segment."""
+    club: float
+    """From the grip to the end of the head."""
+
+
+@dataclass(frozen=True, eq=False)
+class Capsules:
+    """Tapered capsules, the volumetric primitives; each belongs to one segment."""
+
+    segment: Int[np.ndarray, "Q"]
+    start: Float[np.ndarray, "Q 3"]
+    """Axis in segment axes, metres."""
+    end: Float[np.ndarray, "Q 3"]
+    radii: Float[np.ndarray, "Q 2"]
+    """At start and end, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class SwingState:
+    """All that is unknown of a filmed swing: S of Eq. 5."""
+
+    alpha: Float[np.ndarray, "C"]
+    mu: Float[np.ndarray, "T"]
+    """Normalised time of every frame, 0-1."""
+    rotation: Float[np.ndarray, "T 3 3"]
+    """From swing axes to camera axes; with `position` G_t of the paper."""
+    position: Float[np.ndarray, "T 3"]
+    """Origin of the swing axes in the camera's, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """All segments in camera axes."""
+
+    origins: Float[np.ndarray, "T P 3"]
+    """Metres."""
+    rotations: Float[np.ndarray, "T P 3 3"]
+    """Segment axes to camera axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """The same surface points in consecutive frames, px."""
+
+    frame: Int[np.ndarray, "n"]
+    """Frame of `start`; `end` is in the next one."""
+    start: Float[np.ndarray, "n 2"]
+    end: Float[np.ndarray, "n 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """What was seen in the video, px; NaN where nothing was."""
+
+    camera: Camera
+    joints: Float[np.ndarray, "T 14 2"]
+    """In the order of LSP14."""
+    spread: Float[np.ndarray, "T 14"]
+    """Standard deviation of each joint."""
+    club: Float[np.ndarray, "T 2 2"]
+    """Hand end and head of the club."""
+    club_spread: Float[np.ndarray, "T"]
+    foreground: tuple[Float[np.ndarray, "_ 2"], ...]
+    """Samples of the player's mask, one array per frame."""
+    away: tuple[Float[np.ndarray, "_ _"], ...]
+    """Distance to the mask in px at a quarter of the resolution, one per frame; may be empty."""
+    matches: Matches
+    keys: Float[np.ndarray, "4"]
+    """Frames of the key postures."""
+    mu: Float[np.ndarray, "T"]
+    """First guess of the normalised time."""
+    left_handed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Errors of one kind, and how each changes with the point it hangs on."""
+
+    values: Float[np.ndarray, "n"]
+    """px or metres, one unit per record."""
+    frame: Int[np.ndarray, "n"]
+    segment: Int[np.ndarray, "n"]
+    """The segment that carries the point."""
+    point: Float[np.ndarray, "n 3"]
+    """Camera axes, metres."""
+    gradient: Float[np.ndarray, "n 3"]
+    """Change of the value by the point."""
+    group: Int[np.ndarray, "n"]
+    """Rows with one number are one error with several coordinates; robust weights go by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSwing:
+    """A swing found in a video."""
+
+    motion: Motion
+    state: SwingState
+    body: Body
+    pose: Pose
+    club: Float[np.ndarray, "T 2 3"]
+    """Grip and head in camera axes, metres."""
+    club_seen: Float[np.ndarray, "T 2 2"]
+    """The same in the picture, px."""
+    keys: Float[np.ndarray, "4"]
+    """Frames in which the fitted motion passes the key postures."""

@@ -1,0 +1,148 @@
+"""The golfer as rigid segments: turns from captured joints, and joints from turns.
+
+Sixteen segments hang on one another by ball joints, pelvis first; the club hangs on the left
+forearm. A segment's axes are those of its parent at rest, where every bone points along `rest`.
+Pelvis and trunk get their axes from two lines each (hips and spine, shoulders and spine). Of any
+other bone only the direction can be seen, so it turns from rest by the shortest way: no twist is
+made up, and the only undefined direction is opposite to rest, where no limb can go.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from keyrecon.body import HIP_BREADTH, LSP14
+from keyrecon.golf.records import Body, Swing
+
+AHEAD_AND_DOWN = (0.0, -0.7071067811865476, -0.7071067811865476)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One rigid part; `end` is the joint at its far end, '' where it has none."""
+
+    name: str
+    parent: int
+    rest: tuple[float, float, float]
+    """Direction of the bone in its own axes; of the parent's at rest."""
+    end: str = ""
+
+
+def _limbs() -> list[Segment]:
+    """Arms and legs, right before left."""
+    rows = [Segment("pelvis", -1, (0.0, 1.0, 0.0)), Segment("trunk", 0, (0.0, 1.0, 0.0), "neck"),
+            Segment("head", 1, (0.0, 1.0, 0.0), "head_top")]  # fmt: skip
+    chains = (
+        ("clavicle", 1, None, "shoulder"), ("upper_arm", 3, AHEAD_AND_DOWN, "elbow"),
+        ("forearm", 5, AHEAD_AND_DOWN, "wrist"), ("thigh", 0, (0.0, -1.0, 0.0), "knee"),
+        ("shank", 9, (0.0, -1.0, 0.0), "ankle"), ("foot", 11, (0.0, 0.0, -1.0), ""),
+    )  # fmt: skip
+    for name, parent, rest, end in chains:
+        for index, side in enumerate(("right", "left")):
+            outwards = (1.0, 0.0, 0.0) if index == 0 else (-1.0, 0.0, 0.0)
+            above = parent if parent < 2 else parent + index
+            rows.append(Segment(f"{side}_{name}", above, rest or outwards, end and f"{side}_{end}"))
+    return [*rows, Segment("club", 8, AHEAD_AND_DOWN)]
+
+
+SEGMENTS = tuple(_limbs())
+"""Parents before children."""
+NAMES = tuple(segment.name for segment in SEGMENTS)
+PARENTS = tuple(segment.parent for segment in SEGMENTS)
+REST = np.array([segment.rest for segment in SEGMENTS])
+CLUB = NAMES.index("club")
+
+ANKLE_HEIGHT = 0.039
+"""Ankle above the floor as a fraction of stature (Winter)."""
+GRIP = 0.045
+"""From the left wrist along the forearm to between the hands, as a fraction of stature."""
+CLUB_LENGTH = 0.93
+"""Metres from between the hands to the end of a mid iron's head."""
+Vectors = Float[np.ndarray, "*n 3"]
+
+
+def size_body(stature: float, club: float = CLUB_LENGTH) -> Body:
+    """A player with average proportions (Winter) of a given height in metres."""
+    lengths = {LSP14.names[c]: LSP14.proportions[c] for _, c in LSP14.bones}
+    half_hips = HIP_BREADTH / 2
+    lengths["neck"] = np.sqrt(lengths["right_hip"] ** 2 - half_hips**2)
+    offsets = np.zeros((len(SEGMENTS), 3))
+    for index, segment in enumerate(SEGMENTS[1:], start=1):
+        above = SEGMENTS[segment.parent]
+        if above.end:
+            offsets[index] = lengths[above.end] * np.array(above.rest)
+        elif segment.name.endswith("thigh"):
+            offsets[index, 0] = half_hips if segment.name.startswith("right") else -half_hips
+    offsets[CLUB] += GRIP * REST[NAMES.index("left_forearm")]
+    ends = {s.end: i for i, s in enumerate(SEGMENTS) if s.end}
+    carriers = [ends.get(name, 0) for name in LSP14.names]
+    rows = zip(LSP14.names, carriers, strict=True)
+    places = np.array([lengths.get(n, 0.0) * REST[c] for n, c in rows])
+    for side, sign in (("right", 1), ("left", -1)):
+        places[LSP14.index(f"{side}_hip")] = [sign * half_hips, 0, 0]
+    return Body(stature, stature * offsets, np.array(carriers), stature * places, club)
+
+
+def turns_from_swing(swing: Swing) -> tuple[Float[np.ndarray, "T P 3 3"], Vectors]:
+    """Turn of every segment relative to its parent, and the pelvis's place in statures."""
+
+    def joint(name: str) -> Vectors:
+        return swing.joints[:, LSP14.index(name)]
+
+    pelvis = (joint("right_hip") + joint("left_hip")) / 2
+    spine = joint("neck") - pelvis
+    world = np.empty((len(swing.joints), len(SEGMENTS), 3, 3))
+    world[:, 0] = _axes(joint("right_hip") - joint("left_hip"), spine, along_second=False)
+    world[:, 1] = _axes(joint("right_shoulder") - joint("left_shoulder"), spine, along_second=True)
+    turns = world.copy()
+    turns[:, 1] = np.swapaxes(world[:, 0], 1, 2) @ world[:, 1]
+    ways = _bone_directions(swing)
+    for index, segment in enumerate(SEGMENTS[2:], start=2):
+        above = world[:, segment.parent]
+        local = np.einsum("tji,tj->ti", above, ways[segment.name])
+        turns[:, index] = shortest_turn(np.array(segment.rest), local)
+        world[:, index] = above @ turns[:, index]
+    return turns, pelvis / swing.stature
+
+
+def _bone_directions(swing: Swing) -> dict[str, Vectors]:
+    """From the near to the far end of each segment behind the trunk."""
+    ends = {segment.name: segment.end for segment in SEGMENTS}
+    ways = {"club": swing.club[:, 1] - swing.club[:, 0]}
+    for segment in SEGMENTS[2:-1]:
+        side, _, part = segment.name.partition("_")
+        if part == "foot":
+            ankle = swing.joints[:, LSP14.index(f"{side}_ankle")]
+            ways[segment.name] = swing.toes[:, ("right", "left").index(side)] - ankle
+            continue
+        start = f"{side}_hip" if part == "thigh" else ends[NAMES[segment.parent]]
+        end = swing.joints[:, LSP14.index(segment.end)]
+        ways[segment.name] = end - swing.joints[:, LSP14.index(start)]
+    return ways
+
+
+def _axes(across: Vectors, up: Vectors, along_second: bool) -> Float[np.ndarray, "T 3 3"]:
+    """Axes x, y, z as columns from two lines; one is kept, the other made square to it."""
+    back = _unit(np.cross(across, up))
+    if along_second:
+        y = _unit(up)
+        x = np.cross(y, back)
+    else:
+        x = _unit(across)
+        y = np.cross(back, x)
+    return np.stack([x, y, back], axis=2)
+
+
+def shortest_turn(rest: Float[np.ndarray, "3"], to: Vectors) -> Float[np.ndarray, "n 3 3"]:
+    """The rotation without twist that brings `rest` to the directions `to`."""
+    way = _unit(to)
+    axis = np.cross(rest, way)
+    sine = np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = np.arctan2(sine[:, 0], way @ rest)
+    return Rotation.from_rotvec(axis / np.maximum(sine, 1e-12) * angle[:, None]).as_matrix()
+
+
+def _unit(vectors: Vectors) -> Vectors:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
