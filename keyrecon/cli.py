@@ -17,6 +17,7 @@ from keyrecon.console import show
 from keyrecon.errors import KeyreconError
 from keyrecon.pipeline import Options
 from keyrecon.records import Pick
+from keyrecon.serving import serve_annotator
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 from keyrecon.workspace import Workspace
 
@@ -116,6 +117,27 @@ def keyframes(
     """
     chosen = {"budget": budget, "coverage": coverage, "reach": reach}
     print(work.find_keyframes(Workspace(project, force), options, chosen, show))
+
+
+@app.command
+def annotate(
+    project: Positional[Path],
+    port: int = 0,
+    host: str = "127.0.0.1",
+    no_browser: Annotated[bool, arg(name="no-browser")] = False,
+) -> None:
+    """Open the page on which a person picks colours and marks the keyframes.
+
+    The page runs on this machine and needs no network. Every edit is kept at once. Stop the
+    command with Ctrl+C.
+
+    Args:
+        project: Project folder.
+        port: Port of the address; any free one by default.
+        host: Address to listen on; any other than this machine's own lets others in.
+        no_browser: Only print the address.
+    """
+    serve_annotator(Workspace(project), (host, port), not no_browser, print)
 
 
 @app.command(name="import")

@@ -149,9 +149,10 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
     video = workspace.video()
     size = (video.width, video.height)
     merged = read_annotations(file, workspace.skeleton, len(video), size)
-    if workspace.annotations_file.is_file():
-        merged = _merge(workspace, load_annotations(workspace, video), merged, replacing)
-    write_coco(workspace.annotations_file, merged, size)
+    with workspace.exclusive():
+        if workspace.annotations_file.is_file():
+            merged = _merge(workspace, load_annotations(workspace, video), merged, replacing)
+        write_coco(workspace.annotations_file, merged, size)
     warnings = [*joints_outside(merged, size), *implausible_bones(merged)]
     return "\n".join(
         [

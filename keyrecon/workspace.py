@@ -14,7 +14,8 @@ What a person made is written durably and never replaced by something that does 
 import json
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -159,10 +160,23 @@ class Workspace:
 
     def add_picks(self, picks: Sequence[Pick]) -> tuple[Pick, ...]:
         """Add clicks to those there are."""
-        old = self.picks() if self.picks_file.is_file() else ()
-        together = tuple(dict.fromkeys((*old, *picks)))
-        write_picks(self.picks_file, together)
+        with self.exclusive():
+            old = self.picks() if self.picks_file.is_file() else ()
+            together = tuple(dict.fromkeys((*old, *picks)))
+            write_picks(self.picks_file, together)
         return together
+
+    @contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Hold the project's files that a person made while they are read and replaced.
+
+        Commands and the annotator may change one project at the same time; each sees the
+        other's marks whole.
+        """
+        from filelock import FileLock
+
+        with FileLock(self.folder / ".change.lock"):
+            yield
 
     def put_aside(self, file: Path) -> None:
         """Keep a copy of a file that a person made, before it changes."""

@@ -189,14 +189,18 @@ def _annotation(
     }
 
 
-def write_coco(path: Path, annotations: Annotations, size: tuple[int, int]) -> None:
-    """Write marks durably, one annotation to a line."""
-    data = annotations_to_coco(annotations, size)
+def coco_text(annotations: Annotations, size: tuple[int, int]) -> str:
+    """Marks as the text of a COCO file, one annotation to a line."""
     parts = []
-    for key, value in data.items():
+    for key, value in annotations_to_coco(annotations, size).items():
         rows = value if isinstance(value, list) else [value]
         body = ",\n  ".join(json.dumps(row, allow_nan=False) for row in rows)
         parts.append(
             f' "{key}": [\n  {body}\n ]' if isinstance(value, list) else f' "{key}": {body}'
         )
-    write_durably(path, "{\n" + ",\n".join(parts) + "\n}\n")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def write_coco(path: Path, annotations: Annotations, size: tuple[int, int]) -> None:
+    """Write marks durably."""
+    write_durably(path, coco_text(annotations, size))

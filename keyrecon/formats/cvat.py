@@ -7,8 +7,9 @@ number at the end of the picture's name is the frame. Documents with a DTD are r
 
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
 
+import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
@@ -68,3 +69,25 @@ def _marks(figure: Element, frame: int, sheet: Sheet) -> Iterator[Mark]:
             )
         hidden = point.get("occluded", "0") == "1"
         yield Mark(frame, point.attrib["label"], float(x), float(y), not hidden)
+
+
+def cvat_text(annotations: Annotations, size: tuple[int, int]) -> str:
+    """Marks as the text of a 'CVAT for images 1.1' file; pictures are named by their frame."""
+    root = Element("annotations")
+    SubElement(root, "version").text = "1.1"
+    for row, frame in enumerate(annotations.frames.tolist()):
+        told = {"id": str(row), "name": f"frame_{frame:06d}.png"}
+        told |= {"width": str(size[0]), "height": str(size[1])}
+        image = SubElement(root, "image", told)
+        _add_points(SubElement(image, "skeleton", {"label": "person"}), annotations, row)
+    indent(root)
+    return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_points(figure: Element, annotations: Annotations, row: int) -> None:
+    for joint, name in enumerate(annotations.skeleton.names):
+        place = annotations.joints[row, joint]
+        absent, hidden = bool(np.isnan(place).any()), not annotations.visible[row, joint]
+        x, y = np.nan_to_num(place).tolist()
+        told = {"label": name, "outside": str(int(absent)), "occluded": str(int(hidden))}
+        SubElement(figure, "points", {**told, "points": f"{x:.2f},{y:.2f}"})

@@ -12,6 +12,8 @@ import io
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.marks import Mark, Sheet, annotations_from_marks, frame_of_picture
@@ -81,3 +83,21 @@ def _marks(row: list[str], first: int, columns: Columns, path: Path) -> Iterator
         sure = float(row[column["likelihood"]] or 0) if "likelihood" in column else 1.0
         if (x and y and x.lower() != "nan" and y.lower() != "nan") and sure >= SURE:
             yield Mark(frame, part, float(x), float(y), True)
+
+
+def dlc_text(annotations: Annotations, _: tuple[int, int]) -> str:
+    """Marks as the text of a CollectedData CSV; pictures are named by their frame."""
+    names, blank = annotations.skeleton.names, ["", ""]
+    heading = [
+        ["scorer", *blank, *["keyrecon"] * (2 * len(names))],
+        ["bodyparts", *blank, *(name for name in names for _ in "xy")],
+        ["coords", *blank, *["x", "y"] * len(names)],
+    ]
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerows(heading)
+    for frame, joints in zip(annotations.frames.tolist(), annotations.joints, strict=True):
+        if np.isfinite(joints).any():
+            places = ["" if np.isnan(n) else f"{n:.4f}" for n in joints.ravel()]
+            writer.writerow(["labeled-data", "keyframes", f"frame_{frame:06d}.png", *places])
+    return file.getvalue()

@@ -22,8 +22,13 @@ def read_picks(path: Path) -> tuple[Pick, ...]:
         ) from fault
 
 
-def write_picks(path: Path, picks: Sequence[Pick]) -> None:
-    """Write clicks, one to a line."""
+def picks_text(picks: Sequence[Pick]) -> str:
+    """Clicks as the text of a file, one to a line."""
     rows = [{"frame": p.frame, "part": p.part, "x": p.x, "y": p.y} for p in picks]
     body = ",\n  ".join(json.dumps(row) for row in rows)
-    write_durably(path, f'{{"picks": [\n  {body}\n]}}\n')
+    return f'{{"picks": [\n  {body}\n]}}\n'
+
+
+def write_picks(path: Path, picks: Sequence[Pick]) -> None:
+    """Write clicks durably."""
+    write_durably(path, picks_text(picks))

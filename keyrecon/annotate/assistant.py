@@ -1,0 +1,57 @@
+"""What the page shows that must be computed; filled in by keyrecon.assist.
+
+The server knows these functions only by their signatures. A field left None means that there is
+no such help, and its route answers with nothing. Results are ready for JSON (no NaN). The
+server calls them in worker threads, one call of each kind at a time; KeyreconError is shown.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import wraps
+from threading import Lock
+from typing import Any
+
+from keyrecon.records import Annotations, Pick
+
+Json = dict[str, Any]
+Marks = dict[str, list[float]]
+"""[x, y, v] of joints by name."""
+Signs = dict[str, int]
+"""1 or -1 of limbs by name."""
+
+
+@dataclass(frozen=True)
+class Assistant:
+    """Help that can be asked for."""
+
+    keyframes: Callable[[dict[int, str]], Json] | None = None
+    """Own frames -> {"frames": {frame: {"stands_for", "why"}}, "height_px"}."""
+    ghost: Callable[[Annotations, int], Json] | None = None
+    """Where the joints of a frame probably are, from the frames annotated so far."""
+    pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None
+    """A frame's body in space from its marks and signs, and the most plausible alternatives."""
+    checks: Callable[[Annotations, set[tuple[int, str]]], list[Json]] | None = None
+    """Marks to look at again, most suspicious first; the set holds joints said to be absent."""
+    suggest: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
+    """Frames where one more annotation would help most, none of those taken already."""
+    preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
+    """Head and feet found on a few frames with these picks."""
+    backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None
+    """How much each pixel of a frame looks like a part: RGBA, (h, w, 4)."""
+
+
+def one_at_a_time(assistant: Assistant) -> Assistant:
+    """The same help, but a second question of a kind waits for the answer to the first."""
+    given = {field.name: getattr(assistant, field.name) for field in fields(assistant)}
+    return Assistant(**{name: _queued(ask) for name, ask in given.items() if ask is not None})
+
+
+def _queued(ask: Callable[..., Any]) -> Callable[..., Any]:
+    lock = Lock()
+
+    @wraps(ask)
+    def asked(*arguments: object) -> Any:
+        with lock:
+            return ask(*arguments)
+
+    return asked

@@ -1,0 +1,89 @@
+"""Everything a person decides, as one flat sheet of cells, and what a change of it is.
+
+A cell is named by a tuple and holds a plain value; a cell that is not there is not decided:
+
+    ("mark", frame, joint)    [x, y, v], v = 2 visible, 1 placed though hidden, 0 absent
+    ("nearer", frame, limb)   1 the child end is nearer the camera, -1 farther
+    ("pick", id)              {"frame", "part", "x", "y"}, a click on a colour
+    ("own", frame)            "upper", "lower" or "both": a keyframe that the person added
+    ("lock", frame)           True: a keyframe that no new choice may drop
+
+A change tells what stood in a cell and what shall stand there. That makes three things one line
+each: to apply it, to take it back, and to see that somebody else was faster.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+Key = tuple[str | int, ...]
+Value = Any
+Cells = dict[Key, Value]
+FILE_CELLS = ("mark", "nearer")
+"""Kinds of cells that annotations.json holds."""
+
+
+class Change(NamedTuple):
+    """One cell before and after; None: not there."""
+
+    key: Key
+    before: Value
+    after: Value
+
+
+def apply_in_place(cells: Cells, changes: Iterable[Change]) -> None:
+    """Carry changes out on a sheet."""
+    for change in changes:
+        if change.after is None:
+            cells.pop(change.key, None)
+        else:
+            cells[change.key] = change.after
+
+
+def invert_changes(changes: Iterable[Change]) -> tuple[Change, ...]:
+    """What takes the changes back."""
+    return tuple(Change(key, after, before) for key, before, after in reversed([*changes]))
+
+
+def is_stale(cells: Mapping[Key, Value], changes: Iterable[Change]) -> bool:
+    """Whether a cell holds neither what the change expects nor what it wants."""
+    return any(cells.get(c.key) not in (c.before, c.after) for c in changes)
+
+
+def effective(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...]:
+    """The changes that do something, with what really stood there before."""
+    now = ((key, cells.get(key), after) for key, _, after in changes)
+    return tuple(Change(*change) for change in now if change[1] != change[2])
+
+
+def difference(before: Mapping[Key, Value], after: Mapping[Key, Value]) -> tuple[Change, ...]:
+    """The changes that lead from one sheet to another."""
+    keys = sorted({*before, *after}, key=repr)
+    found = (Change(key, before.get(key), after.get(key)) for key in keys)
+    return tuple(change for change in found if change.before != change.after)
+
+
+def of_kind(cells: Mapping[Key, Value], *kinds: str) -> Cells:
+    """The cells of some kinds."""
+    return {key: value for key, value in cells.items() if key[0] in kinds}
+
+
+def by_frame(cells: Mapping[Key, Value], kind: str) -> dict[str, Any]:
+    """Cells of one kind as {frame: {name: value}} or {frame: value}, frames as text for JSON."""
+    found: dict[str, Any] = {}
+    for (_, frame, *name), value in of_kind(cells, kind).items():
+        if name:
+            found.setdefault(str(frame), {})[name[0]] = value
+        else:
+            found[str(frame)] = value
+    return found
+
+
+def picks_of(cells: Mapping[Key, Value]) -> list[dict[str, Any]]:
+    """The picks with their ids, in order of frame."""
+    found = ({"id": key[1], **value} for key, value in of_kind(cells, "pick").items())
+    return sorted(found, key=lambda pick: (pick["frame"], pick["part"], pick["x"], pick["y"]))
+
+
+def marked_frames(cells: Mapping[Key, Value]) -> Iterator[int]:
+    """Frames on which the person decided anything about the body."""
+    return (int(key[1]) for key in of_kind(cells, *FILE_CELLS))

@@ -1,0 +1,133 @@
+"""All that the server works with for one project, and what its state looks like to the page."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from keyrecon.annotate.assistant import Assistant, one_at_a_time
+from keyrecon.annotate.cells import Change, by_frame, picks_of
+from keyrecon.annotate.describe import (
+    describe_keyframes,
+    describe_skeleton,
+    describe_video,
+    halves_by_frame,
+)
+from keyrecon.annotate.edits import Limits
+from keyrecon.annotate.events import Events
+from keyrecon.annotate.history import Entry, State
+from keyrecon.annotate.jobs import Command, Job, Jobs
+from keyrecon.annotate.keeping import KeptKeyframes
+from keyrecon.annotate.stills import Stills
+from keyrecon.annotate.store import Store
+from keyrecon.workspace import Workspace
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Desk:
+    """One project, open for annotation."""
+
+    workspace: Workspace
+    limits: Limits
+    store: Store
+    stills: Stills
+    jobs: Jobs
+    events: Events
+    keyframes: KeptKeyframes
+    assistant: Assistant
+
+    def close(self) -> None:
+        """Put everything away."""
+        self.jobs.close()
+        self.stills.close()
+        self.store.close()
+
+
+def open_desk(workspace: Workspace, assistant: Assistant, commands: Mapping[str, Command]) -> Desk:
+    """Open a project; KeyreconError when its files cannot be read or it is open elsewhere."""
+    video = workspace.video()
+    limits = Limits(workspace.skeleton, len(video), (video.width, video.height))
+    store, events = Store(workspace, limits), Events()
+    store.listen(lambda entries: events.tell(describe_entries(entries)))
+    return Desk(
+        workspace=workspace,
+        limits=limits,
+        store=store,
+        stills=Stills(video, workspace.folder / "cache" / "stills"),
+        jobs=Jobs(commands, lambda job: events.tell({"job": asdict(job)})),
+        events=events,
+        keyframes=KeptKeyframes(workspace, store),
+        assistant=one_at_a_time(assistant),
+    )
+
+
+def describe_project(desk: Desk) -> Json:
+    """What does not change from one edit to the next."""
+    keyframes, cells = desk.keyframes.current(), desk.store.state.cells
+    own = {int(frame): half for frame, half in by_frame(cells, "own").items()}
+    known = desk.assistant.keyframes(own) if desk.assistant.keyframes and keyframes else {}
+    asked = describe_keyframes(keyframes, cells, known.get("frames", {}))
+    desk.stills.prepare(row["frame"] for row in asked)
+    return {
+        **describe_video(desk.stills.video, desk.workspace.folder.resolve().name),
+        **describe_skeleton(desk.limits.skeleton),
+        "stills": desk.stills.identity,
+        "keyframes": asked,
+        "height_px": known.get("height_px"),
+        "has": {
+            "picks": bool(picks_of(cells)),
+            "keyframes": bool(halves_by_frame(keyframes)),
+            "motion": desk.workspace.motion_file.is_file(),
+        },
+    }
+
+
+def describe_state(state: State) -> Json:
+    """Everything that edits change."""
+    cells = state.cells
+    return {
+        "revision": state.revision,
+        "marks": by_frame(cells, "mark"),
+        "nearer": by_frame(cells, "nearer"),
+        "picks": picks_of(cells),
+        "own": by_frame(cells, "own"),
+        "locked": by_frame(cells, "lock"),
+        "undo": len(state.undoable),
+        "redo": len(state.redoable),
+    }
+
+
+def describe_entries(entries: Iterable[Entry]) -> Json:
+    """Accepted edits as news."""
+    told = [
+        {
+            "revision": entry.revision,
+            "id": entry.id,
+            "role": entry.role,
+            "kind": entry.label,
+            "changes": describe_changes(entry.changes),
+        }
+        for entry in entries
+    ]
+    return {"revision": told[-1]["revision"], "edits": told}
+
+
+def describe_changes(changes: Iterable[Change]) -> list[Json]:
+    """Cells as the page names them."""
+    second: dict[str, Callable[[Any], Json]] = {
+        "mark": lambda key: {"frame": key[1], "joint": key[2]},
+        "nearer": lambda key: {"frame": key[1], "limb": key[2]},
+        "pick": lambda key: {"id": key[1]},
+        "own": lambda key: {"frame": key[1]},
+        "lock": lambda key: {"frame": key[1]},
+    }
+    return [
+        {"kind": key[0], **second[str(key[0])](key), "from": before, "to": after}
+        for key, before, after in changes
+    ]
+
+
+def describe_job(job: Job) -> Json:
+    """How far a job is."""
+    return asdict(job)

@@ -1,0 +1,125 @@
+"""The journal of edits on disk: an SQLite database in WAL mode with synchronous=FULL.
+
+Why SQLite and not a text file with fsync: a batch of edits is one transaction, so it stands
+whole or not at all; every frame of the write-ahead log has a checksum, so the torn end that a
+loss of power leaves is dropped at the next start; and a full disk rolls back to what was there.
+With synchronous=FULL the log has reached the disk before a commit returns: what was
+acknowledged survives kill -9 and a loss of power. All of it is the standard library's.
+
+Rows are only ever added. `notes` holds small facts beside them: which revision each file shows.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from keyrecon.annotate.cells import Change
+from keyrecon.annotate.history import Entry
+from keyrecon.errors import KeyreconError
+
+VERSION = 1
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS entries (
+    revision INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, role TEXT NOT NULL, of INTEGER,
+    label TEXT NOT NULL, changes TEXT NOT NULL, at TEXT DEFAULT CURRENT_TIMESTAMP);
+CREATE TABLE IF NOT EXISTS notes (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+"""
+
+
+class NotSaved(KeyreconError):
+    """An edit that could not be made durable; the page keeps it and sends it again."""
+
+
+class Journal:
+    """Entries and notes in one file; callers see to it that one thread writes at a time."""
+
+    def __init__(self, path: Path) -> None:
+        """Open or begin the journal at `path`; KeyreconError for a file that is none."""
+        self.path = path
+        try:
+            self._base = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+            self._base.execute("PRAGMA journal_mode=WAL")
+            self._base.execute("PRAGMA synchronous=FULL")
+            version = self._base.execute("PRAGMA user_version").fetchone()[0]
+            if version not in (0, VERSION):
+                raise KeyreconError(
+                    f"{path} was written by a newer keyrecon (journal version {version}); "
+                    "use that one."
+                )
+            self._base.executescript(SCHEMA + f"PRAGMA user_version={VERSION};")
+        except sqlite3.Error as fault:
+            raise KeyreconError(
+                f"{path} cannot be used as a journal of edits ({fault}). Free some space if the "
+                "disk is full; if the file is damaged, move it away: the marks themselves are in "
+                "annotations.json, only undo is lost."
+            ) from fault
+
+    def entries(self, up_to: int | None = None) -> Iterator[Entry]:
+        """All entries in order, or those up to a revision."""
+        rows = self._base.execute(
+            "SELECT revision, id, role, of, label, changes FROM entries "
+            "WHERE revision <= ? ORDER BY revision",
+            (up_to if up_to is not None else 2**62,),
+        )
+        return (_entry(*row) for row in rows)
+
+    def entry(self, revision: int) -> Entry:
+        """One entry."""
+        row = self._base.execute(
+            "SELECT revision, id, role, of, label, changes FROM entries WHERE revision = ?",
+            (revision,),
+        ).fetchone()
+        return _entry(*row)
+
+    def knows(self, edit_id: str) -> bool:
+        """Whether an edit with this id was accepted before."""
+        query = "SELECT 1 FROM entries WHERE id = ?"
+        return self._base.execute(query, (edit_id,)).fetchone() is not None
+
+    def append(self, entries: Iterable[Entry], notes: Mapping[str, str]) -> None:
+        """Add entries and replace notes, all or none; they are on the disk when this returns."""
+        rows = [
+            (e.revision, e.id, e.role, e.of, e.label, json.dumps(e.changes, allow_nan=False))
+            for e in entries
+        ]
+        with self._transaction():
+            self._base.executemany(
+                "INSERT INTO entries (revision, id, role, of, label, changes) "
+                "VALUES (?, ?, ?, ?, ?, ?)",
+                rows,
+            )
+            self._base.executemany("REPLACE INTO notes VALUES (?, ?)", notes.items())
+
+    def note(self, name: str) -> str | None:
+        """A fact noted earlier."""
+        row = self._base.execute("SELECT value FROM notes WHERE name = ?", (name,)).fetchone()
+        return row[0] if row else None
+
+    def close(self) -> None:
+        """Fold the log into the database and let go of it."""
+        self._base.close()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """One write that stands whole or not at all; NotSaved where the disk refuses it."""
+        try:
+            self._base.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._base.execute("COMMIT")
+            except BaseException:
+                if self._base.in_transaction:
+                    self._base.execute("ROLLBACK")
+                raise
+        except sqlite3.OperationalError as fault:
+            raise NotSaved(
+                f"{self.path} could not be written ({fault}). Free some space: the page keeps the "
+                "edit and sends it again."
+            ) from fault
+
+
+def _entry(revision: int, id_: str, role: str, of: int | None, label: str, changes: str) -> Entry:
+    told = tuple(Change(tuple(key), old, new) for key, old, new in json.loads(changes))
+    return Entry(revision, id_, role, of, label, told)

@@ -1,0 +1,48 @@
+"""The keyframes that were chosen, and what happens when a new choice replaces them.
+
+A person's work must not slip out of sight because the program chose again: a keyframe that is
+locked or bears marks, and that the new choice leaves out, stays in the list as one of the
+person's own.
+"""
+
+import json
+
+from keyrecon.annotate.cells import Change, by_frame, marked_frames
+from keyrecon.annotate.describe import halves_by_frame
+from keyrecon.annotate.store import Store
+from keyrecon.formats.keyframes import keyframes_from_json
+from keyrecon.records import Keyframes
+from keyrecon.workspace import Workspace
+
+
+class KeptKeyframes:
+    """keyframes.json as it is now; re-read when it changes."""
+
+    def __init__(self, workspace: Workspace, store: Store) -> None:
+        """Begin with what the store remembers of the last choice."""
+        self._file, self._store = workspace.keyframes_file, store
+        self._read: tuple[tuple[int, int], Keyframes] | None = None
+        self.current()
+
+    def current(self) -> Keyframes | None:
+        """The choice there is; KeyreconError for a file that cannot be read."""
+        if not self._file.is_file():
+            return None
+        status = self._file.stat()
+        signature = (status.st_mtime_ns, status.st_size)
+        if self._read is None or self._read[0] != signature:
+            found = keyframes_from_json(self._file.read_text())
+            self._keep_worked_on(halves_by_frame(found))
+            self._read = (signature, found)
+        return self._read[1]
+
+    def _keep_worked_on(self, chosen: dict[int, str]) -> None:
+        noted = self._store.note("keyframes")
+        before = {int(frame): half for frame, half in json.loads(noted or "{}").items()}
+        if before == chosen:
+            return
+        cells = self._store.state.cells
+        valued = {*marked_frames(cells), *map(int, by_frame(cells, "lock"))}
+        dropped = [f for f in before if f in valued and f not in chosen]
+        keep = [Change(("own", f), None, before[f]) for f in dropped if ("own", f) not in cells]
+        self._store.apply("keep", keep, role="fixed", notes={"keyframes": json.dumps(chosen)})

@@ -1,0 +1,140 @@
+"""Files that always show the state: annotations.json (COCO) and picks.json.
+
+The journal is what is true; the files are what other programs read and may change. Before each
+edit, and once a second, a file that is not as we left it is read and its difference from what we
+had written is taken in as one more edit, so that `keyrecon import` and an editor count like
+another page. Which version we had written is noted in the same transaction as the edits: the
+`wanted` one, and the one `shown` until then. A kill between the two leaves the older file, which
+is known by its digest and simply brought up to date.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from keyrecon.annotate.cells import Cells, Change, difference
+from keyrecon.annotate.journal import NotSaved
+from keyrecon.durable import write_durably
+from keyrecon.errors import KeyreconError
+
+Version = tuple[int, str]
+"""Revision that a file shows, and the digest of its text."""
+Signature = tuple[int, int, int] | None
+UNKNOWN: Version = (0, "")
+
+
+@dataclass(frozen=True)
+class FileForm:
+    """How some cells look as a file."""
+
+    path: Path
+    kinds: tuple[str, ...]
+    """Kinds of cells that concern the file."""
+    pick_out: Callable[[Cells], Cells]
+    """The cells of the sheet that the file holds."""
+    write: Callable[[Cells], str]
+    """The sheet as text."""
+    read: Callable[[Cells], Cells]
+    """What the file holds; of equal values the keys of the cells given are used."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A version of a file that is still to be written."""
+
+    version: Version
+    text: str
+
+
+class Mirror:
+    """One file, what we last wrote into it, and what it should show next."""
+
+    def __init__(self, form: FileForm, note: str | None) -> None:
+        """Begin with what the journal noted about the file."""
+        self.form = form
+        told = json.loads(note) if note else {}
+        self.shown: Version = tuple(told.get("shown", UNKNOWN))
+        self.wanted: Version = tuple(told.get("wanted", UNKNOWN))
+        self._text: str | None = None
+        self._seen: Signature = None
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.form.path.name
+
+    @property
+    def is_new(self) -> bool:
+        """Whether the journal has never written this file."""
+        return self.wanted == UNKNOWN
+
+    def outside_changes(self, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
+        """What another program changed in the file since we wrote it; `at` recalls a revision.
+
+        Raises NotSaved for a file that cannot be read: nothing is written over it.
+        """
+        signature = _signature(self.form.path)
+        if signature is None or signature == self._seen:
+            return ()
+        digest = _digest(self.form.path.read_bytes())
+        ours = {version[1]: version for version in (self.shown, self.wanted)}
+        changes: tuple[Change, ...] = ()
+        if digest in ours:
+            self.shown = ours[digest]
+        else:
+            changes = self._read(current, at)
+        self._seen = signature
+        return changes
+
+    def _read(self, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
+        try:
+            found = self.form.read(current)
+        except KeyreconError as fault:
+            raise NotSaved(
+                f"{self.name} was changed by another program and cannot be read ({fault}). Mend "
+                "the file, or move it away to have it written anew from what this page knows."
+            ) from fault
+        known = {version[0] for version in (self.wanted, self.shown) if version != UNKNOWN} or {0}
+        bases = [self.form.pick_out(at(revision)) for revision in known]
+        self.shown = UNKNOWN
+        return min((difference(base, found) for base in bases), key=len)
+
+    def plan(self, cells: Cells, revision: int) -> Plan | None:
+        """What the file shall show after an edit; None while there is nothing to write."""
+        if self.is_new and not self.form.pick_out(cells):
+            return None
+        text = self.form.write(cells)
+        return Plan((revision, _digest(text.encode())), text)
+
+    def note(self, plan: Plan) -> str:
+        """What the journal shall know once the plan is accepted."""
+        return json.dumps({"shown": self.shown, "wanted": plan.version})
+
+    def adopt(self, plan: Plan) -> None:
+        """The plan is in the journal; `catch_up` carries it out."""
+        self.wanted, self._text = plan.version, plan.text
+
+    def catch_up(self, cells: Cells) -> None:
+        """Write the file where it does not show what it should; NotSaved if that fails."""
+        if self.is_new or (self.shown[1] == self.wanted[1] and self.form.path.exists()):
+            return
+        try:
+            write_durably(self.form.path, self._text or self.form.write(cells))
+        except KeyreconError as fault:
+            raise NotSaved(str(fault)) from fault
+        self.shown, self._text = self.wanted, None
+        self._seen = _signature(self.form.path)
+
+
+def _signature(path: Path) -> Signature:
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,153 @@
+"""The annotator's server: the route table, and what turns a question into an answer.
+
+Routes lead to plain functions (questions.py), which run in worker threads; bodies are parsed
+against a declared type before. Everything goes through the guard first.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from keyrecon.annotate import questions as ask
+from keyrecon.annotate.desk import Desk
+from keyrecon.annotate.edits import EditList
+from keyrecon.annotate.guard import Door, Guard
+from keyrecon.annotate.journal import NotSaved
+from keyrecon.errors import KeyreconError
+
+PAGE = Path(__file__).parent / "page"
+TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+
+
+@dataclass(frozen=True)
+class Way:
+    """One line of the route table."""
+
+    method: str
+    path: str
+    answer: Callable[..., Any]
+    body: type | None = None
+
+
+WAYS = (
+    Way("GET", "/api/project", ask.project),
+    Way("GET", "/api/state", ask.state),
+    Way("POST", "/api/edits", ask.edits, EditList),
+    Way("POST", "/api/undo", ask.undo, ask.Turn),
+    Way("POST", "/api/redo", ask.redo, ask.Turn),
+    Way("GET", "/api/ghost/{frame:int}", ask.ghost),
+    Way("POST", "/api/pose", ask.pose, ask.PoseQuestion),
+    Way("GET", "/api/checks", ask.checks),
+    Way("GET", "/api/next", ask.suggestions),
+    Way("POST", "/api/picks/preview", ask.preview, ask.StripQuestion),
+    Way("GET", "/api/backprojection/{frame:int}", ask.backprojection),
+    Way("GET", "/api/jobs", ask.jobs),
+    Way("POST", "/api/jobs", ask.begin_job, ask.JobQuestion),
+    Way("DELETE", "/api/jobs/{job:int}", ask.cancel_job),
+    Way("GET", "/api/motion", ask.motion),
+    Way("POST", "/api/import", ask.import_file, ask.ImportQuestion),
+    Way("GET", "/api/export/{format}", ask.export_file),
+)
+
+
+def make_app(desk: Desk, door: Door) -> ASGIApp:
+    """The application behind its guard."""
+    page = read_page(PAGE)
+    app = Starlette(
+        routes=make_routes(desk, page),
+        exception_handlers={
+            NotSaved: lambda _, fault: _error(507, str(fault)),
+            KeyreconError: lambda _, fault: _error(400, str(fault)),
+            HTTPException: lambda _, fault: _error(fault.status_code, fault.detail),
+        },
+    )
+    return Guard(app, door)
+
+
+def make_routes(desk: Desk, page: dict[str, Response]) -> list[Route]:
+    """All routes there are."""
+
+    async def index(request: Request) -> Response:
+        return _page_file(page, "index.html")
+
+    async def part(request: Request) -> Response:
+        return _page_file(page, request.path_params["name"])
+
+    async def events(request: Request) -> Response:
+        first = {"revision": desk.store.state.revision}
+        return StreamingResponse(desk.events.stream(first), media_type="text/event-stream")
+
+    async def still(request: Request) -> Response:
+        return await _still(desk, request)
+
+    return [
+        Route("/", index, methods=["GET"]),
+        Route("/page/{name}", part, methods=["GET"]),
+        Route("/api/events", events, methods=["GET"]),
+        Route("/api/still/{frame:int}", still, methods=["GET"]),
+        *(Route(way.path, _endpoint(desk, way), methods=[way.method]) for way in WAYS),
+    ]
+
+
+def read_page(folder: Path) -> dict[str, Response]:
+    """The files of the page by name; no other file is ever served."""
+    found = (path for path in sorted(folder.iterdir()) if path.suffix in TYPES)
+    return {path.name: Response(path.read_bytes(), media_type=TYPES[path.suffix]) for path in found}
+
+
+def _page_file(page: dict[str, Response], name: str) -> Response:
+    if name not in page:
+        raise HTTPException(404, "There is no such page.")
+    return page[name]
+
+
+def _endpoint(desk: Desk, way: Way) -> Callable[[Request], Any]:
+    """An endpoint that parses what was asked, answers in a worker thread, and writes JSON."""
+
+    async def endpoint(request: Request) -> Response:
+        body = _parsed(await request.body(), way.body) if way.body else None
+        asked = ask.Asked(request.path_params, dict(request.query_params), body)
+        answer = await run_in_threadpool(way.answer, desk, asked)
+        return answer if isinstance(answer, Response) else _json(answer)
+
+    return endpoint
+
+
+def _parsed(body: bytes, kind: type) -> Any:
+    try:
+        return msgspec.json.decode(body, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as fault:
+        raise KeyreconError(f"The request is not what this route takes: {fault}") from fault
+
+
+def _json(answer: Any, status: int = 200) -> Response:
+    """An answer as JSON; numbers that are none become null."""
+    return Response(msgspec.json.encode(answer), status, media_type="application/json")
+
+
+def _error(status: int, text: str) -> Response:
+    return _json({"error": text}, status)
+
+
+async def _still(desk: Desk, request: Request) -> Response:
+    """A frame as JPEG. With the right ?v= the browser may keep it for good: another project may
+    have the same port later, and then `v` differs."""
+    width, stills = request.query_params.get("width", ""), desk.stills
+    if not (width.isdecimal() or not width) or len(width) > 5:
+        raise KeyreconError("'width' is a number of pixels.")
+    picture = stills.still(request.path_params["frame"], int(width or 0) or None)
+    lasting = request.query_params.get("v") == stills.identity
+    control = "private, max-age=31536000, immutable" if lasting else "no-store"
+    data = await asyncio.wrap_future(picture)
+    return Response(data, media_type="image/jpeg", headers={"Cache-Control": control})

@@ -1,0 +1,108 @@
+"""`keyrecon annotate`: the page's server put together with what it calls, and its address."""
+
+import asyncio
+import socket
+import webbrowser
+from collections.abc import Callable
+from functools import partial
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+
+from keyrecon import project
+from keyrecon.annotate.assistant import Assistant
+from keyrecon.annotate.desk import Desk, open_desk
+from keyrecon.annotate.guard import Door
+from keyrecon.annotate.server import make_app
+from keyrecon.errors import KeyreconError
+from keyrecon.pipeline import Options
+from keyrecon.progress import Progress
+from keyrecon.workspace import Workspace
+
+GRACE_SECONDS = 2
+"""How long open connections may take to end when the server is stopped."""
+
+
+def serve_annotator(
+    workspace: Workspace, place: tuple[str, int], open_browser: bool, say: Callable[[str], None]
+) -> None:
+    """Serve the page of a project at (host, port) until interrupted."""
+    with listen(*place) as listener:
+        desk = open_desk(workspace, Assistant(), job_commands(workspace.folder))
+        try:
+            door = make_door(listener, place[0])
+            say(f"Annotating {workspace.folder}. Open in a browser:\n  {door.address}")
+            if not is_loopback(place[0]):
+                say(
+                    f"Warning: {place[0]} can be reached from other machines, without encryption; "
+                    "whoever has the address can change this project. Safer: ssh -L."
+                )
+            if open_browser:
+                webbrowser.open(door.address)
+            _serve(desk, door, listener)
+        finally:
+            desk.close()
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A bound socket; KeyreconError where the port is taken.
+
+    It is told to be TCP: only then are small answers sent at once (asyncio sets TCP_NODELAY).
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as fault:
+        listener.close()
+        raise KeyreconError(
+            f"Nothing can be served at {host} port {port} ({fault.strerror or fault}); choose "
+            "another --port, or none for any that is free."
+        ) from fault
+    return listener
+
+
+def make_door(listener: socket.socket, host: str) -> Door:
+    """The fixed list of names under which the server answers."""
+    port = listener.getsockname()[1]
+    shown = f"[{host}]" if ":" in host else host
+    names = ("127.0.0.1", "localhost") if host == "127.0.0.1" else (shown,)
+    return Door(tuple(f"{name}:{port}" for name in names), port)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach an address."""
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _serve(desk: Desk, door: Door, listener: socket.socket) -> None:
+    config = uvicorn.Config(
+        make_app(desk, door),
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=GRACE_SECONDS,
+    )
+    asyncio.run(uvicorn.Server(config).serve(sockets=[listener]))
+
+
+def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress], str]]:
+    """What the page can have done, by name."""
+    return {"keyframes": partial(_find_keyframes, folder), "run": partial(_run, folder)}
+
+
+def _find_keyframes(folder: Path, told: dict[str, Any], progress: Progress) -> str:
+    chosen = {name: told.get(name) for name in ("budget", "coverage", "reach")}
+    return project.find_keyframes(Workspace(folder), Options(), chosen, progress)
+
+
+def _run(folder: Path, told: dict[str, Any], progress: Progress) -> str:
+    workspace = Workspace(folder)
+    options = project.settings(workspace.options(Options()), told.get("height"), None)
+    return project.run(workspace, options, progress, partial=True)
