@@ -1,19 +1,13 @@
 """What a person decided: kept, undone, shared between pages and programs, never lost."""
 
-import json
-from types import SimpleNamespace
 
 import pytest
-from annotator import edit, mark, submit
+from annotator import mark, submit
 
-from keyrecon import project
 from keyrecon.annotate.edits import Limits
 from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14
-from keyrecon.errors import KeyreconError
 from keyrecon.formats.coco import read_coco
-from keyrecon.formats.picks import read_picks
-from keyrecon.records import Pick
 from keyrecon.workspace import Workspace
 
 LIMITS = Limits(LSP14, 100, (128, 64))

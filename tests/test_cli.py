@@ -45,7 +45,7 @@ def one_line(code, err, *words):
 
 @pytest.mark.parametrize(
     "verb",
-    ["demo", "new", "pick", "keyframes", "annotate", "import", "run", "export", "evaluate", "synth", "relink"],
+    ("demo new pick keyframes annotate import run export evaluate synth relink").split(),
 )
 def test_every_command_explains_itself(keyrecon, verb):
     code, out, _ = keyrecon(verb, "--help")
@@ -101,9 +101,7 @@ def test_an_impossible_height(keyrecon, project):
 
 def coco(frame, name="neck", x=10.0):
     return {
-        "images": [
-            {"id": 1, "file_name": "f.png", "width": 128, "height": 64, "frame": frame}
-        ],
+        "images": [{"id": 1, "file_name": "f.png", "width": 128, "height": 64, "frame": frame}],
         "annotations": [
             {"id": 1, "image_id": 1, "category_id": 1, "keypoints": [x, 20, 2], "num_keypoints": 1}
         ],
