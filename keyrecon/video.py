@@ -159,6 +159,8 @@ def open_video(
         first = next(_decode_from(container, int(stamps[0])), None)
         if first is None:
             raise KeyreconError(f"{path}: no picture can be decoded; the file is damaged.")
+        if first.pts is not None:  # where a file was cut, pictures before lack what they refer to
+            stamps = stamps[stamps >= first.pts]
         seconds_per_tick = float(stream.time_base)
     turns = round(first.rotation / 90) % 4
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]

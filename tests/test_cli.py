@@ -45,7 +45,10 @@ def one_line(code, err, *words):
 
 @pytest.mark.parametrize(
     "verb",
-    ("demo new pick keyframes annotate import run export evaluate synth relink").split(),
+    [
+        *("demo", "new", "pick", "keyframes", "annotate", "import"),
+        *("run", "export", "evaluate", "synth", "relink"),
+    ],
 )
 def test_every_command_explains_itself(keyrecon, verb):
     code, out, _ = keyrecon(verb, "--help")
