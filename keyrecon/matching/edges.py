@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
-from scipy.ndimage import gaussian_filter1d
+from jaxtyping import Bool, Complex, Float, Int, UInt8
 
 from keyrecon.background import Scene
 from keyrecon.colors import BINS, color_bins, distinct_parts, to_lab
+from keyrecon.matching.window import from_complex
 from keyrecon.pictures import read_small, shrinking, side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, Figures, Track
@@ -46,6 +46,9 @@ OVERLAP = 0.05
 """Width of the band that counts for both halves, in the same shares."""
 LEAST_SAMPLES = 6
 """Contours with fewer samples have no direction to speak of."""
+SMOOTHING = np.exp(-0.5 * np.arange(-3, 4) ** 2)
+SMOOTHING /= SMOOTHING.sum()
+"""Low-pass along a contour, over samples: pixels make stairs."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class _Palette:
 
     parts: Float[np.ndarray, "bins G"]
     """Colours of the parts that can be told apart."""
+    total: Float[np.ndarray, "bins"]
+    """Sum of the parts' colours and of a colour that is none of them."""
     surroundings: Float[np.ndarray, "bins"]
     values: UInt8[np.ndarray, "G"]
     """Label of each."""
@@ -75,8 +80,9 @@ def _mix_palette(colors: Colors) -> _Palette:
     groups = distinct_parts(colors)
     parts = [colors.seen[members].mean(axis=0) for members in groups.values()]
     values = np.array(list(groups), np.uint8) + 1
-    table = np.ascontiguousarray(np.stack(parts, axis=1), np.float32)
-    return _Palette(table, colors.surroundings.astype(np.float32), values)
+    table = np.ascontiguousarray(np.stack(parts, axis=1) / len(parts), np.float32)
+    total = table.sum(axis=1) + np.float32(UNIFORM / np.prod(BINS))
+    return _Palette(table, total, colors.surroundings.astype(np.float32), values)
 
 
 def find_edges(  # noqa: PLR0913
@@ -142,14 +148,13 @@ def label_crop(
 ) -> UInt8[np.ndarray, "h w"]:
     """0 background, 1 + c part c; `axis` runs from head to mid-feet in crop pixels."""
     bins = color_bins(lab)
-    count = palette.parts.shape[1]
-    likely = palette.parts[bins] / count
-    known = likely.sum(axis=2) + UNIFORM / np.prod(BINS)
+    known = palette.total[bins]
     scene = np.where(foreground == 0.5, palette.surroundings[bins], known)
-    likely *= (foreground / (foreground * known + (1 - foreground) * scene))[..., None]
+    weight = foreground / (foreground * known + (1 - foreground) * scene)
+    likely = palette.parts[bins] * weight[..., None]
     likely = cv2.GaussianBlur(likely.astype(np.float32), (0, 0), SOFTEN * options.player)
     labels = palette.values[likely.argmax(axis=2)]
-    labels[likely.sum(axis=2) < 0.5] = 0
+    labels[likely @ np.ones(likely.shape[2], np.float32) < 0.5] = 0
     differs = cv2.GaussianBlur(foreground, (0, 0), SOFTEN * options.player) > 0.7
     return _clean(_fill(labels, differs, options), axis, options)
 
@@ -205,51 +210,59 @@ class _Elements:
 def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elements:
     """Contours of all regions as elements with the region on their left, in crop pixels."""
     step = options.step * options.player
-    points, tangents, colors = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0, int)]
+    walks, colors = [], []
     for value in np.unique(labels[labels > 0]):
         mask = (labels == value).astype(np.uint8)
         contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
         for contour, place in zip(contours, tree[0] if contours else (), strict=True):
-            walk = _walk(contour[:, 0].astype(float), hole=bool(place[3] >= 0))
-            sampled = _resample(walk, step)
-            if sampled is None:
-                continue
-            points.append(sampled[0])
-            tangents.append(sampled[1])
-            colors.append(np.full(len(sampled[0]), int(value) - 1))
-    found = _Elements(np.concatenate(points), np.concatenate(tangents), np.concatenate(colors))
+            sampled = _resample(contour, step)
+            if len(sampled) >= LEAST_SAMPLES:
+                walks.append(_walk(sampled, contour, hole=bool(place[3] >= 0)))
+                colors.append(int(value) - 1)
+    if not walks:
+        return _Elements(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, int))
+    lengths = [len(walk) for walk in walks]
+    points, tangent = _smooth_walks(np.concatenate(walks), np.array(lengths))
+    found = _Elements(points, tangent, np.repeat(colors, lengths))
     size = np.array(labels.shape[::-1])
-    keep = ((found.points > 1) & (found.points < size - 2)).all(axis=1)
+    keep = ((points > 1) & (points < size - 2)).all(axis=1) & tangent.any(axis=1)
     return _thin(found, keep, options.most)
 
 
-def _walk(contour: Float[np.ndarray, "n 2"], hole: bool) -> Float[np.ndarray, "n 2"]:
-    """A contour in the direction that has the region on its left, y pointing down."""
-    x, y = contour.T
-    area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-    # Seen on the picture, the shoelace sum is negative when walking counter-clockwise.
-    return contour if (area > 0) == hole else contour[::-1]
-
-
-def _resample(
-    walk: Float[np.ndarray, "n 2"], step: float
-) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]] | None:
-    """Regular samples of a closed contour and their tangents; None if it is too short."""
-    closed = np.concatenate([walk, walk[:1]])
-    length = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+def _resample(contour: Int[np.ndarray, "n 1 2"], step: float) -> Complex[np.ndarray, "m"]:
+    """Regular samples of a closed contour, x + iy; none where it is too short to tell."""
+    if len(contour) * np.sqrt(2) < (LEAST_SAMPLES - 0.5) * step:
+        return np.zeros(0, complex)
+    pixels = contour[:, 0].astype(float).view(complex)[:, 0]
+    closed = np.append(pixels, pixels[0])
+    length = np.concatenate([[0], np.cumsum(np.abs(np.diff(closed)))])
     count = round(length[-1] / step)
-    if count < LEAST_SAMPLES:
-        return None
-    at = np.arange(count) * (length[-1] / count)
-    points = np.stack([np.interp(at, length, c) for c in closed.T], axis=1)
-    points = gaussian_filter1d(points, 1.0, axis=0, mode="wrap", truncate=3)
-    tangent = np.roll(points, -2, axis=0) - np.roll(points, 2, axis=0)
-    size = np.linalg.norm(tangent, axis=1, keepdims=True)
-    tangent /= np.maximum(size, 1e-9)
+    return np.interp(np.arange(count) * (length[-1] / max(count, 1)), length, closed)
+
+
+def _walk(
+    sampled: Complex[np.ndarray, "m"], contour: Int[np.ndarray, "n 1 2"], hole: bool
+) -> Complex[np.ndarray, "m"]:
+    """Samples in the direction that has the region on its left, y pointing down."""
+    # Seen on the picture, the signed area is negative when walking counter-clockwise.
+    outside = cv2.contourArea(contour, oriented=True) > 0
+    return sampled if outside == hole else sampled[::-1]
+
+
+def _smooth_walks(
+    walks: Complex[np.ndarray, "E"], lengths: Int[np.ndarray, "W"]
+) -> tuple[Float[np.ndarray, "E 2"], Float[np.ndarray, "E 2"]]:
+    """Points and unit tangents of closed walks that stand one after the other."""
+    first = np.repeat(np.cumsum(lengths) - lengths, lengths)
+    within, room = np.arange(len(walks)) - first, np.repeat(lengths, lengths)
+    around = first[:, None] + (within[:, None] + np.arange(-3, 4)) % room[:, None]
+    smooth = walks[around] @ SMOOTHING
+    tangent = smooth[around[:, 5]] - smooth[around[:, 1]]
+    size = np.abs(tangent)
+    tangent = np.divide(tangent, size, out=np.zeros_like(tangent), where=size > 1e-6)
     # The contour runs through the centres of the region's outermost pixels; the edge is outside.
-    points += 0.5 * np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    good = size[:, 0] > 1e-6
-    return points[good], tangent[good]
+    smooth += 0.5j * tangent
+    return from_complex(smooth), from_complex(tangent)
 
 
 def _thin(found: _Elements, keep: Bool[np.ndarray, "E"], most: int) -> _Elements:
