@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.matching.candidates import Candidates, fit_candidates, in_blocks
+from keyrecon.matching.blocks import in_blocks
+from keyrecon.matching.candidates import Candidates, fit_candidates
 from keyrecon.matching.correspondence import ElementIndex
 from keyrecon.matching.fit import Figures, Step
 from keyrecon.matching.judge import judge_limb

@@ -7,22 +7,17 @@ each step. The first kinds never drift but may take one leg for the other; the l
 is which for as long as it holds on.
 """
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from keyrecon.matching.blocks import in_blocks
 from keyrecon.matching.correspondence import ElementIndex
 from keyrecon.matching.fit import FAR_TO_NEAR, Figures, Step, fit_figures, keep_shape
 from keyrecon.matching.judge import find_unexplained, judge_figures
 from keyrecon.matching.puppet import Puppets
 
-BLOCK = 128
-"""Figures fitted at a time: few enough for the processor's cache."""
-WORKERS = 2
-"""Blocks in work at the same time; look-ups and matrix products run beside one another."""
 HOLD = (Step(0.05, 0.006, 0.02), Step(0.03, 0.006, 0.02))
 """Corrections of a figure that was carried from the neighbouring frame."""
 LIKENESS = Step(0.0, 0.04, 1.0)
@@ -79,8 +74,7 @@ def fit_candidates(
     """Fit figures, the same number for each frame, one frame after the other."""
 
     def fit(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        figures = Figures(start.frames[part], start.which[part], start.joints[part])
-        found = fit_figures(puppets, index, figures, schedule)
+        found = fit_figures(puppets, index, start.take(part), schedule)
         misfit = judge_figures(puppets, index, found)
         return found.joints, misfit, find_unexplained(puppets, index, found)
 
@@ -95,40 +89,33 @@ def fit_candidates(
     )
 
 
-def in_blocks(
-    work: Callable[[slice], tuple[np.ndarray, ...]], count: int
-) -> tuple[np.ndarray, ...]:
-    """Results of `work` on slices of `count` figures, in order and joined."""
-    slices = [slice(at, at + BLOCK) for at in range(0, count, BLOCK)]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        return tuple(np.concatenate(parts) for parts in zip(*pool.map(work, slices), strict=True))
-
-
 def carry_figures(
-    puppets: Puppets, index: ElementIndex, similar: Int[np.ndarray, "T"], step: int
+    puppets: Puppets, index: ElementIndex, similar: Int[np.ndarray, "T"]
 ) -> Candidates:
-    """Carry every annotated figure forwards (step 1) or back (-1) up to the next annotated one."""
+    """Carry every annotated figure forwards and back up to the next annotated one.
+
+    Two proposals per frame: from the annotated frame before it, and from the one after it.
+    """
     poses, count = puppets.poses, len(similar)
-    joints = np.full((count, poses.joints.shape[1]), np.nan + 0j)
-    age = np.full(count, np.inf)
-    joints[poses.frames], age[poses.frames] = poses.joints, 0
-    last, speed = poses.frames, np.zeros_like(poses.joints)
-    while True:
-        ahead = last + step
+    joints = np.zeros((2, count, poses.joints.shape[1]), complex)
+    age = np.full((2, count), np.inf)
+    joints[:, poses.frames], age[:, poses.frames] = poses.joints, 0
+    way, last = np.repeat([0, 1], len(poses.frames)), np.tile(poses.frames, 2)
+    speed = np.zeros((len(last), joints.shape[2]), complex)
+    while len(last):
+        ahead = last + np.where(way == 0, 1, -1)
         going = (ahead >= 0) & (ahead < count)
-        going[going] = np.isinf(age[ahead[going]])
-        last, ahead, speed = last[going], ahead[going], speed[going]
-        if not len(last):
-            break
-        there = joints[last] + MOMENTUM * speed
+        going[going] = np.isinf(age[way[going], ahead[going]])
+        way, last, ahead, speed = way[going], last[going], ahead[going], speed[going]
+        there = joints[way, last] + MOMENTUM * speed
         alike = keep_shape(puppets, there, poses.joints[similar[ahead]], LIKENESS)
         figures = Figures(ahead, np.full(len(ahead), puppets.average), there)
-        joints[ahead] = fit_figures(puppets, index, figures, HOLD, alike).joints
-        age[ahead] = age[last] + 1
-        last, speed = ahead, joints[ahead] - joints[last]
-    every = np.arange(count)
-    carried = Figures(every, np.full(count, puppets.average), np.nan_to_num(joints))
+        joints[way, ahead] = fit_figures(puppets, index, figures, HOLD, alike).joints
+        age[way, ahead] = age[way, last] + 1
+        last, speed = ahead, joints[way, ahead] - joints[way, last]
+    frames = np.repeat(np.arange(count), 2)
+    paired = np.swapaxes(joints, 0, 1).reshape(2 * count, -1)
+    carried = Figures(frames, np.full(2 * count, puppets.average), paired)
     judged = fit_candidates(puppets, index, carried, ())
     doubt = np.where(np.isfinite(age), AGE * np.minimum(age, AGE_MOST), np.inf)
-    joints[np.isinf(age)] = 0
-    return replace(judged, joints=joints[:, None], which=similar[:, None], doubt=doubt[:, None])
+    return replace(judged, which=np.repeat(similar[:, None], 2, axis=1), doubt=doubt.T)

@@ -21,6 +21,8 @@ BEND = 0.08
 """Player heights that a chord of length one counts for."""
 APART = 10.0
 """Spacing of frames and colours on their axis: more than any reach."""
+LEAF = 32
+"""Elements in a leaf of a tree: a run through these is quicker than a walk down to fewer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ def index_elements(edges: tuple[Edges, ...], window: Window) -> ElementIndex:
     color = np.concatenate([e.color for e in edges])
     n_colors = int(color.max(initial=0)) + 1
     key = frame * n_colors + color
-    tree = cKDTree(_lift(points, tangent, key), balanced_tree=False)
+    tree = cKDTree(_lift(points, tangent, key), leafsize=LEAF, balanced_tree=False)
     return ElementIndex(points, tangent, color, n_colors, tree)
 
 
@@ -100,7 +102,9 @@ def match_parts(
     figure = np.arange(count)
     key = (figure[:, None] * parts + part) * index.n_colors + placed.color
     lifted = _lift(placed.points, placed.tangent, np.where(placed.color < 0, -1, key))
-    tree = cKDTree(lifted.reshape(-1, 5), balanced_tree=False, compact_nodes=False)
+    tree = cKDTree(
+        lifted.reshape(-1, 5), leafsize=LEAF, balanced_tree=False, compact_nodes=False
+    )
     keys = (figure[:, None] * parts + np.arange(parts)) * index.n_colors
     keys = keys[:, :, None] + index.color[listed][:, None]
     wanted = np.empty((*keys.shape, 5))

@@ -57,6 +57,10 @@ class Figures:
     which: Int[np.ndarray, "P"]
     joints: Complex[np.ndarray, "P J"]
 
+    def take(self, part: slice) -> "Figures":
+        """Some of them."""
+        return Figures(self.frames[part], self.which[part], self.joints[part])
+
     def moved(self, joints: Complex[np.ndarray, "P J"]) -> "Figures":
         """The same in other poses."""
         return Figures(self.frames, self.which, joints)

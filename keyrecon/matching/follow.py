@@ -1,5 +1,6 @@
 """Follow one half of the body through the video: propose, choose, settle."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,11 +56,10 @@ def follow_half(
     half = puppets.half
     fitted = fit_similar(puppets, scene.index, start.distance, start.shift, similar)
     nearest = fitted.which[:, 0]
-    candidates = join_candidates(
-        fitted,
-        borrow_limbs(puppets, scene.index, fitted, BORROWED),
-        *(carry_figures(puppets, scene.index, nearest, step) for step in (1, -1)),
-    )
+    with ThreadPoolExecutor(1) as beside:
+        carried = beside.submit(carry_figures, puppets, scene.index, nearest)
+        borrowed = borrow_limbs(puppets, scene.index, fitted, BORROWED)
+    candidates = join_candidates(fitted, borrowed, carried.result())
     chosen, which = choose_limbs(puppets, candidates)
     chosen[:, half.given] = start.given
     proposal = Proposal(chosen, nearest)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Int
 
+from keyrecon.matching.blocks import in_blocks
 from keyrecon.matching.chain import link_frames, solve_chain
 from keyrecon.matching.correspondence import ElementIndex
 from keyrecon.matching.fit import Figures, Step, keep_shape, see_edges
@@ -60,9 +61,20 @@ def settle_joints(
         alone = keep_shape(puppets, joints, proposal.joints, LOOSE)
         alone = alone + _hold(puppets, proposal, joints)
         for which in (proposal.similar, average):
-            alone = alone + see_edges(puppets, index, Figures(every, which, joints), reach)
+            figures = Figures(every, which, joints)
+            alone = alone + _see_all(puppets, index, figures, reach)
         joints = solve_chain(link_frames(alone, calm))
     return joints
+
+
+def _see_all(puppets: Puppets, index: ElementIndex, figures: Figures, reach: float) -> Normals:
+    """The edges of all frames."""
+
+    def see(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        seen = see_edges(puppets, index, figures.take(part), reach)
+        return seen.matrix, seen.right
+
+    return Normals(*in_blocks(see, len(figures.frames)))
 
 
 def _hold(
