@@ -8,7 +8,15 @@ from keyrecon.body import LSP14
 from keyrecon.golf.kinematics import find_club, find_joints, place_body, pose_rates
 from keyrecon.golf.motion_model import left_jacobian, posture_at
 from keyrecon.golf.records import MotionModel, Swing, SwingState
-from keyrecon.golf.skeleton import CLUB, REST, SEGMENTS, size_body, turns_from_swing
+from keyrecon.golf.skeleton import (
+    ANKLE_HEIGHT,
+    CLUB,
+    LENGTHS,
+    REST,
+    SEGMENTS,
+    size_body,
+    turns_from_swing,
+)
 
 P = len(SEGMENTS)
 
@@ -63,16 +71,19 @@ def test_joints_of_a_placed_body_give_its_pose_back(model, state):
                        club[:, 1] - club[:, 0])  # fmt: skip
 
 
-def test_bones_of_the_sized_body_are_those_of_the_length_table(model, state):
+def test_bones_of_a_placed_body_have_the_lengths_of_the_table(model, state):
     body, pose = put(model, state)
     joints = find_joints(body, pose)
-    for (parent, child), length in zip(LSP14.bones, LSP14.lengths, strict=True):
-        bone = np.linalg.norm(joints[:, child] - joints[:, parent], axis=1)
-        if "hip" in LSP14.names[child]:
-            continue  # the spine leans against the pelvis, the table's is upright
-        assert np.allclose(bone, 1.8 * length)
-    assert pose.origins.shape == (4, P, 3)
+    for name, parent in (("elbow", "shoulder"), ("wrist", "elbow"), ("knee", "hip")):
+        ends = [joints[:, LSP14.index(f"left_{n}")] for n in (name, parent)]
+        part = {"elbow": "upper_arm", "wrist": "forearm", "knee": "thigh"}[name]
+        assert np.allclose(np.linalg.norm(ends[0] - ends[1], axis=1), 1.8 * LENGTHS[part])
     assert np.allclose(np.linalg.norm(np.diff(find_club(body, pose), axis=1), axis=2), body.club)
+
+
+def test_an_upright_body_is_as_tall_as_it_is_said_to_be():
+    legs = ANKLE_HEIGHT + LENGTHS["shank"] + LENGTHS["thigh"]
+    assert abs(legs + LENGTHS["trunk"] + LENGTHS["head"] - 1) < 0.001
 
 
 def test_left_jacobian_is_the_derivative_of_the_exponential_map():

@@ -10,7 +10,8 @@ Markers lie on the skin, so joint centres are computed:
 - wrist: midway between its two markers;
 - shoulder: below its marker along the trunk by 17 % of the distance between both (Rab et al.,
   Gait & Posture 15, 2002);
-- neck: midway between C7 and clavicle; crown: above the plane of the head band.
+- neck: midway between C7 and clavicle; crown: above the plane of the head band;
+- club: the line through the markers on its shaft, from beside the hands to the last marker.
 
 Against bones this is wrong by 1-2 cm at limbs and 2-3 cm at hips, shoulders and crown; limb
 lengths vary by some per cent over a swing because skin moves. A marker that is missing for some
@@ -38,6 +39,9 @@ HALF_WIDTHS = {"knee": 0.055, "elbow": 0.040, "ankle": 0.042}
 """From a 14 mm marker's centre to the joint's, metres: half an adult's mean joint width
 (knee 96, elbow 66, ankle 70 mm; ANSUR II, Gordon et al. 2014) and the marker's radius."""
 
+CLUB_MARKERS = "WEP"
+"""How the names of markers on a club or bat begin in the CMU database."""
+
 HEAD_BAND_TO_CROWN = 0.09
 """Height of the crown above a head band at the forehead, metres."""
 
@@ -49,6 +53,8 @@ class MarkerJoints:
     joints: Float[np.ndarray, "T 14 3"]
     toes: Float[np.ndarray, "T 2 3"]
     fps: float
+    club: Float[np.ndarray, "T 2 3"] | None
+    """Beside the hands, and the end of the head; None without markers on a club."""
 
 
 def read_markers(path: Path) -> MarkerJoints:
@@ -72,9 +78,11 @@ def read_markers(path: Path) -> MarkerJoints:
             f"{path} has no markers {', '.join(absent)}; joint centres need the marker set of the "
             "CMU database or Plug-in Gait."
         )
-    filled = {name: fill_gaps(named[name]) for name in needed}
+    shaft = sorted(name for name in named if name.startswith(CLUB_MARKERS))
+    filled = {name: fill_gaps(named[name]) for name in [*needed, *shaft]}
     toes = np.stack([filled["RTOE"], filled["LTOE"]], axis=1)
-    return MarkerJoints(_joint_centres(filled), toes, fps)
+    joints = _joint_centres(filled)
+    return MarkerJoints(joints, toes, fps, _find_club(joints, [filled[name] for name in shaft]))
 
 
 def read_points(path: Path) -> tuple[dict[str, Points], float]:
@@ -137,6 +145,20 @@ def _joint_centres(m: dict[str, Points]) -> Float[np.ndarray, "T 14 3"]:
     up = _unit(np.cross(m["RFHD"] - m["LBHD"], m["LFHD"] - m["RBHD"]))
     centres["neck"], centres["head_top"] = neck, band + HEAD_BAND_TO_CROWN * up
     return np.stack([centres[name] for name in LSP14.names], axis=1)
+
+
+def _find_club(
+    joints: Float[np.ndarray, "T 14 3"], shaft: list[Points]
+) -> Float[np.ndarray, "T 2 3"] | None:
+    """Both ends of a club from two or more markers along it."""
+    if len(shaft) < 2:
+        return None
+    wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
+    hands = joints[:, wrists].mean(axis=1)
+    far = sorted(shaft, key=lambda marker: np.linalg.norm(marker - hands, axis=1).mean())
+    way = _unit(far[-1] - far[0])
+    beside = far[0] + way * np.sum(way * (hands - far[0]), axis=1, keepdims=True)
+    return np.stack([beside, far[-1]], axis=1)
 
 
 def _hips(m: dict[str, Points]) -> tuple[Points, Points]:

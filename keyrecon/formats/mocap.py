@@ -28,6 +28,8 @@ class Capture:
     fps: float
     toes: Float[np.ndarray, "T 2 3"] | None = None
     """Right and left toe, metres; None where the file has none."""
+    club: Float[np.ndarray, "T 2 3"] | None = None
+    """Hand end and head of a golf club, metres; None where the file has none."""
 
 
 def read_mocap(paths: Sequence[Path], trim: int = 0) -> tuple[Capture, ...]:
@@ -60,14 +62,16 @@ def read_capture(path: Path, trim: int = 0) -> Capture:
         )
     kept = slice(trim, trim + frames)
     toes = None if capture.toes is None else capture.toes[kept]
-    return Capture(capture.joints[kept], capture.fps, toes)
+    club = None if capture.club is None else capture.club[kept]
+    return Capture(capture.joints[kept], capture.fps, toes, club)
 
 
 def _read(path: Path) -> Capture:
     suffix = path.suffix.lower()
+    club = None
     if suffix == ".c3d":
         markers = read_markers(path)
-        joints, toes, fps = markers.joints, markers.toes, markers.fps
+        joints, toes, club, fps = markers.joints, markers.toes, markers.club, markers.fps
     elif suffix in (".bvh", ".amc"):
         figure = read_bvh(path) if suffix == ".bvh" else read_acclaim(path)
         joints, toes = find_joints(figure)
@@ -75,12 +79,10 @@ def _read(path: Path) -> Capture:
     else:
         raise KeyreconError(f"{path}: '{suffix}' is not motion capture; use .bvh, .amc or .c3d.")
     metres = metres_per_unit(joints)
-    _check_sides(upright(joints, joints), None if toes is None else upright(toes, joints))
-    return Capture(
-        metres * upright(joints, joints),
-        fps,
-        None if toes is None else metres * upright(toes, joints),
-    )
+    stand = upright(joints, joints)
+    toes, club = (None if p is None else metres * upright(p, joints) for p in (toes, club))
+    _check_sides(metres * stand, toes)
+    return Capture(metres * stand, fps, toes, club)
 
 
 def _check_sides(

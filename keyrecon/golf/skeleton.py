@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from keyrecon.body import HIP_BREADTH, LSP14
+from keyrecon.body import LSP14
 from keyrecon.golf.records import Body, Swing
 
 AHEAD_AND_DOWN = (0.0, -0.7071067811865476, -0.7071067811865476)
@@ -54,6 +54,16 @@ PARENTS = tuple(segment.parent for segment in SEGMENTS)
 REST = np.array([segment.rest for segment in SEGMENTS])
 CLUB = NAMES.index("club")
 
+LENGTHS = {
+    "trunk": 0.308, "head": 0.161, "clavicle": 0.095, "upper_arm": 0.162, "forearm": 0.155,
+    "thigh": 0.243, "shank": 0.249,
+}  # fmt: skip
+"""Between joint centres, in statures: limbs after de Leva (J. Biomech. 29, 1996, men), the neck
+.012 above the shoulder line as in `body`. Breadths of the body are wider than these: shoulder and
+hip joints lie well inside the outline."""
+HALF_HIPS = 0.052
+"""From the middle to a hip joint in statures: 0.36 of the pelvis's breadth (Bell et al.,
+J. Biomech. 23, 1990), which is about 0.145 statures."""
 ANKLE_HEIGHT = 0.039
 """Ankle above the floor as a fraction of stature (Winter)."""
 GRIP = 0.045
@@ -64,25 +74,26 @@ Vectors = Float[np.ndarray, "*n 3"]
 
 
 def size_body(stature: float, club: float = CLUB_LENGTH) -> Body:
-    """A player with average proportions (Winter) of a given height in metres."""
-    lengths = {LSP14.names[c]: LSP14.proportions[c] for _, c in LSP14.bones}
-    half_hips = HIP_BREADTH / 2
-    lengths["neck"] = np.sqrt(lengths["right_hip"] ** 2 - half_hips**2)
+    """A player with average proportions of a given height in metres."""
     offsets = np.zeros((len(SEGMENTS), 3))
     for index, segment in enumerate(SEGMENTS[1:], start=1):
         above = SEGMENTS[segment.parent]
         if above.end:
-            offsets[index] = lengths[above.end] * np.array(above.rest)
+            offsets[index] = _length(above) * np.array(above.rest)
         elif segment.name.endswith("thigh"):
-            offsets[index, 0] = half_hips if segment.name.startswith("right") else -half_hips
+            offsets[index, 0] = HALF_HIPS if segment.name.startswith("right") else -HALF_HIPS
     offsets[CLUB] += GRIP * REST[NAMES.index("left_forearm")]
     ends = {s.end: i for i, s in enumerate(SEGMENTS) if s.end}
-    carriers = [ends.get(name, 0) for name in LSP14.names]
-    rows = zip(LSP14.names, carriers, strict=True)
-    places = np.array([lengths.get(n, 0.0) * REST[c] for n, c in rows])
+    carriers = np.array([ends.get(name, 0) for name in LSP14.names])
+    places = np.array([_length(SEGMENTS[c]) * REST[c] for c in carriers])
     for side, sign in (("right", 1), ("left", -1)):
-        places[LSP14.index(f"{side}_hip")] = [sign * half_hips, 0, 0]
-    return Body(stature, stature * offsets, np.array(carriers), stature * places, club)
+        places[LSP14.index(f"{side}_hip")] = [sign * HALF_HIPS, 0, 0]
+    return Body(stature, stature * offsets, carriers, stature * places, club)
+
+
+def _length(segment: Segment) -> float:
+    """Length of a segment in statures; 0 for the pelvis."""
+    return LENGTHS.get(segment.name.split("_", 1)[-1], 0.0)
 
 
 def turns_from_swing(swing: Swing) -> tuple[Float[np.ndarray, "T P 3 3"], Vectors]:
@@ -146,3 +157,11 @@ def shortest_turn(rest: Float[np.ndarray, "3"], to: Vectors) -> Float[np.ndarray
 
 def _unit(vectors: Vectors) -> Vectors:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def chain_turns(turns: Float[np.ndarray, "T P 3 3"]) -> Float[np.ndarray, "T P 3 3"]:
+    """Turns of every segment relative to the swing axes."""
+    chained = turns.copy()
+    for p, parent in enumerate(PARENTS[1:], start=1):
+        chained[:, p] = chained[:, parent] @ turns[:, p]
+    return chained

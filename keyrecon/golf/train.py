@@ -1,0 +1,115 @@
+"""Learn the motion model: principal components of swings (CVPR 2005, Section 3).
+
+Every swing is carried to one body, so that the model holds styles and not proportions, then
+warped and sampled; captured swings are joined by variations of them. Components are those of the
+motion vectors weighted by how far joints move: a degree at the pelvis moves the whole body, a
+degree at the wrist only the club. They are scaled by their standard deviation, so that each alpha
+has unit variance and their squares add up to a Mahalanobis distance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.motions import find_centre, mean_keys, motion_vectors, sample_swing
+from keyrecon.golf.records import MotionModel, Swing
+from keyrecon.golf.retarget import carry_swing, place_turns
+from keyrecon.golf.skeleton import NAMES, PARENTS, size_body
+from keyrecon.golf.variation import VariationOptions, vary_swing
+from keyrecon.progress import Progress, silent
+
+VERSION = 1
+"""Of segments and motion vectors; a model of another version does not fit this program."""
+REFERENCE = 1.75
+"""Metres; stature of the body that swings are learnt on. Angles do not depend on it."""
+LEAST_LEVER = 0.02
+"""Metres per radian for segments that carry no joint, such as feet."""
+SMALLEST = 1e-4
+"""Share of the variance under which a component is noise of rounding."""
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """How the model is learnt."""
+
+    components: int = 12
+    """Components kept at most; fewer if there are fewer swings. A fit may use fewer still."""
+    variation: VariationOptions = field(default_factory=VariationOptions)
+    """Plausible variations that join the captured swings; count 0 for captured swings alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Database:
+    """Swings on one body as motion vectors."""
+
+    centre: Float[np.ndarray, "P 3 3"]
+    vectors: Float[np.ndarray, "M N D"]
+    keys: Float[np.ndarray, "4"]
+    captured: int
+    """How many of the first swings were captured; the others are variations, in the same order."""
+
+
+def collect_swings(
+    swings: Sequence[Swing], options: TrainOptions = TrainOptions(), progress: Progress = silent
+) -> Database:
+    """Motion vectors of swings and their variations; raises KeyreconError for fewer than two."""
+    body = size_body(REFERENCE)
+    rng = np.random.default_rng(options.variation.seed)
+    keys = mean_keys(swings)
+    everyone = [carry_swing(swing, body) for swing in swings]
+    wanted = [s for s in everyone for _ in range(options.variation.count)]
+    for swing in progress(wanted, "Varying", len(wanted)):
+        everyone.append(vary_swing(swing, body, options.variation, rng))
+    if len(everyone) < 2:
+        raise KeyreconError("One swing has no variance; give several, or variations of it.")
+    sampled = [sample_swing(swing, keys) for swing in everyone]
+    turns, place = (np.stack(parts) for parts in zip(*sampled, strict=True))
+    centre = find_centre(turns)
+    return Database(centre, motion_vectors(turns, place, centre), keys, len(swings))
+
+
+def learn_motion(
+    database: Database, provenance: str, options: TrainOptions = TrainOptions()
+) -> MotionModel:
+    """Mean and principal components of the motion vectors."""
+    vectors = database.vectors
+    mean = vectors.mean(axis=0)
+    weight = motion_weights()
+    rows = ((vectors - mean) * weight).reshape(len(vectors), -1)
+    _, spread, axes = np.linalg.svd(rows, full_matrices=False)
+    variance = spread**2 / max(len(vectors) - 1, 1)
+    share = variance / variance.sum()
+    kept = min(options.components, int((share > SMALLEST).sum()))
+    components = axes[:kept].reshape(kept, *mean.shape) / weight
+    components *= np.sqrt(variance[:kept])[:, None, None]
+    return MotionModel(
+        VERSION, database.centre, mean, components, database.keys, np.cumsum(share)[:kept],
+        provenance,
+    )  # fmt: skip
+
+
+def motion_weights() -> Float[np.ndarray, "D"]:
+    """Metres that the joints behind a segment move per radian: root mean square of their arms."""
+    body = size_body(REFERENCE)
+    straight = np.tile(np.eye(3), (1, len(NAMES), 1, 1))
+    joints, club = place_turns(body, straight, np.zeros((1, 3)))
+    origins = np.zeros((len(NAMES), 3))
+    for p, parent in enumerate(PARENTS[1:], start=1):
+        origins[p] = origins[parent] + body.offsets[p]
+    arms = np.zeros(len(NAMES))
+    for p in range(len(NAMES)):
+        carried = [j for j, s in enumerate(body.joint_segment) if _hangs_on(int(s), p)]
+        reach = np.linalg.norm(joints[0, carried] - origins[p], axis=1)
+        arms[p] = np.sqrt((reach**2).sum() / len(joints[0])) if carried else 0.0
+    arms[NAMES.index("club")] = np.linalg.norm(club[0, 1] - club[0, 0]) / len(joints[0])
+    arms = np.maximum(arms, LEAST_LEVER)
+    return np.concatenate([np.repeat(arms, 3), np.full(3, REFERENCE)])
+
+
+def _hangs_on(segment: int, ancestor: int) -> bool:
+    while segment > ancestor:
+        segment = PARENTS[segment]
+    return segment == ancestor
