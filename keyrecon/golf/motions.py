@@ -18,7 +18,7 @@ from keyrecon.golf.skeleton import NAMES, SEGMENTS, turns_from_swing
 
 SAMPLES = 200
 """N of the paper."""
-FARTHEST = np.radians(165)
+FARTHEST = np.radians(175)
 """Turn from the centre beyond which rotation vectors are about to wrap around."""
 
 

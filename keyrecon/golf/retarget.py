@@ -18,6 +18,8 @@ Points = Float[np.ndarray, "T 3"]
 Turns = Float[np.ndarray, "T P 3 3"]
 STRAIGHT = 0.998
 """Longest reach of a limb as a share of its length."""
+FOLDED = 0.3
+"""Shortest reach: an elbow bends by 145 degrees."""
 
 
 def carry_swing(swing: Swing, body: Body) -> Swing:
@@ -88,7 +90,7 @@ def _reach(joints: np.ndarray, names: tuple[str, str, str], target: Points) -> N
     way = target - joints[:, root]
     distance = np.linalg.norm(way, axis=1, keepdims=True)
     way = way / distance
-    distance = np.minimum(distance, STRAIGHT * (upper + lower))
+    distance = np.clip(distance, FOLDED * (upper + lower), STRAIGHT * (upper + lower))
     along = (upper**2 - lower**2 + distance**2) / (2 * distance)
     out = np.sqrt(np.maximum(upper**2 - along**2, 0))
     side = bend - np.sum(bend * way, axis=1, keepdims=True) * way

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from keyrecon.golf.records import Body, Swing
@@ -21,6 +22,7 @@ from keyrecon.golf.skeleton import CLUB, NAMES, PARENTS, turns_from_swing
 PELVIS, TRUNK, HEAD = (NAMES.index(name) for name in ("pelvis", "trunk", "head"))
 ARMS = tuple(p for p, name in enumerate(NAMES) if "arm" in name)
 UPPER_ARMS = tuple(p for p, name in enumerate(NAMES) if name.endswith("upper_arm"))
+REACHING = tuple(NAMES.index(n) for n in ("right_forearm", "right_shank", "left_shank"))
 Turns = Float[np.ndarray, "T P 3 3"]
 
 
@@ -49,6 +51,9 @@ class VariationOptions:
     """Statures by which the pelvis shifts sideways, sinks, or comes forward at top and finish."""
     cock: float = 10.0
     """Degrees by which the wrists cock more or less."""
+    habit: float = 6.0
+    """Degrees by which any segment is held otherwise, at each of the key postures on its own and
+    throughout: what no coach names, and what captures differ in by their marker sets."""
     build: float = 0.04
     """Share by which arms, legs and trunk are longer or shorter."""
 
@@ -62,6 +67,7 @@ def vary_swing(
     _turn_further(turns, bumps, swing.keys[0], options.turn * rng.normal(0, 1, 2), rng)
     _tilt(turns, UPPER_ARMS, bumps @ rng.normal(0, options.plane, 2))
     _tilt(turns, (CLUB,), bumps @ rng.normal(0, options.cock, 2))
+    _add_habits(turns, swing, options.habit, rng)
     _tilt(turns, (PELVIS,), np.full(len(turns), rng.normal(0, options.posture)))
     _tilt(turns, (HEAD,), np.full(len(turns), rng.normal(0, options.posture)))
     sway = np.column_stack([bumps, np.ones(len(turns))]) @ rng.normal(0, options.sway, (3, 3))
@@ -111,6 +117,19 @@ def _turn_further(
             start = turns[address, p]
             way = Rotation.from_matrix(start.T @ turns[:, p]).as_rotvec()
             turns[:, p] = start @ Rotation.from_rotvec(share[:, None] * way).as_matrix()
+
+
+def _add_habits(turns: Turns, swing: Swing, spread: float, rng: np.random.Generator) -> None:
+    """Turn segments by a little of their own, smoothly from key posture to key posture.
+
+    The last bones of limbs that reach for a place afterwards have no say of their own.
+    """
+    at_keys = rng.normal(0, np.radians(spread / np.sqrt(2)), (5, len(NAMES), 3))
+    at_keys[:, REACHING] = 0
+    curve = PchipInterpolator(swing.keys, at_keys[:4] + at_keys[4])
+    frames = np.clip(np.arange(len(turns)), swing.keys[0], swing.keys[3])
+    own = Rotation.from_rotvec(curve(frames).reshape(-1, 3)).as_matrix()
+    turns[:] = own.reshape(turns.shape) @ turns
 
 
 def _tilt(turns: Turns, segments: tuple[int, ...], degrees: Float[np.ndarray, "T"]) -> None:
