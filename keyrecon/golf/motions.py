@@ -12,13 +12,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
-from keyrecon.errors import KeyreconError
 from keyrecon.golf.records import Swing
 from keyrecon.golf.skeleton import NAMES, SEGMENTS, turns_from_swing
 
 SAMPLES = 200
 """N of the paper."""
-FARTHEST = np.radians(175)
+FARTHEST = np.radians(165)
 """Turn from the centre beyond which rotation vectors are about to wrap around."""
 
 
@@ -48,19 +47,18 @@ def find_centre(turns: Float[np.ndarray, "M N P 3 3"]) -> Float[np.ndarray, "P 3
     return np.stack([Rotation.from_matrix(c).mean().as_matrix() for c in columns])
 
 
-def motion_vectors(
-    turns: Float[np.ndarray, "M N P 3 3"],
-    place: Float[np.ndarray, "M N 3"],
+def motion_vector(
+    sampled: tuple[Float[np.ndarray, "N P 3 3"], Float[np.ndarray, "N 3"]],
     centre: Float[np.ndarray, "P 3 3"],
-) -> Float[np.ndarray, "M N D"]:
-    """Motion vectors; raises KeyreconError where a segment turns too far from its centre."""
+) -> Float[np.ndarray, "N D"]:
+    """Rotation vectors of all segments and the place of the pelvis, as one row per sample."""
+    turns, place = sampled
     local = np.swapaxes(centre, 1, 2) @ turns
     vectors = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_rotvec()
-    vectors = vectors.reshape(*turns.shape[:3], 3)
-    angle = np.linalg.norm(vectors, axis=3).max(axis=(0, 1))
-    if (worst := int(angle.argmax())) and angle[worst] > FARTHEST:
-        raise KeyreconError(
-            f"The {NAMES[worst].replace('_', ' ')} turns {np.degrees(angle[worst]):.0f} degrees "
-            "away from its mean in these swings; leave out swings that are not alike."
-        )
-    return np.concatenate([vectors.reshape(*turns.shape[:2], -1), place], axis=2)
+    return np.concatenate([vectors.reshape(len(turns), -1), place], axis=1)
+
+
+def farthest_turn(vector: Float[np.ndarray, "N D"]) -> tuple[str, float]:
+    """The segment that turns farthest from its centre, and its angle."""
+    angles = np.linalg.norm(vector[:, :-3].reshape(len(vector), -1, 3), axis=2).max(axis=0)
+    return NAMES[int(angles.argmax())], float(angles.max())

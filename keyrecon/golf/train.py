@@ -14,7 +14,14 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.motions import find_centre, mean_keys, motion_vectors, sample_swing
+from keyrecon.golf.motions import (
+    FARTHEST,
+    farthest_turn,
+    find_centre,
+    mean_keys,
+    motion_vector,
+    sample_swing,
+)
 from keyrecon.golf.records import MotionModel, Swing
 from keyrecon.golf.retarget import carry_swing, place_turns
 from keyrecon.golf.skeleton import NAMES, PARENTS, size_body
@@ -56,19 +63,45 @@ def collect_swings(
     swings: Sequence[Swing], options: TrainOptions = TrainOptions(), progress: Progress = silent
 ) -> Database:
     """Motion vectors of swings and their variations; raises KeyreconError for fewer than two."""
-    body = size_body(REFERENCE)
-    rng = np.random.default_rng(options.variation.seed)
-    keys = mean_keys(swings)
-    everyone = [carry_swing(swing, body) for swing in swings]
-    wanted = [s for s in everyone for _ in range(options.variation.count)]
-    for swing in progress(wanted, "Varying", len(wanted)):
-        everyone.append(vary_swing(swing, body, options.variation, rng))
-    if len(everyone) < 2:
+    if len(swings) * (1 + options.variation.count) < 2:
         raise KeyreconError("One swing has no variance; give several, or variations of it.")
-    sampled = [sample_swing(swing, keys) for swing in everyone]
-    turns, place = (np.stack(parts) for parts in zip(*sampled, strict=True))
-    centre = find_centre(turns)
-    return Database(centre, motion_vectors(turns, place, centre), keys, len(swings))
+    body = size_body(REFERENCE)
+    keys = mean_keys(swings)
+    captured = [carry_swing(swing, body) for swing in swings]
+    sampled = [sample_swing(swing, keys) for swing in captured]
+    centre = find_centre(np.stack([turns for turns, _ in sampled]))
+    vectors = [motion_vector(one, centre) for one in sampled]
+    for swing, vector in zip(swings, vectors, strict=True):
+        _check_turns(swing.name, vector)
+    rng = np.random.default_rng(options.variation.seed)
+    wanted = [swing for swing in captured for _ in range(options.variation.count)]
+    for swing in progress(wanted, "Varying swings", len(wanted)):
+        vectors.append(_vary(swing, (keys, centre), options.variation, rng))
+    return Database(centre, np.stack(vectors), keys, len(swings))
+
+
+def _check_turns(name: str, vector: Float[np.ndarray, "N D"]) -> None:
+    segment, angle = farthest_turn(vector)
+    if angle > FARTHEST:
+        raise KeyreconError(
+            f"{name}: the {segment.replace('_', ' ')} turns {np.degrees(angle):.0f} degrees away "
+            "from its mean of all swings; leave this swing out."
+        )
+
+
+def _vary(
+    swing: Swing,
+    basis: tuple[Float[np.ndarray, "4"], Float[np.ndarray, "P 3 3"]],
+    options: VariationOptions,
+    rng: np.random.Generator,
+) -> Float[np.ndarray, "N D"]:
+    """A variation; one that turns a limb inside out is drawn again."""
+    keys, centre = basis
+    body = size_body(REFERENCE)
+    while True:
+        vector = motion_vector(sample_swing(vary_swing(swing, body, options, rng), keys), centre)
+        if farthest_turn(vector)[1] < FARTHEST:
+            return vector
 
 
 def learn_motion(

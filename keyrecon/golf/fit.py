@@ -1,0 +1,157 @@
+"""Fit the motion model to what was seen of a whole swing.
+
+The paper slides windows of three frames (`windows`); all frames of a swing share their alphas, so
+one problem over the whole swing is better conditioned and is the default. It goes from coarse to
+fine: first where the player stands, with the mean motion; then everything.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.golf.kinematics import place_body, pose_rates
+from keyrecon.golf.motion_model import posture_at
+from keyrecon.golf.point_residuals import club_residuals, joint_residuals
+from keyrecon.golf.records import (
+    Body,
+    MotionModel,
+    Observations,
+    SwingState,
+)
+from keyrecon.golf.regularise import (
+    PriorOptions,
+    Rows,
+    expect_alphas,
+    expect_level,
+    expect_stillness,
+    expect_times,
+    stack_rows,
+)
+from keyrecon.golf.solver import Expect, Kind, Problem, chain_rule, robust_weights, solve
+from keyrecon.golf.unknowns import Span, still_span, swing_span
+
+
+@dataclass(frozen=True)
+class WeightOptions:
+    """How much each kind of observation counts against the joints; 0 leaves it out."""
+
+    joints: float = 1.0
+    """Tracked joints; their errors are in standard deviations."""
+    club: float = 1.0
+    """Ends of the club, in standard deviations."""
+    foreground: float = 0.5
+    """Lines of sight through the player's mask, made commensurate with the joints."""
+    matches: float = 0.5
+    """Surface points matched between consecutive frames, made commensurate with the joints."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a swing is fitted."""
+
+    components: int = 40
+    """Alphas used at most; the paper used 4 of its 10 swings."""
+    weights: WeightOptions = field(default_factory=WeightOptions)
+    """Observations."""
+    priors: PriorOptions = field(default_factory=PriorOptions)
+    """Expectations."""
+    robust: float = 3.0
+    """Standard deviations beyond which a joint or club end counts less."""
+    time_knots: float = 0.1
+    """Seconds between knots of the normalised time."""
+    root_knots: float = 0.4
+    """Seconds between knots of the player's place and turn."""
+    steps: int = 25
+    """Steps of the solver at most."""
+
+
+FIRST = 6
+"""Alphas that move before all do: the largest styles first."""
+
+
+def fit_swing(
+    observations: Observations,
+    model: MotionModel,
+    body: Body,
+    start: SwingState,
+    fps: float,
+    options: FitOptions = FitOptions(),
+) -> SwingState:
+    """The swing that explains what was seen, from a rough start."""
+    frames = len(start.mu)
+    kinds = choose_kinds(observations, model, body, start, options)
+    alphas = min(options.components, len(model.components))
+    state = replace(start, alpha=np.zeros(alphas))
+    knots = (options.time_knots * fps, options.root_knots * fps)
+    for span, robust in (
+        (still_span(0, frames), 10.0), (swing_span(min(alphas, FIRST), frames, knots), 3.0),
+        (swing_span(alphas, frames, knots), 1.0),
+    ):  # fmt: skip
+        expect = _whole_swing(span, start.mu, options.priors, fps)
+        wide = [replace(kind, robust=robust * kind.robust) for kind in kinds]
+        state = solve(Problem(model, body, span, wide, expect), state, options.steps)
+        state = replace(state, mu=np.clip(np.maximum.accumulate(state.mu), 0, 1))
+    return state
+
+
+def choose_kinds(
+    observations: Observations,
+    model: MotionModel,
+    body: Body,
+    start: SwingState,
+    options: FitOptions,
+) -> list[Kind]:
+    """Kinds of observation that count, with their weights at the start."""
+    weights = options.weights
+    points = [
+        Kind(partial(joint_residuals, observations, body), weights.joints, options.robust),
+        Kind(partial(club_residuals, observations, body), weights.club, options.robust),
+    ]
+    surfaces: list[Kind] = []
+    points = [kind for kind in points if kind.weight]
+    surfaces = [kind for kind in surfaces if kind.weight]
+    reference = sum(kind.weight * _influence(kind, model, body, start) for kind in points)
+    return points + [_make_commensurate(k, reference, model, body, start) for k in surfaces]
+
+
+def _make_commensurate(
+    kind: Kind, reference: float, model: MotionModel, body: Body, start: SwingState
+) -> Kind:
+    """The kind with its weight as a share of the influence of the points."""
+    own = _influence(kind, model, body, start)
+    return replace(kind, weight=kind.weight * reference / own if own else 0.0)
+
+
+def _whole_swing(
+    span: Span, guess: Float[np.ndarray, "T"], options: PriorOptions, fps: float
+) -> Expect:
+    """Expectations over a whole swing."""
+
+    def expect(state: SwingState) -> Rows:
+        return stack_rows(
+            [
+                expect_alphas(state, span, np.zeros(span.alphas), options.alpha),
+                expect_times(state, span, guess, options, fps),
+                expect_stillness(state, span, options, fps),
+                expect_level(state, span, options),
+            ]
+        )
+
+    return expect
+
+
+_SOME = 4
+_TYPICAL = np.array([1.0] * _SOME + [0.01] + [0.03] * 3 + [0.02] * 3)
+"""Steps of alpha, mu, turn (rad) and shift (m) that count as equally large."""
+
+
+def _influence(kind: Kind, model: MotionModel, body: Body, state: SwingState) -> float:
+    """Trace of J^T J in typical steps of the unknowns, robustly weighted."""
+    posture = posture_at(model, state.mu, np.zeros(_SOME))
+    pose = place_body(body, posture, state)
+    rows = kind.observe(pose)
+    slopes = chain_rule(rows, pose, pose_rates(body, posture, state, pose)) * _TYPICAL
+    share, _ = robust_weights(rows, 10 * kind.robust)
+    return float(((slopes**2).sum(axis=1) * share).sum())

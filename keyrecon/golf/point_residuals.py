@@ -1,0 +1,73 @@
+"""Errors of joints and of the club in the picture (CVPR 2005, Section 4.2).
+
+The distance of a projected joint to where it was tracked is taken as two coordinates: the same
+square, and smooth at zero. The club pulls by its two ends; along the shaft its ends are less sure
+than across, since the hands hide one and blur the other.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.golf.kinematics import find_club, find_joints
+from keyrecon.golf.records import Body, Camera, Observations, Pose, Residuals
+from keyrecon.golf.skeleton import CLUB
+
+ALONG = 0.25
+"""Weight of the error along the shaft, against 1 across it."""
+
+
+def joint_residuals(observations: Observations, body: Body, pose: Pose) -> Residuals:
+    """Projected minus tracked joints, in standard deviations of the track."""
+    frame, joint = np.nonzero(np.isfinite(observations.joints).all(axis=2))
+    points = find_joints(body, pose)[frame, joint]
+    pixels, slope = project(points, observations.camera)
+    spread = observations.spread[frame, joint]
+    values = (pixels - observations.joints[frame, joint]) / spread[:, None]
+    return pair_rows(values, slope / spread[:, None, None], points,
+                     frame, body.joint_segment[joint])  # fmt: skip
+
+
+def club_residuals(observations: Observations, body: Body, pose: Pose) -> Residuals:
+    """Projected minus seen ends of the club, across and along the shaft, standard deviations."""
+    frame = np.flatnonzero(np.isfinite(observations.club).all(axis=(1, 2)))
+    points = find_club(body, pose)[frame].reshape(-1, 3)
+    seen = observations.club[frame]
+    pixels, slope = project(points, observations.camera)
+    along = seen[:, 1] - seen[:, 0]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    axes = np.repeat(np.stack([across, ALONG * along], axis=1), 2, axis=0)
+    axes = axes / np.repeat(observations.club_spread[frame], 2)[:, None, None]
+    values = np.einsum("nij,nj->ni", axes, pixels - seen.reshape(-1, 2))
+    return pair_rows(values, axes @ slope, points, np.repeat(frame, 2),
+                     np.full(len(points), CLUB))  # fmt: skip
+
+
+def project(
+    points: Float[np.ndarray, "n 3"], camera: Camera
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 3"]]:
+    """Pixels of points in camera axes, and their change by the points."""
+    depth = np.maximum(points[:, 2], NEAREST)
+    flat = points[:, :2] / depth[:, None]
+    slope = np.zeros((len(points), 2, 3))
+    slope[:, 0, 0] = slope[:, 1, 1] = camera.focal / depth
+    slope[:, :, 2] = -camera.focal * flat / depth[:, None]
+    return camera.focal * flat + camera.principal, slope
+
+
+NEAREST = 0.1
+"""Metres before the camera within which nothing is filmed."""
+
+
+def pair_rows(
+    values: Float[np.ndarray, "n 2"],
+    gradient: Float[np.ndarray, "n 2 3"],
+    points: Float[np.ndarray, "n 3"],
+    frame: Int[np.ndarray, "n"],
+    segment: Int[np.ndarray, "n"],
+) -> Residuals:
+    """Two rows for every error with two coordinates."""
+    return Residuals(
+        values.ravel(), np.repeat(frame, 2), np.repeat(segment, 2), np.repeat(points, 2, axis=0),
+        gradient.reshape(-1, 3), np.repeat(np.arange(len(values)), 2),
+    )  # fmt: skip
