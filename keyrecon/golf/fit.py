@@ -67,6 +67,9 @@ class FitOptions:
     """Steps of the solver at most."""
 
 
+LOOKS = 5.0
+"""Independent looks at the player per second: errors of trackers and of the model's proportions
+last, so that more frames per second do not make them smaller."""
 FIRST = 6
 """Alphas that move before all do: the largest styles first."""
 
@@ -82,6 +85,7 @@ def fit_swing(
     """The swing that explains what was seen, from a rough start."""
     frames = len(start.mu)
     kinds = choose_kinds(observations, model, body, start, options)
+    kinds = [replace(kind, weight=kind.weight * min(1.0, LOOKS / fps)) for kind in kinds]
     alphas = min(options.components, len(model.components))
     state = replace(start, alpha=np.zeros(alphas))
     knots = (options.time_knots * fps, options.root_knots * fps)

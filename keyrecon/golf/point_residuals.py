@@ -12,6 +12,9 @@ from keyrecon.golf.kinematics import find_club, find_joints
 from keyrecon.golf.records import Body, Camera, Observations, Pose, Residuals
 from keyrecon.golf.skeleton import CLUB
 
+MODEL_ERROR = 0.03
+"""Metres by which joints of the model miss the player's even at best: his proportions and what is
+called a joint differ. Added to the tracker's error, it keeps the fit from explaining them away."""
 ALONG = 0.25
 """Weight of the error along the shaft, against 1 across it."""
 
@@ -21,7 +24,7 @@ def joint_residuals(observations: Observations, body: Body, pose: Pose) -> Resid
     frame, joint = np.nonzero(np.isfinite(observations.joints).all(axis=2))
     points = find_joints(body, pose)[frame, joint]
     pixels, slope = project(points, observations.camera)
-    spread = observations.spread[frame, joint]
+    spread = _total_spread(observations.spread[frame, joint], slope)
     values = (pixels - observations.joints[frame, joint]) / spread[:, None]
     return pair_rows(values, slope / spread[:, None, None], points,
                      frame, body.joint_segment[joint])  # fmt: skip
@@ -37,10 +40,18 @@ def club_residuals(observations: Observations, body: Body, pose: Pose) -> Residu
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     axes = np.repeat(np.stack([across, ALONG * along], axis=1), 2, axis=0)
-    axes = axes / np.repeat(observations.club_spread[frame], 2)[:, None, None]
+    spread = _total_spread(np.repeat(observations.club_spread[frame], 2), slope)
+    axes = axes / spread[:, None, None]
     values = np.einsum("nij,nj->ni", axes, pixels - seen.reshape(-1, 2))
     return pair_rows(values, axes @ slope, points, np.repeat(frame, 2),
                      np.full(len(points), CLUB))  # fmt: skip
+
+
+def _total_spread(
+    tracked: Float[np.ndarray, "n"], slope: Float[np.ndarray, "n 2 3"]
+) -> Float[np.ndarray, "n"]:
+    """Standard deviation of tracker and model together, px."""
+    return np.hypot(tracked, MODEL_ERROR * slope[:, 0, 0])
 
 
 def project(

@@ -26,13 +26,13 @@ class PriorOptions:
     """Of the normalised time around its first guess."""
     pace: float = 1.5
     """Of the change of pace, normalised time per second squared, from what was guessed."""
-    turn: float = 0.15
+    turn: float = 0.05
     """Radians that G turns in a second beyond the learnt motion."""
-    shift: float = 0.06
+    shift: float = 0.02
     """Metres that G shifts in a second beyond the learnt motion."""
-    roll: float = 0.04
+    roll: float = 0.03
     """Radians by which the camera leans sideways."""
-    pitch: float = 0.25
+    pitch: float = 0.12
     """Radians by which the camera looks up or down."""
 
 

@@ -25,6 +25,8 @@ class View(StrEnum):
     SIDE = "side"
     ABOVE = "above"
     OBLIQUE = "oblique"
+    FACE_ON = "face-on"
+    DOWN_THE_LINE = "down-the-line"
 
 
 _PLACES = {  # azimuth from behind the player in degrees, height and distance in metres, spreads
@@ -33,6 +35,8 @@ _PLACES = {  # azimuth from behind the player in degrees, height and distance in
     View.SIDE: ((88.0, 10.0), (1.7, 0.4), (11.0, 1.5)),
     View.ABOVE: ((20.0, 25.0), (7.5, 1.0), (9.0, 1.0)),
     View.OBLIQUE: ((38.0, 10.0), (2.4, 0.7), (11.0, 1.5)),
+    View.FACE_ON: ((180.0, 5.0), (1.15, 0.15), (4.8, 0.5)),
+    View.DOWN_THE_LINE: ((88.0, 4.0), (1.15, 0.15), (4.8, 0.5)),
 }
 
 UP = np.array([0.0, 1.0, 0.0])

@@ -63,13 +63,7 @@ class Rays:
 
 def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> Background:
     """Surroundings as seen in all frames of a camera move; things stand `beyond` metres away."""
-    middle = len(move.rotation) // 2
-    rotation = move.rotation[middle]
-    focal = float(move.focal.max()) * SHARPNESS
-    lo, hi = _extent(move, rotation, focal)
-    shrink = min(1.0, float(np.sqrt(MOST_PIXELS / np.prod(hi - lo))))
-    focal, lo, hi = focal * shrink, np.floor(lo * shrink), np.ceil(hi * shrink)
-    rays = _cast(move.center, rotation, focal, (lo, hi))
+    rays, rotation, focal, lo = cast_rays(move)
     painted, surface_t = _paint(rays, look, np.random.default_rng([seed, 23]))
     picture = np.clip(painted, 0, 255).astype(np.uint8)
     view = View(move.center, rotation, focal, -lo, beyond)
@@ -78,6 +72,16 @@ def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> B
     _add_net(picture, rays, surface_t, look.court)
     add_props(picture, view, (look, seed), lambda z: (z > NET_Z) != behind)
     return Background(picture, rotation, focal, lo)
+
+
+def cast_rays(move: CameraMove) -> tuple[Rays, np.ndarray, float, Float[np.ndarray, "2"]]:
+    """Rays of the picture that holds all frames; its rotation, focal length and corner."""
+    rotation = move.rotation[len(move.rotation) // 2]
+    focal = float(move.focal.max()) * SHARPNESS
+    lo, hi = _extent(move, rotation, focal)
+    shrink = min(1.0, float(np.sqrt(MOST_PIXELS / np.prod(hi - lo))))
+    focal, lo, hi = focal * shrink, np.floor(lo * shrink), np.ceil(hi * shrink)
+    return _cast(move.center, rotation, focal, (lo, hi)), rotation, focal, lo
 
 
 def _extent(

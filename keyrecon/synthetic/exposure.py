@@ -15,7 +15,7 @@ from keyrecon.synthetic.cones import Solids
 from keyrecon.synthetic.figure import FigureSolids
 from keyrecon.synthetic.racket import MOST as RACKET_MOST
 from keyrecon.synthetic.racket import STEP as RACKET_STEP
-from keyrecon.synthetic.racket import Layer, draw_racket
+from keyrecon.synthetic.racket import Layer, draw_implement
 from keyrecon.synthetic.raster import Surface, draw_solids
 from keyrecon.synthetic.shading import paint_surface
 from keyrecon.synthetic.stage import Stage
@@ -95,12 +95,12 @@ def _draw_racket(
         return poses @ stage.move.rotation[frame].T
 
     ends = at(time + length * np.array([-0.5, 0.5]))
-    tips = ends[:, 0] + 0.5 * ends[:, 1]
+    tips = ends[:, 0] + stage.held.reach * ends[:, 1]
     way = np.linalg.norm(tips[1] - tips[0]) * focal / tips[0, 2]
     count = int(np.clip(np.ceil(way / RACKET_STEP), 1, RACKET_MOST))
     poses = at(time + length * ((np.arange(count) + 0.5) / count - 0.5))
     view = (focal, stage.move.principal, stage.move.size, scale)
-    return draw_racket(poses, view, np.float32(stage.look.racket))
+    return draw_implement(stage.held, poses, view, np.float32(stage.look.racket))
 
 
 def _hide(racket: Layer | None, surface: Surface) -> Layer | None:

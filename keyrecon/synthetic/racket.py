@@ -1,7 +1,8 @@
-"""The racket: a handle, a throat and a strung oval, drawn as lines with the depth of its plane.
+"""What the player swings: lines in a plane, drawn with the depth of that plane.
 
 It moves faster than anything else in the picture, so it is drawn several times between two
-instants of the figure. Size after the ITF's rule 4: 0.685 m long, head 0.33 m x 0.26 m.
+instants of the figure. The racket has a handle, a throat and a strung oval, its size after the
+ITF's rule 4: 0.685 m long, head 0.33 m x 0.26 m. The golf club is a mid iron: grip, shaft, head.
 """
 
 from dataclasses import dataclass
@@ -18,9 +19,54 @@ STEP = 3.0
 """px that the tip moves at most between two drawings."""
 MOST = 8
 _CIRCLE = np.linspace(0, 2 * np.pi, 28, endpoint=False)
-_OVAL = np.stack([0.43 + 0.16 * np.cos(_CIRCLE), 0.125 * np.sin(_CIRCLE)], axis=1)
-_HANDLE = np.array([[-0.07, 0.0], [0.12, 0.0]])
-_THROATS = np.array([[[0.11, 0.0], [0.30, 0.072]], [[0.11, 0.0], [0.30, -0.072]]])
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A line of an implement."""
+
+    points: tuple[tuple[float, float], ...]
+    """Along from the fist and across; metres."""
+    width: float
+    """Metres."""
+    closed: bool = False
+    strung: bool = False
+    """Whether a net of strings fills it."""
+
+
+@dataclass(frozen=True)
+class Implement:
+    """What is held in the hand."""
+
+    strokes: tuple[Stroke, ...]
+    reach: float
+    """Metres from the fist to a point that stands for how fast it moves."""
+
+
+RACKET = Implement(
+    (
+        Stroke(
+            tuple((0.43 + 0.16 * np.cos(a), 0.125 * np.sin(a)) for a in _CIRCLE.tolist()),
+            0.02, closed=True, strung=True,
+        ),
+        Stroke(((-0.07, 0.0), (0.12, 0.0)), 0.03),
+        Stroke(((0.11, 0.0), (0.30, 0.072)), 0.02),
+        Stroke(((0.11, 0.0), (0.30, -0.072)), 0.02),
+    ),
+    0.5,
+)  # fmt: skip
+
+
+def golf_club(length: float) -> Implement:
+    """An iron; `length` is from between the hands to the end of the head, metres."""
+    return Implement(
+        (
+            Stroke(((-0.13, 0.0), (0.13, 0.0)), 0.026),
+            Stroke(((0.13, 0.0), (length - 0.03, 0.0)), 0.012),
+            Stroke(((length - 0.04, 0.0), (length - 0.01, 0.075)), 0.04),
+        ),
+        length,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,21 +91,19 @@ def racket_frames(
     return np.stack([fist, pointers.racket, across], axis=1)
 
 
-def draw_racket(
+def draw_implement(
+    implement: Implement,
     poses: Float[np.ndarray, "n 3 3"],
     view: tuple[float, Float[np.ndarray, "2"], tuple[int, int], float],
     color: Float[np.ndarray, "3"],
 ) -> Layer | None:
-    """Average of a racket at several poses in camera axes.
+    """Average of an implement at several poses in camera axes.
 
     `view` is focal length, principal point, picture size, and px per metre of the depth.
     """
     focal, principal, size, depth_scale = view
-
-    def place(flat: np.ndarray) -> np.ndarray:
-        return poses[:, :1] + flat[:, :1] * poses[:, 1:2] + flat[:, 1:] * poses[:, 2:]
-
-    outline = place(np.concatenate([_OVAL, _HANDLE, *_THROATS]))
+    flat = np.concatenate([stroke.points for stroke in implement.strokes])
+    outline = poses[:, :1] + flat[:, :1] * poses[:, 1:2] + flat[:, 1:] * poses[:, 2:]
     pixels = outline[..., :2] / outline[..., 2:] * focal + principal
     lo = np.maximum(np.floor(pixels.min(axis=(0, 1))) - 4, 0).astype(int)
     hi = np.minimum(np.ceil(pixels.max(axis=(0, 1))) + 5, size).astype(int)
@@ -70,16 +114,9 @@ def draw_racket(
     frame = np.zeros(shape, np.float32)
     strings = np.zeros(shape, np.float32)
     for one in np.round((pixels - lo) * 16).astype(np.int32):
-        mask = np.zeros(shape, np.uint8)
-        cv2.fillPoly(mask, [one[: len(_OVAL)]], 70, cv2.LINE_AA, 4)
-        strings += mask
-        mask[:] = 0
-        thin, thick = max(1, round(0.02 * scale)), max(1, round(0.03 * scale))
-        cv2.polylines(mask, [one[: len(_OVAL)]], True, 255, thin, cv2.LINE_AA, 4)
-        handle, *throats = one[len(_OVAL) :].reshape(3, 2, 2)
-        cv2.polylines(mask, [handle], False, 255, thick, cv2.LINE_AA, 4)
-        cv2.polylines(mask, throats, False, 255, thin, cv2.LINE_AA, 4)
-        frame += mask
+        lines, net = _draw_strokes(implement, one, scale, shape)
+        frame += lines
+        strings += net
     frame /= 255 * len(poses)
     strings /= 255 * len(poses)
     cover = np.maximum(frame, strings * (1 - frame))
@@ -87,6 +124,22 @@ def draw_racket(
     middle = len(poses) // 2
     depth = _plane_depth(pixels[middle] - lo, outline[middle, :, 2] * depth_scale, shape)
     return Layer(int(lo[0]), int(lo[1]), np.dstack([paint, cover]).astype(np.float32), depth)
+
+
+def _draw_strokes(
+    implement: Implement, points: np.ndarray, scale: float, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cover of lines and of strings at one pose, 0-255; `points` in sixteenths of a px."""
+    lines, net = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+    first = 0
+    for stroke in implement.strokes:
+        own = points[first : first + len(stroke.points)]
+        first += len(own)
+        if stroke.strung:
+            cv2.fillPoly(net, [own], 70, cv2.LINE_AA, 4)
+        width = max(1, round(stroke.width * scale))
+        cv2.polylines(lines, [own], stroke.closed, 255, width, cv2.LINE_AA, 4)
+    return lines, net
 
 
 def _plane_depth(

@@ -5,7 +5,7 @@ click, taken from the renderer's own part labels) and `scene.json` (options and 
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -29,7 +29,7 @@ from keyrecon.synthetic.figure import PARTS
 from keyrecon.synthetic.looks import Look, choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 from keyrecon.synthetic.pointers import point_figure
-from keyrecon.synthetic.racket import racket_frames
+from keyrecon.synthetic.racket import RACKET, racket_frames
 from keyrecon.synthetic.render import Frame, draw_frame
 from keyrecon.synthetic.shading import make_tiles
 from keyrecon.synthetic.stage import Stage
@@ -87,10 +87,23 @@ def synthesize(
     render_sequence(points, clips.fps, scene, out, progress)
 
 
+def draw_court(
+    points: Float[np.ndarray, "T 14 3"], move: CameraMove, look: Look, seed: int
+) -> Background:
+    """A tennis court with nothing standing between camera and player."""
+    return draw_background(move, look, seed, float(move.to_camera(points)[..., 2].max()) + 0.8)
+
+
 def set_stage(
-    points: Float[np.ndarray, "T 14 3"], fps: float, options: SceneOptions = SceneOptions()
+    points: Float[np.ndarray, "T 14 3"],
+    fps: float,
+    options: SceneOptions = SceneOptions(),
+    surroundings: Callable[..., Background] = draw_court,
 ) -> Stage:
-    """Everything that frames are drawn from; `points` in the world, metres, y up, floor at 0."""
+    """Everything that frames are drawn from; `points` in the world, metres, y up, floor at 0.
+
+    `surroundings` is called with points, camera move, look and seed.
+    """
     rng = np.random.default_rng([options.seed, 3])
     look = choose_look(options.seed)
     pointers = point_figure(points, fps, options.left_handed)
@@ -99,18 +112,11 @@ def set_stage(
     grey = rng.normal(0, options.noise, (height + 64, width + 64, 1))
     color = rng.normal(0, 0.6 * options.noise, (height + 64, width + 64, 3))
     return Stage(
-        points, pointers, racket_frames(points, pointers), move,
-        _draw_surroundings(points, move, look, options.seed), look,
+        points, pointers, racket_frames(points, pointers), RACKET, move,
+        surroundings(points, move, look, options.seed), look,
         make_tiles(rng), np.round(grey + color).astype(np.int8),
         min(1.0, options.shutter * fps), options.seed,
     )  # fmt: skip
-
-
-def _draw_surroundings(
-    points: Float[np.ndarray, "T 14 3"], move: CameraMove, look: Look, seed: int
-) -> Background:
-    """The background, with nothing standing between camera and player."""
-    return draw_background(move, look, seed, float(move.to_camera(points)[..., 2].max()) + 0.8)
 
 
 def render_sequence(
@@ -121,15 +127,22 @@ def render_sequence(
     progress: Progress = silent,
 ) -> None:
     """Film a motion and write the sequence into a folder, which is made if need be."""
+    film_stage(set_stage(points, fps, options), fps, options, out, progress)
+
+
+def film_stage(
+    stage: Stage, fps: float, options: SceneOptions, out: Path, progress: Progress = silent
+) -> None:
+    """Draw all frames of a stage and write video, truth, picks and scene into a folder."""
     out.mkdir(parents=True, exist_ok=True)
-    stage = set_stage(points, fps, options)
-    chosen = {round(share * (len(points) - 1)) for share in (0.1, 0.5, 0.9)}
+    frames = len(stage.points)
+    chosen = {round(share * (frames - 1)) for share in (0.1, 0.5, 0.9)}
     picks: list[Pick] = []
-    visible = np.zeros((len(points), len(LSP14.names)), bool)
+    visible = np.zeros((frames, len(LSP14.names)), bool)
 
     def pictures() -> Iterator[np.ndarray]:
         drawn = _draw_all(stage, options.workers or cpu_count() or 1, chosen)
-        for t, frame in enumerate(progress(drawn, "Drawing", len(points))):
+        for t, frame in enumerate(progress(drawn, "Drawing", frames)):
             visible[t] = frame.visible
             if t in chosen:
                 picks.extend(click_parts(frame.parts, t))

@@ -10,6 +10,7 @@ from keyrecon.synthetic.court import Background
 from keyrecon.synthetic.figure import FigureSolids, build_solids
 from keyrecon.synthetic.looks import Look
 from keyrecon.synthetic.pointers import Pointers, unit
+from keyrecon.synthetic.racket import Implement
 from keyrecon.synthetic.shading import Light, Tiles
 
 
@@ -22,6 +23,8 @@ class Stage:
     pointers: Pointers
     racket: Float[np.ndarray, "T 3 3"]
     """Fist, direction to the tip, direction across; see `racket.racket_frames`."""
+    held: Implement
+    """What the player swings."""
     move: CameraMove
     background: Background
     look: Look
