@@ -1,7 +1,11 @@
 """A project open for annotation, and edits as a page sends them."""
 
+import asyncio
 import itertools
 import json
+from contextlib import suppress
+from dataclasses import dataclass
+from urllib.parse import unquote
 
 from keyrecon import project
 from keyrecon.annotate.assistant import Assistant
@@ -34,3 +38,46 @@ def mark(frame, joint, to, was=None):
 
 def submit(store, *edits):
     return store.submit(parse_edits(json.dumps({"edits": edits}).encode()))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an application answered."""
+
+    status: int
+    headers: dict[str, str]
+    content: bytes
+
+    def json(self):
+        return json.loads(self.content)
+
+
+def request(app, method, address, headers, body=b""):
+    """Ask an ASGI application, with exactly these headers: a list of pairs, or a dict."""
+    path, _, query = address.partition("?")
+    pairs = headers.items() if isinstance(headers, dict) else headers
+    scope = {
+        "type": "http",
+        "http_version": "1.1",
+        "method": method,
+        "scheme": "http",
+        "path": unquote(path),
+        "raw_path": path.encode(),
+        "query_string": query.encode(),
+        "root_path": "",
+        "headers": [(name.encode(), value.encode()) for name, value in pairs],
+    }
+    sent = []
+    coming = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def receive():
+        return coming.pop() if coming else {"type": "http.disconnect"}
+
+    async def send(message):
+        sent.append(message)
+
+    with suppress(Exception):  # the server logs it; what counts is what was answered
+        asyncio.run(app(scope, receive, send))
+    told = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
+    content = b"".join(message.get("body", b"") for message in sent[1:])
+    return Answer(sent[0]["status"], told, content)

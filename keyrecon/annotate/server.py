@@ -70,6 +70,7 @@ def make_app(desk: Desk, door: Door) -> ASGIApp:
             NotSaved: lambda _, fault: _error(507, str(fault)),
             KeyreconError: lambda _, fault: _error(400, str(fault)),
             HTTPException: lambda _, fault: _error(fault.status_code, fault.detail),
+            Exception: lambda *_: _error(500, "A fault of keyrecon; the terminal tells more."),
         },
     )
     return Guard(app, door)
@@ -144,7 +145,7 @@ async def _still(desk: Desk, request: Request) -> Response:
     """A frame as JPEG. With the right ?v= the browser may keep it for good: another project may
     have the same port later, and then `v` differs."""
     width, stills = request.query_params.get("width", ""), desk.stills
-    if not (width.isdecimal() or not width) or len(width) > 5:
+    if width and not (width.isascii() and width.isdecimal() and len(width) < 6):
         raise KeyreconError("'width' is a number of pixels.")
     picture = stills.still(request.path_params["frame"], int(width or 0) or None)
     lasting = request.query_params.get("v") == stills.identity
