@@ -5,6 +5,7 @@ Exit codes: 0 success, 1 with one line on stderr for what a user can mend, 2 for
 """
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -137,7 +138,8 @@ def annotate(
         host: Address to listen on; any other than this machine's own lets others in.
         no_browser: Only print the address.
     """
-    serve_annotator(Workspace(project), (host, port), not no_browser, print)
+    say = partial(print, flush=True)  # whoever starts this from a script waits for the address
+    serve_annotator(Workspace(project), (host, port), not no_browser, say)
 
 
 @app.command(name="import")

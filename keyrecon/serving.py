@@ -4,6 +4,7 @@ import asyncio
 import socket
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
@@ -16,6 +17,7 @@ from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import Desk, open_desk
 from keyrecon.annotate.guard import Door
 from keyrecon.annotate.server import make_app
+from keyrecon.annotate.watch import Watch
 from keyrecon.errors import KeyreconError
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
@@ -31,6 +33,7 @@ def serve_annotator(
     """Serve the page of a project at (host, port) until interrupted."""
     with listen(*place) as listener:
         desk = open_desk(workspace, Assistant(), job_commands(workspace.folder))
+        watch = Watch(desk)
         try:
             door = make_door(listener, place[0])
             say(f"Annotating {workspace.folder}. Open in a browser:\n  {door.address}")
@@ -41,13 +44,16 @@ def serve_annotator(
                 )
             if open_browser:
                 webbrowser.open(door.address)
-            _serve(desk, door, listener)
+            with suppress(KeyboardInterrupt):
+                asyncio.run(_Server(desk, door).serve(sockets=[listener]))
+            say("Stopped. Everything that was marked is kept.")
         finally:
+            watch.close()
             desk.close()
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A bound socket; KeyreconError where the port is taken.
+    """A listening socket; KeyreconError where the port is taken.
 
     It is told to be TCP: only then are small answers sent at once (asyncio sets TCP_NODELAY).
     """
@@ -56,6 +62,7 @@ def listen(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen()  # from now on a browser waits instead of being turned away
     except OSError as fault:
         listener.close()
         raise KeyreconError(
@@ -68,9 +75,25 @@ def listen(host: str, port: int) -> socket.socket:
 def make_door(listener: socket.socket, host: str) -> Door:
     """The fixed list of names under which the server answers."""
     port = listener.getsockname()[1]
-    shown = f"[{host}]" if ":" in host else host
-    names = ("127.0.0.1", "localhost") if host == "127.0.0.1" else (shown,)
-    return Door(tuple(f"{name}:{port}" for name in names), port)
+    return Door(tuple(f"{name}:{port}" for name in _names(host)), port)
+
+
+def _names(host: str) -> tuple[str, ...]:
+    """How a browser may spell an address, best first."""
+    if host in ("0.0.0.0", "::"):
+        name = socket.gethostname()
+        return (name, *_addresses(name), "127.0.0.1", "localhost")
+    if is_loopback(host):
+        return (f"[{host}]" if ":" in host else host, "localhost")
+    return (f"[{host}]" if ":" in host else host,)
+
+
+def _addresses(name: str) -> tuple[str, ...]:
+    """This machine's own addresses, as far as it knows them by name."""
+    try:
+        return tuple(socket.gethostbyname_ex(name)[2])
+    except OSError:
+        return ()
 
 
 def is_loopback(host: str) -> bool:
@@ -81,15 +104,25 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def _serve(desk: Desk, door: Door, listener: socket.socket) -> None:
-    config = uvicorn.Config(
-        make_app(desk, door),
-        log_level="warning",
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=GRACE_SECONDS,
-    )
-    asyncio.run(uvicorn.Server(config).serve(sockets=[listener]))
+class _Server(uvicorn.Server):
+    """Ends the streams of news when it is stopped; they would keep it waiting."""
+
+    def __init__(self, desk: Desk, door: Door) -> None:
+        """Serve a project; the address with its token appears in no log."""
+        config = uvicorn.Config(
+            make_app(desk, door),
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE_SECONDS,
+        )
+        super().__init__(config)
+        self._events = desk.events
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop; called in the server's own loop."""
+        self._events.close()
+        await super().shutdown(sockets)
 
 
 def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress], str]]:

@@ -73,6 +73,7 @@ def make_app(desk: Desk, door: Door) -> ASGIApp:
             Exception: lambda *_: _error(500, "A fault of keyrecon; the terminal tells more."),
         },
     )
+    app.router.redirect_slashes = False
     return Guard(app, door)
 
 
