@@ -27,6 +27,12 @@ def test_stages_know_neither_one_another_nor_what_calls_them(stage):
         assert not banned & set(imported(path)), path
 
 
+def test_the_annotator_knows_neither_the_stages_nor_what_calls_it():
+    banned = (OUTER - {"workspace"}) | STAGES | {"assist", "project", "serving"}
+    for path in (PACKAGE / "annotate").rglob("*.py"):
+        assert not banned & set(imported(path)), path
+
+
 def test_the_base_layer_knows_only_itself():
     for name in BASE:
         path = PACKAGE / f"{name}.py"
