@@ -16,6 +16,7 @@ from keyrecon import demo as demonstration
 from keyrecon import project as work
 from keyrecon.console import show
 from keyrecon.errors import KeyreconError
+from keyrecon.golf_commands import golf
 from keyrecon.pipeline import Options
 from keyrecon.records import Pick
 from keyrecon.serving import serve_annotator
@@ -233,6 +234,9 @@ def relink(project: Positional[Path], video: Positional[Path]) -> None:
     """
     Workspace(project).relink(video)
     print(f"{project} now uses {video}.")
+
+
+app.command(golf, name="golf", help="A model of whole golf swings: train it, fit it to a video.")
 
 
 def main() -> None:

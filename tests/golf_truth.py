@@ -3,10 +3,8 @@
 import numpy as np
 
 from keyrecon.body import LSP14
-from keyrecon.golf.kinematics import find_club, find_joints, place_body
-from keyrecon.golf.motion_model import posture_at
 from keyrecon.golf.point_residuals import project
-from keyrecon.golf.records import Camera, Matches, Observations, SwingState
+from keyrecon.golf.records import Matches, Observations
 
 TRACKED = [LSP14.index(f"{s}_{n}") for s in ("right", "left") for n in ("ankle", "knee", "wrist")]
 TRACKED.append(LSP14.index("head_top"))
@@ -28,17 +26,26 @@ def even_times(frames, still=10):
     return np.clip((np.arange(frames) - still) / (frames - 2 * still), 0, 1)
 
 
-def observe(body, joints, club, camera, noise, seed=0, tracked=TRACKED):
+def observe(joints, club, camera, noise, seed=0):
     """Observations of joints and club in camera axes (T, 14, 3) and (T, 2, 3)."""
     rng = np.random.default_rng(seed)
     frames = len(joints)
     seen = np.full((frames, 14, 2), np.nan)
     pixels = project(joints.reshape(-1, 3), camera)[0].reshape(frames, 14, 2)
-    seen[:, tracked] = pixels[:, tracked] + rng.normal(0, noise, (frames, len(tracked), 2))
+    seen[:, TRACKED] = pixels[:, TRACKED] + rng.normal(0, noise, (frames, len(TRACKED), 2))
     ends = project(club.reshape(-1, 3), camera)[0].reshape(frames, 2, 2)
+    nothing = tuple(np.zeros((0, 2)) for _ in range(frames))
     return Observations(
-        camera, seen, np.full((frames, 14), 3.0), ends + rng.normal(0, noise, ends.shape),
-        np.full(frames, 4.0), tuple(np.zeros((0, 2)) for _ in range(frames)), (),
-        Matches(np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2))), np.arange(4.0),
-        np.zeros(frames), False,
-    )  # fmt: skip
+        camera=camera,
+        joints=seen,
+        spread=np.full((frames, 14), 3.0),
+        club=ends + rng.normal(0, noise, ends.shape),
+        club_spread=np.full(frames, 4.0),
+        club_along=np.full((frames, 2), 16.0),
+        foreground=nothing,
+        away=(),
+        matches=Matches(np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2))),
+        keys=np.arange(4.0),
+        mu=np.zeros(frames),
+        left_handed=False,
+    )

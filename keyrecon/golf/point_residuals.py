@@ -1,8 +1,8 @@
 """Errors of joints and of the club in the picture (CVPR 2005, Section 4.2).
 
 The distance of a projected joint to where it was tracked is taken as two coordinates: the same
-square, and smooth at zero. The club pulls by its two ends; along the shaft its ends are less sure
-than across, since the hands hide one and blur the other.
+square, and smooth at zero. The club pulls by its two ends, each across and along the shaft: where
+the shaft lies is surer than where it ends.
 """
 
 import numpy as np
@@ -15,8 +15,6 @@ from keyrecon.golf.skeleton import CLUB
 MODEL_ERROR = 0.03
 """Metres by which joints of the model miss the player's even at best: his proportions and what is
 called a joint differ. Added to the tracker's error, it keeps the fit from explaining them away."""
-ALONG = 0.25
-"""Weight of the error along the shaft, against 1 across it."""
 
 
 def joint_residuals(observations: Observations, body: Body, pose: Pose) -> Residuals:
@@ -39,9 +37,10 @@ def club_residuals(observations: Observations, body: Body, pose: Pose) -> Residu
     along = seen[:, 1] - seen[:, 0]
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    axes = np.repeat(np.stack([across, ALONG * along], axis=1), 2, axis=0)
-    spread = _total_spread(np.repeat(observations.club_spread[frame], 2), slope)
-    axes = axes / spread[:, None, None]
+    axes = np.repeat(np.stack([across, along], axis=1), 2, axis=0)
+    spreads = np.repeat(observations.club_spread[frame], 2), observations.club_along[frame].ravel()
+    total = np.stack([_total_spread(spread, slope) for spread in spreads], axis=1)
+    axes = axes / total[..., None]
     values = np.einsum("nij,nj->ni", axes, pixels - seen.reshape(-1, 2))
     return pair_rows(values, axes @ slope, points, np.repeat(frame, 2),
                      np.full(len(points), CLUB))  # fmt: skip

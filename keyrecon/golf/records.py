@@ -150,6 +150,10 @@ class Observations:
     club: Float[np.ndarray, "T 2 2"]
     """Hand end and head of the club."""
     club_spread: Float[np.ndarray, "T"]
+    """Standard deviation of both ends across the shaft."""
+    club_along: Float[np.ndarray, "T 2"]
+    """Standard deviation of the hand end and of the head along the shaft; infinite where an end is
+    hidden or outside of the picture."""
     foreground: tuple[Float[np.ndarray, "_ 2"], ...]
     """Samples of the player's mask, one array per frame."""
     away: tuple[Float[np.ndarray, "_ _"], ...]

@@ -42,7 +42,7 @@ SMALLEST = 1e-4
 class TrainOptions:
     """How the model is learnt."""
 
-    components: int = 12
+    components: int = 40
     """Components kept at most; fewer if there are fewer swings. A fit may use fewer still."""
     variation: VariationOptions = field(default_factory=VariationOptions)
     """Plausible variations that join the captured swings; count 0 for captured swings alone."""

@@ -30,7 +30,7 @@ Turns = Float[np.ndarray, "T P 3 3"]
 class VariationOptions:
     """How far swings differ; standard deviations."""
 
-    count: int = 60
+    count: int = 100
     """Variations of every captured swing."""
     seed: int = 0
     """Decides which."""
