@@ -1,0 +1,50 @@
+// The server's answers. Everything but a clear answer counts as "the server is gone".
+
+export class Gone extends Error {}
+
+async function answered(path, options) {
+  let response;
+  try {
+    response = await fetch(path, { credentials: "same-origin", cache: "no-store", ...options });
+  } catch (fault) {
+    throw new Gone(String(fault));
+  }
+  if (response.status >= 500 || response.status === 401 || response.status === 403) throw new Gone(`${response.status}`);
+  const content = await response.json().catch(() => null);
+  if (!response.ok) throw new Error(content?.error ?? `The server answered ${response.status}.`);
+  return content;
+}
+
+const asJson = (method, content) => ({
+  method, body: JSON.stringify(content), headers: { "Content-Type": "application/json" },
+});
+
+export const read = (path) => answered(`/api/${path}`);
+export const send = (path, content) => answered(`/api/${path}`, asJson("POST", content));
+export const remove = (path) => answered(`/api/${path}`, { method: "DELETE" });
+
+// Server-sent events; the browser reconnects by itself, `opened` is called each time.
+export function listen({ opened, closed, news }) {
+  const source = new EventSource("/api/events");
+  source.addEventListener("open", opened);
+  source.addEventListener("error", closed);
+  source.addEventListener("message", (event) => news(JSON.parse(event.data)));
+}
+
+// Asks at most one question at a time; of those that wait only the newest is asked.
+export function latestOnly(ask) {
+  let waiting = null, asking = false;
+  return async function request(...question) {
+    waiting = question;
+    if (asking) return;
+    asking = true;
+    while (waiting) {
+      const now = waiting;
+      waiting = null;
+      await ask(...now).catch((fault) => {
+        if (!(fault instanceof Gone)) throw fault;
+      });
+    }
+    asking = false;
+  };
+}

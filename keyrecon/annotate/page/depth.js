@@ -1,0 +1,70 @@
+// Asks the server for the pose in space of what is marked, after every change and while a joint is
+// dragged, and for the suggestion of a keyframe when it is opened.
+import * as api from "./api.js";
+import { byId, make, setText, toggle } from "./dom.js";
+import { createSpace } from "./space.js";
+
+export function createDepth(model, placed) {
+  const space = createSpace(byId("space"), model.project.limbs, model.sides);
+  const poses = new Map(), ghosts = new Map();
+  let last = "", hovered = null;
+
+  model.pose = () => poses.get(model.doing.frame) ?? null;
+  model.ghost = () => (model.done(model.keyframe() ?? { half: "both", frame: -1 }) ? null : ghosts.get(model.doing.frame) ?? null);
+
+  const ask = api.latestOnly(async (frame, marks, nearer) => {
+    const began = performance.now();
+    poses.set(frame, await api.send("pose", { frame, marks, nearer }));
+    model.changed();
+    performance.measure("pose", { start: began, end: performance.now() });
+  });
+
+  async function askGhost(frame) {
+    const answer = await api.read(`ghost/${frame}`);
+    ghosts.set(frame, answer?.joints ? answer : null);
+    model.changed();
+  }
+
+  function follow() {
+    const { frame } = model.doing, marks = placed(), nearer = model.nearer();
+    const now = JSON.stringify([frame, marks, nearer]);
+    if (frame === null || now === last) return;
+    last = now;
+    ask(frame, marks, nearer);
+  }
+
+  const readings = [0, 1, 2].map((n) => {
+    const button = make("button", {}, make("kbd", {}, String(n + 1)), make("span"));
+    button.addEventListener("pointerenter", () => hover(n));
+    button.addEventListener("pointerleave", () => hover(null));
+    return button;
+  });
+  byId("readings").append(...readings);
+  function hover(n) {
+    hovered = n;
+    model.changed();
+  }
+
+  function drawReadings() {
+    const pose = model.pose(), alternatives = pose?.alternatives ?? [], best = alternatives[0];
+    readings.forEach((button, n) => {
+      const reading = alternatives[n];
+      button.hidden = !reading;
+      if (!reading) return;
+      const turned = Object.keys(reading.nearer).filter((limb) => reading.nearer[limb] !== best.nearer[limb]);
+      setText(button.lastChild, n === 0 ? "most likely" : `${turned.length} turned`);
+      button.title = n === 0 ? "Take the most likely reading" : `Turned: ${turned.join(", ").replaceAll("_", " ")}`;
+      const shown = Object.entries(reading.nearer).every(([limb, sign]) => pose.limbs[limb]?.sign === sign);
+      toggle(button, "on", shown);
+    });
+  }
+
+  function draw() {
+    follow();
+    const pose = model.pose(), other = pose?.alternatives?.[hovered]?.points3d;
+    space.show(other ?? pose?.points3d, other ? pose?.points3d : null);
+    drawReadings();
+  }
+
+  return { draw, askGhost, space, readings };
+}

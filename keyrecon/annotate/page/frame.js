@@ -1,0 +1,93 @@
+// What surrounds every page: the steps, whether all is saved, notices, the running job and the keys.
+import * as api from "./api.js";
+import { byId, make, setText, toggle } from "./dom.js";
+import { KEYS, keyText } from "./keys.js";
+
+const SAVING = {
+  saved: () => "All saved",
+  saving: () => "Saving …",
+  unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
+};
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", pick: "Colours", motion: "Motion" };
+
+function keysTable() {
+  const parts = Object.entries(KEYS).map(([page, rows]) => make("section", {},
+    make("h2", {}, TITLES[page]),
+    make("dl", {}, ...rows.flatMap(([keys, what]) => [
+      make("dt", {}, ...keys.map((key) => make("kbd", {}, keyText(key)))), make("dd", {}, what),
+    ]))));
+  const pointer = make("section", {}, make("h2", {}, "Pointer"), make("dl", {}, ...[
+    ["click", "place the joint that is asked for; else select a joint, turn a limb"],
+    ["Shift click", "place it as hidden"],
+    ["drag", "move a joint, or the picture"],
+    ["wheel", "zoom at the pointer"],
+    ["over a joint or limb", "the keys V, F, R and Del mean what is under the pointer"],
+  ].flatMap(([what, does]) => [make("dt", {}, what), make("dd", {}, does)])));
+  return [...parts, pointer];
+}
+
+export function createFrame(model, go) {
+  document.querySelectorAll("[data-go]").forEach((button) => button.addEventListener("click", () => go(button.dataset.go)));
+  const keys = byId("keys-panel");
+  keys.append(make("form", { method: "dialog" }, make("button", { className: "plain close", "aria-label": "Close" }, "✕")),
+    make("div", { className: "keys" }, ...keysTable()));
+  const help = () => (keys.open ? keys.close() : keys.showModal());
+  byId("help").addEventListener("click", help);
+  for (const panel of document.querySelectorAll("dialog")) {
+    panel.addEventListener("click", (event) => event.target === panel && panel.close());
+  }
+  byId("notice-close").addEventListener("click", () => model.tell(null));
+  byId("notice-offer").addEventListener("click", () => {
+    const { offer } = model.notice;
+    model.tell(null);
+    offer.act();
+  });
+  byId("job-cancel").addEventListener("click", () => {
+    const job = runningJob();
+    if (job) api.remove(`jobs/${job.id}`).catch((fault) => model.tell(fault.message));
+  });
+  addEventListener("beforeunload", (event) => {
+    if (model.saving.status !== "saved") event.preventDefault();
+  });
+
+  const runningJob = () => [...model.jobs.values()].find(({ state }) => state === "running");
+
+  function drawJob() {
+    const job = runningJob();
+    byId("job").hidden = !job;
+    if (!job) return;
+    setText(byId("job-text"), job.text || "Starting");
+    if (job.total) byId("job-progress").value = job.done / job.total;
+    else byId("job-progress").removeAttribute("value");
+  }
+
+  function drawNotice() {
+    const { text, offer } = model.notice ?? {};
+    byId("notice").hidden = !text;
+    setText(byId("notice-text"), text ?? "");
+    byId("notice-offer").hidden = !offer;
+    setText(byId("notice-offer"), offer?.text ?? "");
+  }
+
+  function draw() {
+    const { status, waiting } = model.saving, { undo, redo } = model.state, keyframes = model.keyframes();
+    const { view } = model.doing;
+    document.body.dataset.view = view;
+    for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
+    document.querySelectorAll("[data-go]").forEach((button) => {
+      button.setAttribute("aria-current", button.dataset.go === view ? "step" : "false");
+    });
+    setText(byId("project-name"), model.project.name);
+    setText(byId("saving"), SAVING[status](waiting));
+    byId("saving").dataset.status = status;
+    byId("undo").disabled = !undo && !waiting;
+    byId("redo").disabled = !redo;
+    setText(byId("pick-count"), model.state.picks.length ? `${model.state.picks.length} picks` : "");
+    setText(byId("done-count"), keyframes.length ? `${keyframes.filter(model.done).length} of ${keyframes.length}` : "");
+    setText(byId("motion-state"), model.project.has?.motion ? "made" : "");
+    drawNotice();
+    drawJob();
+  }
+
+  return { draw, help, runningJob };
+}

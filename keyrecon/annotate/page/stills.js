@@ -1,0 +1,73 @@
+// Exact frames as pictures, fetched ahead and kept ready to draw while there is room.
+
+const ROOM = 260e6; // bytes of decoded pictures
+const SIDE_BY_SIDE = 4; // requests at a time
+
+export function createStills(project, ready) {
+  const kept = new Map(); // key -> picture, oldest use first
+  const coming = new Map();
+  let wanted = [], room = 0;
+
+  const key = (frame, width) => `${frame}/${width ?? 0}`;
+
+  function address(frame, width) {
+    const parts = new URLSearchParams();
+    if (width) parts.set("width", width);
+    if (project.version) parts.set("v", project.version);
+    return `/api/still/${frame}?${parts}`;
+  }
+
+  async function fetchOne(frame, width) {
+    const response = await fetch(address(frame, width), { credentials: "same-origin" });
+    if (!response.ok) throw new Error(`still ${frame}: ${response.status}`);
+    return createImageBitmap(await response.blob());
+  }
+
+  function keep(name, picture) {
+    kept.set(name, picture);
+    room += picture.width * picture.height * 4;
+    for (const [oldest, old] of kept) {
+      if (room <= ROOM || oldest === name) break;
+      room -= old.width * old.height * 4;
+      kept.delete(oldest);
+      old.close();
+    }
+  }
+
+  function load(frame, width) {
+    const name = key(frame, width);
+    if (kept.has(name) || coming.has(name)) return;
+    const arrival = fetchOne(frame, width).then((picture) => {
+      keep(name, picture);
+      ready(frame);
+    }).catch(() => {}).finally(() => { // a picture that fails is asked for again when it is drawn
+      coming.delete(name);
+      work();
+    });
+    coming.set(name, arrival);
+  }
+
+  function work() {
+    while (wanted.length && coming.size < SIDE_BY_SIDE) load(...wanted.shift());
+  }
+
+  return {
+    // The picture if it is here; asks for it at once if not.
+    get(frame, width) {
+      const name = key(frame, width), picture = kept.get(name);
+      if (!picture) {
+        load(frame, width);
+        return null;
+      }
+      kept.delete(name);
+      kept.set(name, picture);
+      return picture;
+    },
+    has: (frame, width) => kept.has(key(frame, width)),
+    // What is likely to be looked at next, in order; replaces what was wished for before.
+    wish(list) {
+      wanted = list.filter(([frame]) => frame >= 0 && frame < project.n_frames);
+      work();
+    },
+  };
+}

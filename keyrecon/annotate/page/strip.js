@@ -1,0 +1,55 @@
+// Small pictures of frames spread over the video, with the head and the feet that the picks find there.
+import * as api from "./api.js";
+import { byId, make, penOf, setText } from "./dom.js";
+import { spread } from "./parts.js";
+
+const FRAMES = 7;
+const WIDTH = 480; // px of the stills
+
+export function createStrip(model, choose) {
+  const { project } = model, frames = spread(project.n_frames, FRAMES);
+  const found = new Map(); // frame -> {head, feet, box}
+  let trust = null;
+
+  const cells = frames.map((frame) => {
+    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?width=${WIDTH}` });
+    const canvas = make("canvas");
+    const cell = make("button", { title: `Frame ${frame}` }, picture, canvas, make("small", {}, String(frame)));
+    cell.addEventListener("click", () => choose(frame));
+    picture.addEventListener("load", () => model.changed());
+    return { frame, cell, canvas };
+  });
+  byId("strip").append(...cells.map(({ cell }) => cell));
+
+  const ask = api.latestOnly(async () => {
+    const answer = await api.send("picks/preview", { frames }).catch(() => null); // too few picks so far
+    found.clear();
+    for (const row of answer?.frames ?? []) found.set(row.frame, row);
+    trust = answer?.trust ?? null;
+    model.changed();
+  });
+
+  function mark(pen, [x, y], scale, style, size) {
+    pen.beginPath();
+    pen.arc(x * scale, y * scale, size, 0, 2 * Math.PI);
+    pen.lineWidth = 4;
+    pen.strokeStyle = "rgba(0, 0, 0, .7)";
+    pen.stroke();
+    pen.lineWidth = 2;
+    pen.strokeStyle = style;
+    pen.stroke();
+  }
+
+  function draw(current) {
+    for (const { frame, cell, canvas } of cells) {
+      const [pen, width] = penOf(canvas), row = found.get(frame), scale = width / project.width;
+      cell.setAttribute("aria-current", frame === current);
+      if (row?.head) mark(pen, row.head, scale, "#56b4e9", 5);
+      for (const foot of row?.feet ?? []) mark(pen, foot, scale, "#e69f00", 3.5);
+    }
+    const seen = typeof trust === "number" ? `Head and feet agree on ${Math.round(100 * trust)} % of the strip.` : "";
+    setText(byId("strip-note"), seen);
+  }
+
+  return { ask, draw };
+}
