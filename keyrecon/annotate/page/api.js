@@ -1,5 +1,7 @@
 // The server's answers. Everything but a clear answer counts as "the server is gone".
 
+const AGAIN = 2000; // ms
+
 export class Gone extends Error {}
 
 async function answered(path, options) {
@@ -7,10 +9,10 @@ async function answered(path, options) {
   try {
     response = await fetch(path, { credentials: "same-origin", cache: "no-store", ...options });
   } catch (fault) {
-    throw new Gone(String(fault));
+    throw new Gone("", { cause: fault });
   }
-  if (response.status >= 500 || response.status === 401 || response.status === 403) throw new Gone(`${response.status}`);
   const content = await response.json().catch(() => null);
+  if (response.status >= 500 || response.status === 403) throw new Gone(content?.error ?? "");
   if (!response.ok) throw new Error(content?.error ?? `The server answered ${response.status}.`);
   return content;
 }
@@ -23,11 +25,14 @@ export const read = (path) => answered(`/api/${path}`);
 export const send = (path, content) => answered(`/api/${path}`, asJson("POST", content));
 export const remove = (path) => answered(`/api/${path}`, { method: "DELETE" });
 
-// Server-sent events; the browser reconnects by itself, `opened` is called each time.
-export function listen({ opened, closed, news }) {
-  const source = new EventSource("/api/events");
+// Server-sent events; the browser connects again by itself unless it was refused.
+export function listen(hears) {
+  const { opened, closed, news } = hears, source = new EventSource("/api/events");
   source.addEventListener("open", opened);
-  source.addEventListener("error", closed);
+  source.addEventListener("error", () => {
+    closed();
+    if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN, hears);
+  });
   source.addEventListener("message", (event) => news(JSON.parse(event.data)));
 }
 

@@ -63,6 +63,7 @@ export function createDepth(model, placed) {
     follow();
     const pose = model.pose(), other = pose?.alternatives?.[hovered]?.points3d;
     space.show(other ?? pose?.points3d, other ? pose?.points3d : null);
+    byId("space-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
     drawReadings();
   }
 

@@ -10,11 +10,16 @@ const SAVING = {
 };
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", pick: "Colours", motion: "Motion" };
 
+function shownKeys(keys) {
+  const shown = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
+  return shown.flatMap((key, n) => [...(n && keys.length > 4 ? ["–"] : []), make("kbd", {}, keyText(key))]);
+}
+
 function keysTable() {
   const parts = Object.entries(KEYS).map(([page, rows]) => make("section", {},
     make("h2", {}, TITLES[page]),
     make("dl", {}, ...rows.flatMap(([keys, what]) => [
-      make("dt", {}, ...keys.map((key) => make("kbd", {}, keyText(key)))), make("dd", {}, what),
+      make("dt", {}, ...shownKeys(keys)), make("dd", {}, what),
     ]))));
   const pointer = make("section", {}, make("h2", {}, "Pointer"), make("dl", {}, ...[
     ["click", "place the joint that is asked for; else select a joint, turn a limb"],
@@ -70,7 +75,7 @@ export function createFrame(model, go) {
   }
 
   function draw() {
-    const { status, waiting } = model.saving, { undo, redo } = model.state, keyframes = model.keyframes();
+    const { status, waiting, why } = model.saving, { undo, redo } = model.state, keyframes = model.keyframes();
     const { view } = model.doing;
     document.body.dataset.view = view;
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
@@ -80,6 +85,7 @@ export function createFrame(model, go) {
     setText(byId("project-name"), model.project.name);
     setText(byId("saving"), SAVING[status](waiting));
     byId("saving").dataset.status = status;
+    byId("saving").title = status === "unsaved" ? why || "The server does not answer; is keyrecon annotate still running?" : "";
     byId("undo").disabled = !undo && !waiting;
     byId("redo").disabled = !redo;
     setText(byId("pick-count"), model.state.picks.length ? `${model.state.picks.length} picks` : "");

@@ -4,9 +4,9 @@ import * as api from "./api.js";
 export function createJobs(model) {
   const seen = new Map(); // job -> last state that was acted on
 
-  async function start(kind) {
+  async function start(kind, options = {}) {
     try {
-      await api.send("jobs", { kind });
+      await api.send("jobs", { kind, options });
       await refresh();
     } catch (fault) {
       model.tell(fault instanceof api.Gone ? "The server does not answer; is keyrecon annotate still running?" : fault.message);
@@ -14,8 +14,7 @@ export function createJobs(model) {
   }
 
   async function refresh() {
-    const answer = await api.read("jobs");
-    for (const job of answer.jobs ?? answer) model.jobs.set(job.id, job);
+    for (const job of await api.read("jobs")) model.jobs.set(job.id, job);
     model.changed();
   }
 

@@ -35,7 +35,7 @@ export const KEYS = {
   ],
   pick: [
     [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
-    [["1", "2", "3", "4", "5", "6", "7", "8", "9"], "choose what to click", "part"],
+    [[..."123456789"], "choose what to click", "part"],
     [["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"], "move the cross (with Shift by ten)", "nudge"],
     [[" "], "pick the colour under the cross", "put"],
     [["Backspace", "Delete"], "take the last pick of this frame away", "clear"],

@@ -43,9 +43,9 @@ export async function createModel() {
 
   const outbox = createOutbox({
     send: (edits) => api.send("edits", { edits }),
-    kept: keptEdits(localStorage, model.project.id ?? model.project.name),
-    status(status, waiting) {
-      model.saving = { status, waiting };
+    kept: keptEdits(localStorage, `${model.project.name}-${model.project.stills}`),
+    status(status, waiting, why) {
+      model.saving = { status, waiting, why };
       model.changed();
     },
     answered,
@@ -122,11 +122,10 @@ export async function createModel() {
 
   model.jobs = new Map();
   model.listen = () => api.listen({
-    opened: () => model.readState().then(() => outbox.found()).catch(outbox.lost),
-    closed: outbox.lost,
-    news({ job, project, ...told }) {
+    opened: () => model.readState().then(() => outbox.found()).catch((fault) => outbox.lost(fault)),
+    closed: () => outbox.lost(),
+    news({ job, ...told }) {
       if (job) model.jobs.set(job.id, job);
-      if (project) model.readProject().catch(outbox.lost);
       const others = told.edits?.filter(({ id }) => !sent.has(id));
       if (others?.length) takeIn(told, others.flatMap(({ changes }) => changes));
       model.changed();

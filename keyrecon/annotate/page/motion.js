@@ -93,7 +93,10 @@ export function createMotion(model, { stills, jobs, frame: surround, actions }) 
   viewer.listen({ grab: () => null, drag() {}, drop() {}, click() {}, hover() {} });
 
   function primary() {
-    if (!surround.runningJob()) jobs.start("run");
+    const text = byId("height").value.trim().replace(",", ".");
+    const height = text ? Number(text) : null;
+    if (Number.isNaN(height)) model.tell(`The height is a number of metres, such as 1.80; "${text}" is not.`);
+    else if (!surround.runningJob()) jobs.start("run", { height });
   }
 
   function drawSkeleton() {
@@ -114,7 +117,7 @@ export function createMotion(model, { stills, jobs, frame: surround, actions }) 
     const left = open ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.` : "All keyframes are marked.";
     setText(byId("motion-text"), text);
     setText(byId("motion-more"), job ? "You may go on marking meanwhile." : keyframes.length ? left : "The colours come first.");
-    byId("motion-primary").hidden = Boolean(job) || !marked;
+    byId("motion-primary").hidden = byId("height-row").hidden = Boolean(job) || !marked;
     setText(byId("motion-primary"), made !== null ? "Make it anew" : "Make the motion");
     setText(byId("motion-note"), made !== null ? "Where the skeleton leaves the body, press K: the frame becomes a keyframe of yours." : "");
   }
@@ -128,7 +131,9 @@ export function createMotion(model, { stills, jobs, frame: surround, actions }) 
     drawWords();
     viewer.drawPicture(frame, [WIDTH]);
     drawSkeleton();
-    space.show(points("points3d"));
+    const body = points("points3d");
+    byId("motion-empty").hidden = body !== null;
+    space.show(body);
   }
 
   function add() {

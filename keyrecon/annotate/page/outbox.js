@@ -24,14 +24,14 @@ export function keptEdits(storage, project) {
 }
 
 // `send` takes edits and resolves to the server's answer. `status` hears ("saved" | "saving" |
-// "unsaved", how many wait), `answered` the answer and the edits that were sent, `refused` an edit
+// "unsaved", how many wait, and why), `answered` the answer and the edits that were sent, `refused` an edit
 // that the server will never take and why.
 export function createOutbox({ send, kept, status, answered, refused, wait = setTimeout }) {
-  let waiting = kept.all(), sending = false, failures = 0, most = MOST, timer = null;
+  let waiting = kept.all(), sending = false, failures = 0, most = MOST, timer = null, why = "";
 
   function tell() {
     if (!waiting.length && !failures) status("saved", 0);
-    else status(failures ? "unsaved" : "saving", waiting.length);
+    else status(failures ? "unsaved" : "saving", waiting.length, why);
   }
 
   function forget(edits) {
@@ -51,7 +51,7 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
       forget(batch);
       answered(answer, batch);
     } catch (fault) {
-      if (fault instanceof Gone) retry();
+      if (fault instanceof Gone) retry(fault);
       else turnDown(batch, fault);
     } finally {
       sending = false;
@@ -60,7 +60,8 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
     if (!failures) flush();
   }
 
-  function retry() {
+  function retry(fault) {
+    why = fault.message;
     timer = wait(flush, PATIENCE[Math.min(failures, PATIENCE.length - 1)]);
     failures += 1;
   }
@@ -86,7 +87,8 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
       tell();
       flush();
     },
-    lost() {
+    lost(fault) {
+      why = fault?.message ?? why;
       failures = Math.max(1, failures);
       tell();
     },

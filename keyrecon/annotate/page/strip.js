@@ -4,7 +4,7 @@ import { byId, make, penOf, setText } from "./dom.js";
 import { spread } from "./parts.js";
 
 const FRAMES = 7;
-const WIDTH = 480; // px of the stills
+const WIDTH = 320; // px of the stills
 
 export function createStrip(model, choose) {
   const { project } = model, frames = spread(project.n_frames, FRAMES);
@@ -12,7 +12,7 @@ export function createStrip(model, choose) {
   let trust = null;
 
   const cells = frames.map((frame) => {
-    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?width=${WIDTH}` });
+    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.stills })}` });
     const canvas = make("canvas");
     const cell = make("button", { title: `Frame ${frame}` }, picture, canvas, make("small", {}, String(frame)));
     cell.addEventListener("click", () => choose(frame));

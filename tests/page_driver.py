@@ -1,0 +1,158 @@
+"""A person at the annotator's page: a real browser on a real server, and a count of what they did."""
+
+import asyncio
+import json
+import math
+import re
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Thread
+from urllib.request import Request, urlopen
+
+import uvicorn
+
+from keyrecon.annotate.assistant import Assistant
+from keyrecon.annotate.desk import open_desk
+from keyrecon.annotate.server import make_app
+from keyrecon.serving import listen, make_door
+from keyrecon.workspace import Workspace
+
+CHROMIUM = Path("/usr/bin/chromium")
+SCREEN = {"width": 1366, "height": 768}
+SOON = 10_000
+"""How long the page may take for anything, ms."""
+
+
+class Serving:
+    """The server of one project in a thread; may be stopped and started again at its address."""
+
+    def __init__(self, folder, assistant=Assistant(), commands=None):
+        self.folder, self.assistant, self.commands = folder, assistant, commands or {}
+        self.door = None
+        self.start()
+
+    def start(self):
+        listener = listen("127.0.0.1", self.door.port if self.door else 0)
+        self.door = self.door or make_door(listener, "127.0.0.1")
+        self.desk = open_desk(Workspace(self.folder), self.assistant, self.commands)
+        config = uvicorn.Config(
+            make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=1
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = Thread(target=asyncio.run, args=(self._server.serve(sockets=[listener]),))
+        self._thread.start()
+
+    def stop(self):
+        self.desk.events.close()
+        self._server.should_exit = True
+        self._thread.join()
+        self.desk.close()
+
+    def ask(self, path):
+        """An answer of the server, as the page would get it."""
+        cookie = f"{self.door.cookie}={self.door.session}"
+        with urlopen(Request(f"{self.door.origins[0]}/api/{path}", headers={"Cookie": cookie})) as it:
+            return json.load(it)
+
+
+@contextmanager
+def serving(folder, assistant=Assistant(), commands=None):
+    server = Serving(folder, assistant, commands)
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+@contextmanager
+def browser():
+    """Chromium from the system; nothing is downloaded."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Person:
+    """Somebody at the page, who counts clicks, drags and keys and notes every complaint."""
+
+    def __init__(self, context, address):
+        self.page = context.new_page()
+        self.page.set_default_timeout(SOON)
+        self.clicks = self.drags = self.keys = 0
+        self.complaints = []
+        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
+        self.page.on("console", self._hear)
+        self.page.goto(address)
+        self.page.wait_for_selector("#saving[data-status]", state="attached")
+
+    def _hear(self, message):
+        if message.type == "error" and "ERR_CONNECTION" not in message.text:
+            self.complaints.append(message.text)
+
+    @property
+    def actions(self):
+        return self.clicks + self.drags + self.keys
+
+    def on_screen(self, place):
+        """Where a point of the picture is in the window."""
+        scale, x, y = map(float, self.page.get_attribute("#picture", "data-view").split())
+        box = self.page.locator("#picture").bounding_box()
+        return box["x"] + scale * place[0] + x, box["y"] + scale * place[1] + y
+
+    def click(self, place):
+        self.page.mouse.click(*self.on_screen(place))
+        self.clicks += 1
+
+    def point_at(self, place):
+        self.page.mouse.move(*self.on_screen(place))
+
+    def drag(self, start, end):
+        self.point_at(start)
+        self.page.mouse.down()
+        x, y = self.on_screen(end)
+        self.page.mouse.move(x + 6, y + 6)
+        self.page.mouse.move(x, y)
+        self.page.mouse.up()
+        self.drags += 1
+
+    def press(self, key):
+        self.page.keyboard.press(key)
+        self.keys += 1
+
+    def text(self, selector):
+        return self.page.inner_text(selector)
+
+    def frame(self):
+        """The keyframe that is open."""
+        found = re.search(r"frame (\d+) of", self.text("#where"))
+        return int(found[1])
+
+    def asked(self):
+        """The joint that is asked for, if any."""
+        return self.page.evaluate("document.querySelector('.joint.selected')?.dataset.joint ?? null")
+
+    def await_text(self, selector, pattern):
+        self.page.wait_for_function(
+            "([s, p]) => new RegExp(p).test(document.querySelector(s).innerText)",
+            arg=[selector, pattern],
+        )
+
+    def await_saved(self):
+        self.page.wait_for_selector("#saving[data-status=saved]")
+
+    def open(self, frame):
+        """Go to a keyframe as by its row in the list."""
+        self.page.evaluate("frame => { location.hash = `frame=${frame}`; }", frame)
+        self.await_text("#where", rf"frame {frame} of")
+        self.page.wait_for_selector(f"#picture[data-frame='{frame}']")
+
+    def call(self, module, expression):
+        """What an expression on a module of the page gives; the module is called `m`."""
+        return self.page.evaluate(f"import('/page/{module}.js').then((m) => ({expression}))")
+
+
+def far(one, other):
+    return math.dist(one[:2], other[:2])
