@@ -36,14 +36,13 @@ class Serving:
         self.door = self.door or make_door(listener, "127.0.0.1")
         self.desk = open_desk(Workspace(self.folder), self.assistant, self.commands)
         config = uvicorn.Config(
-            make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=1
+            make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=0
         )
         self._server = uvicorn.Server(config)
         self._thread = Thread(target=asyncio.run, args=(self._server.serve(sockets=[listener]),))
         self._thread.start()
 
     def stop(self):
-        self.desk.events.close()
         self._server.should_exit = True
         self._thread.join()
         self.desk.close()
@@ -89,7 +88,7 @@ class Person:
         self.page.wait_for_selector("#saving[data-status]", state="attached")
 
     def _hear(self, message):
-        if message.type == "error" and "ERR_CONNECTION" not in message.text:
+        if message.type == "error" and "net::ERR_" not in message.text:
             self.complaints.append(message.text)
 
     @property
@@ -140,7 +139,12 @@ class Person:
             arg=[selector, pattern],
         )
 
+    def await_drawn(self):
+        """Until what was done shows: two animation frames."""
+        self.page.evaluate("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f)))")
+
     def await_saved(self):
+        self.await_drawn()
         self.page.wait_for_selector("#saving[data-status=saved]")
 
     def open(self, frame):

@@ -13,6 +13,12 @@ export function createActions(model) {
   // Context only: off the keyframe nothing is changed.
   const away = () => doing.look !== 0 || doing.frame === null;
 
+  // What is in hand is put down before anything else is changed.
+  function ready() {
+    keepHeld();
+    return !away();
+  }
+
   function select(joint) {
     keepHeld();
     model.do({ joint });
@@ -71,27 +77,29 @@ export function createActions(model) {
   const meant = () => doing.under?.joint ?? doing.joint;
 
   function visibility() {
-    const joint = meant(), mark = model.marks()[joint];
-    if (away() || !joint) return;
+    const joint = meant();
+    if (!ready() || !joint) return;
+    const mark = model.marks()[joint];
     reply(placeJoint(model.state, doing.frame, joint, nextVisibility(mark)));
     if (!mark) goOn(joint);
   }
 
   function clear() {
     const joint = meant();
-    if (away() || !joint || !model.marks()[joint]) return;
+    if (!ready() || !joint || !model.marks()[joint]) return;
     reply(placeJoint(model.state, doing.frame, joint, null));
     model.do({ joint });
   }
 
   function swap(pairs) {
-    if (!away()) reply(swapSides(model.state, doing.frame, pairs));
+    if (ready()) reply(swapSides(model.state, doing.frame, pairs));
   }
 
   function accept() {
+    if (!ready()) return;
     const places = suggested(joints(), model.marks(), model.ghost());
     const to = Object.fromEntries(Object.entries(places).map(([joint, [x, y]]) => [joint, [x, y, 2]]));
-    if (away() || !Object.keys(to).length) return;
+    if (!Object.keys(to).length) return;
     reply(placeJoints(model.state, doing.frame, to));
     goOn(null);
   }
@@ -101,7 +109,7 @@ export function createActions(model) {
 
   function setDepth(limb, sign) {
     const known = model.project.limbs.some(({ name }) => name === limb);
-    if (!away() && known && (model.nearer()[limb] ?? null) !== sign) {
+    if (ready() && known && (model.nearer()[limb] ?? null) !== sign) {
       reply(setNearer(model.state, doing.frame, { [limb]: sign }));
     }
   }
@@ -113,7 +121,7 @@ export function createActions(model) {
 
   // The depths of a whole reading become the person's word; without one, of what is shown.
   function keepDepths(reading) {
-    if (away()) return;
+    if (!ready()) return;
     const limbs = model.pose()?.limbs ?? {}, to = {};
     for (const { name } of limbsShown(model.project.limbs, model.marks())) {
       const sign = reading?.nearer[name] ?? limbs[name]?.sign;
@@ -124,7 +132,7 @@ export function createActions(model) {
 
   function automaticDepths() {
     const given = Object.keys(model.nearer());
-    if (!away() && given.length) {
+    if (ready() && given.length) {
       reply(setNearer(model.state, doing.frame, Object.fromEntries(given.map((limb) => [limb, null]))));
     }
   }

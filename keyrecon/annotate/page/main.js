@@ -55,11 +55,16 @@ function lookAhead() {
   stills.wish([...near.map((number) => [number]), ...around]);
 }
 
+// The keyframe that the address names, so that a place can be returned to.
+function addressed() {
+  const frame = Number(location.hash.match(/^#frame=(\d+)$/)?.[1] ?? NaN);
+  return model.keyframes().some((keyframe) => keyframe.frame === frame) ? frame : null;
+}
+
 function drawKeyframes() {
   if (doing.frame === null && model.keyframes().length) {
-    const asked = Number(location.hash.match(/^#frame=(\d+)$/)?.[1] ?? NaN);
-    const known = model.keyframes().some((keyframe) => keyframe.frame === asked);
-    actions.open(known ? asked : (model.keyframes().find((k) => !model.done(k)) ?? model.keyframes()[0]).frame);
+    const all = model.keyframes();
+    actions.open(addressed() ?? (all.find((keyframe) => !model.done(keyframe)) ?? all[0]).frame);
     return;
   }
   for (const part of parts) part.draw();
@@ -131,6 +136,7 @@ document.querySelectorAll("#keyframes [data-yaw]").forEach((button) => {
 depth.readings.forEach((button, n) => button.addEventListener("click", () => actions.reading(n)));
 byId("undo").addEventListener("click", () => commands.any.undo().catch((fault) => model.tell(fault.message)));
 byId("redo").addEventListener("click", () => commands.any.redo().catch((fault) => model.tell(fault.message)));
+addEventListener("hashchange", () => addressed() !== null && actions.open(addressed()));
 addEventListener("pagehide", actions.keepHeld);
 
 await model.readState();

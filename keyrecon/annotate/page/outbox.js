@@ -27,11 +27,11 @@ export function keptEdits(storage, project) {
 // "unsaved", how many wait, and why), `answered` the answer and the edits that were sent, `refused` an edit
 // that the server will never take and why.
 export function createOutbox({ send, kept, status, answered, refused, wait = setTimeout }) {
-  let waiting = kept.all(), sending = false, failures = 0, most = MOST, timer = null, why = "";
+  let waiting = kept.all(), sending = false, failures = 0, most = MOST, timer = null, cut = false, why = "";
 
   function tell() {
-    if (!waiting.length && !failures) status("saved", 0);
-    else status(failures ? "unsaved" : "saving", waiting.length, why);
+    if (failures || (cut && !waiting.length)) status("unsaved", waiting.length, why);
+    else status(waiting.length ? "saving" : "saved", waiting.length);
   }
 
   function forget(edits) {
@@ -47,6 +47,7 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
     try {
       const answer = await send(batch);
       failures = 0;
+      cut = false;
       most = MOST;
       forget(batch);
       answered(answer, batch);
@@ -81,16 +82,17 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
       tell();
       if (!failures) flush();
     },
+    lost(fault) {
+      cut = true;
+      why = fault?.message ?? "";
+      tell();
+    },
     found() { // the server answers again
       clearTimeout(timer);
+      cut = false;
       failures = 0;
       tell();
       flush();
-    },
-    lost(fault) {
-      why = fault?.message ?? why;
-      failures = Math.max(1, failures);
-      tell();
     },
     waiting: () => waiting,
   };

@@ -60,7 +60,11 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     model.changed();
   }
 
-  const remove = (pick) => model.edit(removePick(pick));
+  // What was clicked wrong is to be clicked again.
+  function remove(pick) {
+    model.edit(removePick(pick));
+    choose(pick.part);
+  }
   const here = () => picks().filter(({ frame }) => frame === doing.frame);
 
   viewer.listen({
