@@ -1,4 +1,4 @@
-"""A person at the annotator's page: a real browser on a real server, and a count of what they did."""
+"""A person at the annotator's page: a real browser, a real server, and a count of what is done."""
 
 import asyncio
 import json
@@ -19,7 +19,7 @@ from keyrecon.workspace import Workspace
 
 CHROMIUM = Path("/usr/bin/chromium")
 SCREEN = {"width": 1366, "height": 768}
-SOON = 10_000
+SOON = 60_000
 """How long the page may take for anything, ms."""
 
 
@@ -50,8 +50,9 @@ class Serving:
     def ask(self, path):
         """An answer of the server, as the page would get it."""
         cookie = f"{self.door.cookie}={self.door.session}"
-        with urlopen(Request(f"{self.door.origins[0]}/api/{path}", headers={"Cookie": cookie})) as it:
-            return json.load(it)
+        request = Request(f"{self.door.origins[0]}/api/{path}", headers={"Cookie": cookie})
+        with urlopen(request) as answer:
+            return json.load(answer)
 
 
 @contextmanager
@@ -88,7 +89,7 @@ class Person:
         self.page.wait_for_selector("#saving[data-status]", state="attached")
 
     def _hear(self, message):
-        if message.type == "error" and "net::ERR_" not in message.text:
+        if message.type == "error" and not message.text.startswith("Failed to load resource"):
             self.complaints.append(message.text)
 
     @property
@@ -131,7 +132,8 @@ class Person:
 
     def asked(self):
         """The joint that is asked for, if any."""
-        return self.page.evaluate("document.querySelector('.joint.selected')?.dataset.joint ?? null")
+        selected = "document.querySelector('.joint.selected')"
+        return self.page.evaluate(f"{selected}?.dataset.joint ?? null")
 
     def await_text(self, selector, pattern):
         self.page.wait_for_function(
@@ -141,7 +143,9 @@ class Person:
 
     def await_drawn(self):
         """Until what was done shows: two animation frames."""
-        self.page.evaluate("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f)))")
+        self.page.evaluate(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
 
     def await_saved(self):
         self.await_drawn()

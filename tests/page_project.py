@@ -1,4 +1,4 @@
-"""A project to be marked in a browser: a short video, keyframes, and a body whose truth is known."""
+"""A project to be marked in a browser: a short video, keyframes, and a body that is known."""
 
 import numpy as np
 

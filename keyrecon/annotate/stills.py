@@ -98,10 +98,10 @@ class Stills:
             try:
                 if not path.is_file():
                     self._make(frame, width, alone=waiting is None)
-                if waiting:
+                if waiting and waiting.set_running_or_notify_cancel():
                     waiting.set_result(path.read_bytes())
             except Exception as fault:  # noqa: BLE001 - raised again where the still was asked for
-                if waiting:
+                if waiting and (waiting.running() or waiting.set_running_or_notify_cancel()):
                     waiting.set_exception(fault)
 
     def _next(self) -> Order | None:
@@ -137,7 +137,7 @@ class Stills:
             ready = [o for o in self._asked if self._path(o[0], o[1]).is_file()]
             self._asked = [order for order in self._asked if order not in ready]
         for frame, width, waiting in ready:
-            if waiting:
+            if waiting and waiting.set_running_or_notify_cancel():  # False: nobody waits any more
                 waiting.set_result(self._path(frame, width).read_bytes())
 
 

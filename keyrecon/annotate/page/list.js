@@ -21,7 +21,6 @@ export function createList(root, { height, fill, choose }) {
   function draw() {
     const first = Math.max(0, Math.floor(root.scrollTop / height) - 4);
     const last = Math.min(items.length, Math.ceil((root.scrollTop + root.clientHeight) / height) + 4);
-    tall.style.height = `${items.length * height}px`;
     for (const [n, element] of shown) {
       if (n < first || n >= last) {
         element.remove();
@@ -56,6 +55,7 @@ export function createList(root, { height, fill, choose }) {
   return {
     show(next, chosen) {
       items = next;
+      tall.style.height = `${items.length * height}px`;
       if (chosen !== current && chosen >= 0) reveal(chosen);
       current = chosen;
       draw();

@@ -124,8 +124,10 @@ export async function createModel() {
   model.listen = () => api.listen({
     opened: () => model.readState().then(() => outbox.found()).catch((fault) => outbox.lost(fault)),
     closed: () => outbox.lost(),
-    news({ job, ...told }) {
+    news({ job, project, trouble, ...told }) {
       if (job) model.jobs.set(job.id, job);
+      if (project) model.readProject().catch((fault) => outbox.lost(fault));
+      if (trouble !== undefined) model.tell(trouble);
       const others = told.edits?.filter(({ id }) => !sent.has(id));
       if (others?.length) takeIn(told, others.flatMap(({ changes }) => changes));
       model.changed();
