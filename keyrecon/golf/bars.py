@@ -1,0 +1,175 @@
+"""Straight thin bars in a picture: what may be a part of the club's shaft.
+
+The two sides of a shaft are close parallel edges of opposite direction, whether it is darker or
+brighter than what is behind it (Lepetit, Shahrokni and Fua, CVPR 2003). Line segments come from
+the Line Segment Detector (Grompone von Gioi et al., PAMI 32, 2010), which orients every segment by
+its gradient; only those on the foreground are paired. Bars in one line are joined where the
+foreground continues between them, as a shaft does that crosses the player or a bright cloud.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from keyrecon.golf.foreground import Foreground
+
+PARALLEL = np.deg2rad(6.0)
+"""Two sides of a bar, and two bars of a shaft, differ by no more."""
+OVERLAP = 0.5
+"""Share of the shorter side that lies beside the longer one."""
+STEPS = 9
+"""Places along a segment or a gap where the foreground is asked."""
+SPREAD = 0.02
+"""Distance from their common line at which two bars still are one shaft, lengths of the bar."""
+
+
+@dataclass(frozen=True)
+class BarOptions:
+    """What counts as a bar; lengths in player heights."""
+
+    thinnest: float = 0.0015
+    """Least width of the shaft."""
+    thickest: float = 0.018
+    """Greatest width of the shaft, with the blur of motion."""
+    shortest: float = 0.03
+    """Least length of a side."""
+    moving: float = 0.12
+    """Least mean probability of foreground along a side: a club at rest hardly differs from a
+    scene that was learnt while it lay there, but the scene itself differs by nothing."""
+    bridge: float = 0.3
+    """Longest gap between two bars of one shaft."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Bars of one frame."""
+
+    ends: Float[np.ndarray, "n 2 2"]
+    """px of the video"""
+    support: Float[np.ndarray, "n"]
+    """Length over which both sides were seen, px."""
+
+
+def find_bars(
+    grey: UInt8[np.ndarray, "h w"],
+    foreground: Foreground,
+    frame: int,
+    options: BarOptions = BarOptions(),
+) -> Bars:
+    """Bars of a full picture, in px; `frame` is its number."""
+    height = foreground.height
+    found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD, 0.8).detect(grey)[0]
+    sides = np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(float)
+    long = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1) > options.shortest * height
+    sides = sides[long]
+    sides = sides[_along(foreground, frame, sides) > options.moving]
+    bars = _pair(sides, options.thinnest * height, options.thickest * height)
+    return _join(bars, foreground, frame, options)
+
+
+def _along(
+    foreground: Foreground, frame: int, lines: Float[np.ndarray, "n 2 2"]
+) -> Float[np.ndarray, "n"]:
+    """Mean probability of foreground along lines; a pixel beside them counts too."""
+    share = np.linspace(0, 1, STEPS)[:, None]
+    points = lines[:, None, 0] * (1 - share) + lines[:, None, 1] * share
+    return foreground.sample(frame, points).mean(axis=1)
+
+
+def _pair(
+    sides: Float[np.ndarray, "n 2 2"], thinnest: float, thickest: float
+) -> Float[np.ndarray, "m 2 2"]:
+    """Middle lines of close, overlapping sides of opposite direction."""
+    length = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+    unit = (sides[:, 1] - sides[:, 0]) / length[:, None]
+    i, j = np.nonzero(np.triu(unit @ unit.T < -np.cos(PARALLEL), 1))
+    axis = unit[i] * length[i, None] - unit[j] * length[j, None]
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    normal = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+    middle = sides.mean(axis=1)
+    gap = np.einsum("nk,nk->n", middle[j] - middle[i], normal)
+    one = np.einsum("nek,nk->ne", sides[i] - middle[i, None], axis)
+    other = np.einsum("nek,nk->ne", sides[j] - middle[i, None], axis)
+    low = np.stack([one.min(axis=1), other.min(axis=1)])
+    high = np.stack([one.max(axis=1), other.max(axis=1)])
+    shared = high.min(axis=0) - low.max(axis=0)
+    good = (np.abs(gap) > thinnest) & (np.abs(gap) < thickest)
+    good &= shared > OVERLAP * np.minimum(length[i], length[j])
+    center = middle[i] + normal * gap[:, None] / 2
+    ends = np.stack([low.min(axis=0), high.max(axis=0)], axis=1)[..., None]
+    return (center[:, None] + ends * axis[:, None])[good]
+
+
+def _join(
+    bars: Float[np.ndarray, "m 2 2"], foreground: Foreground, frame: int, options: BarOptions
+) -> Bars:
+    """Bars, and what several of them in one line make together, the longest first."""
+    length = np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1)
+    bars, length = bars[np.argsort(-length)], np.sort(length)[::-1]
+    ends, support = list(bars), list(length)
+    taken = np.zeros(len(bars), bool)
+    for k in range(len(bars)):
+        if taken[k]:
+            continue
+        whole, members = _grow(k, bars, (foreground, frame), options)
+        taken |= members
+        if members.sum() > 1:
+            ends.append(whole)
+            support.append(_covered(whole, bars[members]))
+    return Bars(np.array(ends).reshape(-1, 2, 2), np.array(support, float))
+
+
+def _grow(
+    start: int,
+    bars: Float[np.ndarray, "m 2 2"],
+    seen: tuple[Foreground, int],
+    options: BarOptions,
+) -> tuple[Float[np.ndarray, "2 2"], Bool[np.ndarray, "m"]]:
+    """A bar lengthened by others in its line, nearest first, and which these are."""
+    whole, members = bars[start], np.arange(len(bars)) == start
+    limit = options.bridge * seen[0].height
+    while True:
+        length = float(np.linalg.norm(whole[1] - whole[0]))
+        axis = (whole[1] - whole[0]) / length
+        normal = np.array([-axis[1], axis[0]])
+        place = np.sort((bars - whole[0]) @ axis, axis=1)
+        gap = np.maximum(place[:, 0] - length, -place[:, 1])
+        turn = bars[:, 1] - bars[:, 0]
+        turn = np.abs(turn @ normal) / np.linalg.norm(turn, axis=1)
+        off = np.abs((bars - whole[0]) @ normal).max(axis=1)
+        near = (off < 2.0 + SPREAD * (length + np.maximum(gap, 0))) & (turn < np.sin(PARALLEL))
+        near &= ~members & (gap < limit)
+        inside = near & (place[:, 0] > 0) & (place[:, 1] < length)
+        members = members | inside
+        near &= ~inside
+        if not near.any():
+            return whole, members
+        chosen = int(np.where(near, gap, np.inf).argmin())
+        members = members | (np.arange(len(bars)) == chosen)
+        both = np.concatenate([whole, bars[chosen]])
+        along = (both - whole[0]) @ axis
+        joined = both[[along.argmin(), along.argmax()]]
+        if _is_open(whole, bars[chosen], seen):
+            continue
+        whole = joined
+
+
+def _covered(whole: Float[np.ndarray, "2 2"], bars: Float[np.ndarray, "m 2 2"]) -> float:
+    """Length of a shaft over which bars were seen, however many."""
+    axis = (whole[1] - whole[0]) / np.linalg.norm(whole[1] - whole[0])
+    covered, reached = 0.0, -np.inf
+    for start, end in sorted(np.sort((bars - whole[0]) @ axis, axis=1).tolist()):
+        covered += max(0.0, end - max(start, reached))
+        reached = max(reached, end)
+    return covered
+
+
+def _is_open(
+    whole: Float[np.ndarray, "2 2"], other: Float[np.ndarray, "2 2"], seen: tuple[Foreground, int]
+) -> bool:
+    """Whether scenery shows between two bars."""
+    apart = np.linalg.norm(whole[:, None] - other[None], axis=2)
+    i, j = np.unravel_index(apart.argmin(), apart.shape)
+    return bool(_along(*seen, np.stack([whole[i], other[j]])[None])[0] < 0.5)
