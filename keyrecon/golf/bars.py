@@ -7,6 +7,7 @@ its gradient; only those on the foreground are paired. Bars in one line are join
 foreground continues between them, as a shaft does that crosses the player or a bright cloud.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -21,6 +22,10 @@ OVERLAP = 0.5
 """Share of the shorter side that lies beside the longer one."""
 STEPS = 9
 """Places along a segment or a gap where the foreground is asked."""
+END_PART = 10
+"""The beginning and the end of a video are this part of it."""
+SAME = 0.02
+"""Distance between the ends of two bars that are one, player heights."""
 SPREAD = 0.02
 """Distance from their common line at which two bars still are one shaft, lengths of the bar."""
 
@@ -67,6 +72,25 @@ def find_bars(
     sides = sides[_along(foreground, frame, sides) > options.moving]
     bars = _pair(sides, options.thinnest * height, options.thickest * height)
     return _join(bars, foreground, frame, options)
+
+
+def drop_scenery(bars: Sequence[Bars], height: float) -> list[Bars]:
+    """Bars without those that are there both in the beginning and in the end.
+
+    A club that lies still at address is somewhere else at the finish; a rope is not.
+    """
+    part = max(1, len(bars) // END_PART)
+    first, last = (np.concatenate([b.ends for b in few]) for few in (bars[:part], bars[-part:]))
+
+    def strange(ends: Float[np.ndarray, "n 2 2"]) -> Bool[np.ndarray, "n"]:
+        known = np.ones(len(ends), bool)
+        for others in (first, last):
+            apart = np.linalg.norm(ends[:, None] - others[None], axis=3).max(axis=2)
+            known &= apart.min(axis=1, initial=np.inf) < SAME * height
+        return ~known
+
+    kept = [strange(b.ends) for b in bars]
+    return [Bars(b.ends[k], b.support[k]) for b, k in zip(bars, kept, strict=True)]
 
 
 def _along(

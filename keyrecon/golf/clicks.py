@@ -1,34 +1,26 @@
 """The few clicks that start a golf fit: joints of one frame, and what is known of the player.
 
-The file is a small JSON, one object:
-
-    {"keyrecon_golf_clicks": 1, "frame": 0, "size": [800, 720], "left_handed": false,
-     "stature": 1.8, "focal": null, "principal": [400, 360],
-     "joints": {"head_top": [421, 115], "root": [237, 360], "right_knee": [277, 505], ...}}
-
-`root` is the middle between the hips (Section 5.1 of the CVPR 2005 paper: the root, the head, both
-knees and both ankles suffice); any joint of the Leeds skeleton may be added. `size` is that of the
-picture that was clicked, so that a file taken for another video is noticed.
+The root, the head, both knees and both ankles suffice (Section 5.1 of the CVPR 2005 paper); any
+joint of the Leeds skeleton may be added. `root` is the middle between the hips.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
-from keyrecon.durable import write_durably
 from keyrecon.errors import KeyreconError
 
-FORMAT = 1
-"""Version of the file."""
 NEEDED = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
 """Without these nothing can be started; `root` may be given as both hips."""
 STATURE = 1.75
 """Metres, where the file does not tell."""
+HEAD_DEPTH = 0.06
+"""From the top of the head to its centre, player heights."""
+SHOULDERS = 0.2
+"""Height of the middle between the shoulders, share of the way from the head's top to the feet."""
 SHORTEST_PLAYER = 60.0
 """px from the head to the ankles: below it neither club nor limbs can be seen."""
 
@@ -42,6 +34,8 @@ class Clicks:
     """Width and height of the pictures, px."""
     joints: Mapping[str, tuple[float, float]]
     """px by name: joints of the Leeds skeleton, and `root` between the hips."""
+    hidden: tuple[str, ...] = ()
+    """Joints that were clicked though something hides them: they are not tracked."""
     left_handed: bool = False
     stature: float = STATURE
     """Metres."""
@@ -58,57 +52,26 @@ class Clicks:
 
     @property
     def feet(self) -> Float[np.ndarray, "2"]:
-        """Between the ankles."""
+        """Between the ankles, px."""
         return (self.place("right_ankle") + self.place("left_ankle")) / 2
+
+    @property
+    def head(self) -> Float[np.ndarray, "2"]:
+        """Centre of the head, px: below its top, towards the neck or the root."""
+        top = self.place("head_top")
+        below = self.place("neck" if "neck" in self.joints else "root") - top
+        return top + HEAD_DEPTH * self.height * below / np.linalg.norm(below)
+
+    @property
+    def shoulders(self) -> Float[np.ndarray, "2"]:
+        """Roughly the middle between the shoulders, px."""
+        top = self.place("head_top")
+        return top + SHOULDERS * (self.feet - top)
 
     @property
     def height(self) -> float:
         """From the top of the head to between the ankles, px."""
         return float(np.linalg.norm(self.place("head_top") - self.feet))
-
-
-def read_clicks(path: Path) -> Clicks:
-    """Read and check a file of clicks; raises KeyreconError with what is wrong and what helps."""
-    try:
-        content = json.loads(path.read_text())
-        version = content["keyrecon_golf_clicks"]
-        if version != FORMAT:
-            raise KeyreconError(
-                f"{path} is a file of clicks of version {version}; this keyrecon reads {FORMAT}."
-            )
-        principal, focal = content.get("principal"), content.get("focal")
-        clicks = Clicks(
-            frame=int(content["frame"]),
-            size=_pair(content["size"], int),
-            joints={str(n): _pair(p, float) for n, p in content["joints"].items()},
-            left_handed=bool(content.get("left_handed", False)),
-            stature=float(content.get("stature") or STATURE),
-            focal=None if focal is None else float(focal),
-            principal=None if principal is None else _pair(principal, float),
-        )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise KeyreconError(
-            f"{path} is not a file of golf clicks ({fault!r}); it is a JSON object with "
-            '"keyrecon_golf_clicks", "frame", "size" and "joints".'
-        ) from fault
-    _check(clicks, path)
-    return clicks
-
-
-def write_clicks(path: Path, clicks: Clicks) -> None:
-    """Write clicks as a person would: one joint to a line."""
-    joints = ",\n    ".join(f'"{n}": [{x:g}, {y:g}]' for n, (x, y) in clicks.joints.items())
-    head = {
-        "keyrecon_golf_clicks": FORMAT,
-        "frame": clicks.frame,
-        "size": list(clicks.size),
-        "left_handed": clicks.left_handed,
-        "stature": clicks.stature,
-        "focal": clicks.focal,
-        "principal": clicks.principal and list(clicks.principal),
-    }
-    body = ",\n  ".join(f'"{name}": {json.dumps(value)}' for name, value in head.items())
-    write_durably(path, f'{{\n  {body},\n  "joints": {{\n    {joints}\n  }}\n}}\n')
 
 
 def check_clicks(clicks: Clicks, n_frames: int, size: tuple[int, int]) -> None:
@@ -124,41 +87,39 @@ def check_clicks(clicks: Clicks, n_frames: int, size: tuple[int, int]) -> None:
         )
 
 
-def _pair(values: list, kind: type) -> tuple:
-    first, second = values
-    return kind(first), kind(second)
+def check_joints(clicks: Clicks, origin: str) -> None:
+    """The joints that a start needs, inside the picture, the right way up.
 
-
-def _check(clicks: Clicks, path: Path) -> None:
-    """The joints that a start needs, inside the picture, the right way up."""
+    Raises KeyreconError that names `origin`, the file they come from.
+    """
     known = {*LSP14.names, "root"}
     if strange := sorted(set(clicks.joints) - known):
         raise KeyreconError(
-            f"{path} clicks '{strange[0]}', which is no joint; use {', '.join(sorted(known))}."
+            f"{origin} clicks '{strange[0]}', which is no joint; use {', '.join(sorted(known))}."
         )
     given = set(clicks.joints) | (
         {"root"} if {"right_hip", "left_hip"} <= set(clicks.joints) else set()
     )
     if missing := [name for name in NEEDED if name not in given]:
-        raise KeyreconError(f"{path} lacks a click on {' and '.join(missing)}; add it.")
+        raise KeyreconError(f"{origin} lacks a click on {' and '.join(missing)}; add it.")
     for name, (x, y) in clicks.joints.items():
         if not (0 <= x < clicks.size[0] and 0 <= y < clicks.size[1]):
             raise KeyreconError(
-                f"{path}: the click on {name} at ({x:g}, {y:g}) is outside the picture of "
+                f"{origin}: the click on {name} at ({x:g}, {y:g}) is outside the picture of "
                 f"{clicks.size[0]} x {clicks.size[1]} px."
             )
-    _check_posture(clicks, path)
+    _check_posture(clicks, origin)
 
 
-def _check_posture(clicks: Clicks, path: Path) -> None:
+def _check_posture(clicks: Clicks, origin: str) -> None:
     if clicks.height < SHORTEST_PLAYER:
         raise KeyreconError(
-            f"{path}: head and ankles are only {clicks.height:.0f} px apart; the player must be "
+            f"{origin}: head and ankles are only {clicks.height:.0f} px apart; the player must be "
             f"at least {SHORTEST_PLAYER:.0f} px tall. Check the clicks or crop the video."
         )
     head, root, feet = clicks.place("head_top")[1], clicks.place("root")[1], clicks.feet[1]
     if not head < root < feet:
         raise KeyreconError(
-            f"{path}: the head, the root and the ankles must be clicked from top to bottom, but "
+            f"{origin}: the head, the root and the ankles must be clicked from top to bottom, but "
             f"they are at y = {head:g}, {root:g} and {feet:g}; click the address posture again."
         )

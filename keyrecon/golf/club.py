@@ -17,7 +17,6 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.shafts import Shafts
 
-
 NOWHERE = np.full((2, 2), np.nan)
 FEWEST = 5
 """Shafts that a local motion is fitted to, at least."""
@@ -43,10 +42,13 @@ class ClubOptions:
     """Cost of a frame without a shaft."""
     gap: float = 0.4
     """Longest time that is bridged."""
-    window: float = 0.12
+    window: float = 0.07
     """Time on either side that the local motion is fitted over."""
     off: float = 0.035
-    """Distance from the local motion at which a shaft counts for a quarter."""
+    """Distance from the local motion at which a shaft counts for a quarter, where it rests."""
+    off_moving: float = 0.2
+    """The same for a moving shaft, as a share of its movement from frame to frame: a quadratic
+    follows a fast club less well."""
     trusted: float = 0.08
     """A shaft that counts for less was something else."""
 
@@ -104,7 +106,9 @@ def _local_motion(
     for t in range(frames[0], frames[-1] + 1):
         near = _neighbours(frames, t, max(FEWEST, round(2 * options.window * fps) + 1))
         time = (near - t) / max(1, np.abs(near - t).max())
-        fitted, weight = _fit_window(taken[near], tip[near], time, options.off * height)
+        steps = np.abs(np.diff(taken[near], axis=0)).sum(axis=2) / np.diff(near)[:, None]
+        off = options.off * height + options.off_moving * float(np.median(steps.max(axis=1)))
+        fitted, weight = _fit_window(taken[near], tip[near], time, off)
         model[t] = fitted
         if t in near:
             trust[t] = weight[np.searchsorted(near, t)]
@@ -132,10 +136,10 @@ def _fit_window(
     nearness = 1 / (1 + (2 * time) ** 2)
     weight = np.ones(len(time))
     for _ in range(ROUNDS):
-        coefficients = np.stack([
-            _weighted_quadratic(basis, ends[:, e], metric[:, e] * (nearness * weight)[:, None, None])
-            for e in range(2)
-        ])  # fmt: skip
+        metrics = metric * (nearness * weight)[:, None, None, None]
+        coefficients = np.stack(
+            [_weighted_quadratic(basis, ends[:, e], metrics[:, e]) for e in range(2)]
+        )
         miss = ends - np.einsum("nk,ekx->nex", basis, coefficients)
         square = np.einsum("nex,nexy,ney->n", miss, metric, miss) / off**2
         weight = 1 / (1 + square) ** 2

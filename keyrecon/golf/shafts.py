@@ -24,8 +24,6 @@ GAP = 3
 """Places in a row that may be missing."""
 FIST = (0.04, 0.16)
 """Stretch behind the end of a shaft that lies beyond the hands that hold it, player heights."""
-SHOULDERS = 0.2
-"""Height of the middle between the shoulders, share of the way from the head's top to the feet."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,9 @@ def _look(
 ) -> Float[np.ndarray, "n"]:
     """Values of a picture of the mask's size at points in px of the video."""
     places = (points * foreground.shrink + (foreground.shrink - 1) / 2).astype(np.float32)
-    read = cv2.remap(picture, places[:, None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    read = cv2.remap(
+        picture, places[:, None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
     return read.ravel().astype(float)
 
 

@@ -1,0 +1,197 @@
+"""Everything that is seen of a swing before the motion model is fitted to it.
+
+One pass separates the player from the scene, one over the full pictures finds bars that may be the
+club's shaft, and one over reduced pictures, all at once in memory, follows joints and matches
+points of the player's surface. The club tells when the swing passes its key postures.
+"""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from keyrecon.colors import to_lab
+from keyrecon.golf.appearance import AppearanceOptions
+from keyrecon.golf.bars import BarOptions, Bars, drop_scenery, find_bars
+from keyrecon.golf.clicks import Clicks, check_clicks
+from keyrecon.golf.club import Club, ClubOptions, follow_club
+from keyrecon.golf.foreground import Foreground, ForegroundOptions, separate_player
+from keyrecon.golf.matching_points import MatchOptions, match_points
+from keyrecon.golf.records import Camera, Matches, Observations
+from keyrecon.golf.shafts import ShaftOptions, Shafts, suppose_shafts
+from keyrecon.golf.surface_residuals import AWAY_SCALE
+from keyrecon.golf.timing import TimingOptions, find_keys, interpolate_times
+from keyrecon.golf.tracked_joints import track_joints
+from keyrecon.pictures import read_small, side_by_side
+from keyrecon.progress import Progress, silent
+from keyrecon.video import Video
+
+FOCAL = 1.2
+"""Focal length where nobody knows it, picture widths."""
+ACROSS = 0.006
+"""Standard deviation of the club across its shaft, player heights."""
+TIP, NO_TIP, HEAD = 0.02, 0.12, 0.1
+"""The same along it, of a hand end where the hands are, of one where the shaft may go on behind
+the player, and of the head end, which contrast often cuts short."""
+INTO_HANDS = 0.025
+"""From where the shaft leaves the hands to between them, player heights."""
+SAMPLE = 0.03
+"""Distance between samples of the mask, player heights."""
+ISLAND = 0.06
+"""What is farther from the player than this does not belong to it, player heights."""
+
+
+@dataclass(frozen=True)
+class LookOptions:
+    """How a video of a swing is looked at."""
+
+    foreground: ForegroundOptions = field(default_factory=ForegroundOptions)
+    """The player against the scene."""
+    bars: BarOptions = field(default_factory=BarOptions)
+    """Parts of the shaft."""
+    shafts: ShaftOptions = field(default_factory=ShaftOptions)
+    """What may be the club."""
+    club: ClubOptions = field(default_factory=ClubOptions)
+    """How the club moves."""
+    timing: TimingOptions = field(default_factory=TimingOptions)
+    """Key postures."""
+    appearance: AppearanceOptions = field(default_factory=AppearanceOptions)
+    """Head, knees and ankles."""
+    matches: MatchOptions = field(default_factory=MatchOptions)
+    """Points of the surface."""
+
+
+def look_at_swing(
+    video: Video,
+    clicks: Clicks,
+    key_times: Float[np.ndarray, "4"],
+    options: LookOptions = LookOptions(),
+    progress: Progress = silent,
+) -> Observations:
+    """Observations of all frames; `key_times` are the normalised times of the key postures.
+
+    Raises KeyreconError where the clicks do not fit the video or no swing is seen.
+    """
+    check_clicks(clicks, len(video), (video.width, video.height))
+    foreground = separate_player(video, clicks, options.foreground, progress)
+    club = find_club(video, foreground, clicks, options, progress)
+    keys = find_keys(club, foreground.height, video.fps, options.timing)
+    width = foreground.likely.shape[2]
+    pictures = [to_lab(p) for p in progress(read_small(video, width), "Reading", len(video))]
+    joints, spread = track_joints(
+        pictures, foreground, clicks, video.fps, options.appearance, progress
+    )
+    bodies = [_main_part(foreground, t) for t in range(len(video))]
+    ends, along = _describe_club(club, foreground.height, (video.width, video.height))
+    return Observations(
+        camera=rough_camera(clicks),
+        joints=joints,
+        spread=spread,
+        club=ends,
+        club_spread=np.full(len(video), ACROSS * foreground.height),
+        club_along=along,
+        foreground=tuple(_sample_mask(b, foreground) for b in bodies),
+        away=tuple(_away(foreground, t, body) for t, body in enumerate(bodies)),
+        matches=_match_all([p[..., 0] for p in pictures], bodies, foreground, options.matches),
+        keys=keys,
+        mu=interpolate_times(keys, key_times, len(video)),
+        left_handed=clicks.left_handed,
+    )
+
+
+def rough_camera(clicks: Clicks) -> Camera:
+    """The camera as far as it is known: a usual focal length, looking at the picture's middle."""
+    width, height = clicks.size
+    principal = clicks.principal or ((width - 1) / 2, (height - 1) / 2)
+    return Camera(clicks.focal or FOCAL * width, np.array(principal, float))
+
+
+def find_club(
+    video: Video,
+    foreground: Foreground,
+    clicks: Clicks,
+    options: LookOptions = LookOptions(),
+    progress: Progress = silent,
+) -> Club:
+    """The club in every frame of a video."""
+
+    def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Bars:
+        frame, grey = numbered
+        return find_bars(np.ascontiguousarray(grey), foreground, frame, options.bars)
+
+    pictures = progress(enumerate(video.grey_frames()), "Looking for the club", len(video))
+    bars = drop_scenery(list(side_by_side(look, pictures)), foreground.height)
+
+    def suppose(numbered: tuple[int, Bars]) -> Shafts:
+        frame, own = numbered
+        return suppose_shafts(own, foreground, frame, clicks.shoulders, options.shafts)
+
+    shafts = list(side_by_side(suppose, enumerate(bars)))
+    return follow_club(shafts, foreground.height, video.fps, options.club)
+
+
+def _describe_club(
+    club: Club, height: float, size: tuple[int, int]
+) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T 2"]]:
+    """Ends of the club where it was seen, and their deviations along the shaft, px."""
+    ends = np.where(club.seen[:, None, None], club.ends, np.nan)
+    unit = ends[:, 1] - ends[:, 0]
+    unit = unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-9)
+    ends[:, 0] -= INTO_HANDS * height * unit
+    border = 0.02 * height
+    inside = ((ends[:, 1] > border) & (ends[:, 1] < np.array(size) - border)).all(axis=1)
+    hands = np.where(club.tip, TIP, NO_TIP) * height
+    return ends, np.stack([hands, np.where(inside, HEAD * height, np.inf)], axis=1)
+
+
+def _main_part(foreground: Foreground, frame: int) -> Bool[np.ndarray, "h w"]:
+    """The player without the club and without what lies apart."""
+    body = foreground.body(frame).astype(np.uint8)
+    size = max(3, round(ISLAND * foreground.height * foreground.shrink)) | 1
+    joined = cv2.dilate(body, np.ones((size, size), np.uint8))
+    _, labels = cv2.connectedComponents(joined)
+    counts = np.bincount(labels[body > 0], minlength=2)
+    return (body > 0) & (labels == counts.argmax())
+
+
+def _sample_mask(body: Bool[np.ndarray, "h w"], foreground: Foreground) -> Float[np.ndarray, "n 2"]:
+    """Points of a grid on the player, px of the video."""
+    step = max(1, round(SAMPLE * foreground.height * foreground.shrink))
+    y, x = np.nonzero(body[step // 2 :: step, step // 2 :: step])
+    places = np.stack([x, y], axis=1) * step + step // 2
+    return (places - (foreground.shrink - 1) / 2) / foreground.shrink
+
+
+def _away(
+    foreground: Foreground, frame: int, body: Bool[np.ndarray, "h w"]
+) -> Float[np.ndarray, "y x"]:
+    """Distance to the player in px of the video, on a coarser grid."""
+    rest = (~(body | (foreground.mask(frame) > 0))).astype(np.uint8)
+    distance = cv2.distanceTransform(rest, cv2.DIST_L2, 3) / foreground.shrink
+    rows, columns = (max(2, round(s / foreground.shrink / AWAY_SCALE)) for s in rest.shape)
+    return cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_AREA).astype(float)
+
+
+def _match_all(
+    pictures: list[UInt8[np.ndarray, "h w"]],
+    bodies: list[Bool[np.ndarray, "h w"]],
+    foreground: Foreground,
+    options: MatchOptions,
+) -> Matches:
+    """Points of the surface found again in the next frame, px of the video."""
+    height = foreground.height * foreground.shrink
+
+    def match(t: int) -> tuple[np.ndarray, np.ndarray]:
+        return match_points(pictures[t], pictures[t + 1], bodies[t], height, options)
+
+    pairs = list(side_by_side(match, range(len(pictures) - 1)))
+    shift = (foreground.shrink - 1) / 2
+    start, end = (
+        (np.concatenate([p[k] for p in pairs]) - shift) / foreground.shrink for k in (0, 1)
+    )
+    return Matches(_repeated([len(p[0]) for p in pairs]), start, end)
+
+
+def _repeated(counts: list[int]) -> Int[np.ndarray, "n"]:
+    return np.repeat(np.arange(len(counts)), counts)
