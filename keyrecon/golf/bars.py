@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.spatial import cKDTree
 
 from keyrecon.golf.foreground import Foreground
 
@@ -80,17 +81,16 @@ def drop_scenery(bars: Sequence[Bars], height: float) -> list[Bars]:
     A club that lies still at address is somewhere else at the finish; a rope is not.
     """
     part = max(1, len(bars) // END_PART)
-    first, last = (np.concatenate([b.ends for b in few]) for few in (bars[:part], bars[-part:]))
-
-    def strange(ends: Float[np.ndarray, "n 2 2"]) -> Bool[np.ndarray, "n"]:
-        known = np.ones(len(ends), bool)
-        for others in (first, last):
-            apart = np.linalg.norm(ends[:, None] - others[None], axis=3).max(axis=2)
-            known &= apart.min(axis=1, initial=np.inf) < SAME * height
-        return ~known
-
-    kept = [strange(b.ends) for b in bars]
-    return [Bars(b.ends[k], b.support[k]) for b, k in zip(bars, kept, strict=True)]
+    known = [
+        cKDTree(np.concatenate([b.ends for b in few]).reshape(-1, 4))
+        for few in (bars[:part], bars[-part:])
+    ]
+    kept = []
+    for own in bars:
+        apart = [tree.query(own.ends.reshape(-1, 4))[0] for tree in known]
+        strange = np.max(apart, axis=0) > SAME * height
+        kept.append(Bars(own.ends[strange], own.support[strange]))
+    return kept
 
 
 def _along(
