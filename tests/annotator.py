@@ -29,7 +29,8 @@ def open_project(folder, assistant=Assistant(), commands=None):
 def edit(kind, **parts):
     """An edit with an id of its own; `was` stands for `from`."""
     parts = {"from" if name == "was" else name: value for name, value in parts.items()}
-    return {"id": f"edit-{next(_numbers)}", "kind": kind, "from": None, **parts}
+    expected = {} if kind == "group" else {"from": None}
+    return {"id": f"edit-{next(_numbers)}", "kind": kind, **expected, **parts}
 
 
 def mark(frame, joint, to, was=None):

@@ -153,7 +153,7 @@ def test_stills_asked_for_all_at_once_are_all_answered(opened):
 
 def test_stills_may_be_kept_by_the_browser_only_under_the_name_of_this_video(opened):
     desk = opened()
-    name = ask(desk, "GET", "/api/project").json()["stills"]
+    name = ask(desk, "GET", "/api/project").json()["version"]
     for query, kept in (("", False), ("?v=other", False), (f"?v={name}", True)):
         control = ask(desk, "GET", f"/api/still/3{query}").headers["cache-control"]
         assert ("immutable" in control) == kept

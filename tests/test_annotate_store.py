@@ -318,6 +318,29 @@ def test_a_change_of_several_cells_stands_whole_or_not_at_all(opened):
     assert store.state.cells == {NECK: [10, 20, 2]}
 
 
+def test_a_group_is_carried_out_in_order_and_undone_at_once(opened):
+    store = opened()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    parts = [
+        mark(3, "neck", None, was=[10, 20, 2]),
+        mark(3, "neck", [1, 1, 1]),
+        edit("nearer", frame=3, was={}, to={"left_hip": 1}),
+    ]
+    assert submit(store, edit("group", edits=parts))[0]["ok"]
+    assert store.state.cells == {NECK: [1, 1, 1], ("nearer", 3, "left_hip"): 1}
+    store.undo("u")
+    assert store.state.cells == {NECK: [10, 20, 2]}
+
+
+def test_a_group_of_which_one_part_conflicts_changes_nothing(opened):
+    store = opened()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    parts = [mark(3, "head_top", [5, 5, 2]), mark(3, "neck", [1, 1, 1])]
+    answer = submit(store, edit("group", edits=parts))[0]
+    assert answer["current"] == {"head_top": None, "neck": [10, 20, 2]}
+    assert store.state.cells == {NECK: [10, 20, 2]}
+
+
 IMPOSSIBLE = {
     "Frame 100 is outside": mark(100, "neck", [1, 1, 2]),
     "no joint 'tail'": mark(3, "tail", [1, 1, 2]),

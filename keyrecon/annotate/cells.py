@@ -44,9 +44,18 @@ def invert_changes(changes: Iterable[Change]) -> tuple[Change, ...]:
     return tuple(Change(key, after, before) for key, before, after in reversed([*changes]))
 
 
-def is_stale(cells: Mapping[Key, Value], changes: Iterable[Change]) -> bool:
-    """Whether a cell holds neither what the change expects nor what it wants."""
-    return any(cells.get(c.key) not in (c.before, c.after) for c in changes)
+def settle(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...] | None:
+    """The changes one after the other, as one change for each cell that becomes another.
+
+    None if a cell holds neither what its change expects nor what it wants: someone was faster.
+    """
+    now: dict[Key, Value] = {}
+    for key, before, after in changes:
+        if now.get(key, cells.get(key)) not in (before, after):
+            return None
+        now[key] = after
+    told = (Change(key, cells.get(key), after) for key, after in now.items())
+    return tuple(change for change in told if change.before != change.after)
 
 
 def effective(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...]:

@@ -49,7 +49,7 @@ def open_desk(workspace: Workspace, assistant: Assistant, commands: Mapping[str,
     video = workspace.video()
     limits = Limits(workspace.skeleton, len(video), (video.width, video.height))
     store, events = Store(workspace, limits), Events()
-    store.listen(lambda entries: events.tell(describe_entries(entries)))
+    store.listen(lambda entries: events.tell(describe_entries(entries, store.state)))
     return Desk(
         workspace=workspace,
         limits=limits,
@@ -72,7 +72,8 @@ def describe_project(desk: Desk) -> Json:
     return {
         **describe_video(desk.stills.video, desk.workspace.folder.resolve().name),
         **describe_skeleton(desk.limits.skeleton),
-        "stills": desk.stills.identity,
+        "id": f"{desk.workspace.folder.resolve().name}-{desk.stills.identity}",
+        "version": desk.stills.identity,
         "keyframes": asked,
         "height_px": known.get("height_px"),
         "has": {
@@ -93,13 +94,17 @@ def describe_state(state: State) -> Json:
         "picks": picks_of(cells),
         "own": by_frame(cells, "own"),
         "locked": by_frame(cells, "lock"),
-        "undo": len(state.undoable),
-        "redo": len(state.redoable),
+        **describe_stacks(state),
     }
 
 
-def describe_entries(entries: Iterable[Entry]) -> Json:
-    """Accepted edits as news."""
+def describe_stacks(state: State) -> Json:
+    """How much can be taken back and done again."""
+    return {"undo": len(state.undoable), "redo": len(state.redoable)}
+
+
+def describe_entries(entries: Iterable[Entry], state: State) -> Json:
+    """Accepted edits, and what can be undone after them, as news."""
     told = [
         {
             "revision": entry.revision,
@@ -110,12 +115,12 @@ def describe_entries(entries: Iterable[Entry]) -> Json:
         }
         for entry in entries
     ]
-    return {"revision": told[-1]["revision"], "edits": told}
+    return {"revision": state.revision, "edits": told, **describe_stacks(state)}
 
 
 def describe_changes(changes: Iterable[Change]) -> list[Json]:
     """Cells as the page names them."""
-    second: dict[str, Callable[[Any], Json]] = {
+    where: dict[str, Callable[[Any], Json]] = {
         "mark": lambda key: {"frame": key[1], "joint": key[2]},
         "nearer": lambda key: {"frame": key[1], "limb": key[2]},
         "pick": lambda key: {"id": key[1]},
@@ -123,7 +128,7 @@ def describe_changes(changes: Iterable[Change]) -> list[Json]:
         "lock": lambda key: {"frame": key[1]},
     }
     return [
-        {"kind": key[0], **second[str(key[0])](key), "from": before, "to": after}
+        {"kind": key[0], **where[str(key[0])](key), "from": before, "to": after}
         for key, before, after in changes
     ]
 

@@ -1,4 +1,4 @@
-"""What the page sends: an edit in one of six kinds, checked as it is parsed.
+"""What the page sends: an edit in one of a few kinds, checked as it is parsed.
 
 Every edit has an id that the page made, so that one sent twice counts once, and says what the
 page believed to stand in each cell (`from`), so that two pages cannot overwrite each other.
@@ -84,7 +84,16 @@ class LockEdit(Edit, frozen=True, tag="lock"):
     was: bool = field(name="from")
 
 
-AnyEdit = MarkEdit | MarksEdit | NearerEdit | PickEdit | OwnEdit | LockEdit
+Part = MarkEdit | MarksEdit | NearerEdit | PickEdit | OwnEdit | LockEdit
+
+
+class GroupEdit(Edit, frozen=True, tag="group"):
+    """Several edits that stand together or not at all, and are undone as one."""
+
+    edits: Annotated[list[Part], Meta(min_length=1, max_length=5000)]
+
+
+AnyEdit = Part | GroupEdit
 
 
 class Limits(Struct, frozen=True):
@@ -125,6 +134,8 @@ def _cells(edit: AnyEdit) -> list[tuple[Key, Value, Value]]:
             return [(("own", frame), edit.was, edit.to)]
         case LockEdit(frame=frame):
             return [(("lock", frame), edit.was or None, edit.to or None)]
+        case GroupEdit(edits=parts):
+            return [cell for part in parts for cell in _cells(part)]
 
 
 def _pick_cells(edit: PickEdit) -> list[tuple[Key, Value, Value]]:

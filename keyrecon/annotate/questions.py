@@ -16,6 +16,7 @@ from keyrecon.annotate.desk import (
     describe_changes,
     describe_job,
     describe_project,
+    describe_stacks,
     describe_state,
 )
 from keyrecon.annotate.edits import EditList, Frame, Name, Place, Sign
@@ -85,8 +86,8 @@ def state(desk: Desk, asked: Asked) -> Json:
 def edits(desk: Desk, asked: Asked) -> Json:
     """Accept edits; when this is answered they are durable."""
     body: EditList = asked.body
-    results = desk.store.submit(body.edits)
-    return {"revision": desk.store.state.revision, "results": results}
+    results, now = desk.store.submit(body.edits), desk.store.state
+    return {"revision": now.revision, "results": results, **describe_stacks(now)}
 
 
 def undo(desk: Desk, asked: Asked) -> Json:
@@ -100,11 +101,13 @@ def redo(desk: Desk, asked: Asked) -> Json:
 
 
 def _turned(desk: Desk, entry: Entry | None) -> Json:
-    changes = describe_changes(entry.changes) if entry else []
-    kind = entry.label if entry else None
-    now = describe_state(desk.store.state)
-    counts = {name: now[name] for name in ("revision", "undo", "redo")}
-    return {**counts, "edit": kind, "changes": changes}
+    now = desk.store.state
+    return {
+        "revision": now.revision,
+        **describe_stacks(now),
+        "edit": entry.label if entry else None,
+        "changes": describe_changes(entry.changes) if entry else [],
+    }
 
 
 def ghost(desk: Desk, asked: Asked) -> Json:

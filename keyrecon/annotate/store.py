@@ -14,7 +14,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from keyrecon.annotate.cells import Cells, Change, apply_in_place, effective, is_stale
+from keyrecon.annotate.cells import Cells, Change, apply_in_place, effective, settle
 from keyrecon.annotate.cells import invert_changes as inverted
 from keyrecon.annotate.edits import AnyEdit, Limits, changes_of
 from keyrecon.annotate.files import annotations_form, picks_form
@@ -106,23 +106,29 @@ class Store:
     ) -> list[Draft]:
         drafts: list[Draft] = []
         for edit in edits:
-            if self._journal.knows(edit.id) or any(edit.id == d.id for d in drafts):
-                results.append({"id": edit.id, "ok": True})
-                continue
-            try:
-                changes = changes_of(edit, self._limits)
-            except KeyreconError as fault:
-                results.append({"id": edit.id, "ok": False, "status": 400, "error": str(fault)})
-                continue
-            if is_stale(cells, changes):
-                current = {str(c.key[-1]): cells.get(c.key) for c in changes}
-                results.append({"id": edit.id, "ok": False, "status": 409, "current": current})
-                continue
-            results.append({"id": edit.id, "ok": True})
-            if told := effective(cells, changes):
-                drafts.append(Draft(edit.id, type(edit).__struct_config__.tag, told))
-                apply_in_place(cells, told)
+            result, draft = self._judge(edit, cells, {draft.id for draft in drafts})
+            results.append({"id": edit.id, **result})
+            if draft is not None:
+                drafts.append(draft)
+                apply_in_place(cells, draft.changes)
         return drafts
+
+    def _judge(
+        self, edit: AnyEdit, cells: Cells, accepted: set[str]
+    ) -> tuple[dict[str, Any], Draft | None]:
+        """The answer to one edit, and what it changes if it is new and fits."""
+        if edit.id in accepted or self._journal.knows(edit.id):
+            return {"ok": True}, None
+        try:
+            changes = changes_of(edit, self._limits)
+        except KeyreconError as fault:
+            return {"ok": False, "status": 400, "error": str(fault)}, None
+        told = settle(cells, changes)
+        if told is None:
+            current = {str(c.key[-1]): cells.get(c.key) for c in changes}
+            return {"ok": False, "status": 409, "current": current}, None
+        draft = Draft(edit.id, type(edit).__struct_config__.tag, told)
+        return {"ok": True}, draft if told else None
 
     def apply(
         self,
