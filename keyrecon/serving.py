@@ -6,19 +6,18 @@ import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 import uvicorn
 
 from keyrecon import project
+from keyrecon.annotate.address import Memory, is_loopback, listen, make_door, recall, remember
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import Desk, open_desk
 from keyrecon.annotate.guard import Door
 from keyrecon.annotate.server import make_app
 from keyrecon.annotate.watch import Watch
-from keyrecon.errors import KeyreconError
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
 from keyrecon.workspace import Workspace
@@ -31,13 +30,17 @@ def serve_annotator(
     workspace: Workspace, place: tuple[str, int], open_browser: bool, say: Callable[[str], None]
 ) -> None:
     """Serve the page of a project at (host, port) until interrupted."""
-    with listen(*place) as listener:
+    file, private = workspace.folder / "cache" / "annotator.json", is_loopback(place[0])
+    memory = recall(file) if private else Memory()
+    with listen(*place, memory) as listener:
         desk = open_desk(workspace, Assistant(), job_commands(workspace.folder))
         watch = Watch(desk)
         try:
-            door = make_door(listener, place[0])
+            door = make_door(listener, place[0], memory)
             say(f"Annotating {workspace.folder}. Open in a browser:\n  {door.address}")
-            if not is_loopback(place[0]):
+            if private:
+                remember(file, door)
+            else:
                 say(
                     f"Warning: {place[0]} can be reached from other machines, without encryption; "
                     "whoever has the address can change this project. Safer: ssh -L."
@@ -50,58 +53,6 @@ def serve_annotator(
         finally:
             watch.close()
             desk.close()
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A listening socket; KeyreconError where the port is taken.
-
-    It is told to be TCP: only then are small answers sent at once (asyncio sets TCP_NODELAY).
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((host, port))
-        listener.listen()  # from now on a browser waits instead of being turned away
-    except OSError as fault:
-        listener.close()
-        raise KeyreconError(
-            f"Nothing can be served at {host} port {port} ({fault.strerror or fault}); choose "
-            "another --port, or none for any that is free."
-        ) from fault
-    return listener
-
-
-def make_door(listener: socket.socket, host: str) -> Door:
-    """The fixed list of names under which the server answers."""
-    port = listener.getsockname()[1]
-    return Door(tuple(f"{name}:{port}" for name in _names(host)), port)
-
-
-def _names(host: str) -> tuple[str, ...]:
-    """How a browser may spell an address, best first."""
-    if host in ("0.0.0.0", "::"):
-        name = socket.gethostname()
-        return (name, *_addresses(name), "127.0.0.1", "localhost")
-    if is_loopback(host):
-        return (f"[{host}]" if ":" in host else host, "localhost")
-    return (f"[{host}]" if ":" in host else host,)
-
-
-def _addresses(name: str) -> tuple[str, ...]:
-    """This machine's own addresses, as far as it knows them by name."""
-    try:
-        return tuple(socket.gethostbyname_ex(name)[2])
-    except OSError:
-        return ()
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach an address."""
-    try:
-        return host == "localhost" or ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 class _Server(uvicorn.Server):

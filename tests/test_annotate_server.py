@@ -18,7 +18,8 @@ from annotator import edit, mark, new_project, open_project, request, submit
 from annotator_jobs import counting, crashing
 from conftest import read_number
 
-from keyrecon import KeyreconError, serving
+from keyrecon import KeyreconError
+from keyrecon.annotate import address
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.cells import by_frame
 from keyrecon.annotate.describe import guided_order
@@ -346,11 +347,11 @@ def serve(folder):
         program = subprocess.Popen([*command, *words], stdout=subprocess.PIPE, env=paths, text=True)
         running.append(program)
         program.stdout.readline()
-        address = program.stdout.readline().strip()
-        base = address.partition("/?")[0]
+        printed = program.stdout.readline().strip()
+        base = printed.partition("/?")[0]
         opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         json_headers = {"Origin": base, "Content-Type": "application/json"}
-        opener.open(address)
+        opener.open(printed)
 
         def ask(path, body=None):
             data = None if body is None else json.dumps(body).encode()
@@ -373,7 +374,8 @@ def test_a_killed_server_starts_again_with_all_it_acknowledged(serve, folder):
         assert answer["results"][0]["ok"]
     program.kill()
     program.wait()
-    program, ask = serve()
+    program, _ = serve()
+    # the page that was open goes on: same port, same cookie
     assert ask("/api/state")["marks"].keys() == {str(frame) for frame in range(10)}
     assert ask("/api/state")["undo"] == 10
     program.send_signal(signal.SIGINT)
@@ -387,13 +389,13 @@ def test_a_killed_server_starts_again_with_all_it_acknowledged(serve, folder):
 
 def test_an_address_answers_only_under_the_names_it_is_reached_by():
     for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", socket.gethostname())):
-        with serving.listen(host, 0) as listener:
+        with address.listen(host, 0) as listener:
             port = listener.getsockname()[1]
-            door = serving.make_door(listener, host)
+            door = address.make_door(listener, host)
             assert door.hosts[0] == f"{first}:{port}"
             assert f"localhost:{port}" in door.hosts
             with pytest.raises(KeyreconError, match="choose another --port"):
-                serving.listen(host, port)
+                address.listen(host, port)
 
 
 @pytest.mark.parametrize(
@@ -401,4 +403,25 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
     [("127.0.0.1", True), ("localhost", True), ("::1", True), ("0.0.0.0", False), ("evil", False)],
 )
 def test_only_this_machine_reaches_a_loopback_address(host, ours):
-    assert serving.is_loopback(host) == ours
+    assert address.is_loopback(host) == ours
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"port": 80, "session": "guess"}', "null"])
+def test_a_damaged_memory_of_the_address_is_no_memory(tmp_path, text):
+    (tmp_path / "annotator.json").write_text(text)
+    assert address.recall(tmp_path / "annotator.json") == address.Memory()
+
+
+def test_the_last_address_is_kept_for_oneself_and_used_again_if_free(tmp_path):
+    file = tmp_path / "cache" / "annotator.json"
+    with address.listen("127.0.0.1", 0) as first:
+        door = address.make_door(first, "127.0.0.1")
+        address.remember(file, door)
+        memory = address.recall(file)
+        with address.listen("127.0.0.1", 0, memory) as second:
+            assert second.getsockname()[1] != door.port
+    with address.listen("127.0.0.1", 0, memory) as third:
+        again = address.make_door(third, "127.0.0.1", memory)
+    assert (again.port, again.session) == (door.port, door.session)
+    assert again.token != door.token
+    assert file.stat().st_mode & 0o077 == 0
