@@ -1,6 +1,9 @@
 """The sheet's marks as `Annotations`, which the rest of keyrecon reads, and back."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
+from jaxtyping import Float
 
 from keyrecon.annotate.cells import FILE_CELLS, Cells, of_kind
 from keyrecon.body import Skeleton
@@ -10,19 +13,30 @@ from keyrecon.records import Annotations
 def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
     """Marks and signs of all frames that have any; joints said to be absent count as unmarked."""
     told = written_cells(cells)
-    frames = np.array(sorted({int(key[1]) for key in told}), dtype=np.int64)
-    row = {frame: k for k, frame in enumerate(frames.tolist())}
-    limb = {skeleton.names[child]: b for b, (_, child) in enumerate(skeleton.bones.tolist())}
-    joints = np.full((len(frames), len(skeleton.names), 2), np.nan)
-    visible = np.zeros(joints.shape[:2], dtype=bool)
-    nearer = np.zeros((len(frames), len(skeleton.bones)), dtype=np.int64)
-    for (kind, frame, name), value in told.items():
-        if kind == "mark":
-            joints[row[frame], skeleton.index(name)] = value[:2]
-            visible[row[frame], skeleton.index(name)] = value[2] == 2
-        else:
-            nearer[row[frame], limb[name]] = value
-    return Annotations(skeleton, frames, joints, visible, nearer)
+    frames = sorted({key[1] for key in told})
+    row = {frame: k for k, frame in enumerate(frames)}
+    limbs = [skeleton.names[child] for _, child in skeleton.bones.tolist()]
+    marks = _table(of_kind(told, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
+    signs = _table(of_kind(told, "nearer"), row, limbs, [0])
+    return Annotations(
+        skeleton,
+        np.array(frames, dtype=np.int64),
+        marks[..., :2],
+        marks[..., 2] == 2,
+        signs[..., 0].astype(np.int64),
+    )
+
+
+def _table(
+    cells: Cells, row: Mapping[int, int], names: Sequence[str], empty: list[float]
+) -> Float[np.ndarray, "K N C"]:
+    """Values of cells by frame and name."""
+    column = {name: n for n, name in enumerate(names)}
+    table = np.tile(np.array(empty, dtype=float), (len(row), len(names), 1))
+    if cells:
+        where = np.array([(row[key[1]], column[key[2]]) for key in cells])
+        table[where[:, 0], where[:, 1]] = np.array([*cells.values()]).reshape(len(cells), -1)
+    return table
 
 
 def cells_from_annotations(annotations: Annotations) -> Cells:
