@@ -17,7 +17,7 @@ def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
     row = {frame: k for k, frame in enumerate(frames)}
     limbs = [skeleton.names[child] for _, child in skeleton.bones.tolist()]
     marks = _table(of_kind(told, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
-    signs = _table(of_kind(told, "nearer"), row, limbs, [0])
+    signs = _table(of_kind(told, "nearer"), row, limbs, [0.0])
     return Annotations(
         skeleton,
         np.array(frames, dtype=np.int64),
