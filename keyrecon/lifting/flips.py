@@ -101,12 +101,7 @@ def choose_signs(
     `nearer` as in `Annotations` (1: child end nearer, dz < 0); `breadths` in statures.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = _costs(shown, breadths, anatomy)
-    trunk = trunk + _contradiction(anatomy.trunk, nearer, options.confirmed)
-    limbs = [
-        cost + _contradiction(limb.bones, nearer, options.confirmed)[:, None]
-        for limb, cost in zip(anatomy.limbs, limbs, strict=True)
-    ]
+    trunk, limbs = sign_costs(shown, nearer, breadths, skeleton, options)
     total = trunk + sum(cost.min(axis=-1) for cost in limbs)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
@@ -120,6 +115,27 @@ def choose_signs(
         bones = list(limb.bones)
         sign[:, bones], probability[:, bones] = _read(given.argmin(axis=1), given, len(bones))
     return Signs(sign, probability)
+
+
+def sign_costs(
+    shown: Shown,
+    nearer: Int[np.ndarray, "T B"],
+    breadths: Float[np.ndarray, "P"],
+    skeleton: Skeleton,
+    options: FlipOptions = FlipOptions(),
+) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S L"]]]:
+    """Cost of every trunk state, and of every state of each limb given it, nats.
+
+    States as `sign_states` lists them, limbs in the order of `anatomy_of`.
+    """
+    anatomy = anatomy_of(skeleton)
+    trunk, limbs = _costs(shown, breadths, anatomy)
+    trunk = trunk + _contradiction(anatomy.trunk, nearer, options.confirmed)
+    limbs = [
+        cost + _contradiction(limb.bones, nearer, options.confirmed)[:, None]
+        for limb, cost in zip(anatomy.limbs, limbs, strict=True)
+    ]
+    return trunk, limbs
 
 
 def follow_signs(

@@ -64,17 +64,18 @@ def follow_half(
     chosen[:, half.given] = start.given
     proposal = Proposal(chosen, nearest)
     joints = settle_joints(puppets, scene.index, proposal, scene.fps, rounds)
-    confidence = _confidence(puppets, scene.index, proposal, joints)
+    confidence = judge_joints(puppets, scene.index, proposal, joints)
     return Followed(joints, confidence, which)
 
 
-def _confidence(
+def judge_joints(
     puppets: Puppets,
     index: ElementIndex,
     proposal: Proposal,
     joints: Complex[np.ndarray, "T J"],
 ) -> Float[np.ndarray, "T J"]:
-    """Share of the outline found around a joint, less where the proposal lay elsewhere."""
+    """Confidence 0-1: share of the outline found around a joint, less where the proposal lay
+    elsewhere."""
     every = np.arange(len(joints))
     figures = Figures(every, np.full(len(every), puppets.average), joints)
     fit = 1 - judge_figures(puppets, index, figures)

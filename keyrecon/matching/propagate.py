@@ -96,7 +96,7 @@ def _fuse(
     halves = split_body(annotations.skeleton)
     for half in progress(halves, "carrying joints", len(halves)):
         settled = joints[:, half.joints[half.given]]
-        poses = _gather_poses(annotations, window, half, settled)
+        poses = gather_poses(annotations, window, half, settled)
         puppets = make_puppets(edges, window, poses, options.elements)
         if half.name == "lower":
             tracked = window.from_pixels(survey.track.feet, every[:, None])
@@ -114,7 +114,7 @@ def _fuse(
     return _with_marks(annotations, np.isfinite(annotations.joints).all(axis=2), tracks)
 
 
-def _gather_poses(
+def gather_poses(
     annotations: Annotations,
     window: Window,
     half: Half,

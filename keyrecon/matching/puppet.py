@@ -57,7 +57,7 @@ class Puppets:
     @property
     def average(self) -> int:
         """Row of the average outline."""
-        return len(self.poses.frames)
+        return len(self.riders.bone) - 1
 
 
 def make_puppets(
