@@ -6,7 +6,7 @@ interpolation (J).
 """
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from keyrecon.matching.cells import ranges
 from keyrecon.matching.coverage import Neighborhoods
@@ -40,13 +40,33 @@ def assign_frames(
     smoothed: Float[np.ndarray, "M M"],
     comparison: Comparison,
     detour: Float[np.ndarray, "T"],
-    chosen: list[int],
+    keyframes: Int[np.ndarray, "K"],
 ) -> tuple[Int[np.ndarray, "T"], Float[np.ndarray, "T"]]:
-    """(row of the nearest of the `chosen` rows, distance D to it) for every frame.
+    """(nearest keyframe, distance D to it) for every frame.
 
-    A frame that an exemplar stands for is as far as the exemplar, or as far from it.
+    Frames that an exemplar stands for, keyframes among them, are as far from others as the
+    exemplar, or as far as they are from it. Frames with the same exemplar as several keyframes go
+    to the nearest in time, and a keyframe stands for itself.
     """
-    rows = np.sort(chosen)
-    to_keyframes = smoothed[rows]
-    nearest, distance = rows[to_keyframes.argmin(axis=0)], to_keyframes.min(axis=0)
-    return nearest[comparison.row], np.maximum(distance[comparison.row], detour)
+    rows = comparison.row[keyframes]
+    apart = np.maximum(smoothed[rows], detour[keyframes][:, None])
+    nearest = keyframes[apart.argmin(axis=0)][comparison.row]
+    distance = np.maximum(apart.min(axis=0)[comparison.row], detour)
+    for row in np.flatnonzero(np.bincount(rows) > 1):
+        near, members = keyframes[rows == row], np.flatnonzero(comparison.row == row)
+        closest = near[np.abs(members[:, None] - near).argmin(axis=1)]
+        nearest[members] = np.where(np.isin(nearest[members], near), closest, nearest[members])
+    nearest[keyframes], distance[keyframes] = keyframes, 0
+    return nearest, distance
+
+
+def represent_frames(
+    hoods: Neighborhoods,
+    comparison: Comparison,
+    near: Bool[np.ndarray, "K"],
+    keyframes: Int[np.ndarray, "K"],
+) -> Bool[np.ndarray, "T"]:
+    """W: what keyframes represent; one that is not `near` its exemplar only itself."""
+    represented = hoods.union(np.unique(comparison.row[keyframes[near]]).tolist())
+    represented[keyframes] = True
+    return represented

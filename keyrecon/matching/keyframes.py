@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.matching.assignment import assign_frames, find_neighborhoods
+from keyrecon.matching.assignment import assign_frames, find_neighborhoods, represent_frames
 from keyrecon.matching.coverage import choose_as_printed, choose_greedily
 from keyrecon.matching.exchange import (
     Goal,
@@ -162,7 +162,7 @@ def _choose_half(
     goal = half.goal(beta)
     if half.options.method == "coverage":
         chosen = _center(half, goal, chosen, most if searched else 0, also)
-    return _record(half, goal, beta, chosen)
+    return _record(half, goal, beta, half.comparison.frames[np.sort(chosen)])
 
 
 def _choose(half: Half, goal: Goal, most: int) -> list[int]:
@@ -229,14 +229,16 @@ def _center(
     return exchange_for_closeness(goal, chosen, distance, weight)
 
 
-def _record(half: Half, goal: Goal, beta: float, chosen: list[int]) -> HalfKeyframes:
-    frames = half.comparison.frames
-    nearest, distance = assign_frames(half.distances(beta), half.comparison, half.detour, chosen)
-    represented = goal.hoods.union(chosen)
-    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(frames))
+def _record(
+    half: Half, goal: Goal, beta: float, keyframes: Int[np.ndarray, "K"]
+) -> HalfKeyframes:
+    comparison, detour = half.comparison, half.detour
+    nearest, distance = assign_frames(half.distances(beta), comparison, detour, keyframes)
+    represented = represent_frames(goal.hoods, comparison, detour[keyframes] < beta, keyframes)
+    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
     return HalfKeyframes(
-        frames=frames[np.sort(chosen)],
-        nearest=frames[nearest],
+        frames=keyframes,
+        nearest=nearest,
         represented=represented,
         coverage=1 - goal.left_over(represented) / len(represented),
         beta=beta,
@@ -254,14 +256,12 @@ def adopt_keyframes(
 ) -> Keyframes:
     """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
 
-    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
+    Frames that nobody asked for count like the others. Beta stays, so that coverage tells what the missing ones cost or more ones bring.
     """
     halves = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
     for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
         beta = getattr(asked, name).beta
-        rows = np.unique(comparison.row[frames])
-        rows = rows[np.isin(comparison.frames[rows], frames)]
-        halves.append(_record(half, half.goal(beta), beta, rows.tolist()))
+        halves.append(_record(half, half.goal(beta), beta, np.unique(frames)))
     return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)

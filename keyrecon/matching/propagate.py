@@ -145,10 +145,13 @@ def gather_poses(
 def distances_to(
     comparison: Comparison, name: HalfName, frames: Int[np.ndarray, "K"]
 ) -> Float[np.ndarray, "T K"]:
-    """Pose distance of every frame to a few, player heights."""
+    """Pose distance of every frame to a few, player heights; by way of their exemplars."""
     table = comparison.upper if name == "upper" else comparison.lower
     detour = comparison.detour[0 if name == "upper" else 1]
-    return table[comparison.row[:, None], comparison.row[frames]] + detour[:, None]
+    apart = table[comparison.row[:, None], comparison.row[frames]]
+    apart = apart + detour[:, None] + detour[frames]
+    apart[frames, np.arange(len(frames))] = 0
+    return apart
 
 
 def _with_marks(
