@@ -13,11 +13,11 @@ import uvicorn
 
 from keyrecon import project
 from keyrecon.annotate.address import Memory, is_loopback, listen, make_door, recall, remember
-from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import Desk, open_desk
 from keyrecon.annotate.guard import Door
 from keyrecon.annotate.server import make_app
 from keyrecon.annotate.watch import Watch
+from keyrecon.assist.assistant import make_assistant
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
 from keyrecon.workspace import Workspace
@@ -33,7 +33,7 @@ def serve_annotator(
     file, private = workspace.folder / "cache" / "annotator.json", is_loopback(place[0])
     memory = recall(file) if private else Memory()
     with listen(*place, memory) as listener:
-        desk = open_desk(workspace, Assistant(), job_commands(workspace.folder))
+        desk = open_desk(workspace, make_assistant(workspace), job_commands(workspace.folder))
         watch = Watch(desk)
         try:
             door = make_door(listener, place[0], memory)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from keyrecon.errors import KeyreconError
 from keyrecon.progress import Progress, silent
 from keyrecon.storage import load_record, save_record
 from keyrecon.video import Video
@@ -58,6 +59,23 @@ class StageStore:
             self.seconds[name] = time.perf_counter() - started
             self._forget(name)
             save_record(path, result)
+        self._keys[id(result)] = (result, key)
+        return result
+
+    def recall(
+        self,
+        name: str,
+        stage: Callable[..., Any],
+        *inputs: object,
+        options: object = None,
+        progress: Progress = silent,
+    ) -> Any:
+        """The stored result of a stage, as `keep` would find it; KeyreconError if there is none."""
+        key = self._key((_code_of(stage), name, options, *inputs))
+        path = self.folder / f"{name}-{key}.npz"
+        if not path.is_file():
+            raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
+        result = load_record(path)
         self._keys[id(result)] = (result, key)
         return result
 

@@ -3,6 +3,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from keyrecon.errors import KeyreconError
 from keyrecon.progress import silent
 from keyrecon.stages import StageStore
 
@@ -65,4 +66,16 @@ def test_an_interrupted_run_goes_on_after_the_last_finished_stage(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         store.keep("add", interrupted, power)
     recipe(StageStore(tmp_path), np.arange(3.0))
+    assert CALLS == [2, "add"]
+
+
+def test_a_result_is_recalled_without_ever_being_made(tmp_path):
+    store, values = StageStore(tmp_path), np.arange(3.0)
+    with pytest.raises(KeyreconError, match=r"'power' is not in"):
+        store.recall("power", raise_to, values, options=PowerOptions())
+    assert CALLS == []
+    made = recipe(store, values)
+    again = StageStore(tmp_path)
+    power = again.recall("power", raise_to, values, options=PowerOptions())
+    assert np.array_equal(again.recall("add", add_one, power), made)
     assert CALLS == [2, "add"]

@@ -3,7 +3,7 @@
 long     a bone shows more of its length than it has: impossible under scaled orthography
 crossed  left and right of a limb agree better with the other annotated frames when swapped
 far      a joint lies where none of the annotated figures that look alike puts it
-missing  a joint of a half that is marked otherwise
+missing  joints of a half that was begun
 
 Silhouettes do not tell left from right, so frames only say of one another whether they agree. Which
 of them is wrong is settled by the majority: the frame whose swap settles most disagreement is
@@ -21,7 +21,8 @@ from jaxtyping import Float
 from keyrecon.assist.lookalikes import Lookalikes
 from keyrecon.body import Skeleton
 from keyrecon.lifting.lengths import BodySize, LengthOptions
-from keyrecon.records import Annotations, Keyframes
+from keyrecon.matching.propagate import LEAST_MARKED
+from keyrecon.records import Annotations
 
 CAP = 0.15
 """Distance at which a joint counts as elsewhere, player heights: half a thigh."""
@@ -37,8 +38,8 @@ EVEN_EXCESS = 4.0
 POOR_FIT = 0.06
 """Mean distance of a figure's joints, left and right as they agree better, at which it says half as
 much about left and right, player heights."""
-MISSING = 0.95
-"""Suspicion of a joint that was left out."""
+MISSING, BEGUN = 0.95, 0.5
+"""Suspicion of joints left out of a half that is marked, and of one that is only begun."""
 WORTH_TELLING = 0.2
 """Suspicion below which nothing is said."""
 
@@ -59,13 +60,12 @@ class Check:
 
 def find_checks(
     annotations: Annotations,
-    keyframes: Keyframes,
     size: BodySize,
     looks: tuple[Lookalikes, ...],
     absent: Collection[tuple[int, str]] = (),
 ) -> list[Check]:
     """All that is worth telling; `absent` joints (frame, name) were said not to be visible."""
-    found = [*_too_long(annotations, size), *_left_out(annotations, keyframes, absent)]
+    found = [*_too_long(annotations, size), *_left_out(annotations, absent)]
     for look in looks:
         found += [*_swapped(look, annotations.skeleton), *_elsewhere(look, annotations.skeleton)]
     told: list[Check] = []
@@ -94,39 +94,51 @@ def _spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
+def measure_excess(
+    stretch: Float[np.ndarray, "*n B"], lengths: Float[np.ndarray, "B"]
+) -> Float[np.ndarray, "*n B"]:
+    """By how many deviations of clicks bones are too long; negative where they are not.
+
+    `stretch` is the shown length over the possible one, `lengths` are in body heights.
+    """
+    return (stretch - 1) * lengths / (np.sqrt(2) * LengthOptions.click_noise)
+
+
 def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
-    skeleton, noise = annotations.skeleton, np.sqrt(2) * LengthOptions.click_noise
+    skeleton = annotations.skeleton
     ends = annotations.joints[:, skeleton.bones]
     shown = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    shown = shown / size.scale[annotations.frames][:, None]
-    excess = np.nan_to_num((shown - size.lengths) / noise)
+    stretch = shown / size.scale[annotations.frames][:, None] / size.lengths
+    excess = np.nan_to_num(measure_excess(stretch, size.lengths))
     for row, bone in np.argwhere(excess > 0):
         parent, child = (skeleton.names[j] for j in skeleton.bones[bone])
-        times = shown[row, bone] / size.lengths[bone]
         yield Check(
             frame=int(annotations.frames[row]),
             joint=child,
             kind="long",
             suspicion=_likely(float(excess[row, bone]), EVEN_EXCESS),
-            text=f"From {_spoken(parent)} to {_spoken(child)} is {times:.1f} times as long as it "
-            "can be; check both ends.",
+            text=f"From {_spoken(parent)} to {_spoken(child)} is {stretch[row, bone]:.1f} times as "
+            "long as it can be; check both ends.",
             joints=(child, parent),
         )
 
 
 def _left_out(
-    annotations: Annotations, keyframes: Keyframes, absent: Collection[tuple[int, str]]
+    annotations: Annotations, absent: Collection[tuple[int, str]]
 ) -> Iterator[Check]:
+    """Halves of the body that were begun and lack joints."""
     skeleton = annotations.skeleton
     marked = np.isfinite(annotations.joints[:, :, 0])
-    for half, members in (("upper", ~skeleton.is_lower), ("lower", skeleton.is_lower)):
-        asked = np.isin(annotations.frames, getattr(keyframes, half).frames)
-        begun = marked[:, members].any(axis=1)
-        for row, joint in np.argwhere(~marked & members & (asked | begun)[:, None]):
-            frame, name = int(annotations.frames[row]), skeleton.names[joint]
-            if begun[row] and (frame, name) not in absent:
-                text = f"The {_spoken(name)} is not marked; place it, or say that it is not seen."
-                yield Check(frame, name, "missing", MISSING, text, (name,))
+    for half in (~skeleton.is_lower, skeleton.is_lower):
+        for row in np.flatnonzero(marked[:, half].any(axis=1)):
+            frame = int(annotations.frames[row])
+            open_ = [skeleton.names[j] for j in np.flatnonzero(half & ~marked[row])]
+            names = tuple(name for name in open_ if (frame, name) not in absent)
+            done = marked[row, half].mean() >= LEAST_MARKED
+            if names:
+                listed = ", ".join(_spoken(name) for name in names)
+                text = f"Not marked: {listed}; place them, or say that they are not seen."
+                yield Check(frame, names[0], "missing", MISSING if done else BEGUN, text, names)
 
 
 def _elsewhere(look: Lookalikes, skeleton: Skeleton) -> Iterator[Check]:

@@ -256,7 +256,8 @@ def adopt_keyframes(
 ) -> Keyframes:
     """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
 
-    Frames that nobody asked for count like the others. Beta stays, so that coverage tells what the missing ones cost or more ones bring.
+    Frames that nobody asked for count like the others. Beta stays, so that coverage tells what the
+    missing ones cost or more ones bring.
     """
     halves = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)

@@ -1,0 +1,201 @@
+"""The annotator's help, put together: records in, what the page reads out.
+
+Joints, limbs (named by their outer joint) and frames are told by name and number, unknown ones are
+left out, and depths have the camera's axes in body heights.
+"""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
+from keyrecon.assist.checks import EVEN_EXCESS, find_checks, measure_excess
+from keyrecon.assist.knowledge import Knowledge
+from keyrecon.assist.pose import Alternative, PoseReading, Sighting, read_pose
+from keyrecon.assist.study import Study
+from keyrecon.assist.suggest import suggest_frames
+from keyrecon.assist.why import explain_keyframes
+from keyrecon.body import Skeleton
+from keyrecon.records import Annotations
+from keyrecon.workspace import Workspace
+
+SURE = 0.8
+"""Depth signs that a ghost tells are at least so sure: nine in ten are right."""
+
+
+def make_assistant(workspace: Workspace) -> Assistant:
+    """Help for a project; what needs the automatic part says nothing before it was run."""
+    study = Study(workspace)
+    return Assistant(
+        keyframes=partial(describe_keyframes, study),
+        ghost=partial(describe_ghost, study),
+        pose=partial(describe_pose, study),
+        checks=partial(describe_checks, study),
+        suggest=partial(describe_suggestions, study),
+    )
+
+
+def describe_keyframes(study: Study, own: dict[int, str]) -> Json:
+    """Why each keyframe is one, and where the player is on it."""
+    preparation = study.preparation()
+    if preparation is None:
+        return {}
+    reasons = explain_keyframes(preparation.comparison, preparation.keyframes, own)
+    boxes = preparation.track.box
+    frames = {
+        frame: {
+            "stands_for": reason.stands_for,
+            "why": reason.why,
+            "box": [round(float(c), 1) for c in boxes[frame]],
+        }
+        for frame, reason in reasons.items()
+    }
+    return {"frames": frames, "height_px": float(np.median(preparation.track.height))}
+
+
+def describe_ghost(study: Study, annotations: Annotations, frame: int) -> Json:
+    """Joints with confidence, the frames they come from, and depth signs that are sure."""
+    ghost = study.ghost(annotations, frame)
+    if ghost is None:
+        return {}
+    skeleton = annotations.skeleton
+    joints = {
+        skeleton.names[j]: [*_rounded(ghost.joints[j], 2), round(float(ghost.confidence[j]), 3)]
+        for j in np.flatnonzero(np.isfinite(ghost.joints[:, 0]))
+    }
+    sources = sorted({int(source) for source in ghost.source if source >= 0})
+    return {"joints": joints, "from": sources, "nearer": _sure_signs(study, annotations, frame)}
+
+
+def _sure_signs(study: Study, annotations: Annotations, frame: int) -> Signs:
+    """Depth signs that the marks and the ghost of a frame leave little doubt about."""
+    knowledge, names = study.knowledge(annotations), _limb_names(annotations.skeleton)
+    sighting = _sight(study, knowledge, annotations, frame, ({}, {}))
+    reading = read_pose(sighting, knowledge.size, annotations.skeleton, knowledge.votes(frame))
+    return {names[b]: int(reading.nearer[b]) for b in np.flatnonzero(reading.sure >= SURE)}
+
+
+def describe_pose(
+    study: Study, annotations: Annotations, frame: int, marks: Marks, nearer: Signs
+) -> Json:
+    """The pose in space, how sure its signs are, and what else it could be."""
+    knowledge, skeleton = study.knowledge(annotations), annotations.skeleton
+    if knowledge is None:
+        return {}
+    sighting = _sight(study, knowledge, annotations, frame, (marks, nearer))
+    reading = read_pose(sighting, knowledge.size, skeleton, knowledge.votes(frame))
+    itself = Alternative(reading.nearer, reading.points3d, 0.0)
+    points = _points(skeleton, reading.points3d)
+    marked = {name for name, place in marks.items() if place[2]}
+    return {
+        "points3d": points,
+        "limbs": _limbs(skeleton, sighting, reading),
+        "alternatives": [
+            {
+                "nearer": _signs(skeleton, reading, other.nearer),
+                "points3d": _points(skeleton, other.points3d),
+                "cost": round(other.cost, 2),
+            }
+            for other in (itself, *reading.alternatives)
+        ],
+        "stretched": _stretched(skeleton, reading, knowledge, marked),
+        "foreseen": sorted({*points} - marked),
+    }
+
+
+def _sight(
+    study: Study,
+    knowledge: Knowledge,
+    annotations: Annotations,
+    frame: int,
+    told: tuple[Marks, Signs],
+) -> Sighting:
+    """What is marked on a frame, and its ghost where nothing is."""
+    skeleton, (marks, signs) = annotations.skeleton, told
+    joints = np.full((len(skeleton.names), 2), np.nan)
+    for name, (x, y, seen) in marks.items():
+        if seen:
+            joints[skeleton.index(name)] = x, y
+    names = _limb_names(skeleton)
+    nearer = np.array([signs.get(name, 0) for name in names])
+    return knowledge.sighting(frame, joints, nearer, study.any_ghost(annotations, frame))
+
+
+def _limbs(skeleton: Skeleton, sighting: Sighting, reading: PoseReading) -> Json:
+    """Sign of every limb whose ends are known, how sure it is, and whether a person gave it."""
+    names = _limb_names(skeleton)
+    return {
+        names[b]: {
+            "sign": int(reading.nearer[b]),
+            "sure": round(float(reading.sure[b]), 3),
+            "given": bool(sighting.nearer[b] != 0),
+        }
+        for b in np.flatnonzero(np.isfinite(reading.stretch))
+    }
+
+
+def _stretched(
+    skeleton: Skeleton, reading: PoseReading, knowledge: Knowledge, marked: set[str]
+) -> Json:
+    """Limbs between marked joints that look longer than they can be, and how many times."""
+    names, lengths = _limb_names(skeleton), knowledge.size.lengths
+    ends = [{skeleton.names[j] for j in bone} for bone in skeleton.bones]
+    excess = measure_excess(reading.stretch, lengths)
+    return {
+        names[b]: round(float(reading.stretch[b]), 2)
+        for b in np.flatnonzero(np.nan_to_num(excess) > EVEN_EXCESS)
+        if ends[b] <= marked
+    }
+
+
+def _signs(skeleton: Skeleton, reading: PoseReading, nearer: Int[np.ndarray, "B"]) -> Signs:
+    names = _limb_names(skeleton)
+    return {names[b]: int(nearer[b]) for b in np.flatnonzero(np.isfinite(reading.stretch))}
+
+
+def _points(skeleton: Skeleton, points: Float[np.ndarray, "J 3"]) -> Json:
+    """Known joints by name."""
+    known = np.flatnonzero(np.isfinite(points).all(axis=1))
+    return {skeleton.names[j]: _rounded(points[j], 4) for j in known}
+
+
+def _limb_names(skeleton: Skeleton) -> list[str]:
+    return [skeleton.names[child] for _, child in skeleton.bones]
+
+
+def _rounded(values: Iterable[float], digits: int) -> list[float]:
+    return [round(float(value), digits) for value in values]
+
+
+def describe_checks(
+    study: Study, annotations: Annotations, absent: set[tuple[int, str]]
+) -> list[Json]:
+    """Marks to look at again, the most suspicious first."""
+    preparation, knowledge = study.preparation(), study.knowledge(annotations, wait=True)
+    if preparation is None or knowledge is None:
+        return []
+    looks = study.lookalikes(annotations)
+    return [
+        {
+            "frame": check.frame,
+            "joint": check.joint,
+            "kind": check.kind,
+            "suspicion": round(float(check.suspicion), 3),
+            "text": check.text,
+        }
+        for check in find_checks(annotations, knowledge.size, looks, absent)
+    ]
+
+
+def describe_suggestions(
+    study: Study, annotations: Annotations, taken: frozenset[int]
+) -> list[Json]:
+    """Frames to annotate next, once there is a result to judge."""
+    preparation, motion = study.preparation(), study.motion()
+    if preparation is None or motion is None:
+        return []
+    found = suggest_frames(preparation.comparison, motion, annotations, taken)
+    return [{**asdict(one), "gain": round(one.gain, 4)} for one in found]

@@ -1,0 +1,145 @@
+"""A project as the annotator thinks about it: what was prepared, and what marks have taught.
+
+Everything is loaded when it is first asked for and again when its file has changed. Ghosts are kept
+by the marks they depend on, so that an edit makes only those anew that it touches. The size of the
+body is learnt in a thread of its own: an answer about a pose takes the latest there is, and waits
+only for the first.
+"""
+
+import hashlib
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from threading import RLock
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.assist.ghost import Ghost, choose_sources, foresee_joints
+from keyrecon.assist.knowledge import Knowledge, learn_body
+from keyrecon.assist.lookalikes import Lookalikes, compare_marks
+from keyrecon.errors import KeyreconError
+from keyrecon.formats.keyframes import keyframes_from_json
+from keyrecon.formats.npz import read_motion
+from keyrecon.pipeline import Options, Preparation, prepare
+from keyrecon.records import Annotations, Motion
+from keyrecon.workspace import Workspace
+
+
+class Study:
+    """One project; safe to ask from several threads."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        """Study the project of a workspace."""
+        self._workspace = workspace
+        self._loading = RLock()
+        self._learner = ThreadPoolExecutor(1)
+        self._loaded: dict[str, tuple[object, object]] = {}
+        self._ghosts: dict[int, tuple[str, Ghost]] = {}
+        self._learnt: tuple[str, Future[Knowledge]] | None = None
+        self._knowledge: Knowledge | None = None
+        self._looks: tuple[str, tuple[Lookalikes, ...]] | None = None
+
+    def preparation(self) -> Preparation | None:
+        """The automatic part; None before it was run, or when its results are gone."""
+        files = self._workspace.keyframes_file, self._workspace.picks_file
+        return self._load("preparation", files, self._prepared)
+
+    def motion(self) -> Motion | None:
+        """The result of the last run, if there was one."""
+        file = self._workspace.motion_file
+        return self._load("motion", (file,), lambda: read_motion(file))
+
+    def ghost(self, annotations: Annotations, frame: int) -> Ghost | None:
+        """Where the joints of a frame probably are; None while nothing else is annotated."""
+        preparation = self.preparation()
+        if preparation is None:
+            return None
+        sources = choose_sources(preparation.survey, annotations, frame)
+        if not len(sources.frames):
+            return None
+        held = _marks_of(annotations, frame)
+        key = _digest(sources.frames, sources.joints, held)
+        known = self._ghosts.get(frame)
+        if known is None or known[0] != key:
+            known = key, foresee_joints(preparation.survey, sources, frame, held)
+            self._ghosts[frame] = known
+        return known[1]
+
+    def any_ghost(self, annotations: Annotations, frame: int) -> Ghost | None:
+        """A ghost of the frame, even if marks were added since it was made: at once, if seen."""
+        known = self._ghosts.get(frame)
+        return self.ghost(annotations, frame) if known is None else known[1]
+
+    def lookalikes(self, annotations: Annotations) -> tuple[Lookalikes, ...]:
+        """What annotated frames say of one another."""
+        preparation = self.preparation()
+        key = _digest(annotations.frames, annotations.joints)
+        if preparation is None:
+            return ()
+        if self._looks is None or self._looks[0] != key:
+            self._looks = key, compare_marks(preparation.survey, annotations)
+        return self._looks[1]
+
+    def knowledge(self, annotations: Annotations, wait: bool = False) -> Knowledge | None:
+        """What is known of the body: the latest, or with `wait` all that these marks tell."""
+        preparation = self.preparation()
+        if preparation is None:
+            return None
+        key = _digest(annotations.frames, annotations.joints, annotations.nearer)
+        with self._loading:
+            if self._learnt is None or self._learnt[0] != key:
+                work = self._learner.submit(self._learn, preparation, annotations)
+                self._learnt = key, work
+            work = self._learnt[1]
+        if wait or self._knowledge is None or work.done():
+            self._knowledge = work.result()
+        return self._knowledge
+
+    def _learn(self, preparation: Preparation, annotations: Annotations) -> Knowledge:
+        """Marks, and ghosts where a frame shows only half of the body."""
+        halves = ~np.isfinite(annotations.joints[:, :, 0]).all(axis=1)
+        for frame in annotations.frames[halves].tolist():
+            if frame not in self._ghosts:
+                self.ghost(annotations, frame)
+        ghosts = {frame: ghost for frame, (_, ghost) in [*self._ghosts.items()]}
+        video, track = preparation.video, preparation.track
+        return learn_body(annotations, ghosts, track.height, video.fps)
+
+    def _prepared(self) -> Preparation:
+        """The stored results of the automatic part, with the keyframes that were asked for."""
+        workspace = Workspace(self._workspace.folder)
+        options = workspace.options(Options())
+        recall = workspace.stages.recall
+        found = prepare(workspace.video(), workspace.picks(), options, recall)
+        asked = keyframes_from_json(workspace.keyframes_file.read_text())
+        if len(asked.upper.nearest) != len(found.video):
+            raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")
+        return replace(found, keyframes=asked)
+
+    def _load(self, name: str, files: tuple[Path, ...], read: Callable[[], Any]) -> Any:
+        """What `read` gives, read again when a file changes; the last there was if it cannot be."""
+        stamps = tuple(file.stat().st_mtime_ns if file.is_file() else None for file in files)
+        with self._loading:
+            known = self._loaded.get(name, (None, None))
+            if None not in stamps and known[0] != stamps:
+                with suppress(KeyreconError):
+                    known = stamps, read()
+                self._loaded[name] = stamps, known[1]
+            return self._loaded.get(name, (None, None))[1]
+
+
+def _marks_of(annotations: Annotations, frame: int) -> Float[np.ndarray, "J 2"]:
+    row = np.flatnonzero(annotations.frames == frame)
+    empty = np.full((len(annotations.skeleton.names), 2), np.nan)
+    return annotations.joints[row[0]] if len(row) else empty
+
+
+def _digest(*arrays: np.ndarray) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
