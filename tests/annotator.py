@@ -1,7 +1,6 @@
-"""A project open for annotation, and edits as a page sends them."""
+"""A project open for annotation, and requests as a page sends them."""
 
 import asyncio
-import itertools
 import json
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,10 +9,7 @@ from urllib.parse import unquote
 from keyrecon import project
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import open_desk
-from keyrecon.annotate.edits import parse_edits
 from keyrecon.workspace import Workspace
-
-_numbers = itertools.count()
 
 
 def new_project(folder, video_file):
@@ -24,21 +20,6 @@ def new_project(folder, video_file):
 
 def open_project(folder, assistant=Assistant(), commands=None):
     return open_desk(Workspace(folder), assistant, commands or {})
-
-
-def edit(kind, **parts):
-    """An edit with an id of its own; `was` stands for `from`."""
-    parts = {"from" if name == "was" else name: value for name, value in parts.items()}
-    expected = {} if kind == "group" else {"from": None}
-    return {"id": f"edit-{next(_numbers)}", "kind": kind, **expected, **parts}
-
-
-def mark(frame, joint, to, was=None):
-    return edit("mark", frame=frame, joint=joint, to=to, was=was)
-
-
-def submit(store, *edits):
-    return store.submit(parse_edits(json.dumps({"edits": edits}).encode()))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from annotator import mark, submit
+from annotator_edits import mark, submit
 
 from keyrecon.annotate.edits import Limits
 from keyrecon.annotate.journal import NotSaved
@@ -26,7 +26,7 @@ KILLS = int(os.environ.get("KEYRECON_KILLS", "8"))
 EDITING = """
 import sys
 from pathlib import Path
-from annotator import mark, submit
+from annotator_edits import mark, submit
 from keyrecon.annotate.edits import Limits
 from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14

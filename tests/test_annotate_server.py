@@ -14,7 +14,8 @@ import urllib.request
 import cv2
 import numpy as np
 import pytest
-from annotator import edit, mark, new_project, open_project, request, submit
+from annotator import new_project, open_project, request
+from annotator_edits import edit, mark, submit
 from annotator_jobs import counting, crashing
 from conftest import read_number
 

@@ -6,7 +6,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from annotator import edit, mark, submit
+from annotator_edits import edit, mark, submit
 
 from keyrecon.annotate.edits import Limits, parse_edits
 from keyrecon.annotate.journal import NotSaved

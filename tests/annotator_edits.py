@@ -1,0 +1,23 @@
+"""Edits as a page sends them; a module of its own, because programs that are killed start often."""
+
+import itertools
+import json
+
+from keyrecon.annotate.edits import parse_edits
+
+_numbers = itertools.count()
+
+
+def edit(kind, **parts):
+    """An edit with an id of its own; `was` stands for `from`."""
+    parts = {"from" if name == "was" else name: value for name, value in parts.items()}
+    expected = {} if kind == "group" else {"from": None}
+    return {"id": f"edit-{next(_numbers)}", "kind": kind, **expected, **parts}
+
+
+def mark(frame, joint, to, was=None):
+    return edit("mark", frame=frame, joint=joint, to=to, was=was)
+
+
+def submit(store, *edits):
+    return store.submit(parse_edits(json.dumps({"edits": edits}).encode()))
