@@ -126,8 +126,10 @@ LSP14 = _skeleton_from_rows(
 )
 """The default skeleton."""
 
-HIP_BREADTH = 0.191
-"""Distance between the hip joints as a fraction of stature (Winter)."""
+HIP_BREADTH = 0.145
+"""Distance between marked hips as a fraction of stature: midway between the joints' centres (.10,
+Bell, Pedersen and Brand, J. Biomechanics 23, 1990) and the breadth over the hips (.191, Winter),
+since people mark somewhere between."""
 SHOULDER_BREADTH = 0.258
 """Distance between the shoulder joints as a fraction of stature (Winter)."""
 

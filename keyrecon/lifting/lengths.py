@@ -22,6 +22,9 @@ from keyrecon.lifting.shown import LEANINGS, log_density
 from keyrecon.records import Annotations, JointTracks
 
 
+_LEAST_CONFIDENCE = 0.05
+
+
 @dataclass(frozen=True)
 class LengthOptions:
     """How far the body may differ from the table, and how well joints are known."""
@@ -36,8 +39,9 @@ class LengthOptions:
     """Seconds between the knots of the scale's deviation from the tracked height."""
     click_noise: float = 0.007
     """Standard deviation of an annotated joint, in player heights."""
-    track_noise: float = 0.025
-    """Standard deviation of a propagated joint, in player heights."""
+    track_noise: float = 0.009
+    """Standard deviation of a propagated joint of full confidence, in player heights; it grows
+    with the inverse root of the confidence."""
     correlation: float = 0.15
     """Seconds over which errors of propagated joints stay alike; they count once."""
 
@@ -90,6 +94,13 @@ def estimate_lengths(
     lengths = np.exp(log_lengths)[kind_of]
     size = _standing(lengths[:bones], skeleton) / _standing(skeleton.lengths, skeleton)
     return BodySize(lengths[:bones] / size, lengths[bones:] / size, np.exp(log_scale) * size)
+
+
+def joint_noise(
+    confidence: Float[np.ndarray, "T J"], options: LengthOptions
+) -> Float[np.ndarray, "T J"]:
+    """Standard deviation of propagated joints, player heights."""
+    return options.track_noise / np.sqrt(np.clip(confidence, _LEAST_CONFIDENCE, 1.0))
 
 
 def marked_joints(tracks: JointTracks, annotations: Annotations) -> Float[np.ndarray, "T J 2"]:
@@ -145,12 +156,14 @@ def _collect(
     passing = np.setdiff1d(np.arange(0, len(height_px), step), annotations.frames)
     frames = np.concatenate([annotations.frames, passing])
     joints = np.concatenate([annotations.joints, tracks.joints[passing]])
-    sigma = np.where(np.isin(frames, annotations.frames), options.click_noise, options.track_noise)
+    clicked = np.full(annotations.joints.shape[:2], options.click_noise)
+    carried = joint_noise(tracks.confidence[passing], options)
+    sigma = np.concatenate([clicked, carried])[:, ends]
     shown = np.linalg.norm(joints[:, ends[:, 1]] - joints[:, ends[:, 0]], axis=-1)
     known = shown > 0
     row, column = np.nonzero(known)
-    noise = np.sqrt(2) * sigma * height_px[frames]
-    return _Votes(np.log(shown[known]), noise[row], kind_of[column], frames[row])
+    noise = np.linalg.norm(sigma, axis=-1) * height_px[frames, None]
+    return _Votes(np.log(shown[known]), noise[known], kind_of[column], frames[row])
 
 
 def _fit(

@@ -19,7 +19,13 @@ from keyrecon.lifting.flips import FlipOptions
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
 from keyrecon.lifting.keysigns import follow_key_signs
-from keyrecon.lifting.lengths import BodySize, LengthOptions, estimate_lengths, marked_joints
+from keyrecon.lifting.lengths import (
+    BodySize,
+    LengthOptions,
+    estimate_lengths,
+    joint_noise,
+    marked_joints,
+)
 from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
 from keyrecon.lifting.refine import RefineOptions, descend_motion
 from keyrecon.lifting.solver import State
@@ -85,7 +91,7 @@ def lift_motion(  # noqa: PLR0913
     _check(tracks, annotations)
     skeleton = annotations.skeleton
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths)
-    observed = _observe(tracks, annotations, size, options)
+    observed = _observe(tracks, annotations, size, fps, options)
     signs = follow_key_signs(observed, annotations, size, fps, options.flips)
     keys = lift_keyframes(observed, annotations, size, options.flips, signs)
     slerped = interpolate_poses(
@@ -93,7 +99,7 @@ def lift_motion(  # noqa: PLR0913
     )
     guide = _place(slerped.directions, observed, size, skeleton)
     residual = observed.joints - _flat(guide, size, skeleton)
-    slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, options.lengths.track_noise / 2)
+    slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, 1.4 * options.lengths.track_noise)
     slips[annotations.frames] = False
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
     if options.method == "paper":
@@ -152,11 +158,19 @@ def _flat(state: State, size: BodySize, skeleton: Skeleton) -> Float[np.ndarray,
 
 
 def _observe(
-    tracks: JointTracks, annotations: Annotations, size: BodySize, options: LiftOptions
+    tracks: JointTracks,
+    annotations: Annotations,
+    size: BodySize,
+    fps: float,
+    options: LiftOptions,
 ) -> Observed:
-    """Joints and their spread in body heights; annotated ones are sharper."""
+    """Joints and their spread in body heights; annotated ones are sharper.
+
+    Errors of propagated joints stay alike for a while: all of these frames together count once.
+    """
     joints = marked_joints(tracks, annotations) / size.scale[:, None, None]
-    spread = options.lengths.track_noise / np.sqrt(np.clip(tracks.confidence, 0.05, 1.0))
+    alike = max(options.lengths.correlation * fps, 1.0)
+    spread = np.sqrt(alike) * joint_noise(tracks.confidence, options.lengths)
     marked = np.isfinite(annotations.joints[..., 0])
     spread[annotations.frames] = np.where(
         marked, options.lengths.click_noise, spread[annotations.frames]
