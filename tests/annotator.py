@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from urllib.parse import unquote
@@ -9,13 +10,24 @@ from urllib.parse import unquote
 from keyrecon import project
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import open_desk
+from keyrecon.annotate.guard import Door
+from keyrecon.annotate.server import make_app
 from keyrecon.workspace import Workspace
+
+DOOR = Door(("127.0.0.1:8000", "localhost:8000"), 8000)
+HEADERS = {
+    "host": "127.0.0.1:8000",
+    "origin": "http://127.0.0.1:8000",
+    "cookie": f"{DOOR.cookie}={DOOR.session}",
+    "content-type": "application/json",
+}
+"""What a browser sends for the page."""
 
 
 def new_project(folder, video_file):
-    """A project without picks or keyframes."""
+    """The folder of a project without picks or keyframes."""
     project.start(video_file, folder)
-    return Workspace(folder)
+    return folder
 
 
 def open_project(folder, assistant=Assistant(), commands=None):
@@ -32,6 +44,12 @@ class Answer:
 
     def json(self):
         return json.loads(self.content)
+
+
+def run_apart(work):
+    """Do asynchronous work in a thread: a driven browser has a loop of its own in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
 
 
 def request(app, method, address, headers, body=b""):
@@ -59,7 +77,13 @@ def request(app, method, address, headers, body=b""):
         sent.append(message)
 
     with suppress(Exception):  # the server logs it; what counts is what was answered
-        asyncio.run(app(scope, receive, send))
+        run_apart(app(scope, receive, send))
     told = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
     content = b"".join(message.get("body", b"") for message in sent[1:])
     return Answer(sent[0]["status"], told, content)
+
+
+def ask(desk, method, path, body=None):
+    """Ask as the page does."""
+    data = b"" if body is None else json.dumps(body).encode()
+    return request(make_app(desk, DOOR), method, path, HEADERS, data)

@@ -40,3 +40,29 @@ def write_numbered(tmp_path_factory):
         return path
 
     return write
+
+
+@pytest.fixture
+def folder(tmp_path, write_numbered):
+    """A project for a video of 50 numbered pictures, without picks or keyframes."""
+    from annotator import new_project
+
+    return new_project(tmp_path / "p", write_numbered("v.mp4", list(range(0, 600, 12))))
+
+
+@pytest.fixture
+def opened(folder):
+    """Open that project for annotation; the one opened before is closed."""
+    from annotator import open_project
+
+    desks = []
+
+    def again(*arguments):
+        for desk in desks:
+            desk.close()
+        desks[:] = [open_project(folder, *arguments)]
+        return desks[0]
+
+    yield again
+    for desk in desks:
+        desk.close()

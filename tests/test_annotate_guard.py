@@ -1,22 +1,14 @@
 """Nothing gets in: good and bad Host, Origin, token, method, path and body on every route."""
 
-import asyncio
 import itertools
 import json
 
 import pytest
-from annotator import new_project, open_project, request
+from annotator import DOOR, HEADERS, new_project, open_project, request, run_apart
 
 from keyrecon.annotate import server
-from keyrecon.annotate.guard import MOST_BYTES, Door
+from keyrecon.annotate.guard import MOST_BYTES
 
-DOOR = Door(("127.0.0.1:8000", "localhost:8000"), 8000)
-GOOD = {
-    "host": "127.0.0.1:8000",
-    "origin": "http://127.0.0.1:8000",
-    "cookie": f"{DOOR.cookie}={DOOR.session}",
-    "content-type": "application/json",
-}
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE")
 BAD_HOSTS = (
     *("evil.com", "evil.com:8000", "127.0.0.1", "127.0.0.1:80", "127.0.0.1.evil.com:8000"),
@@ -66,7 +58,7 @@ def ask(desk):
     """Ask with exactly these headers; returns the answer."""
     app = server.make_app(desk, DOOR)
 
-    def send(method, path, headers=GOOD, body=b""):
+    def send(method, path, headers=HEADERS, body=b""):
         return request(app, method, path, headers, body)
 
     return send
@@ -75,7 +67,7 @@ def ask(desk):
 def changed(**headers):
     """Good headers with some changed or left out."""
     named = {name.replace("_", "-"): value for name, value in headers.items()}
-    return {n: v for n, v in {**GOOD, **named}.items() if v is not None}
+    return {n: v for n, v in {**HEADERS, **named}.items() if v is not None}
 
 
 def test_the_page_itself_gets_in_everywhere(ask, routes):
@@ -112,7 +104,7 @@ def test_no_route_answers_what_a_browser_calls_foreign(ask, routes, site):
 
 def test_two_hosts_origins_or_cookies_at_once_are_not_good(ask):
     for name, other in (("host", "evil.com"), ("origin", "http://evil.com")):
-        twice = [*GOOD.items(), (name, other)]
+        twice = [*HEADERS.items(), (name, other)]
         assert ask("GET", "/api/state", twice).status in (403, 421)
 
 
@@ -196,7 +188,7 @@ def test_forms_of_other_sites_are_no_json(ask, routes, kind):
 
 
 def test_the_token_gives_the_cookie_once_more_for_each_page(ask):
-    bare = {"host": GOOD["host"]}
+    bare = {"host": HEADERS["host"]}
     for _ in range(2):
         answer = ask("GET", f"/?token={DOOR.token}", bare)
         assert (answer.status, answer.headers["location"]) == (303, "/")
@@ -226,9 +218,9 @@ def test_sockets_are_closed_at_once(desk):
     async def send(message):
         sent.append(message)
 
-    headers = [(name.encode(), value.encode()) for name, value in GOOD.items()]
+    headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
     scope = {"type": "websocket", "path": "/api/events", "headers": headers}
-    asyncio.run(server.make_app(desk, DOOR)(scope, None, send))
+    run_apart(server.make_app(desk, DOOR)(scope, None, send))
     assert sent == [{"type": "websocket.close", "code": 1008}]
 
 

@@ -1,24 +1,11 @@
-import struct
-from fractions import Fraction
-
 import av
 import numpy as np
 import pytest
 from conftest import read_number
+from numbered_videos import EVEN, KINDS, OPEN_GOP, UNEVEN, copy_packets, trim_with_edit_list, turn
 
 from keyrecon import KeyreconError
 from keyrecon.video import open_video
-
-EVEN = list(range(0, 60 * 12, 12))
-UNEVEN = np.cumsum([0, *np.random.default_rng(3).choice([10, 12, 30], 59)]).tolist()
-OPEN_GOP = {"x264-params": "open-gop=1:bframes=8:b-pyramid=normal:keyint=20:min-keyint=20"}
-KINDS = {
-    "constant rate": (EVEN, {}),
-    "variable rate": (UNEVEN, {}),
-    "B-frames": (EVEN, {"bf": "3", "g": "20"}),
-    "open GOP": (EVEN, {"x264-params": "open-gop=1:bframes=3:keyint=15:min-keyint=15"}),
-    "late start": ([t + 6000 for t in EVEN], {"bf": "2"}),
-}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -40,22 +27,6 @@ def numbers(video):
     return in_a_row
 
 
-def copy_packets(source, target, skip_until=0, earlier=0):
-    """The same packets from some key picture on, and earlier by some ticks of 1/600 s."""
-    with av.open(str(source)) as old, av.open(str(target), "w") as new:
-        stream = old.streams.video[0]
-        copied = new.add_stream_from_template(stream)
-        keys = 0
-        for packet in old.demux(stream):
-            keys += packet.is_keyframe
-            if packet.dts is not None and keys > skip_until:
-                shift = round(Fraction(earlier, 600) / packet.time_base)
-                packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
-                packet.stream = copied
-                new.mux(packet)
-    return target
-
-
 @pytest.mark.parametrize("options", [{"bf": "3", "g": "20"}, OPEN_GOP])
 def test_frames_before_the_start_of_an_edit_list_do_not_count(write_numbered, tmp_path, options):
     whole = write_numbered("whole.mp4", EVEN, options)
@@ -66,13 +37,9 @@ def test_frames_before_the_start_of_an_edit_list_do_not_count(write_numbered, tm
 
 @pytest.mark.parametrize("options", [{"bf": "3", "g": "20"}, OPEN_GOP])
 def test_frames_outside_both_ends_of_an_edit_list_do_not_count(write_numbered, tmp_path, options):
-    data = bytearray(write_numbered("whole.mp4", EVEN, options).read_bytes())
-    box, track, movie = data.index(b"elst"), data.index(b"mdhd"), data.index(b"mvhd")
-    (ticks,), (units,) = (struct.unpack_from(">I", data, b + 16) for b in (track, movie))
-    (start,) = struct.unpack_from(">i", data, box + 16)
-    struct.pack_into(">ii", data, box + 12, 20 * units // 50, start + 13 * ticks // 50)
-    (tmp_path / "trimmed.mp4").write_bytes(data)
-    assert numbers(open_video(tmp_path / "trimmed.mp4")) == list(range(13, 33))
+    whole = write_numbered("whole.mp4", EVEN, options)
+    trimmed = trim_with_edit_list(whole, tmp_path / "trimmed.mp4", 13, 20)
+    assert numbers(open_video(trimmed)) == list(range(13, 33))
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
@@ -86,13 +53,8 @@ def test_a_file_cut_inside_an_open_gop_begins_with_its_first_whole_picture(
 
 @pytest.mark.parametrize("degrees", [90, 180, 270])
 def test_a_file_that_says_it_is_turned_is_turned_as_players_do(write_numbered, tmp_path, degrees):
-    data = bytearray(write_numbered("whole.mp4", EVEN).read_bytes())
-    sine, cosine = {90: (1, 0), 180: (0, -1), 270: (-1, 0)}[degrees]
-    matrix = [cosine, sine, 0, -sine, cosine, 0, 0, 0, 1]
-    fixed = [value << (30 if n % 3 == 2 else 16) for n, value in enumerate(matrix)]
-    struct.pack_into(">9i", data, data.index(b"tkhd") + 44, *fixed)
-    (tmp_path / "turned.mp4").write_bytes(data)
-    video = open_video(tmp_path / "turned.mp4")
+    whole = write_numbered("whole.mp4", EVEN)
+    video = open_video(turn(whole, tmp_path / "turned.mp4", degrees))
     assert video.turns == -degrees // 90 % 4  # clockwise in the file, counter-clockwise here
     assert (video.width, video.height) == ((128, 64) if degrees == 180 else (64, 128))
     assert numbers(video) == list(range(60))

@@ -1,0 +1,56 @@
+"""Video files of every kind that misleads players, with pictures that say their number."""
+
+import struct
+from fractions import Fraction
+
+import av
+import numpy as np
+
+EVEN = list(range(0, 60 * 12, 12))
+UNEVEN = np.cumsum([0, *np.random.default_rng(3).choice([10, 12, 30], 59)]).tolist()
+OPEN_GOP = {"x264-params": "open-gop=1:bframes=8:b-pyramid=normal:keyint=20:min-keyint=20"}
+KINDS = {
+    "constant rate": (EVEN, {}),
+    "variable rate": (UNEVEN, {}),
+    "B-frames": (EVEN, {"bf": "3", "g": "20"}),
+    "open GOP": (EVEN, {"x264-params": "open-gop=1:bframes=3:keyint=15:min-keyint=15"}),
+    "late start": ([t + 6000 for t in EVEN], {"bf": "2"}),
+}
+
+
+def copy_packets(source, target, skip_until=0, earlier=0):
+    """The same packets from some key picture on, and earlier by some ticks of 1/600 s."""
+    with av.open(str(source)) as old, av.open(str(target), "w") as new:
+        stream = old.streams.video[0]
+        copied = new.add_stream_from_template(stream)
+        keys = 0
+        for packet in old.demux(stream):
+            keys += packet.is_keyframe
+            if packet.dts is not None and keys > skip_until:
+                shift = round(Fraction(earlier, 600) / packet.time_base)
+                packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
+                packet.stream = copied
+                new.mux(packet)
+    return target
+
+
+def trim_with_edit_list(source, target, first, count):
+    """The same file whose edit list shows only some of its frames, as phones trim."""
+    data = bytearray(source.read_bytes())
+    box, track, movie = data.index(b"elst"), data.index(b"mdhd"), data.index(b"mvhd")
+    (ticks,), (units,) = (struct.unpack_from(">I", data, b + 16) for b in (track, movie))
+    (start,) = struct.unpack_from(">i", data, box + 16)
+    struct.pack_into(">ii", data, box + 12, count * units // 50, start + first * ticks // 50)
+    target.write_bytes(data)
+    return target
+
+
+def turn(source, target, degrees):
+    """The same file that says that it is to be shown turned clockwise."""
+    data = bytearray(source.read_bytes())
+    sine, cosine = {90: (1, 0), 180: (0, -1), 270: (-1, 0)}[degrees]
+    matrix = [cosine, sine, 0, -sine, cosine, 0, 0, 0, 1]
+    fixed = [value << (30 if n % 3 == 2 else 16) for n, value in enumerate(matrix)]
+    struct.pack_into(">9i", data, data.index(b"tkhd") + 44, *fixed)
+    target.write_bytes(data)
+    return target

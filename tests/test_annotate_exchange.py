@@ -1,0 +1,54 @@
+"""Marks from and for other programs, through the page."""
+
+import pytest
+from annotator import ask
+from annotator_edits import mark, submit
+
+
+def test_marks_go_out_and_come_back_in_every_format(opened):
+    desk = opened()
+    submit(desk.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
+    for form in ("coco", "dlc", "cvat"):
+        text = ask(desk, "GET", f"/api/export/{form}").content.decode()
+        told = ask(desk, "POST", "/api/import", {"name": form, "text": text}).json()
+        assert (told["frames"], told["new"], told["conflicts"]) == ([3, 7], 0, [])
+    assert ask(desk, "GET", "/api/export/doc").status == 400
+
+
+def coco_with(desk, *edits):
+    """The text of a COCO file with these marks alone."""
+    before = desk.store.state.revision
+    submit(desk.store, *edits)
+    text = ask(desk, "GET", "/api/export/coco").content.decode()
+    while desk.store.state.revision < before + 2 * len(edits):
+        desk.store.undo(f"undo {desk.store.state.revision}")
+    return text
+
+
+@pytest.mark.parametrize("mode", ["keep", "replace"])
+def test_conflicts_are_shown_before_anything_changes_and_then_settled_as_told(opened, mode):
+    desk = opened()
+    text = coco_with(desk, mark(3, "neck", [50, 20, 2]), mark(4, "neck", [1, 2, 2]))
+    submit(desk.store, mark(3, "neck", [10, 20, 2]))
+    before = desk.store.state
+    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert told["conflicts"] == [
+        {"frame": 3, "kind": "mark", "joint": "neck", "old": [10, 20, 2], "new": [50, 20, 2]}
+    ]
+    assert told["new"] == 1
+    assert desk.store.state == before
+    question = {"name": "a.json", "text": text, "accept": True, "mode": mode}
+    assert ask(desk, "POST", "/api/import", question).status == 200
+    wanted = [10, 20, 2] if mode == "keep" else [50, 20, 2]
+    assert desk.store.state.cells["mark", 3, "neck"] == wanted
+    assert desk.store.state.cells["mark", 4, "neck"] == [1, 2, 2]
+    desk.store.undo("u")
+    assert desk.store.state.cells == before.cells
+
+
+def test_a_file_of_another_kind_is_refused_under_its_own_name(opened):
+    desk = opened()
+    for text in ("", "hello", "{", '{"images": 3}', "<annotations>", "scorer,a\n", "\u0000"):
+        answer = ask(desk, "POST", "/api/import", {"name": "../../marks.txt", "text": text})
+        assert answer.status == 400
+        assert answer.json()["error"].startswith("../../marks.txt ")
