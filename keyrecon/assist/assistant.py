@@ -9,17 +9,18 @@ from dataclasses import asdict
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.assist.checks import EVEN_EXCESS, find_checks, measure_excess
 from keyrecon.assist.knowledge import Knowledge
 from keyrecon.assist.pose import Alternative, PoseReading, Sighting, read_pose
+from keyrecon.assist.preview import find_player, tint_part
 from keyrecon.assist.study import Study
 from keyrecon.assist.suggest import suggest_frames
 from keyrecon.assist.why import explain_keyframes
 from keyrecon.body import Skeleton
-from keyrecon.records import Annotations
+from keyrecon.records import Annotations, Pick
 from keyrecon.workspace import Workspace
 
 SURE = 0.8
@@ -35,6 +36,8 @@ def make_assistant(workspace: Workspace) -> Assistant:
         pose=partial(describe_pose, study),
         checks=partial(describe_checks, study),
         suggest=partial(describe_suggestions, study),
+        preview=partial(describe_preview, study),
+        backprojection=partial(show_part, study),
     )
 
 
@@ -199,3 +202,28 @@ def describe_suggestions(
         return []
     found = suggest_frames(preparation.comparison, motion, annotations, taken)
     return [{**asdict(one), "gain": round(one.gain, 4)} for one in found]
+
+
+def describe_preview(study: Study, picks: tuple[Pick, ...], frames: tuple[int, ...]) -> Json:
+    """Head, feet and box that these picks find on some frames; no places where unseen."""
+    strip, camera = study.strip(frames)
+    found = find_player(strip, study.colors(picks), camera, frames)
+    rows = zip(found.frames.tolist(), found.head, found.feet, found.box, strict=True)
+    strip_rows = [
+        {
+            "frame": frame,
+            "head": _rounded(head, 1) if np.isfinite(head).all() else None,
+            "feet": [_rounded(foot, 1) for foot in feet] if np.isfinite(feet).all() else [],
+            "box": _rounded(box, 1),
+        }
+        for frame, head, feet, box in rows
+    ]
+    return {"frames": strip_rows, "trust": round(found.trust, 3)}
+
+
+def show_part(
+    study: Study, picks: tuple[Pick, ...], frame: int, part: str
+) -> UInt8[np.ndarray, "h w 4"]:
+    """How much each pixel of a frame looks like a part."""
+    colors = study.colors(picks)
+    return tint_part(study.video.frame(frame), colors, part)

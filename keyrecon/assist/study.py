@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -21,11 +22,15 @@ from jaxtyping import Float
 from keyrecon.assist.ghost import Ghost, choose_sources, foresee_joints
 from keyrecon.assist.knowledge import Knowledge, learn_body
 from keyrecon.assist.lookalikes import Lookalikes, compare_marks
+from keyrecon.assist.preview import Strip, cut_strip
+from keyrecon.colors import learn_colors
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.keyframes import keyframes_from_json
 from keyrecon.formats.npz import read_motion
 from keyrecon.pipeline import Options, Preparation, prepare
-from keyrecon.records import Annotations, Motion
+from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick
+from keyrecon.tracking.camera_motion import follow_camera
+from keyrecon.video import Video
 from keyrecon.workspace import Workspace
 
 
@@ -42,6 +47,8 @@ class Study:
         self._learnt: tuple[str, Future[Knowledge]] | None = None
         self._knowledge: Knowledge | None = None
         self._looks: tuple[str, tuple[Lookalikes, ...]] | None = None
+        self._colors: tuple[tuple[Pick, ...], Colors] | None = None
+        self._strip: tuple[tuple[int, ...], Strip, CameraPath] | None = None
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
@@ -52,6 +59,24 @@ class Study:
         """The result of the last run, if there was one."""
         file = self._workspace.motion_file
         return self._load("motion", (file,), lambda: read_motion(file))
+
+    @cached_property
+    def video(self) -> Video:
+        """The project's video."""
+        return self._workspace.video()
+
+    def colors(self, picks: tuple[Pick, ...]) -> Colors:
+        """What the picked parts look like."""
+        if self._colors is None or self._colors[0] != picks:
+            self._colors = picks, learn_colors(self.video, picks)
+        return self._colors[1]
+
+    def strip(self, frames: tuple[int, ...]) -> tuple[Strip, CameraPath]:
+        """Pictures of some frames and others around them, and how the camera moves between."""
+        if self._strip is None or self._strip[0] != frames:
+            strip = cut_strip(self.video, frames)
+            self._strip = frames, strip, follow_camera(strip)
+        return self._strip[1:]
 
     def ghost(self, annotations: Annotations, frame: int) -> Ghost | None:
         """Where the joints of a frame probably are; None while nothing else is annotated."""

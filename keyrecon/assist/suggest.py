@@ -24,7 +24,7 @@ COUNT = 5
 """Suggestions at a time."""
 BOTH = 0.5
 """Share of a half's best gain from which it is marked along with the other half."""
-LEAST_GAIN = 0.02
+LEAST_GAIN = 0.002
 """Share of all need that a suggestion takes away at least."""
 
 
