@@ -37,14 +37,9 @@ def serve_annotator(
         watch = Watch(desk)
         try:
             door = make_door(listener, place[0], memory)
-            say(f"Annotating {workspace.folder}. Open in a browser:\n  {door.address}")
+            say(announce(workspace.folder, door.address, place[0]))
             if private:
                 remember(file, door)
-            else:
-                say(
-                    f"Warning: {place[0]} can be reached from other machines, without encryption; "
-                    "whoever has the address can change this project. Safer: ssh -L."
-                )
             if open_browser:
                 webbrowser.open(door.address)
             with suppress(KeyboardInterrupt):
@@ -53,6 +48,17 @@ def serve_annotator(
         finally:
             watch.close()
             desk.close()
+
+
+def announce(folder: Path, address: str, host: str) -> str:
+    """What to open, and a warning where others can reach it too."""
+    text = f"Annotating {folder}. Open in a browser:\n  {address}"
+    if is_loopback(host):
+        return text
+    return (
+        f"{text}\nWarning: {host} can be reached from other machines, without encryption; whoever "
+        "has the address can change this project. Safer: leave --host out and use ssh -L."
+    )
 
 
 class _Server(uvicorn.Server):

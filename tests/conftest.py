@@ -66,3 +66,31 @@ def opened(folder):
     yield again
     for desk in desks:
         desk.close()
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """A project folder that is good enough for a store of marks."""
+    (tmp_path / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
+    return tmp_path
+
+
+@pytest.fixture
+def open_store(bare):
+    """Open its store; the one opened before is closed."""
+    from annotator_files import LIMITS
+
+    from keyrecon.annotate.store import Store
+    from keyrecon.workspace import Workspace
+
+    stores = []
+
+    def again():
+        for store in stores:
+            store.close()
+        stores[:] = [Store(Workspace(bare), LIMITS)]
+        return stores[0]
+
+    yield again
+    for store in stores:
+        store.close()

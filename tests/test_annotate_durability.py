@@ -48,28 +48,22 @@ for line in sys.stdin:
 """
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
-    return tmp_path
-
-
-def cells_now(folder):
+def cells_now(bare):
     """What is there when the project is opened; the file must say the same."""
-    store = Store(Workspace(folder), LIMITS)
+    store = Store(Workspace(bare), LIMITS)
     cells = store.state.cells
     store.close()
     if cells:
-        marks = read_coco(folder / "annotations.json", LSP14, 100, (128, 64))
+        marks = read_coco(bare / "annotations.json", LSP14, 100, (128, 64))
         assert cells_from_annotations(marks) == written_cells(cells)
     return cells
 
 
-def edit_and_be_killed(folder, first, seconds):
+def edit_and_be_killed(bare, first, seconds):
     """Numbers of the edits that were acknowledged before the kill."""
     paths = os.pathsep.join([os.path.dirname(__file__), *sys.path])
     with subprocess.Popen(
-        [sys.executable, "-c", EDITING, str(folder)],
+        [sys.executable, "-c", EDITING, str(bare)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -91,14 +85,14 @@ def cells_after(count):
     return {("mark", n % 100, "neck"): [n % 120, 7.5, 2] for n in edits}
 
 
-def test_no_kill_loses_an_acknowledged_edit(folder):
+def test_no_kill_loses_an_acknowledged_edit(bare):
     rng, done = random.Random(1), 0
     for _ in range(KILLS):
-        heard = edit_and_be_killed(folder, done, rng.uniform(0.0, 0.15))
+        heard = edit_and_be_killed(bare, done, rng.uniform(0.0, 0.15))
         done = heard[-1] + 1 if heard else done
         assert heard == [*range(done - len(heard), done)]
         one_ahead = cells_after(done + 1)  # accepted, and killed before it was acknowledged
-        assert cells_now(folder) in (cells_after(done), one_ahead)
+        assert cells_now(bare) in (cells_after(done), one_ahead)
     assert done > KILLS
 
 
@@ -127,19 +121,19 @@ def fill(store):
 
 
 @pytest.mark.parametrize("size", [1_000, 9_000, 30_000, 64_000])
-def test_a_full_disk_is_told_and_damages_nothing(folder, size):
-    store = Store(Workspace(folder), LIMITS)
+def test_a_full_disk_is_told_and_damages_nothing(bare, size):
+    store = Store(Workspace(bare), LIMITS)
     with files_of_at_most(size):
         accepted, late, message = fill(store)
     assert "could not be written" in message
     assert "ree some space" in message
     store.close()
-    assert accepted.items() <= cells_now(folder).items()
-    store = Store(Workspace(folder), LIMITS)
+    assert accepted.items() <= cells_now(bare).items()
+    store = Store(Workspace(bare), LIMITS)
     assert submit(store, late)[0]["ok"]
     store.close()
     accepted["mark", late["frame"], late["joint"]] = late["to"]
-    assert cells_now(folder) == accepted
+    assert cells_now(bare) == accepted
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs to mount a disk")

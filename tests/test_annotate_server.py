@@ -99,12 +99,23 @@ def test_a_new_choice_of_keyframes_drops_none_that_was_worked_on_or_locked(opene
     desk = opened()
     submit(desk.store, mark(10, "neck", [10, 20, 2]))
     submit(desk.store, edit("lock", frame=40, was=False, to=True))
-    write_keyframes(folder, [12, 31], [31])
+    submit(desk.store, mark(30, "left_hip", [10, 20, 2]))
+    write_keyframes(folder, [12, 30], [31])
     rows = {row["frame"]: row for row in ask(desk, "GET", "/api/project").json()["keyframes"]}
-    assert rows.keys() == {10, 12, 31, 40}
+    assert rows.keys() == {10, 12, 30, 31, 40}
     assert (rows[10]["half"], rows[10]["own"]) == ("upper", True)
+    assert (rows[30]["half"], rows[30]["own"]) == ("both", True)  # now asked for the upper body
     assert (rows[40]["half"], rows[40]["locked"]) == ("lower", True)
-    assert by_frame(opened().store.state.cells, "own") == {"10": "upper", "40": "lower"}
+    kept = {"10": "upper", "30": "both", "40": "lower"}
+    assert by_frame(opened().store.state.cells, "own") == kept
+
+
+def test_a_frame_that_bears_marks_is_listed_even_if_nobody_asked_for_it(opened, folder):
+    write_keyframes(folder, [10], [10])
+    desk = opened()
+    submit(desk.store, mark(20, "neck", [10, 20, 2]), mark(20, "left_hip", [10, 20, 2]))
+    rows = {row["frame"]: row for row in ask(desk, "GET", "/api/project").json()["keyframes"]}
+    assert (rows[20]["half"], rows[20]["own"], rows[20]["stands_for"]) == ("both", False, 0)
 
 
 def test_every_open_page_hears_the_news():

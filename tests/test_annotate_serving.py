@@ -7,12 +7,14 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from pathlib import Path
 
 import pytest
 from annotator_edits import mark
 
 from keyrecon import KeyreconError
 from keyrecon.annotate import address
+from keyrecon.serving import announce
 
 
 @pytest.fixture
@@ -62,8 +64,12 @@ def test_a_killed_server_starts_again_with_all_it_acknowledged(serve, folder):
     assert "Everything that was marked is kept" in rest
     assert program.returncode == 0
     assert not {*folder.glob("annotate.sqlite-*")}  # the log is folded into the database
-    program, _ = serve("--host", "0.0.0.0")
-    assert "can be reached from other machines" in program.stdout.readline()
+
+
+def test_an_address_that_others_can_reach_is_warned_of():
+    address = "http://127.0.0.1:1/?token=x"
+    assert announce(Path("p"), address, "127.0.0.1").endswith(address)
+    assert "reached from other machines" in announce(Path("p"), address, "0.0.0.0")
 
 
 def test_an_address_answers_only_under_the_names_it_is_reached_by():

@@ -2,98 +2,28 @@
 
 import json
 import random
-from threading import Thread
+from dataclasses import replace
 
-import numpy as np
 import pytest
 from annotator_edits import edit, mark, submit
+from annotator_files import LIMITS, NECK, on_file
 
 from keyrecon.annotate.edits import Limits, parse_edits
-from keyrecon.annotate.journal import NotSaved
-from keyrecon.annotate.marks import cells_from_annotations, written_cells
+from keyrecon.annotate.marks import written_cells
 from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.coco import read_coco, write_coco
-from keyrecon.formats.picks import read_picks
-from keyrecon.merging import merge_annotations
-from keyrecon.records import Annotations, Pick
 from keyrecon.workspace import Workspace
 
-LIMITS = Limits(LSP14, 100, (128, 64))
-NECK = ("mark", 3, "neck")
+
+def test_an_edit_is_in_the_state_the_file_and_the_next_start(open_store, bare):
+    assert submit(open_store(), mark(3, "neck", [10, 20.25, 2]))[0]["ok"]
+    assert on_file(bare) == {NECK: [10, 20.25, 2]}
+    assert open_store().state.cells == {NECK: [10, 20.25, 2]}
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
-    return tmp_path
-
-
-@pytest.fixture
-def opened(folder):
-    """Open the project's store; those opened before are closed."""
-    stores = []
-
-    def again():
-        for store in stores:
-            store.close()
-        stores[:] = [Store(Workspace(folder), LIMITS)]
-        return stores[0]
-
-    yield again
-    for store in stores:
-        store.close()
-
-
-def read_marks(folder):
-    return read_coco(folder / "annotations.json", LSP14, 100, (128, 64))
-
-
-def in_thread(work):
-    thread = Thread(target=work)
-    thread.start()
-    return thread
-
-
-def one_mark():
-    """A neck at (10, 20) on frame 3, and the size of its picture."""
-    joints = np.full((1, 14, 2), np.nan)
-    joints[0, LSP14.index("neck")] = 10, 20
-    seen = np.isfinite(joints).all(axis=2)
-    return Annotations(LSP14, np.array([3]), joints, seen, np.zeros((1, 13), int)), (128, 64)
-
-
-def on_file(folder):
-    """The cells that annotations.json holds."""
-    if not (folder / "annotations.json").exists():
-        return {}
-    return cells_from_annotations(read_marks(folder))
-
-
-def add_mark(folder, frame, joint, x, y):
-    """What `keyrecon import` does: read, add, write."""
-    joints = np.full((1, 14, 2), np.nan)
-    joints[0, LSP14.index(joint)] = x, y
-    old = read_marks(folder)
-    new = type(old)(
-        skeleton=LSP14,
-        frames=np.array([frame]),
-        joints=joints,
-        visible=np.isfinite(joints).all(axis=2),
-        nearer=np.zeros((1, 13), dtype=np.int64),
-    )
-    write_coco(folder / "annotations.json", merge_annotations(old, new), (128, 64))
-
-
-def test_an_edit_is_in_the_state_the_file_and_the_next_start(opened, folder):
-    assert submit(opened(), mark(3, "neck", [10, 20.25, 2]))[0]["ok"]
-    assert on_file(folder) == {NECK: [10, 20.25, 2]}
-    assert opened().state.cells == {NECK: [10, 20.25, 2]}
-
-
-def test_what_another_page_changed_meanwhile_is_not_overwritten(opened):
-    store = opened()
+def test_what_another_page_changed_meanwhile_is_not_overwritten(open_store):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     answer = submit(store, mark(3, "neck", [50, 20, 2]))[0]
     assert not answer["ok"]
@@ -102,32 +32,32 @@ def test_what_another_page_changed_meanwhile_is_not_overwritten(opened):
     assert submit(store, mark(3, "neck", [50, 20, 2], was=[10, 20, 2]))[0]["ok"]
 
 
-def test_an_edit_sent_twice_counts_once(opened):
-    store = opened()
+def test_an_edit_sent_twice_counts_once(open_store):
+    store = open_store()
     first = mark(3, "neck", [10, 20, 2])
     submit(store, first)
     store.undo("u")
-    assert submit(opened(), first)[0]["ok"]
-    assert opened().state.cells == {}
+    assert submit(open_store(), first)[0]["ok"]
+    assert open_store().state.cells == {}
 
 
-def test_undo_and_redo_survive_a_restart(opened, folder):
-    store = opened()
+def test_undo_and_redo_survive_a_restart(open_store, bare):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     submit(store, mark(3, "neck", [11, 20, 2], was=[10, 20, 2]))
-    opened().undo("u1")
-    assert opened().state.cells == {NECK: [10, 20, 2]}
-    opened().undo("u2")
-    assert opened().state.cells == {}
-    assert on_file(folder) == {}
-    opened().redo("r1")
-    opened().redo("r2")
-    assert on_file(folder) == {NECK: [11, 20, 2]}
-    assert opened().redo("r3") is None
+    open_store().undo("u1")
+    assert open_store().state.cells == {NECK: [10, 20, 2]}
+    open_store().undo("u2")
+    assert open_store().state.cells == {}
+    assert on_file(bare) == {}
+    open_store().redo("r1")
+    open_store().redo("r2")
+    assert on_file(bare) == {NECK: [11, 20, 2]}
+    assert open_store().redo("r3") is None
 
 
-def test_a_new_edit_ends_what_could_be_redone(opened):
-    store = opened()
+def test_a_new_edit_ends_what_could_be_redone(open_store):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     store.undo("u")
     submit(store, mark(4, "neck", [10, 20, 2]))
@@ -156,156 +86,50 @@ def random_edit(store, rng):
     )
 
 
-def test_undoing_everything_leads_back_through_every_state_and_redoing_forward(opened, folder):
-    store, rng = opened(), random.Random(5)
+def test_undoing_everything_leads_back_through_every_state_and_redoing_forward(open_store, bare):
+    store, rng = open_store(), random.Random(5)
     states = [store.state.cells]
     while len(states) < 40:
         assert submit(store, random_edit(store, rng))[0]["ok"]
         if store.state.cells != states[-1]:
             states.append(store.state.cells)
-        assert on_file(folder) == written_cells(store.state.cells)
-    store = opened()
+        assert on_file(bare) == written_cells(store.state.cells)
+    store = open_store()
     for n, before in enumerate(reversed(states[:-1])):
         store.undo(f"undo {n}")
         assert store.state.cells == before
     for n, after in enumerate(states[1:]):
         store.redo(f"redo {n}")
         assert store.state.cells == after
-    assert opened().state.cells == states[-1]
+    assert open_store().state.cells == states[-1]
 
 
-def test_marks_that_another_program_adds_come_in_and_ours_stay(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    add_mark(folder, 5, "head_top", 30, 40)
-    submit(store, mark(4, "neck", [11, 21, 2]))
-    wanted = {
-        NECK: [10, 20, 2],
-        ("mark", 4, "neck"): [11, 21, 2],
-        ("mark", 5, "head_top"): [30, 40, 2],
-    }
-    assert store.state.cells == wanted == on_file(folder)
+def test_marks_that_no_longer_fit_the_project_stop_the_start(open_store, bare):
+    submit(open_store(), mark(99, "neck", [10, 20, 2]))
+    for limits, message in (
+        (Limits(LSP14, 50, (128, 64)), "Frame 99 was marked"),
+        (Limits(replace(LSP14, names=("tail",) * 14), 100, (128, 64)), "Marks of neck"),
+    ):
+        open_store().close()
+        with pytest.raises(KeyreconError, match=message):
+            Store(Workspace(bare), limits)
 
 
-def test_marks_added_while_nobody_served_come_in_at_the_next_start(opened, folder):
-    submit(opened(), mark(3, "neck", [10, 20, 2]), mark(6, "neck", [1, 2, 0]))
-    add_mark(folder, 5, "head_top", 30, 40)
-    assert opened().state.cells == {
-        NECK: [10, 20, 2],
-        ("mark", 6, "neck"): [1, 2, 0],
-        ("mark", 5, "head_top"): [30, 40, 2],
-    }
-
-
-def test_what_another_program_did_can_be_undone(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    add_mark(folder, 3, "neck", 60, 20)
-    store.refresh()
-    assert store.state.cells == {NECK: [60, 20, 2]}
-    store.undo("u")
-    assert store.state.cells == {NECK: [10, 20, 2]} == on_file(folder)
-
-
-def test_an_edit_between_another_programs_reading_and_writing_waits(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    done = []
-    with Workspace(folder).exclusive():
-        late = in_thread(lambda: done.append(submit(store, mark(4, "neck", [11, 21, 2]))))
-        add_mark(folder, 5, "head_top", 30, 40)
-        assert not done
-    late.join()
-    assert len(store.state.cells) == 3
-    assert store.state.cells == on_file(folder)
-
-
-def test_the_first_start_takes_what_is_there_and_keeps_a_copy(opened, folder):
-    write_coco(folder / "annotations.json", *one_mark())
-    text = (folder / "annotations.json").read_text()
-    store = opened()
-    assert store.state.cells == {NECK: [10, 20, 2]}
-    assert store.undo("u") is None
-    assert (folder / "annotations.old-1.json").read_text() == text
-
-
-@pytest.mark.parametrize("text", ["", "{", '{"images": []}', "no json at all"])
-def test_a_file_that_does_not_parse_never_becomes_an_empty_project(opened, folder, text):
-    submit(opened(), mark(3, "neck", [10, 20, 2]))
-    (folder / "annotations.json").write_text(text)
-    with pytest.raises(KeyreconError, match=r"annotations\.json was changed .* move it away"):
-        opened()
-    assert (folder / "annotations.json").read_text() == text
-    (folder / "annotations.json").unlink()
-    assert opened().state.cells == {NECK: [10, 20, 2]} == on_file(folder)
-
-
-def test_a_file_that_stops_parsing_meanwhile_is_not_written_over(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    (folder / "annotations.json").write_text("half a fi")
-    late = mark(4, "neck", [11, 21, 2])
-    for _ in range(2):
-        with pytest.raises(NotSaved, match="move it away"):
-            submit(store, late)
-    assert (folder / "annotations.json").read_text() == "half a fi"
-    (folder / "annotations.json").unlink()
-    assert submit(store, late)[0]["ok"]
-    assert len(on_file(folder)) == 2
-
-
-def test_a_journal_that_is_none_is_not_replaced(opened, folder):
-    (folder / "annotate.sqlite").write_bytes(b"something else" * 1000)
+def test_a_journal_that_is_none_is_not_replaced(open_store, bare):
+    (bare / "annotate.sqlite").write_bytes(b"something else" * 1000)
     with pytest.raises(KeyreconError, match="cannot be used as a journal"):
-        opened()
-    assert (folder / "annotate.sqlite").read_bytes().startswith(b"something else")
+        open_store()
+    assert (bare / "annotate.sqlite").read_bytes().startswith(b"something else")
 
 
-def test_a_project_is_annotated_by_one_server_at_a_time(opened, folder):
-    opened()
+def test_a_project_is_annotated_by_one_server_at_a_time(open_store, bare):
+    open_store()
     with pytest.raises(KeyreconError, match="being annotated already"):
-        Store(Workspace(folder), LIMITS)
+        Store(Workspace(bare), LIMITS)
 
 
-def test_a_kill_between_journal_and_file_is_made_good_at_the_next_start(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    before = (folder / "annotations.json").read_bytes()
-    submit(store, mark(4, "neck", [11, 21, 2]))
-    store.close()
-    (folder / "annotations.json").write_bytes(before)
-    assert len(opened().state.cells) == 2
-    assert len(on_file(folder)) == 2
-
-
-def test_a_kill_between_journal_and_file_then_an_import_loses_neither(opened, folder):
-    store = opened()
-    submit(store, mark(3, "neck", [10, 20, 2]))
-    before = (folder / "annotations.json").read_bytes()
-    submit(store, mark(4, "neck", [11, 21, 2]))
-    store.close()
-    (folder / "annotations.json").write_bytes(before)
-    add_mark(folder, 5, "head_top", 30, 40)
-    assert {key[1] for key in opened().state.cells} == {3, 4, 5}
-
-
-def test_the_newest_picks_of_page_and_command_line_are_together(opened, folder):
-    store = opened()
-    place = {"id": "p1", "frame": 2, "part": " Head ", "x": 10, "y": 20}
-    submit(store, edit("pick", to=place))
-    Workspace(folder).add_picks([Pick(4, "foot", 5.0, 6.0)])
-    store.refresh()
-    assert read_picks(folder / "picks.json") == (
-        Pick(2, "head", 10.0, 20.0),
-        Pick(4, "foot", 5.0, 6.0),
-    )
-    gone = {**place, "part": "head"}
-    submit(store, edit("pick", was=gone, to=None))
-    assert read_picks(folder / "picks.json") == (Pick(4, "foot", 5.0, 6.0),)
-
-
-def test_a_change_of_several_cells_stands_whole_or_not_at_all(opened):
-    store = opened()
+def test_a_change_of_several_cells_stands_whole_or_not_at_all(open_store):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     swap = edit(
         "marks",
@@ -318,8 +142,8 @@ def test_a_change_of_several_cells_stands_whole_or_not_at_all(opened):
     assert store.state.cells == {NECK: [10, 20, 2]}
 
 
-def test_a_group_is_carried_out_in_order_and_undone_at_once(opened):
-    store = opened()
+def test_a_group_is_carried_out_in_order_and_undone_at_once(open_store):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     parts = [
         mark(3, "neck", None, was=[10, 20, 2]),
@@ -332,8 +156,8 @@ def test_a_group_is_carried_out_in_order_and_undone_at_once(opened):
     assert store.state.cells == {NECK: [10, 20, 2]}
 
 
-def test_a_group_of_which_one_part_conflicts_changes_nothing(opened):
-    store = opened()
+def test_a_group_of_which_one_part_conflicts_changes_nothing(open_store):
+    store = open_store()
     submit(store, mark(3, "neck", [10, 20, 2]))
     parts = [mark(3, "head_top", [5, 5, 2]), mark(3, "neck", [1, 1, 1])]
     answer = submit(store, edit("group", edits=parts))[0]
@@ -351,8 +175,8 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("message", IMPOSSIBLE)
-def test_what_cannot_be_is_refused_and_the_rest_of_a_batch_accepted(opened, message):
-    store = opened()
+def test_what_cannot_be_is_refused_and_the_rest_of_a_batch_accepted(open_store, message):
+    store = open_store()
     bad, good = submit(store, IMPOSSIBLE[message], mark(3, "head_top", [1, 1, 1]))
     assert (bad["status"], good["ok"]) == (400, True)
     assert message in bad["error"]
@@ -388,8 +212,8 @@ def test_a_place_that_is_no_number_is_refused(number):
         parse_edits(text.encode())
 
 
-def test_what_was_accepted_is_told_to_every_listener(opened):
-    store, told = opened(), []
+def test_what_was_accepted_is_told_to_every_listener(open_store):
+    store, told = open_store(), []
     store.listen(told.extend)
     submit(store, mark(3, "neck", [10, 20, 2]), mark(3, "neck", [99, 20, 2]))
     store.undo("u")

@@ -15,6 +15,9 @@ each: to apply it, to take it back, and to see that somebody else was faster.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from keyrecon.body import Skeleton
+from keyrecon.errors import KeyreconError
+
 Key = tuple[str | int, ...]
 Value = Any
 Cells = dict[Key, Value]
@@ -96,3 +99,20 @@ def picks_of(cells: Mapping[Key, Value]) -> list[dict[str, Any]]:
 def marked_frames(cells: Mapping[Key, Value]) -> Iterator[int]:
     """Frames on which the person decided anything about the body."""
     return (int(key[1]) for key in of_kind(cells, *FILE_CELLS))
+
+
+def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> None:
+    """Raise KeyreconError for decisions about joints or frames that the project does not have."""
+    decided = of_kind(cells, *FILE_CELLS)
+    unknown = sorted({str(key[2]) for key in decided} - {*skeleton.names})
+    if unknown:
+        raise KeyreconError(
+            f"Marks of {', '.join(unknown)} were made in this project, and its skeleton has no "
+            "such joint; bring the former skeleton.json back, or begin a new project."
+        )
+    last = max((int(key[1]) for key in decided), default=0)
+    if last >= n_frames:
+        raise KeyreconError(
+            f"Frame {last} was marked in this project, and its video now has {n_frames} frames; "
+            "bring the former video or trim back, or begin a new project."
+        )

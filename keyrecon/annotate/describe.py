@@ -76,15 +76,27 @@ def halves_by_frame(keyframes: Keyframes | None) -> dict[int, str]:
     }
 
 
-def describe_keyframes(keyframes: Keyframes | None, cells: Cells, known: Json) -> list[Json]:
-    """All frames to annotate: those chosen and the person's own."""
-    asked = halves_by_frame(keyframes)
+def halves_marked(cells: Cells, skeleton: Skeleton) -> dict[int, str]:
+    """Which half of the body has marks on each frame that has any."""
+    found: dict[int, str] = {}
+    for _, frame, joint in of_kind(cells, "mark"):
+        half = "lower" if skeleton.is_lower[skeleton.index(joint)] else "upper"
+        found[frame] = join_halves(found.get(frame), half)
+    return found
+
+
+def describe_keyframes(
+    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, known: Json
+) -> list[Json]:
+    """All frames to annotate: those chosen, the person's own, and others that bear marks."""
+    asked, marked = halves_by_frame(keyframes), halves_marked(cells, skeleton)
     own = {int(key[1]): half for key, half in of_kind(cells, "own").items()}
+    asked |= {frame: half for frame, half in marked.items() if frame not in asked}
     counts = _represented(keyframes)
     return [
         {
             "frame": frame,
-            "half": _joined(asked.get(frame), own.get(frame)),
+            "half": join_halves(asked.get(frame), own.get(frame)),
             "stands_for": counts.get(frame, 0),
             "why": "",
             "own": frame in own,
@@ -95,7 +107,8 @@ def describe_keyframes(keyframes: Keyframes | None, cells: Cells, known: Json) -
     ]
 
 
-def _joined(one: str | None, other: str | None) -> str:
+def join_halves(one: str | None, other: str | None) -> str:
+    """What two requests for a frame, not both empty, ask for together."""
     found = {one, other} - {None}
     return found.pop() if len(found) == 1 else "both"
 

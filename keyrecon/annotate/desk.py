@@ -55,7 +55,7 @@ def open_desk(workspace: Workspace, assistant: Assistant, commands: Mapping[str,
         limits=limits,
         store=store,
         stills=Stills(video, workspace.folder / "cache" / "stills"),
-        jobs=Jobs(commands, lambda job: events.tell({"job": asdict(job)})),
+        jobs=Jobs(commands, lambda job: events.tell({"job": describe_job(job)})),
         events=events,
         keyframes=KeptKeyframes(workspace, store),
         assistant=one_at_a_time(assistant),
@@ -67,14 +67,13 @@ def describe_project(desk: Desk) -> Json:
     keyframes, cells = desk.keyframes.current(), desk.store.state.cells
     own = {int(frame): half for frame, half in by_frame(cells, "own").items()}
     known = desk.assistant.keyframes(own) if desk.assistant.keyframes and keyframes else {}
-    asked = describe_keyframes(keyframes, cells, known.get("frames", {}))
-    desk.stills.prepare(row["frame"] for row in asked)
+    skeleton = desk.limits.skeleton
     return {
         **describe_video(desk.stills.video, desk.workspace.folder.resolve().name),
-        **describe_skeleton(desk.limits.skeleton),
+        **describe_skeleton(skeleton),
         "id": f"{desk.workspace.folder.resolve().name}-{desk.stills.identity}",
         "version": desk.stills.identity,
-        "keyframes": asked,
+        "keyframes": describe_keyframes(keyframes, cells, skeleton, known.get("frames", {})),
         "height_px": known.get("height_px"),
         "has": {
             "picks": bool(picks_of(cells)),

@@ -4,6 +4,7 @@ Every edit has an id that the page made, so that one sent twice counts once, and
 page believed to stand in each cell (`from`), so that two pages cannot overwrite each other.
 """
 
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -96,7 +97,8 @@ class GroupEdit(Edit, frozen=True, tag="group"):
 AnyEdit = Part | GroupEdit
 
 
-class Limits(Struct, frozen=True):
+@dataclass(frozen=True)
+class Limits:
     """What an edit can refer to."""
 
     skeleton: Skeleton

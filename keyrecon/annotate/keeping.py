@@ -1,14 +1,14 @@
 """The keyframes that were chosen, and what happens when a new choice replaces them.
 
 A person's work must not slip out of sight because the program chose again: a keyframe that is
-locked or bears marks, and that the new choice leaves out, stays in the list as one of the
-person's own.
+locked or bears marks, and that the new choice leaves out or asks less of, stays in the list as
+one of the person's own.
 """
 
 import json
 
 from keyrecon.annotate.cells import Change, by_frame, marked_frames
-from keyrecon.annotate.describe import halves_by_frame
+from keyrecon.annotate.describe import halves_by_frame, join_halves
 from keyrecon.annotate.store import Store
 from keyrecon.formats.keyframes import keyframes_from_json
 from keyrecon.records import Keyframes
@@ -43,6 +43,10 @@ class KeptKeyframes:
             return
         cells = self._store.state.cells
         valued = {*marked_frames(cells), *map(int, by_frame(cells, "lock"))}
-        dropped = [f for f in before if f in valued and f not in chosen]
-        keep = [Change(("own", f), None, before[f]) for f in dropped if ("own", f) not in cells]
+        keep = [
+            Change(("own", frame), None, half)
+            for frame, half in before.items()
+            if frame in valued and ("own", frame) not in cells
+            if join_halves(chosen.get(frame), half) != chosen.get(frame)
+        ]
         self._store.apply("keep", keep, role="fixed", notes={"keyframes": json.dumps(chosen)})

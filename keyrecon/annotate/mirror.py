@@ -70,6 +70,10 @@ class Mirror:
         """Whether the journal has never written this file."""
         return self.wanted == UNKNOWN
 
+    def is_shown(self) -> bool:
+        """Whether the file already is what it should be, to the letter."""
+        return _digest(self.form.path.read_bytes()) == self.wanted[1]
+
     def outside_changes(self, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
         """What another program changed in the file since we wrote it; `at` recalls a revision.
 

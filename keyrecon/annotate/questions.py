@@ -74,8 +74,10 @@ class ImportQuestion(Struct, forbid_unknown_fields=True):
 
 
 def project(desk: Desk, asked: Asked) -> Json:
-    """Video, skeleton, keyframes."""
-    return describe_project(desk)
+    """Video, skeleton, keyframes; their pictures are made ready."""
+    told = describe_project(desk)
+    desk.stills.prepare(row["frame"] for row in told["keyframes"])
+    return told
 
 
 def state(desk: Desk, asked: Asked) -> Json:

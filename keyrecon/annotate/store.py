@@ -8,18 +8,17 @@ and its id makes sure that it counts once. Listeners hear of every accepted entr
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from threading import RLock
 from typing import Any
 
 from filelock import FileLock, Timeout
 
-from keyrecon.annotate.cells import Cells, Change, apply_in_place, effective, settle
-from keyrecon.annotate.cells import invert_changes as inverted
-from keyrecon.annotate.edits import AnyEdit, Limits, changes_of
+from keyrecon.annotate.cells import Cells, Change, check_fit, effective, invert_changes
+from keyrecon.annotate.edits import AnyEdit, Limits
 from keyrecon.annotate.files import annotations_form, picks_form
 from keyrecon.annotate.history import Entry, Role, State, advance
 from keyrecon.annotate.journal import Journal
+from keyrecon.annotate.judging import Draft, judge
 from keyrecon.annotate.marks import annotations_from_cells
 from keyrecon.annotate.mirror import Mirror
 from keyrecon.errors import KeyreconError
@@ -27,17 +26,6 @@ from keyrecon.records import Annotations
 from keyrecon.workspace import Workspace
 
 Listener = Callable[[Sequence[Entry]], None]
-
-
-@dataclass(frozen=True)
-class Draft:
-    """An entry that has no revision yet."""
-
-    id: str
-    label: str
-    changes: tuple[Change, ...]
-    role: Role = "edit"
-    of: int | None = None
 
 
 class Store:
@@ -70,11 +58,9 @@ class Store:
         self._listeners: list[Listener] = []
         self._journal = Journal(folder / "annotate.sqlite")
         self.state = advance(State(), self._journal.entries())
+        check_fit(self.state.cells, self._limits.skeleton, self._limits.n_frames)
         forms = (annotations_form(self._workspace, self._limits), picks_form(self._workspace))
         self._mirrors = [Mirror(form, self._journal.note(form.path.name)) for form in forms]
-        for mirror in self._mirrors:
-            if mirror.is_new and mirror.form.path.exists():
-                self._workspace.put_aside(mirror.form.path)
         self.refresh()
 
     def annotations(self) -> Annotations:
@@ -95,40 +81,11 @@ class Store:
         listed = [*edits]
 
         def draft(state: State) -> list[Draft]:
-            results.clear()
-            return self._drafts(listed, dict(state.cells), results)
+            drafts, results[:] = judge(listed, state.cells, self._limits, self._journal.knows)
+            return drafts
 
         self._change(draft)
         return results
-
-    def _drafts(
-        self, edits: list[AnyEdit], cells: Cells, results: list[dict[str, Any]]
-    ) -> list[Draft]:
-        drafts: list[Draft] = []
-        for edit in edits:
-            result, draft = self._judge(edit, cells, {draft.id for draft in drafts})
-            results.append({"id": edit.id, **result})
-            if draft is not None:
-                drafts.append(draft)
-                apply_in_place(cells, draft.changes)
-        return drafts
-
-    def _judge(
-        self, edit: AnyEdit, cells: Cells, accepted: set[str]
-    ) -> tuple[dict[str, Any], Draft | None]:
-        """The answer to one edit, and what it changes if it is new and fits."""
-        if edit.id in accepted or self._journal.knows(edit.id):
-            return {"ok": True}, None
-        try:
-            changes = changes_of(edit, self._limits)
-        except KeyreconError as fault:
-            return {"ok": False, "status": 400, "error": str(fault)}, None
-        told = settle(cells, changes)
-        if told is None:
-            current = {str(c.key[-1]): cells.get(c.key) for c in changes}
-            return {"ok": False, "status": 409, "current": current}, None
-        draft = Draft(edit.id, type(edit).__struct_config__.tag, told)
-        return {"ok": True}, draft if told else None
 
     def apply(
         self,
@@ -165,7 +122,7 @@ class Store:
             if not stack or self._journal.knows(edit_id):
                 return []
             entry = self._journal.entry(stack[-1])
-            wanted = inverted(entry.changes) if role == "undo" else entry.changes
+            wanted = invert_changes(entry.changes) if role == "undo" else entry.changes
             ours = [c for c in wanted if state.cells.get(c.key) == c.before]
             return [Draft(edit_id, entry.label, tuple(ours), role, entry.revision)]
 
@@ -191,12 +148,15 @@ class Store:
         return told
 
     def _take_in(self, mirror: Mirror) -> None:
-        role: Role = "fixed" if mirror.is_new else "edit"
+        first = mirror.is_new
         changes = effective(
             self.state.cells, mirror.outside_changes(self.state.cells, self._cells_at)
         )
         if changes:
+            role: Role = "fixed" if first else "edit"
             self._commit([Draft(f"file-{uuid.uuid4().hex}", "file", changes, role)])
+        if changes and first and not mirror.is_shown():
+            self._workspace.put_aside(mirror.form.path)  # it may hold what we do not know
 
     def _commit(
         self, drafts: Iterable[Draft], notes: Mapping[str, str] | None = None

@@ -21,7 +21,6 @@ from keyrecon.lifting.chain import ancestry, breadths
 from keyrecon.lifting.shown import LEANINGS, log_density
 from keyrecon.records import Annotations, JointTracks
 
-
 _LEAST_CONFIDENCE = 0.05
 
 

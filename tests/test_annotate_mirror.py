@@ -1,0 +1,140 @@
+"""annotations.json and picks.json show the state, and what other programs change comes in."""
+
+from threading import Thread
+
+import pytest
+from annotator_edits import edit, mark, submit
+from annotator_files import NECK, add_mark, on_file, one_mark
+
+from keyrecon.annotate.journal import NotSaved
+from keyrecon.errors import KeyreconError
+from keyrecon.formats.coco import write_coco
+from keyrecon.formats.picks import read_picks
+from keyrecon.records import Pick
+from keyrecon.workspace import Workspace
+
+
+def test_marks_that_another_program_adds_come_in_and_ours_stay(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    add_mark(bare, 5, "head_top", 30, 40)
+    submit(store, mark(4, "neck", [11, 21, 2]))
+    wanted = {
+        NECK: [10, 20, 2],
+        ("mark", 4, "neck"): [11, 21, 2],
+        ("mark", 5, "head_top"): [30, 40, 2],
+    }
+    assert store.state.cells == wanted == on_file(bare)
+
+
+def test_marks_added_while_nobody_served_come_in_at_the_next_start(open_store, bare):
+    submit(open_store(), mark(3, "neck", [10, 20, 2]), mark(6, "neck", [1, 2, 0]))
+    add_mark(bare, 5, "head_top", 30, 40)
+    assert open_store().state.cells == {
+        NECK: [10, 20, 2],
+        ("mark", 6, "neck"): [1, 2, 0],
+        ("mark", 5, "head_top"): [30, 40, 2],
+    }
+
+
+def test_what_another_program_did_can_be_undone(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    add_mark(bare, 3, "neck", 60, 20)
+    store.refresh()
+    assert store.state.cells == {NECK: [60, 20, 2]}
+    store.undo("u")
+    assert store.state.cells == {NECK: [10, 20, 2]} == on_file(bare)
+
+
+def test_an_edit_between_another_programs_reading_and_writing_waits(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    done = []
+    with Workspace(bare).exclusive():
+        late = Thread(target=lambda: done.append(submit(store, mark(4, "neck", [11, 21, 2]))))
+        late.start()
+        add_mark(bare, 5, "head_top", 30, 40)
+        assert not done
+    late.join()
+    assert len(store.state.cells) == 3
+    assert store.state.cells == on_file(bare)
+
+
+def test_the_first_start_takes_what_is_there_and_keeps_a_copy(open_store, bare):
+    write_coco(bare / "annotations.json", *one_mark())
+    text = (bare / "annotations.json").read_text()
+    text = text.replace('"info"', '"from": "elsewhere", "info"')
+    (bare / "annotations.json").write_text(text)
+    store = open_store()
+    assert store.state.cells == {NECK: [10, 20, 2]}
+    assert store.undo("u") is None
+    assert (bare / "annotations.old-1.json").read_text() == text
+
+
+def test_a_file_of_our_own_needs_no_copy(open_store, bare):
+    write_coco(bare / "annotations.json", *one_mark())
+    assert open_store().state.cells == {NECK: [10, 20, 2]}
+    assert not {*bare.glob("*.old-*")}
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"images": []}', "no json at all"])
+def test_a_file_that_does_not_parse_never_becomes_an_empty_project(open_store, bare, text):
+    submit(open_store(), mark(3, "neck", [10, 20, 2]))
+    (bare / "annotations.json").write_text(text)
+    with pytest.raises(KeyreconError, match=r"annotations\.json was changed .* move it away"):
+        open_store()
+    assert (bare / "annotations.json").read_text() == text
+    (bare / "annotations.json").unlink()
+    assert open_store().state.cells == {NECK: [10, 20, 2]} == on_file(bare)
+
+
+def test_a_file_that_stops_parsing_meanwhile_is_not_written_over(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    (bare / "annotations.json").write_text("half a fi")
+    late = mark(4, "neck", [11, 21, 2])
+    for _ in range(2):
+        with pytest.raises(NotSaved, match="move it away"):
+            submit(store, late)
+    assert (bare / "annotations.json").read_text() == "half a fi"
+    (bare / "annotations.json").unlink()
+    assert submit(store, late)[0]["ok"]
+    assert len(on_file(bare)) == 2
+
+
+def test_a_kill_between_journal_and_file_is_made_good_at_the_next_start(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    before = (bare / "annotations.json").read_bytes()
+    submit(store, mark(4, "neck", [11, 21, 2]))
+    store.close()
+    (bare / "annotations.json").write_bytes(before)
+    assert len(open_store().state.cells) == 2
+    assert len(on_file(bare)) == 2
+
+
+def test_a_kill_between_journal_and_file_then_an_import_loses_neither(open_store, bare):
+    store = open_store()
+    submit(store, mark(3, "neck", [10, 20, 2]))
+    before = (bare / "annotations.json").read_bytes()
+    submit(store, mark(4, "neck", [11, 21, 2]))
+    store.close()
+    (bare / "annotations.json").write_bytes(before)
+    add_mark(bare, 5, "head_top", 30, 40)
+    assert {key[1] for key in open_store().state.cells} == {3, 4, 5}
+
+
+def test_the_newest_picks_of_page_and_command_line_are_together(open_store, bare):
+    store = open_store()
+    place = {"id": "p1", "frame": 2, "part": " Head ", "x": 10, "y": 20}
+    submit(store, edit("pick", to=place))
+    Workspace(bare).add_picks([Pick(4, "foot", 5.0, 6.0)])
+    store.refresh()
+    assert read_picks(bare / "picks.json") == (
+        Pick(2, "head", 10.0, 20.0),
+        Pick(4, "foot", 5.0, 6.0),
+    )
+    gone = {**place, "part": "head"}
+    submit(store, edit("pick", was=gone, to=None))
+    assert read_picks(bare / "picks.json") == (Pick(4, "foot", 5.0, 6.0),)
