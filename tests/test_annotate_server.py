@@ -65,6 +65,19 @@ def test_edits_and_undo_through_the_page(opened):
     assert ask(desk, "POST", "/api/undo", {"id": "u2"}).json()["edit"] is None
 
 
+def test_what_is_not_saved_is_answered_so_and_accepted_when_it_is_sent_again(opened, folder):
+    desk = opened()
+    submit(desk.store, mark(3, "neck", [10, 20, 2]))
+    (folder / "annotations.json").write_text("half a fi")
+    late = {"edits": [mark(4, "neck", [10, 20, 2])]}
+    answer = ask(desk, "POST", "/api/edits", late)
+    assert answer.status == 507
+    assert "cannot be read" in answer.json()["error"]
+    (folder / "annotations.json").unlink()
+    assert ask(desk, "POST", "/api/edits", late).json()["results"][0]["ok"]
+    assert len(desk.store.state.cells) == 2
+
+
 def test_without_an_assistant_its_questions_have_empty_answers(opened):
     desk = opened()
     assert ask(desk, "GET", "/api/ghost/3").json() == {}

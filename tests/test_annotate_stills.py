@@ -54,6 +54,16 @@ def test_stills_asked_for_all_at_once_are_all_answered(opened):
         assert read_number(cv2.imdecode(data, cv2.IMREAD_COLOR)) == frame
 
 
+def test_a_still_that_nobody_waits_for_any_more_delays_no_other(opened):
+    stills = opened().stills
+    waiting = [stills.still(frame) for frame in range(50)]
+    for picture in waiting[::2]:
+        picture.cancel()
+    for picture in waiting[1::2]:
+        assert picture.result(timeout=20)
+    assert stills.still(0).result(timeout=20)
+
+
 def test_stills_may_be_kept_by_the_browser_only_under_the_name_of_this_video(opened):
     desk = opened()
     name = ask(desk, "GET", "/api/project").json()["version"]

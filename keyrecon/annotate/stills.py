@@ -114,19 +114,29 @@ class Stills:
             return self._asked.pop() if self._asked else self._coming.pop()
 
     def _make(self, frame: int, width: int, alone: bool) -> None:
-        """Decode a run of frames; keep the one asked for first."""
+        """Decode a run of frames; keep the one asked for first, then what else is asked of it."""
         first = frame if alone else frame - frame % RUN
-        last = frame + 1 if alone else min(first + RUN, len(self.video))
+        span = range(first, frame + 1 if alone else min(first + RUN, len(self.video)))
         run = {}
-        for number, picture in enumerate(self.video.frames(first, last), first):
+        for number, picture in enumerate(self.video.frames(first, span.stop), first):
             run[number] = reduce_picture(picture, width)
             if number == frame:
                 self._keep(frame, run[frame])
                 self._answer_waiting()
-        for number, picture in run.items():
+        asked, _ = self._waited_for(span, width)
+        for number in sorted(run, key=lambda n: (n not in asked, abs(n - frame))):
+            if number not in asked and self._waited_for(span, width)[1]:
+                return
             if not self._path(number, width).is_file():
-                self._keep(number, picture)
-        self._answer_waiting()
+                self._keep(number, run[number])
+                self._answer_waiting()
+
+    def _waited_for(self, span: range, width: int) -> tuple[set[int], bool]:
+        """Frames of a run that someone waits for, and whether someone waits for any other."""
+        with self._changed:
+            here = {f for f, kept, _ in self._asked if f in span and kept == width}
+            other = any(f not in span or kept != width for f, kept, _ in self._asked)
+        return here, other
 
     def _keep(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
         write_durably(self._path(frame, picture.shape[1]), encode_jpeg(picture))
