@@ -36,20 +36,23 @@ export function listen(hears) {
   source.addEventListener("message", (event) => news(JSON.parse(event.data)));
 }
 
-// Asks at most one question at a time; of those that wait only the newest is asked.
+// Asks at most one question at a time; of those that wait only the newest is asked. The promise is
+// kept when nothing waits any more.
 export function latestOnly(ask) {
-  let waiting = null, asking = false;
-  return async function request(...question) {
-    waiting = question;
-    if (asking) return;
-    asking = true;
+  let waiting = null, asking = null;
+  async function work() {
     while (waiting) {
-      const now = waiting;
+      const question = waiting;
       waiting = null;
-      await ask(...now).catch((fault) => {
+      await ask(...question).catch((fault) => {
         if (!(fault instanceof Gone)) throw fault;
       });
     }
-    asking = false;
+    asking = null;
+  }
+  return function request(...question) {
+    waiting = question;
+    asking ??= work();
+    return asking;
   };
 }

@@ -7,7 +7,7 @@ import { createSpace } from "./space.js";
 export function createDepth(model, placed) {
   const space = createSpace(byId("space"), model.project.limbs, model.sides);
   const poses = new Map(), ghosts = new Map();
-  let last = "", hovered = null;
+  let last = "", hovered = null, settled = Promise.resolve();
 
   model.pose = () => poses.get(model.doing.frame) ?? null;
   model.ghost = () => (model.done(model.keyframe() ?? { half: "both", frame: -1 }) ? null : ghosts.get(model.doing.frame) ?? null);
@@ -30,8 +30,15 @@ export function createDepth(model, placed) {
     const now = JSON.stringify([frame, marks, nearer]);
     if (frame === null || now === last) return;
     last = now;
-    ask(frame, marks, nearer);
+    settled = ask(frame, marks, nearer);
   }
+
+  // The pose of what is marked at this moment.
+  model.settledPose = async () => {
+    follow();
+    await settled;
+    return model.pose();
+  };
 
   const readings = [0, 1, 2].map((n) => {
     const button = make("button", {}, make("kbd", {}, String(n + 1)), make("span"));

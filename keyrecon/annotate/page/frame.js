@@ -28,7 +28,7 @@ function keysTable() {
     ["wheel", "zoom at the pointer"],
     ["over a joint or limb", "the keys V, F, R and Del mean what is under the pointer"],
   ].flatMap(([what, does]) => [make("dt", {}, what), make("dd", {}, does)])));
-  return [...parts, pointer];
+  return [parts[0], pointer, ...parts.slice(1)];
 }
 
 export function createFrame(model, go) {

@@ -21,7 +21,7 @@ export function createJoints(model, actions) {
     const seen = make("button", { className: "seen", title: "visible, hidden, cannot be seen (V)" });
     seen.addEventListener("click", () => {
       actions.select(joint);
-      actions.visibility();
+      actions.visibility(joint);
     });
     const depth = make("span", { className: "depth" });
     if (limbs.has(joint)) depth.append(...DEPTHS.map((choice) => depthButton(joint, choice)));
@@ -48,7 +48,7 @@ export function createJoints(model, actions) {
   }
 
   function draw() {
-    const marks = model.marks(), wanted = new Set(actions.asked()), { joint: selected, under } = model.doing;
+    const marks = model.marks(), wanted = new Set(actions.joints()), { joint: selected, under } = model.doing;
     for (const [joint, row] of rows) {
       const mark = marks[joint];
       row.hidden = !wanted.has(joint) && !mark;

@@ -98,7 +98,7 @@ const commands = {
     undo: actions.undo, redo: actions.redo, help: frame.help, page: ({ place }) => go(VIEWS[place]),
   },
   keyframes: {
-    primary: actions.primary, put: actions.putDown, visibility: actions.visibility, clear: actions.clear,
+    primary: actions.primary, put: actions.putDown, visibility: () => actions.visibility(), clear: actions.clear,
     flip: () => actions.flip(), automatic: actions.automaticDepth, automaticAll: actions.automaticDepths,
     open: actions.nextKeyframe, lock: actions.lock, check: lists.firstCheck, suggestion: lists.firstSuggestion,
     keyframe: ({ place }) => actions.stepKeyframe(place ? 1 : -1),

@@ -43,7 +43,7 @@ export async function createModel() {
 
   const outbox = createOutbox({
     send: (edits) => api.send("edits", { edits }),
-    kept: keptEdits(localStorage, `${model.project.name}-${model.project.stills}`),
+    kept: keptEdits(localStorage, model.project.id),
     status(status, waiting, why) {
       model.saving = { status, waiting, why };
       model.changed();

@@ -18,7 +18,7 @@ function outline(pen, shape, [x, y], size) {
   }
 }
 
-// look: {side, color, hollow, dashed, alpha, size, ring}
+// look: {side, color, hollow, alpha, size, ring}
 export function drawJoint(pen, place, look) {
   const size = look.size ?? 5;
   pen.save();
@@ -38,7 +38,6 @@ export function drawJoint(pen, place, look) {
   pen.lineWidth = look.hollow ? 5 : 3;
   pen.stroke();
   if (look.hollow) {
-    if (look.dashed) pen.setLineDash([2.5, 2.5]);
     pen.strokeStyle = look.color;
     pen.lineWidth = 2;
     pen.stroke();

@@ -18,7 +18,7 @@ export function createStage(model, actions, viewer, colors) {
     if (held) marks[held.joint] = [...held.at, marks[held.joint]?.[2] || 2];
     return marks;
   }
-  const offered = () => suggested(actions.asked(), model.marks(), model.ghost());
+  const offered = () => suggested(actions.joints(), model.marks(), model.ghost());
 
   const onScreen = (places) => Object.fromEntries(Object.entries(places)
     .filter(([, place]) => place[2] !== 0).map(([name, place]) => [name, viewer.toScreen(place)]));
@@ -89,7 +89,7 @@ export function createStage(model, actions, viewer, colors) {
     for (const [name, [x, y, confidence]] of Object.entries(ghost)) {
       if (doing.held?.joint === name) continue;
       drawJoint(pen, viewer.toScreen([x, y]), {
-        side: model.sides[name], color: colors[model.sides[name]], hollow: true, dashed: true,
+        side: model.sides[name], color: colors[model.sides[name]], hollow: true, size: 4,
         alpha: 0.5 + 0.5 * (confidence ?? 1), ring: doing.joint === name,
       });
     }

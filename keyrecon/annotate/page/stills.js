@@ -13,7 +13,7 @@ export function createStills(project, ready) {
   function address(frame, width) {
     const parts = new URLSearchParams();
     if (width) parts.set("width", width);
-    if (project.stills) parts.set("v", project.stills);
+    parts.set("v", project.version);
     return `/api/still/${frame}?${parts}`;
   }
 

@@ -12,7 +12,7 @@ export function createStrip(model, choose) {
   let trust = null;
 
   const cells = frames.map((frame) => {
-    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.stills })}` });
+    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.version })}` });
     const canvas = make("canvas");
     const cell = make("button", { title: `Frame ${frame}` }, picture, canvas, make("small", {}, String(frame)));
     cell.addEventListener("click", () => choose(frame));
