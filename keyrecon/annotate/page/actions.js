@@ -5,7 +5,9 @@ import { createHand } from "./hand.js";
 import { createTravel } from "./travel.js";
 
 export function createActions(model) {
-  const { doing } = model, hand = createHand(model), travel = createTravel(model, hand);
+  const { doing } = model,
+    hand = createHand(model),
+    travel = createTravel(model, hand);
 
   // What a key means: the joint under the pointer, else the selected one.
   const meant = () => doing.under?.joint ?? doing.joint;
@@ -55,7 +57,8 @@ export function createActions(model) {
   // pose that is still being computed is waited for, so that no limb is left out.
   async function keepDepths(n = null) {
     if (!hand.ready()) return;
-    const { frame } = doing, pose = await model.settledPose();
+    const { frame } = doing,
+      pose = await model.settledPose();
     const reading = n === null ? null : pose?.alternatives?.[n]?.nearer;
     if (doing.frame !== frame || (n !== null && !reading)) return;
     const to = {};
@@ -69,17 +72,26 @@ export function createActions(model) {
   function automaticDepths() {
     const given = Object.keys(model.nearer());
     if (!hand.ready() || !given.length) return;
-    model.edit(setNearer(model.state, doing.frame, Object.fromEntries(given.map((limb) => [limb, null]))));
+    model.edit(
+      setNearer(model.state, doing.frame, Object.fromEntries(given.map((limb) => [limb, null]))),
+    );
   }
 
   function lock() {
-    if (model.keyframe()) model.edit(setLock(model.state, doing.frame, !model.state.locked[doing.frame]));
+    if (model.keyframe())
+      model.edit(setLock(model.state, doing.frame, !model.state.locked[doing.frame]));
   }
 
-  const thing = () => nextThing({
-    project: model.project, half: model.keyframe()?.half, marks: model.marks(), nearer: model.nearer(),
-    ghost: model.ghost(), pose: model.pose(), joint: doing.joint,
-  });
+  const thing = () =>
+    nextThing({
+      project: model.project,
+      half: model.keyframe()?.half,
+      marks: model.marks(),
+      nearer: model.nearer(),
+      ghost: model.ghost(),
+      pose: model.pose(),
+      joint: doing.joint,
+    });
 
   const primaries = { accept, depth: () => keepDepths(), next: travel.nextKeyframe, place() {} };
 
@@ -91,7 +103,18 @@ export function createActions(model) {
   }
 
   return {
-    ...hand, ...travel, visibility, clear, swap, accept, setDepth, flip, automaticDepths, lock, thing, primary,
+    ...hand,
+    ...travel,
+    visibility,
+    clear,
+    swap,
+    accept,
+    setDepth,
+    flip,
+    automaticDepths,
+    lock,
+    thing,
+    primary,
     reading: (n) => keepDepths(n),
     automaticDepth: () => setDepth(meantLimb(), null),
   };

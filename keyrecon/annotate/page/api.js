@@ -18,7 +18,9 @@ async function answered(path, options) {
 }
 
 const asJson = (method, content) => ({
-  method, body: JSON.stringify(content), headers: { "Content-Type": "application/json" },
+  method,
+  body: JSON.stringify(content),
+  headers: { "Content-Type": "application/json" },
 });
 
 export const read = (path) => answered(`/api/${path}`);
@@ -27,7 +29,8 @@ export const remove = (path) => answered(`/api/${path}`, { method: "DELETE" });
 
 // Server-sent events; the browser connects again by itself unless it was refused.
 export function listen(hears) {
-  const { opened, closed, news } = hears, source = new EventSource("/api/events");
+  const { opened, closed, news } = hears,
+    source = new EventSource("/api/events");
   source.addEventListener("open", opened);
   source.addEventListener("error", () => {
     closed();
@@ -39,7 +42,8 @@ export function listen(hears) {
 // Asks at most one question at a time; of those that wait only the newest is asked. The promise is
 // kept when nothing waits any more.
 export function latestOnly(ask) {
-  let waiting = null, asking = null;
+  let waiting = null,
+    asking = null;
   async function work() {
     while (waiting) {
       const question = waiting;

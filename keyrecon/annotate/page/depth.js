@@ -6,11 +6,17 @@ import { createSpace } from "./space.js";
 
 export function createDepth(model, placed) {
   const space = createSpace(byId("space"), model.project.limbs, model.sides);
-  const poses = new Map(), ghosts = new Map();
-  let last = "", hovered = null, settled = Promise.resolve();
+  const poses = new Map(),
+    ghosts = new Map();
+  let last = "",
+    hovered = null,
+    settled = Promise.resolve();
 
   model.pose = () => poses.get(model.doing.frame) ?? null;
-  model.ghost = () => (model.done(model.keyframe() ?? { half: "both", frame: -1 }) ? null : ghosts.get(model.doing.frame) ?? null);
+  model.ghost = () =>
+    model.done(model.keyframe() ?? { half: "both", frame: -1 })
+      ? null
+      : (ghosts.get(model.doing.frame) ?? null);
 
   const ask = api.latestOnly(async (frame, marks, nearer) => {
     const began = performance.now();
@@ -26,7 +32,9 @@ export function createDepth(model, placed) {
   }
 
   function follow() {
-    const { frame } = model.doing, marks = placed(), nearer = model.nearer();
+    const { frame } = model.doing,
+      marks = placed(),
+      nearer = model.nearer();
     const now = JSON.stringify([frame, marks, nearer]);
     if (frame === null || now === last) return;
     last = now;
@@ -53,22 +61,32 @@ export function createDepth(model, placed) {
   }
 
   function drawReadings() {
-    const pose = model.pose(), alternatives = pose?.alternatives ?? [], best = alternatives[0];
+    const pose = model.pose(),
+      alternatives = pose?.alternatives ?? [],
+      best = alternatives[0];
     readings.forEach((button, n) => {
       const reading = alternatives[n];
       button.hidden = !reading;
       if (!reading) return;
-      const turned = Object.keys(reading.nearer).filter((limb) => reading.nearer[limb] !== best.nearer[limb]);
+      const turned = Object.keys(reading.nearer).filter(
+        (limb) => reading.nearer[limb] !== best.nearer[limb],
+      );
       setText(button.lastChild, n === 0 ? "most likely" : `${turned.length} turned`);
-      button.title = n === 0 ? "Take the most likely reading" : `Turned: ${turned.join(", ").replaceAll("_", " ")}`;
-      const shown = Object.entries(reading.nearer).every(([limb, sign]) => pose.limbs[limb]?.sign === sign);
+      button.title =
+        n === 0
+          ? "Take the most likely reading"
+          : `Turned: ${turned.join(", ").replaceAll("_", " ")}`;
+      const shown = Object.entries(reading.nearer).every(
+        ([limb, sign]) => pose.limbs[limb]?.sign === sign,
+      );
       toggle(button, "on", shown);
     });
   }
 
   function draw() {
     follow();
-    const pose = model.pose(), other = pose?.alternatives?.[hovered]?.points3d;
+    const pose = model.pose(),
+      other = pose?.alternatives?.[hovered]?.points3d;
     space.show(other ?? pose?.points3d, other ? pose?.points3d : null);
     byId("space-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
     drawReadings();

@@ -6,13 +6,22 @@ export function newId() {
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-const pickedFrom = (values, names) => Object.fromEntries(names.map((name) => [name, values[name] ?? null]));
+const pickedFrom = (values, names) =>
+  Object.fromEntries(names.map((name) => [name, values[name] ?? null]));
 
 // A tenth of a pixel is finer than anyone clicks.
-const rounded = (place) => place && [Math.round(place[0] * 10) / 10, Math.round(place[1] * 10) / 10, place[2]];
+const rounded = (place) =>
+  place && [Math.round(place[0] * 10) / 10, Math.round(place[1] * 10) / 10, place[2]];
 
 export function placeJoint(state, frame, joint, to) {
-  return { id: newId(), kind: "mark", frame, joint, to: rounded(to), from: marksOf(state, frame)[joint] ?? null };
+  return {
+    id: newId(),
+    kind: "mark",
+    frame,
+    joint,
+    to: rounded(to),
+    from: marksOf(state, frame)[joint] ?? null,
+  };
 }
 
 export function placeJoints(state, frame, places) {
@@ -22,7 +31,13 @@ export function placeJoints(state, frame, places) {
 }
 
 export function setNearer(state, frame, to) {
-  return { id: newId(), kind: "nearer", frame, to, from: pickedFrom(nearerOf(state, frame), Object.keys(to)) };
+  return {
+    id: newId(),
+    kind: "nearer",
+    frame,
+    to,
+    from: pickedFrom(nearerOf(state, frame), Object.keys(to)),
+  };
 }
 
 export const addPick = (pick) => ({ id: newId(), kind: "pick", to: pick, from: null });
@@ -69,7 +84,8 @@ export function nextVisibility(mark) {
 
 // The edit that takes another back.
 export function inverse(edit) {
-  if (edit.kind === "group") return { id: newId(), kind: "group", edits: edit.edits.map(inverse).reverse() };
+  if (edit.kind === "group")
+    return { id: newId(), kind: "group", edits: edit.edits.map(inverse).reverse() };
   return { ...edit, id: newId(), to: edit.from, from: edit.to };
 }
 
@@ -77,12 +93,23 @@ export function inverse(edit) {
 export function rebased(state, edit) {
   const { frame } = edit;
   switch (edit.kind) {
-    case "group": return { ...edit, id: newId(), edits: edit.edits.map((part) => rebased(state, part)) };
-    case "mark": return placeJoint(state, frame, edit.joint, edit.to);
-    case "marks": return placeJoints(state, frame, edit.to);
-    case "nearer": return setNearer(state, frame, edit.to);
-    case "own": return setOwn(state, frame, edit.to);
-    case "lock": return setLock(state, frame, edit.to);
-    default: return { ...edit, id: newId(), from: state.picks.find(({ id }) => id === (edit.to ?? edit.from).id) ?? null };
+    case "group":
+      return { ...edit, id: newId(), edits: edit.edits.map((part) => rebased(state, part)) };
+    case "mark":
+      return placeJoint(state, frame, edit.joint, edit.to);
+    case "marks":
+      return placeJoints(state, frame, edit.to);
+    case "nearer":
+      return setNearer(state, frame, edit.to);
+    case "own":
+      return setOwn(state, frame, edit.to);
+    case "lock":
+      return setLock(state, frame, edit.to);
+    default:
+      return {
+        ...edit,
+        id: newId(),
+        from: state.picks.find(({ id }) => id === (edit.to ?? edit.from).id) ?? null,
+      };
   }
 }

@@ -3,12 +3,16 @@ import * as api from "./api.js";
 import { byId, make } from "./dom.js";
 import { spoken } from "./guide.js";
 
-const FORMATS = [["coco", "COCO keypoints", "annotations.json"], ["dlc", "DeepLabCut CSV", "CollectedData.csv"],
-  ["cvat", "CVAT XML 1.1", "annotations.xml"]];
+const FORMATS = [
+  ["coco", "COCO keypoints", "annotations.json"],
+  ["dlc", "DeepLabCut CSV", "CollectedData.csv"],
+  ["cvat", "CVAT XML 1.1", "annotations.xml"],
+];
 const LISTED = 12; // conflicts shown one by one
 
 export function createFiles(model) {
-  const panel = byId("files-panel"), found = make("div", { className: "found" });
+  const panel = byId("files-panel"),
+    found = make("div", { className: "found" });
   const chosen = make("input", { type: "file", accept: ".json,.csv,.xml", id: "import-file" });
 
   async function look() {
@@ -21,13 +25,28 @@ export function createFiles(model) {
       button.addEventListener("click", () => take(content, mode));
       return button;
     };
-    const { conflicts, frames } = answer, count = Array.isArray(frames) ? frames.length : frames;
+    const { conflicts, frames } = answer,
+      count = Array.isArray(frames) ? frames.length : frames;
     found.replaceChildren(
-      make("p", {}, `${file.name}: ${count} frames, ${answer.new} new marks, ${conflicts.length} that differ from yours.`),
-      make("ul", {}, ...conflicts.slice(0, LISTED).map(({ frame, joint }) => make("li", {}, `frame ${frame}, ${spoken(joint)}`)),
-        conflicts.length > LISTED ? make("li", {}, `and ${conflicts.length - LISTED} more`) : null),
-      make("p", { className: "choices" }, offer(conflicts.length ? "Take it, keep mine where they differ" : "Take it", "keep"),
-        conflicts.length ? offer("Take it, replace mine", "replace") : null),
+      make(
+        "p",
+        {},
+        `${file.name}: ${count} frames, ${answer.new} new marks, ${conflicts.length} that differ from yours.`,
+      ),
+      make(
+        "ul",
+        {},
+        ...conflicts
+          .slice(0, LISTED)
+          .map(({ frame, joint }) => make("li", {}, `frame ${frame}, ${spoken(joint)}`)),
+        conflicts.length > LISTED ? make("li", {}, `and ${conflicts.length - LISTED} more`) : null,
+      ),
+      make(
+        "p",
+        { className: "choices" },
+        offer(conflicts.length ? "Take it, keep mine where they differ" : "Take it", "keep"),
+        conflicts.length ? offer("Take it, replace mine", "replace") : null,
+      ),
     );
   }
 
@@ -38,17 +57,38 @@ export function createFiles(model) {
     model.tell("The marks were taken in; Undo takes them out again.");
   }
 
-  const failing = (work) => () => work().catch((fault) => found.replaceChildren(make("p", { className: "wrong" }, fault.message)));
+  const failing = (work) => () =>
+    work().catch((fault) =>
+      found.replaceChildren(make("p", { className: "wrong" }, fault.message)),
+    );
   chosen.addEventListener("change", failing(look));
   panel.append(
-    make("form", { method: "dialog" }, make("button", { className: "plain close", "aria-label": "Close" }, "✕")),
+    make(
+      "form",
+      { method: "dialog" },
+      make("button", { className: "plain close", "aria-label": "Close" }, "✕"),
+    ),
     make("h2", {}, "Take marks from a file"),
-    make("p", { className: "note" }, "COCO keypoints, DeepLabCut CollectedData or CVAT XML; told by its content."),
-    chosen, found,
+    make(
+      "p",
+      { className: "note" },
+      "COCO keypoints, DeepLabCut CollectedData or CVAT XML; told by its content.",
+    ),
+    chosen,
+    found,
     make("h2", {}, "Save marks for another program"),
-    make("p", { className: "choices" }, ...FORMATS.map(([format, name, file]) =>
-      make("a", { href: `/api/export/${format}`, download: file }, name))),
-    make("p", { className: "note" }, "annotations.json in the project folder is always a COCO file of what is marked now."),
+    make(
+      "p",
+      { className: "choices" },
+      ...FORMATS.map(([format, name, file]) =>
+        make("a", { href: `/api/export/${format}`, download: file }, name),
+      ),
+    ),
+    make(
+      "p",
+      { className: "note" },
+      "annotations.json in the project folder is always a COCO file of what is marked now.",
+    ),
   );
   byId("files").addEventListener("click", () => {
     found.replaceChildren();

@@ -12,30 +12,60 @@ const TITLES = { any: "Everywhere", keyframes: "Keyframes", pick: "Colours", mot
 
 function shownKeys(keys) {
   const shown = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
-  return shown.flatMap((key, n) => [...(n && keys.length > 4 ? ["–"] : []), make("kbd", {}, keyText(key))]);
+  return shown.flatMap((key, n) => [
+    ...(n && keys.length > 4 ? ["–"] : []),
+    make("kbd", {}, keyText(key)),
+  ]);
 }
 
 function keysTable() {
-  const parts = Object.entries(KEYS).map(([page, rows]) => make("section", {},
-    make("h2", {}, TITLES[page]),
-    make("dl", {}, ...rows.flatMap(([keys, what]) => [
-      make("dt", {}, ...shownKeys(keys)), make("dd", {}, what),
-    ]))));
-  const pointer = make("section", {}, make("h2", {}, "Pointer"), make("dl", {}, ...[
-    ["click", "place the joint that is asked for; else select a joint, turn a limb"],
-    ["Shift click", "place it as hidden"],
-    ["drag", "move a joint, or the picture"],
-    ["wheel", "zoom at the pointer"],
-    ["over a joint or limb", "the keys V, F, R and Del mean what is under the pointer"],
-  ].flatMap(([what, does]) => [make("dt", {}, what), make("dd", {}, does)])));
+  const parts = Object.entries(KEYS).map(([page, rows]) =>
+    make(
+      "section",
+      {},
+      make("h2", {}, TITLES[page]),
+      make(
+        "dl",
+        {},
+        ...rows.flatMap(([keys, what]) => [
+          make("dt", {}, ...shownKeys(keys)),
+          make("dd", {}, what),
+        ]),
+      ),
+    ),
+  );
+  const pointer = make(
+    "section",
+    {},
+    make("h2", {}, "Pointer"),
+    make(
+      "dl",
+      {},
+      ...[
+        ["click", "place the joint that is asked for; else select a joint, turn a limb"],
+        ["Shift click", "place it as hidden"],
+        ["drag", "move a joint, or the picture"],
+        ["wheel", "zoom at the pointer"],
+        ["over a joint or limb", "the keys V, F, R and Del mean what is under the pointer"],
+      ].flatMap(([what, does]) => [make("dt", {}, what), make("dd", {}, does)]),
+    ),
+  );
   return [parts[0], pointer, ...parts.slice(1)];
 }
 
 export function createFrame(model, go) {
-  document.querySelectorAll("[data-go]").forEach((button) => button.addEventListener("click", () => go(button.dataset.go)));
+  document
+    .querySelectorAll("[data-go]")
+    .forEach((button) => button.addEventListener("click", () => go(button.dataset.go)));
   const keys = byId("keys-panel");
-  keys.append(make("form", { method: "dialog" }, make("button", { className: "plain close", "aria-label": "Close" }, "✕")),
-    make("div", { className: "keys" }, ...keysTable()));
+  keys.append(
+    make(
+      "form",
+      { method: "dialog" },
+      make("button", { className: "plain close", "aria-label": "Close" }, "✕"),
+    ),
+    make("div", { className: "keys" }, ...keysTable()),
+  );
   const help = () => (keys.open ? keys.close() : keys.showModal());
   byId("help").addEventListener("click", help);
   for (const panel of document.querySelectorAll("dialog")) {
@@ -75,7 +105,9 @@ export function createFrame(model, go) {
   }
 
   function draw() {
-    const { status, waiting, why } = model.saving, { undo, redo } = model.state, keyframes = model.keyframes();
+    const { status, waiting, why } = model.saving,
+      { undo, redo } = model.state,
+      keyframes = model.keyframes();
     const { view } = model.doing;
     document.body.dataset.view = view;
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
@@ -85,11 +117,20 @@ export function createFrame(model, go) {
     setText(byId("project-name"), model.project.name);
     setText(byId("saving"), SAVING[status](waiting));
     byId("saving").dataset.status = status;
-    byId("saving").title = status === "unsaved" ? why || "The server does not answer; is keyrecon annotate still running?" : "";
+    byId("saving").title =
+      status === "unsaved"
+        ? why || "The server does not answer; is keyrecon annotate still running?"
+        : "";
     byId("undo").disabled = !undo && !waiting;
     byId("redo").disabled = !redo;
-    setText(byId("pick-count"), model.state.picks.length ? `${model.state.picks.length} picks` : "");
-    setText(byId("done-count"), keyframes.length ? `${keyframes.filter(model.done).length} of ${keyframes.length}` : "");
+    setText(
+      byId("pick-count"),
+      model.state.picks.length ? `${model.state.picks.length} picks` : "",
+    );
+    setText(
+      byId("done-count"),
+      keyframes.length ? `${keyframes.filter(model.done).length} of ${keyframes.length}` : "",
+    );
     setText(byId("motion-state"), model.project.has?.motion ? "made" : "");
     drawNotice();
     drawJob();

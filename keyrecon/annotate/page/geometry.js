@@ -2,7 +2,10 @@
 // screen = scale * picture + (x, y), in CSS pixels of the canvas.
 
 export const toScreen = (view, [px, py]) => [view.scale * px + view.x, view.scale * py + view.y];
-export const toPicture = (view, [sx, sy]) => [(sx - view.x) / view.scale, (sy - view.y) / view.scale];
+export const toPicture = (view, [sx, sy]) => [
+  (sx - view.x) / view.scale,
+  (sy - view.y) / view.scale,
+];
 
 const between = (low, value, high) => Math.max(low, Math.min(high, value));
 
@@ -14,7 +17,8 @@ export function fit([x0, y0, x1, y1], [width, height], margin = 0) {
 
 // Zooms by a factor; the point under the pointer stays where it is.
 export function zoomAt(view, [sx, sy], factor, [least, most]) {
-  const scale = between(least, view.scale * factor, most), gain = scale / view.scale;
+  const scale = between(least, view.scale * factor, most),
+    gain = scale / view.scale;
   return { scale, x: sx - gain * (sx - view.x), y: sy - gain * (sy - view.y) };
 }
 
@@ -31,14 +35,21 @@ export function held(view, [width, height], picture, strip = 80) {
 
 // A box widened about its middle, cut at the picture's edge.
 export function widened([x0, y0, x1, y1], share, [width, height]) {
-  const dx = (x1 - x0) * share, dy = (y1 - y0) * share;
-  return [Math.max(0, x0 - dx), Math.max(0, y0 - dy), Math.min(width, x1 + dx), Math.min(height, y1 + dy)];
+  const dx = (x1 - x0) * share,
+    dy = (y1 - y0) * share;
+  return [
+    Math.max(0, x0 - dx),
+    Math.max(0, y0 - dy),
+    Math.min(width, x1 + dx),
+    Math.min(height, y1 + dy),
+  ];
 }
 
 export const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
 
 export function toSegment([px, py], [ax, ay], [bx, by]) {
-  const [dx, dy] = [bx - ax, by - ay], square = dx * dx + dy * dy;
+  const [dx, dy] = [bx - ax, by - ay],
+    square = dx * dx + dy * dy;
   const along = square ? between(0, ((px - ax) * dx + (py - ay) * dy) / square, 1) : 0;
   return Math.hypot(px - ax - along * dx, py - ay - along * dy);
 }

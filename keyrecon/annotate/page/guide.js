@@ -15,9 +15,11 @@ export function following(joints, marks, after) {
 
 // Where the suggestion may be taken: unmarked joints that it knows.
 export function suggested(joints, marks, ghost) {
-  return Object.fromEntries(unmarked(joints, marks)
-    .filter((joint) => ghost?.joints?.[joint])
-    .map((joint) => [joint, ghost.joints[joint]]));
+  return Object.fromEntries(
+    unmarked(joints, marks)
+      .filter((joint) => ghost?.joints?.[joint])
+      .map((joint) => [joint, ghost.joints[joint]]),
+  );
 }
 
 // Limbs whose depth can be told: both ends are placed.
@@ -28,11 +30,19 @@ export function limbsShown(limbs, marks) {
 
 // {do: "accept" | "place" | "depth" | "next", ...}: the one next thing on this keyframe.
 export function nextThing({ project, half, marks, nearer, ghost, pose, joint }) {
-  const joints = asked(project, half), offered = Object.keys(suggested(joints, marks, ghost));
+  const joints = asked(project, half),
+    offered = Object.keys(suggested(joints, marks, ghost));
   const missing = unmarked(joints, marks);
   if (offered.length) return { do: "accept", joints: offered, joint: joint ?? missing[0] };
-  if (missing.length) return { do: "place", joint: missing.includes(joint) ? joint : missing[0], left: missing.length };
-  const open = limbsShown(project.limbs, marks).filter(({ name }) => pose?.limbs?.[name] && !nearer[name]);
+  if (missing.length)
+    return {
+      do: "place",
+      joint: missing.includes(joint) ? joint : missing[0],
+      left: missing.length,
+    };
+  const open = limbsShown(project.limbs, marks).filter(
+    ({ name }) => pose?.limbs?.[name] && !nearer[name],
+  );
   if (open.length) return { do: "depth", limbs: open.map(({ name }) => name) };
   return { do: "next" };
 }
@@ -54,10 +64,15 @@ export function allKeyframes(project, state) {
   for (const [frame, half] of Object.entries(state.own)) {
     const chosen = byFrame.get(Number(frame));
     byFrame.set(Number(frame), {
-      why: "added by you", ...chosen, frame: Number(frame), half: joinHalves(chosen?.half, half), own: true,
+      why: "added by you",
+      ...chosen,
+      frame: Number(frame),
+      half: joinHalves(chosen?.half, half),
+      own: true,
     });
   }
-  return [...byFrame.values()].filter(({ frame, own }) => !own || state.own[frame])
+  return [...byFrame.values()]
+    .filter(({ frame, own }) => !own || state.own[frame])
     .map((keyframe) => ({ ...keyframe, locked: Boolean(state.locked[keyframe.frame]) }))
     .sort((a, b) => a.frame - b.frame);
 }

@@ -32,10 +32,13 @@ export function createHand(model) {
 
   // A joint on its way is held until the arrows rest, so that one undo takes the whole walk back.
   function nudge(dx, dy) {
-    const joint = doing.joint, mark = model.marks()[joint];
+    const joint = doing.joint,
+      mark = model.marks()[joint];
     if (away() || !joint) return;
-    const start = doing.held?.joint === joint ? doing.held.at
-      : mark ?? model.ghost()?.joints?.[joint] ?? model.middle();
+    const start =
+      doing.held?.joint === joint
+        ? doing.held.at
+        : (mark ?? model.ghost()?.joints?.[joint] ?? model.middle());
     model.do({ held: { joint, at: [start[0] + dx, start[1] + dy], floating: !mark } });
     clearTimeout(resting);
     if (mark) resting = setTimeout(keepHeld, PAUSE);

@@ -9,7 +9,11 @@ export function createJobs(model) {
       await api.send("jobs", { kind, options });
       await refresh();
     } catch (fault) {
-      model.tell(fault instanceof api.Gone ? "The server does not answer; is keyrecon annotate still running?" : fault.message);
+      model.tell(
+        fault instanceof api.Gone
+          ? "The server does not answer; is keyrecon annotate still running?"
+          : fault.message,
+      );
     }
   }
 
@@ -20,7 +24,8 @@ export function createJobs(model) {
 
   function ended(job) {
     if (job.state === "failed") model.tell(job.text || "The work failed.");
-    if (job.state === "cancelled") model.tell("Cancelled. What was finished is kept; starting again goes on from there.");
+    if (job.state === "cancelled")
+      model.tell("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
     model.readProject().then(() => {
       if (job.kind === "keyframes") model.do({ view: "keyframes" });

@@ -13,7 +13,11 @@ export const KEYS = {
     [["a", "d"], "previous, next keyframe", "keyframe"],
     [["n"], "next keyframe that is not done", "open"],
     [["w", "s"], "previous, next joint", "joint"],
-    [["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"], "move the joint by a pixel (with Shift by ten)", "nudge"],
+    [
+      ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
+      "move the joint by a pixel (with Shift by ten)",
+      "nudge",
+    ],
     [[" "], "put the joint down where the cross is", "put"],
     [["v"], "visible, placed though hidden, cannot be seen", "visibility"],
     [["Backspace", "Delete"], "take the joint's mark away", "clear"],
@@ -36,7 +40,11 @@ export const KEYS = {
   pick: [
     [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
     [[..."123456789"], "choose what to click", "part"],
-    [["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"], "move the cross (with Shift by ten)", "nudge"],
+    [
+      ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
+      "move the cross (with Shift by ten)",
+      "nudge",
+    ],
     [[" "], "pick the colour under the cross", "put"],
     [["Backspace", "Delete"], "take the last pick of this frame away", "clear"],
     [["m"], "show where the colour is found", "map"],
@@ -68,7 +76,8 @@ function named(event) {
 export function meaning(event, page) {
   const name = named(event);
   for (const [keys, , action] of [...KEYS[page], ...KEYS.any]) {
-    if (keys.includes(name)) return { action, key: name, place: keys.indexOf(name), shift: event.shiftKey };
+    if (keys.includes(name))
+      return { action, key: name, place: keys.indexOf(name), shift: event.shiftKey };
   }
   return null;
 }
@@ -76,12 +85,19 @@ export function meaning(event, page) {
 // Keys that belong to the element that has the focus: text, lists, sliders, buttons.
 export function belongsTo(element, key) {
   if (element.closest("input[type=text], textarea, select")) return true;
-  if (element.closest("input[type=range], [role=listbox], [data-turns]")) return key.startsWith("Arrow");
+  if (element.closest("input[type=range], [role=listbox], [data-turns]"))
+    return key.startsWith("Arrow");
   return Boolean(element.closest("button, a, summary")) && [" ", "Enter"].includes(key);
 }
 
 const shownNames = {
-  ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", " ": "Space", Escape: "Esc", Delete: "Del",
+  ArrowLeft: "←",
+  ArrowRight: "→",
+  ArrowUp: "↑",
+  ArrowDown: "↓",
+  " ": "Space",
+  Escape: "Esc",
+  Delete: "Del",
 };
 
 const shownPart = (part) => shownNames[part] ?? (part.length === 1 ? part.toUpperCase() : part);

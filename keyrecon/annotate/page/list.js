@@ -5,7 +5,8 @@ export function createList(root, { height, fill, choose }) {
   const tall = make("div", { className: "tall" });
   root.append(tall);
   const shown = new Map(); // row number -> element
-  let items = [], current = -1;
+  let items = [],
+    current = -1;
 
   function row(n) {
     if (!shown.has(n)) {
@@ -20,7 +21,10 @@ export function createList(root, { height, fill, choose }) {
 
   function draw() {
     const first = Math.max(0, Math.floor(root.scrollTop / height) - 4);
-    const last = Math.min(items.length, Math.ceil((root.scrollTop + root.clientHeight) / height) + 4);
+    const last = Math.min(
+      items.length,
+      Math.ceil((root.scrollTop + root.clientHeight) / height) + 4,
+    );
     for (const [n, element] of shown) {
       if (n < first || n >= last) {
         element.remove();
@@ -37,14 +41,17 @@ export function createList(root, { height, fill, choose }) {
   }
 
   function reveal(n) {
-    const top = n * height, bottom = top + height;
+    const top = n * height,
+      bottom = top + height;
     if (top < root.scrollTop) root.scrollTop = Math.max(0, top - height);
-    else if (bottom > root.scrollTop + root.clientHeight) root.scrollTop = bottom + height - root.clientHeight;
+    else if (bottom > root.scrollTop + root.clientHeight)
+      root.scrollTop = bottom + height - root.clientHeight;
   }
 
   root.addEventListener("scroll", draw, { passive: true });
   root.addEventListener("keydown", (event) => {
-    const by = { ArrowDown: 1, ArrowUp: -1 }[event.key], next = items[current + by];
+    const by = { ArrowDown: 1, ArrowUp: -1 }[event.key],
+      next = items[current + by];
     if (!by) return;
     event.preventDefault();
     event.stopPropagation();

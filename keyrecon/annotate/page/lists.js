@@ -21,17 +21,31 @@ function fillRow(element, label, parts) {
 }
 
 function keyframeRow(model, element, keyframe) {
-  const marks = model.marks(keyframe.frame), joints = asked(model.project, keyframe.half);
-  const count = joints.filter((joint) => marks[joint]).length, done = count === joints.length;
-  const stands = keyframe.stands_for ? `stands for ${keyframe.stands_for}` : keyframe.own ? "added by you" : "";
+  const marks = model.marks(keyframe.frame),
+    joints = asked(model.project, keyframe.half);
+  const count = joints.filter((joint) => marks[joint]).length,
+    done = count === joints.length;
+  const stands = keyframe.stands_for
+    ? `stands for ${keyframe.stands_for}`
+    : keyframe.own
+      ? "added by you"
+      : "";
   const label = [keyframe.frame, keyframe.half, stands, count, keyframe.locked].join();
   toggle(element, "done", done);
   fillRow(element, label, () => [
     bodySign(keyframe.half),
-    make("span", { className: "text" },
-      make("b", {}, `Frame ${keyframe.frame}`), make("small", {}, stands)),
-    make("span", { className: "state" }, keyframe.locked ? "🔒︎ " : "",
-      done ? "✓" : count ? `${count}/${joints.length}` : ""),
+    make(
+      "span",
+      { className: "text" },
+      make("b", {}, `Frame ${keyframe.frame}`),
+      make("small", {}, stands),
+    ),
+    make(
+      "span",
+      { className: "state" },
+      keyframe.locked ? "🔒︎ " : "",
+      done ? "✓" : count ? `${count}/${joints.length}` : "",
+    ),
   ]);
 }
 
@@ -39,16 +53,24 @@ function checkRow(element, check) {
   const name = check.joint ?? check.limb;
   fillRow(element, JSON.stringify(check), () => [
     make("span", { className: "suspicion" }, meter(check.suspicion)),
-    make("span", { className: "text" },
-      make("b", {}, `Frame ${check.frame}${name ? `, ${spoken(name)}` : ""}`), make("small", {}, check.text)),
+    make(
+      "span",
+      { className: "text" },
+      make("b", {}, `Frame ${check.frame}${name ? `, ${spoken(name)}` : ""}`),
+      make("small", {}, check.text),
+    ),
   ]);
 }
 
 function suggestionRow(element, suggestion) {
   fillRow(element, JSON.stringify(suggestion), () => [
     bodySign(suggestion.half),
-    make("span", { className: "text" },
-      make("b", {}, `Frame ${suggestion.frame}`), make("small", {}, suggestion.why)),
+    make(
+      "span",
+      { className: "text" },
+      make("b", {}, `Frame ${suggestion.frame}`),
+      make("small", {}, suggestion.why),
+    ),
     make("span", { className: "state" }, "add"),
   ]);
 }
@@ -60,9 +82,13 @@ function meter(share) {
 }
 
 export function createLists(model, actions) {
-  let tab = "frames", checks = [], suggestions = [];
+  let tab = "frames",
+    checks = [],
+    suggestions = [];
   const frames = createList(byId("frame-list"), {
-    height: 44, fill: (element, item) => keyframeRow(model, element, item), choose: ({ frame }) => actions.open(frame),
+    height: 44,
+    fill: (element, item) => keyframeRow(model, element, item),
+    choose: ({ frame }) => actions.open(frame),
   });
   const checkList = createList(byId("check-list"), { height: 58, fill: checkRow, choose: goTo });
   const nextList = createList(byId("next-list"), { height: 58, fill: suggestionRow, choose: add });
@@ -80,16 +106,20 @@ export function createLists(model, actions) {
   }
   model.onSettled(() => ask().catch(() => {})); // the server is gone: the lists stay as they are
 
-  document.querySelectorAll("[data-tab]").forEach((button) => button.addEventListener("click", () => {
-    tab = button.dataset.tab;
-    model.changed();
-  }));
+  document.querySelectorAll("[data-tab]").forEach((button) =>
+    button.addEventListener("click", () => {
+      tab = button.dataset.tab;
+      model.changed();
+    }),
+  );
 
   function explain() {
     const keyframe = model.keyframe();
-    if (tab === "checks") return checks.length ? "Most suspicious first. G goes to the first." : "Nothing looks wrong.";
+    if (tab === "checks")
+      return checks.length ? "Most suspicious first. G goes to the first." : "Nothing looks wrong.";
     if (tab === "next") {
-      if (suggestions.length) return "Frames where one more keyframe would help most. Y adds the first.";
+      if (suggestions.length)
+        return "Frames where one more keyframe would help most. Y adds the first.";
       return "After the motion was made, frames where one more keyframe would help are listed here.";
     }
     return keyframe?.why ? `Frame ${keyframe.frame}: ${keyframe.why}.`.replace("..", ".") : "";
@@ -103,11 +133,26 @@ export function createLists(model, actions) {
     });
     setText(byId("check-count"), checks.length ? String(checks.length) : "");
     setText(byId("why"), explain());
-    if (tab === "frames") frames.show(keyframes, keyframes.findIndex(({ frame }) => frame === model.doing.frame));
-    if (tab === "checks") checkList.show(checks, checks.findIndex(({ frame, joint, limb }) =>
-      frame === model.doing.frame && (joint ?? limb ?? null) === model.doing.joint));
+    if (tab === "frames")
+      frames.show(
+        keyframes,
+        keyframes.findIndex(({ frame }) => frame === model.doing.frame),
+      );
+    if (tab === "checks")
+      checkList.show(
+        checks,
+        checks.findIndex(
+          ({ frame, joint, limb }) =>
+            frame === model.doing.frame && (joint ?? limb ?? null) === model.doing.joint,
+        ),
+      );
     if (tab === "next") nextList.show(suggestions, -1);
   }
 
-  return { draw, ask, firstCheck: () => goTo(checks[0]), firstSuggestion: () => add(suggestions[0]) };
+  return {
+    draw,
+    ask,
+    firstCheck: () => goTo(checks[0]),
+    firstSuggestion: () => add(suggestions[0]),
+  };
 }

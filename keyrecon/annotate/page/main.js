@@ -23,15 +23,28 @@ const VIEWS = ["pick", "keyframes", "motion"];
 const model = await createModel();
 const { doing } = model;
 const stills = createStills(model.project, model.changed);
-const viewer = createViewer({ root: byId("picture"), project: model.project, stills, changed: model.changed });
+const viewer = createViewer({
+  root: byId("picture"),
+  project: model.project,
+  stills,
+  changed: model.changed,
+});
 const actions = createActions(model);
-const marks = Object.fromEntries(["left", "right", "middle"].map((side) => [side, color(`mark-${side}`)]));
+const marks = Object.fromEntries(
+  ["left", "right", "middle"].map((side) => [side, color(`mark-${side}`)]),
+);
 const stage = createStage(model, actions, viewer, marks);
 const depth = createDepth(model, stage.placed);
 const lists = createLists(model, actions);
 const jobs = createJobs(model);
 const frame = createFrame(model, go);
-const parts = [depth, createPrompt(model, actions), createScrub(model, actions), lists, createJoints(model, actions)];
+const parts = [
+  depth,
+  createPrompt(model, actions),
+  createScrub(model, actions),
+  lists,
+  createJoints(model, actions),
+];
 const pick = createPick(model, { stills, jobs, frame });
 const motion = createMotion(model, { stills, jobs, frame, actions });
 createFiles(model);
@@ -48,10 +61,13 @@ model.opened = (number) => {
 
 // The next and previous keyframes first, then a second around this one.
 function lookAhead() {
-  const frames = model.keyframes().map((keyframe) => keyframe.frame), at = frames.indexOf(doing.frame);
+  const frames = model.keyframes().map((keyframe) => keyframe.frame),
+    at = frames.indexOf(doing.frame);
   const near = [1, -1, 2].map((by) => frames[at + by]).filter((number) => number !== undefined);
-  const reach = Math.round(model.project.fps), around = [];
-  for (let by = 1; by <= reach; by++) around.push([doing.frame + by, SMALL], [doing.frame - by, SMALL]);
+  const reach = Math.round(model.project.fps),
+    around = [];
+  for (let by = 1; by <= reach; by++)
+    around.push([doing.frame + by, SMALL], [doing.frame - by, SMALL]);
   stills.wish([...near.map((number) => [number]), ...around]);
 }
 
@@ -90,17 +106,29 @@ function go(view) {
   if (view === "pick") pick.opened();
 }
 
-const mirrored = (half) => model.project.mirror.filter(([left]) => !half || model.project.halves[half].includes(left));
+const mirrored = (half) =>
+  model.project.mirror.filter(([left]) => !half || model.project.halves[half].includes(left));
 const swaps = { swapBody: null, swapUpper: "upper", swapLower: "lower" };
 
 const commands = {
   any: {
-    undo: actions.undo, redo: actions.redo, help: frame.help, page: ({ place }) => go(VIEWS[place]),
+    undo: actions.undo,
+    redo: actions.redo,
+    help: frame.help,
+    page: ({ place }) => go(VIEWS[place]),
   },
   keyframes: {
-    primary: actions.primary, put: actions.putDown, visibility: () => actions.visibility(), clear: actions.clear,
-    flip: () => actions.flip(), automatic: actions.automaticDepth, automaticAll: actions.automaticDepths,
-    open: actions.nextKeyframe, lock: actions.lock, check: lists.firstCheck, suggestion: lists.firstSuggestion,
+    primary: actions.primary,
+    put: actions.putDown,
+    visibility: () => actions.visibility(),
+    clear: actions.clear,
+    flip: () => actions.flip(),
+    automatic: actions.automaticDepth,
+    automaticAll: actions.automaticDepths,
+    open: actions.nextKeyframe,
+    lock: actions.lock,
+    check: lists.firstCheck,
+    suggestion: lists.firstSuggestion,
     keyframe: ({ place }) => actions.stepKeyframe(place ? 1 : -1),
     joint: ({ place }) => actions.stepJoint(place ? 1 : -1),
     look: ({ place }) => actions.look(doing.look + (place ? 1 : -1)),
@@ -108,9 +136,15 @@ const commands = {
     nudge: ({ key, shift }) => actions.nudge(...ARROWS[key].map((step) => step * (shift ? 10 : 1))),
     back: () => (doing.held ? model.do({ held: null }) : actions.look(0)),
     zoom: viewer.toggleZoom,
-    zoomBy: ({ place }) => viewer.zoom([byId("picture").clientWidth / 2, byId("picture").clientHeight / 2], place ? 0.8 : 1.25),
+    zoomBy: ({ place }) =>
+      viewer.zoom(
+        [byId("picture").clientWidth / 2, byId("picture").clientHeight / 2],
+        place ? 0.8 : 1.25,
+      ),
     hide: () => model.do({ hidden: true }),
-    ...Object.fromEntries(Object.entries(swaps).map(([name, half]) => [name, () => actions.swap(mirrored(half))])),
+    ...Object.fromEntries(
+      Object.entries(swaps).map(([name, half]) => [name, () => actions.swap(mirrored(half))]),
+    ),
   },
   pick: pick.commands,
   motion: motion.commands,
@@ -124,23 +158,16 @@ document.addEventListener("keydown", (event) => {
   const act = commands[doing.view][meant.action] ?? commands.any[meant.action];
   Promise.resolve(act(meant)).catch((fault) => model.tell(fault.message));
 });
-document.addEventListener("keyup", (event) => event.key.toLowerCase() === "h" && model.do({ hidden: false }));
+document.addEventListener(
+  "keyup",
+  (event) => event.key.toLowerCase() === "h" && model.do({ hidden: false }),
+);
 // A button pressed with the mouse does not keep the keys to itself.
-document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
+document.addEventListener(
+  "click",
+  (event) => event.detail && event.target.closest("button")?.blur(),
+);
 document.querySelectorAll("[data-swap]").forEach((button) => {
   button.addEventListener("click", () => commands.keyframes[button.dataset.swap]());
 });
-document.querySelectorAll("#keyframes [data-yaw]").forEach((button) => {
-  button.addEventListener("click", () => depth.space.look(Number(button.dataset.yaw), Number(button.dataset.pitch)));
-});
-depth.readings.forEach((button, n) => button.addEventListener("click", () => actions.reading(n)));
-byId("undo").addEventListener("click", () => commands.any.undo().catch((fault) => model.tell(fault.message)));
-byId("redo").addEventListener("click", () => commands.any.redo().catch((fault) => model.tell(fault.message)));
-addEventListener("hashchange", () => addressed() !== null && actions.open(addressed()));
-addEventListener("pagehide", actions.keepHeld);
-
-await model.readState();
-model.listen();
-jobs.refresh();
-lists.ask().catch(() => {});
 go(model.keyframes().length ? "keyframes" : "pick");

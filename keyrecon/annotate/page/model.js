@@ -14,8 +14,12 @@ export async function createModel() {
     saving: { status: "saved", waiting: 0 },
     notice: null,
   };
-  const drawers = [], settled = [], sent = new Set();
-  let asked = false, settling = null;
+  const drawers = [],
+    settled = [],
+    readers = [],
+    sent = new Set();
+  let asked = false,
+    settling = null;
 
   // A hidden page gets no animation frames; it is drawn when it is shown.
   model.changed = () => {
@@ -34,9 +38,10 @@ export async function createModel() {
     settling = setTimeout(() => settled.forEach((react) => react()), 400);
   };
 
+  model.onProject = (react) => readers.push(react);
   model.readProject = async () => {
     model.project = await api.read("project");
-    model.sides = sidesOf(model.project);
+    readers.forEach((react) => react());
     model.changed();
   };
   model.sides = sidesOf(model.project);
@@ -70,8 +75,15 @@ export async function createModel() {
   };
 
   function answered({ revision, results, undo, redo }, batch) {
-    model.state = { ...model.state, revision, undo: undo ?? model.state.undo + batch.length, redo: redo ?? 0 };
-    const failed = results.map((result, n) => ({ ...result, edit: batch[n] })).filter(({ ok }) => !ok);
+    model.state = {
+      ...model.state,
+      revision,
+      undo: undo ?? model.state.undo + batch.length,
+      redo: redo ?? 0,
+    };
+    const failed = results
+      .map((result, n) => ({ ...result, edit: batch[n] }))
+      .filter(({ ok }) => !ok);
     if (failed.length) yieldTo(failed);
     model.settle();
   }
@@ -83,7 +95,8 @@ export async function createModel() {
     if (error) model.tell(`Not taken: ${error}`);
     else {
       model.tell("Another page changed the same place; its version was kept.", {
-        text: "Use mine", act: () => model.edit(rebased(model.state, edit)),
+        text: "Use mine",
+        act: () => model.edit(rebased(model.state, edit)),
       });
     }
   }
@@ -97,7 +110,9 @@ export async function createModel() {
   // by its answer.
   function takeIn({ revision, undo, redo }, changes) {
     const ours = new Set(outbox.waiting().flatMap(slots));
-    const free = changes.map(fromCell).filter((cell) => !slots(cell).some((slot) => ours.has(slot)));
+    const free = changes
+      .map(fromCell)
+      .filter((cell) => !slots(cell).some((slot) => ours.has(slot)));
     const counts = undo === undefined ? {} : { undo, redo };
     model.state = { ...free.reduce(apply, model.state), revision, ...counts };
     model.changed();
@@ -121,18 +136,27 @@ export async function createModel() {
   model.redo = () => step("redo");
 
   model.jobs = new Map();
-  model.listen = () => api.listen({
-    opened: () => model.readState().then(() => outbox.found()).catch((fault) => outbox.lost(fault)),
-    closed: () => outbox.lost(),
-    news({ job, project, trouble, ...told }) {
-      if (job) model.jobs.set(job.id, job);
-      if (project) model.readProject().catch((fault) => outbox.lost(fault));
-      if (trouble !== undefined) model.tell(trouble);
-      const others = told.edits?.filter(({ id }) => !sent.has(id));
-      if (others?.length) takeIn(told, others.flatMap(({ changes }) => changes));
-      model.changed();
-    },
-  });
+  model.listen = () =>
+    api.listen({
+      opened: () =>
+        model
+          .readState()
+          .then(() => outbox.found())
+          .catch((fault) => outbox.lost(fault)),
+      closed: () => outbox.lost(),
+      news({ job, project, trouble, ...told }) {
+        if (job) model.jobs.set(job.id, job);
+        if (project) model.readProject().catch((fault) => outbox.lost(fault));
+        if (trouble !== undefined) model.tell(trouble);
+        const others = told.edits?.filter(({ id }) => !sent.has(id));
+        if (others?.length)
+          takeIn(
+            told,
+            others.flatMap(({ changes }) => changes),
+          );
+        model.changed();
+      },
+    });
 
   model.marks = (frame = model.doing.frame) => marksOf(model.state, frame);
   model.nearer = (frame = model.doing.frame) => nearerOf(model.state, frame);

@@ -10,14 +10,19 @@ const MOST = 200; // edits in one message
 export function keptEdits(storage, project) {
   const prefix = `keyrecon/${project}/`;
   let count = 0;
-  const keys = () => Object.keys(storage).filter((key) => key.startsWith(prefix)).sort();
+  const keys = () =>
+    Object.keys(storage)
+      .filter((key) => key.startsWith(prefix))
+      .sort();
   return {
     keep(edit) {
       const order = `${String(Date.now()).padStart(15, "0")}-${String(count++).padStart(6, "0")}`;
       storage.setItem(`${prefix}${order}/${edit.id}`, JSON.stringify(edit));
     },
     drop(ids) {
-      keys().filter((key) => ids.has(key.split("/").at(-1))).forEach((key) => storage.removeItem(key));
+      keys()
+        .filter((key) => ids.has(key.split("/").at(-1)))
+        .forEach((key) => storage.removeItem(key));
     },
     all: () => keys().map((key) => JSON.parse(storage.getItem(key))),
   };
@@ -27,7 +32,13 @@ export function keptEdits(storage, project) {
 // "unsaved", how many wait, and why), `answered` the answer and the edits that were sent, `refused` an edit
 // that the server will never take and why.
 export function createOutbox({ send, kept, status, answered, refused, wait = setTimeout }) {
-  let waiting = kept.all(), sending = false, failures = 0, most = MOST, timer = null, cut = false, why = "";
+  let waiting = kept.all(),
+    sending = false,
+    failures = 0,
+    most = MOST,
+    timer = null,
+    cut = false,
+    why = "";
 
   function tell() {
     if (failures || (cut && !waiting.length)) status("unsaved", waiting.length, why);
@@ -87,7 +98,8 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
       why = fault?.message ?? "";
       tell();
     },
-    found() { // the server answers again
+    found() {
+      // the server answers again
       clearTimeout(timer);
       cut = false;
       failures = 0;

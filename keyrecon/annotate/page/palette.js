@@ -3,7 +3,14 @@ import { byId, make } from "./dom.js";
 import { NEEDED } from "./parts.js";
 
 const COLORS = [
-  "#56b4e9", "#e69f00", "#f0e442", "#cc79a7", "#009e73", "#d55e00", "#0072b2", "#ffffff",
+  "#56b4e9",
+  "#e69f00",
+  "#f0e442",
+  "#cc79a7",
+  "#009e73",
+  "#d55e00",
+  "#0072b2",
+  "#ffffff",
 ];
 
 // Replaces the children of an element when what they show has changed.
@@ -24,11 +31,17 @@ export function createPalette({ choose, show, remove, name }) {
   }
 
   function partButton({ part, text, picked, count }, n, current) {
-    const swatch = make("i"), needed = NEEDED.some((one) => one.part === part) && picked < count;
+    const swatch = make("i"),
+      needed = NEEDED.some((one) => one.part === part) && picked < count;
     swatch.style.background = colorOf(part);
-    const button = make("button", { data: { part } }, swatch, text,
+    const button = make(
+      "button",
+      { data: { part } },
+      swatch,
+      text,
       make("small", {}, picked ? String(picked) : needed ? "needed" : ""),
-      make("kbd", {}, n < 9 ? String(n + 1) : ""));
+      make("kbd", {}, n < 9 ? String(n + 1) : ""),
+    );
     button.setAttribute("aria-pressed", part === current);
     button.addEventListener("click", () => choose(part));
     return button;
@@ -51,7 +64,9 @@ export function createPalette({ choose, show, remove, name }) {
   });
 
   function draw(parts, picks, current) {
-    refill(byId("parts"), [parts, current], () => parts.map((part, n) => partButton(part, n, current)));
+    refill(byId("parts"), [parts, current], () =>
+      parts.map((part, n) => partButton(part, n, current)),
+    );
     refill(byId("pick-list"), picks, () => [...picks].reverse().map(pickRow));
   }
 

@@ -10,19 +10,26 @@ const counted = (picks, part) => picks.filter((pick) => pick.part === part).leng
 
 // All parts in the order of the list: needed, usual, and what else was picked or named.
 export function partsOf(picks, named = []) {
-  const regions = [...new Set([...USUAL, ...named, ...picks.map(({ part }) => part)])]
-    .filter((part) => !NEEDED.some((needed) => needed.part === part));
+  const regions = [...new Set([...USUAL, ...named, ...picks.map(({ part }) => part)])].filter(
+    (part) => !NEEDED.some((needed) => needed.part === part),
+  );
   return [
     ...NEEDED.map((needed) => ({ ...needed, picked: counted(picks, needed.part) })),
     ...regions.map((part) => ({
-      part, text: part, hint: `the ${part}, away from its rim`, count: 1, picked: counted(picks, part),
+      part,
+      text: part,
+      hint: `the ${part}, away from its rim`,
+      count: 1,
+      picked: counted(picks, part),
     })),
   ];
 }
 
 // What still has to be clicked before the program can start: head, both feet and one region.
 export function stillNeeded(parts) {
-  const open = parts.filter(({ part, picked, count }) => NEEDED.some((needed) => needed.part === part) && picked < count);
+  const open = parts.filter(
+    ({ part, picked, count }) => NEEDED.some((needed) => needed.part === part) && picked < count,
+  );
   const regions = parts.slice(NEEDED.length);
   return regions.some(({ picked }) => picked) ? open : [...open, regions[0]];
 }

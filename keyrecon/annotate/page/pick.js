@@ -13,11 +13,19 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const REACH = 8; // px around a pick
 
 export function createPick(model, { stills, jobs, frame: surround }) {
-  const { project } = model, last = project.n_frames - 1, root = byId("pick-picture");
+  const { project } = model,
+    last = project.n_frames - 1,
+    root = byId("pick-picture");
   const viewer = createViewer({ root, project, stills, changed: model.changed });
   const strip = createStrip(model, show);
   const palette = createPalette({ choose, show, remove, name });
-  const doing = { frame: Math.round(last / 2), part: "head", named: [], cross: null, pointer: null };
+  const doing = {
+    frame: Math.round(last / 2),
+    part: "head",
+    named: [],
+    cross: null,
+    pointer: null,
+  };
   let map = null; // where the part's colour is, over the picture
 
   const picks = () => model.state.picks;
@@ -45,7 +53,8 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     if (x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
     const [px, py] = [x, y].map((value) => Math.round(value * 10) / 10);
     model.edit(addPick({ id: newId(), frame: doing.frame, part: doing.part, x: px, y: py }));
-    const next = stillNeeded(parts())[0], now = parts().find(({ part }) => part === doing.part);
+    const next = stillNeeded(parts())[0],
+      now = parts().find(({ part }) => part === doing.part);
     if (next && now.picked >= now.count) choose(next.part);
   }
 
@@ -58,9 +67,10 @@ export function createPick(model, { stills, jobs, frame: surround }) {
   async function askMap() {
     map = null;
     if (!byId("show-map").checked) return;
-    const { frame, part } = doing, asked = new URLSearchParams({ part, revision: model.state.revision });
+    const { frame, part } = doing,
+      asked = new URLSearchParams({ part, revision: model.state.revision });
     const response = await fetch(`/api/backprojection/${frame}?${asked}`).catch(() => null);
-    const picture = response?.status === 200 && await createImageBitmap(await response.blob());
+    const picture = response?.status === 200 && (await createImageBitmap(await response.blob()));
     if (picture && frame === doing.frame && part === doing.part) map = picture;
     model.changed();
   }
@@ -73,7 +83,9 @@ export function createPick(model, { stills, jobs, frame: surround }) {
   });
 
   viewer.listen({
-    grab: () => null, drag() {}, drop() {},
+    grab: () => null,
+    drag() {},
+    drop() {},
     click(at) {
       const places = here().map((pick) => [pick.id, viewer.toScreen([pick.x, pick.y])]);
       const id = placeUnder(at, Object.fromEntries(places), REACH);
@@ -113,18 +125,25 @@ export function createPick(model, { stills, jobs, frame: surround }) {
       drawLabel(pen, [at[0] + 10, at[1] - 14], pick.part);
     }
     if (doing.cross) drawCross(pen, viewer.toScreen(doing.cross), "#fff");
-    if (doing.pointer) drawLabel(pen, [doing.pointer[0] + 14, doing.pointer[1] + 18], doing.part, true);
+    if (doing.pointer)
+      drawLabel(pen, [doing.pointer[0] + 14, doing.pointer[1] + 18], doing.part, true);
     viewer.cursor("crosshair");
   }
 
   function words() {
     const now = parts().find(({ part }) => part === doing.part);
-    if (surround.runningJob()) return ["The keyframes are being chosen", "When cancelled, it goes on from there later."];
+    if (surround.runningJob())
+      return ["The keyframes are being chosen", "When cancelled, it goes on from there later."];
     if (stillNeeded(parts()).length) {
-      return [`Click ${now.hint}`, "On any frame where it is well seen. A click on a pick removes it."];
+      return [
+        `Click ${now.hint}`,
+        "On any frame where it is well seen. A click on a pick removes it.",
+      ];
     }
-    return ["The colours are known",
-      "Look at the strip: are head and feet on the player? Clicks on more frames make it surer."];
+    return [
+      "The colours are known",
+      "Look at the strip: are head and feet on the player? Clicks on more frames make it surer.",
+    ];
   }
 
   function draw() {
@@ -134,18 +153,24 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     setText(byId("pick-text"), text);
     setText(byId("pick-more"), more);
     byId("pick-primary").hidden = stillNeeded(parts()).length > 0 || Boolean(surround.runningJob());
-    setText(byId("pick-primary"), model.project.has.keyframes ? "Choose the keyframes again" : "Choose the keyframes");
+    setText(
+      byId("pick-primary"),
+      model.project.has.keyframes ? "Choose the keyframes again" : "Choose the keyframes",
+    );
     palette.draw(parts(), picks(), doing.part);
     drawPicture();
     strip.draw(doing.frame);
   }
 
   const commands = {
-    primary, clear: () => here().length && remove(here().at(-1)),
-    step: ({ place, shift }) => show(doing.frame + (place ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
+    primary,
+    clear: () => here().length && remove(here().at(-1)),
+    step: ({ place, shift }) =>
+      show(doing.frame + (place ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
     part: ({ place }) => parts()[place] && choose(parts()[place].part),
     nudge({ key, shift }) {
-      const step = ARROWS[key].map((by) => by * (shift ? 10 : 1)), [x, y] = doing.cross ?? viewer.middle();
+      const step = ARROWS[key].map((by) => by * (shift ? 10 : 1)),
+        [x, y] = doing.cross ?? viewer.middle();
       doing.cross = [x + step[0], y + step[1]];
       model.changed();
     },

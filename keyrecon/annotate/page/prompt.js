@@ -14,19 +14,27 @@ function counted(n, word) {
 }
 
 function sureness(model, limbs) {
-  const unsure = limbs.filter((limb) => (model.pose()?.limbs?.[limb]?.sure ?? 1) < 0.75).map(spoken);
+  const unsure = limbs
+    .filter((limb) => (model.pose()?.limbs?.[limb]?.sure ?? 1) < 0.75)
+    .map(spoken);
   if (!unsure.length) return "The program is fairly sure of all of them.";
-  const listed = unsure.slice(0, 3).join(", ") + (unsure.length > 3 ? ` and ${unsure.length - 3} more` : "");
+  const listed =
+    unsure.slice(0, 3).join(", ") + (unsure.length > 3 ? ` and ${unsure.length - 3} more` : "");
   return `Least sure: ${listed}. Click a limb to turn it, or try 1, 2, 3.`;
 }
 
 const prompts = {
   accept(model, { joints, joint }) {
     const ghost = model.ghost();
-    const source = ghost.from?.length ? ` carried over from frame ${ghost.from.slice(0, 3).join(", ")}` : "";
+    const source = ghost.from?.length
+      ? ` carried over from frame ${ghost.from.slice(0, 3).join(", ")}`
+      : "";
     return {
       text: `Take the suggestion for ${counted(joints.length, "joint")}?`,
-      more: `It is${source}. Drag what is wrong, or click ${named(model, joint)} yourself.`.replace("is.", "is dashed."),
+      more: `It is${source}. Drag what is wrong, or click ${named(model, joint)} yourself.`.replace(
+        "is.",
+        "is dashed.",
+      ),
       button: "Take it",
     };
   },
@@ -42,8 +50,16 @@ const prompts = {
   next(model) {
     const open = model.keyframes().filter((keyframe) => !model.done(keyframe)).length;
     return open
-      ? { text: "This keyframe is done", more: `${counted(open, "keyframe")} to go.`, button: "Next keyframe" }
-      : { text: "All keyframes are done", more: "The motion can be made.", button: "Go to the motion" };
+      ? {
+          text: "This keyframe is done",
+          more: `${counted(open, "keyframe")} to go.`,
+          button: "Next keyframe",
+        }
+      : {
+          text: "All keyframes are done",
+          more: "The motion can be made.",
+          button: "Go to the motion",
+        };
   },
 };
 
@@ -60,9 +76,19 @@ export function createPrompt(model, actions) {
   byId("primary").addEventListener("click", actions.primary);
 
   function words() {
-    if (!model.keyframe()) return { text: "No keyframes yet", more: "Pick the colours first; the program then chooses the keyframes." };
-    if (model.doing.look) return { text: "Looking around the keyframe", more: "Nothing is marked here.", button: "Back to the keyframe" };
-    const thing = actions.thing(), found = prompts[thing.do](model, thing);
+    if (!model.keyframe())
+      return {
+        text: "No keyframes yet",
+        more: "Pick the colours first; the program then chooses the keyframes.",
+      };
+    if (model.doing.look)
+      return {
+        text: "Looking around the keyframe",
+        more: "Nothing is marked here.",
+        button: "Back to the keyframe",
+      };
+    const thing = actions.thing(),
+      found = prompts[thing.do](model, thing);
     return { ...found, more: stretched(model) ?? found.more };
   }
 

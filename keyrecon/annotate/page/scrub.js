@@ -9,12 +9,14 @@ export function createScrub(model, actions) {
 
   return {
     draw() {
-      const { frame, look } = model.doing, { fps, time, n_frames: count } = model.project;
+      const { frame, look } = model.doing,
+        { fps, time, n_frames: count } = model.project;
       const reach = Math.round(fps);
       slider.min = -Math.min(reach, frame);
       slider.max = Math.min(reach, count - 1 - frame);
       slider.value = look;
-      const at = frame + look, seconds = time?.[at] ?? at / fps;
+      const at = frame + look,
+        seconds = time?.[at] ?? at / fps;
       setText(byId("where"), `frame ${at} of ${count}, ${seconds.toFixed(2)} s`);
       byId("away").hidden = look === 0;
       setText(byId("away"), `${look > 0 ? "+" : "−"}${Math.abs(look)} frames from the keyframe`);

@@ -2,7 +2,9 @@
 // orange square, the middle a white diamond. A limb is a wedge, broad at the end nearer the camera.
 
 const TAU = 2 * Math.PI;
-const BROAD = 4.5, NARROW = 1, FLAT = 2; // half widths of a limb, px
+const BROAD = 4.5,
+  NARROW = 1,
+  FLAT = 2; // half widths of a limb, px
 const CASING = "rgba(10, 12, 16, .75)";
 
 function outline(pen, shape, [x, y], size) {
@@ -52,7 +54,8 @@ export function drawJoint(pen, place, look) {
 function wedge(pen, [ax, ay], [bx, by], sign) {
   const length = Math.hypot(bx - ax, by - ay) || 1;
   const [nx, ny] = [(ay - by) / length, (bx - ax) / length];
-  const a = sign > 0 ? NARROW : sign < 0 ? BROAD : FLAT, b = sign > 0 ? BROAD : sign < 0 ? NARROW : FLAT;
+  const a = sign > 0 ? NARROW : sign < 0 ? BROAD : FLAT,
+    b = sign > 0 ? BROAD : sign < 0 ? NARROW : FLAT;
   pen.beginPath();
   pen.moveTo(ax + nx * a, ay + ny * a);
   pen.lineTo(bx + nx * b, by + ny * b);
@@ -117,11 +120,19 @@ export function drawLabel(pen, [x, y], text, bold = false) {
 }
 
 export function drawCross(pen, [x, y], color) {
-  for (const [style, width] of [[CASING, 3.5], [color, 1.5]]) {
+  for (const [style, width] of [
+    [CASING, 3.5],
+    [color, 1.5],
+  ]) {
     pen.strokeStyle = style;
     pen.lineWidth = width;
     pen.beginPath();
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    for (const [dx, dy] of [
+      [1, 0],
+      [-1, 0],
+      [0, 1],
+      [0, -1],
+    ]) {
       pen.moveTo(x + 4 * dx, y + 4 * dy);
       pen.lineTo(x + 16 * dx, y + 16 * dy);
     }

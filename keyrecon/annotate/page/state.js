@@ -1,6 +1,15 @@
 // What a person has said, as plain values; an edit makes a new state and leaves the old one.
 
-const empty = { revision: 0, marks: {}, nearer: {}, picks: [], own: {}, locked: {}, undo: 0, redo: 0 };
+const empty = {
+  revision: 0,
+  marks: {},
+  nearer: {},
+  picks: [],
+  own: {},
+  locked: {},
+  undo: 0,
+  redo: 0,
+};
 
 export const emptyState = () => structuredClone(empty);
 
@@ -46,7 +55,8 @@ export function slots(edit) {
   const { kind, frame, joint } = edit;
   if (kind === "group") return edit.edits.flatMap(slots);
   if (kind === "mark") return [`marks/${frame}/${joint}`];
-  if (kind === "marks" || kind === "nearer") return Object.keys(edit.to).map((name) => `${kind}/${frame}/${name}`);
+  if (kind === "marks" || kind === "nearer")
+    return Object.keys(edit.to).map((name) => `${kind}/${frame}/${name}`);
   if (kind === "pick") return [`pick/${(edit.to ?? edit.from)?.id}`];
   return [`${kind}/${frame}`];
 }

@@ -6,7 +6,8 @@ const SIDE_BY_SIDE = 4; // requests at a time
 export function createStills(project, ready) {
   const kept = new Map(); // key -> picture, oldest use first
   const coming = new Map();
-  let wanted = [], room = 0;
+  let wanted = [],
+    room = 0;
 
   const key = (frame, width) => `${frame}/${width ?? 0}`;
 
@@ -37,13 +38,17 @@ export function createStills(project, ready) {
   function load(frame, width) {
     const name = key(frame, width);
     if (kept.has(name) || coming.has(name)) return;
-    const arrival = fetchOne(frame, width).then((picture) => {
-      keep(name, picture);
-      ready(frame);
-    }).catch(() => {}).finally(() => { // a picture that fails is asked for again when it is drawn
-      coming.delete(name);
-      work();
-    });
+    const arrival = fetchOne(frame, width)
+      .then((picture) => {
+        keep(name, picture);
+        ready(frame);
+      })
+      .catch(() => {})
+      .finally(() => {
+        // a picture that fails is asked for again when it is drawn
+        coming.delete(name);
+        work();
+      });
     coming.set(name, arrival);
   }
 
@@ -54,7 +59,8 @@ export function createStills(project, ready) {
   return {
     // The picture if it is here; asks for it at once if not.
     get(frame, width) {
-      const name = key(frame, width), picture = kept.get(name);
+      const name = key(frame, width),
+        picture = kept.get(name);
       if (!picture) {
         load(frame, width);
         return null;

@@ -7,14 +7,24 @@ const FRAMES = 7;
 const WIDTH = 320; // px of the stills
 
 export function createStrip(model, choose) {
-  const { project } = model, frames = spread(project.n_frames, FRAMES);
+  const { project } = model,
+    frames = spread(project.n_frames, FRAMES);
   const found = new Map(); // frame -> {head, feet, box}
   let trust = null;
 
   const cells = frames.map((frame) => {
-    const picture = make("img", { alt: `Frame ${frame}`, src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.version })}` });
+    const picture = make("img", {
+      alt: `Frame ${frame}`,
+      src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.version })}`,
+    });
     const canvas = make("canvas");
-    const cell = make("button", { title: `Frame ${frame}` }, picture, canvas, make("small", {}, String(frame)));
+    const cell = make(
+      "button",
+      { title: `Frame ${frame}` },
+      picture,
+      canvas,
+      make("small", {}, String(frame)),
+    );
     cell.addEventListener("click", () => choose(frame));
     picture.addEventListener("load", () => model.changed());
     return { frame, cell, canvas };
@@ -42,12 +52,17 @@ export function createStrip(model, choose) {
 
   function draw(current) {
     for (const { frame, cell, canvas } of cells) {
-      const [pen, width] = penOf(canvas), row = found.get(frame), scale = width / project.width;
+      const [pen, width] = penOf(canvas),
+        row = found.get(frame),
+        scale = width / project.width;
       cell.setAttribute("aria-current", frame === current);
       if (row?.head) mark(pen, row.head, scale, "#56b4e9", 5);
       for (const foot of row?.feet ?? []) mark(pen, foot, scale, "#e69f00", 3.5);
     }
-    const seen = typeof trust === "number" ? `Head and feet agree on ${Math.round(100 * trust)} % of the strip.` : "";
+    const seen =
+      typeof trust === "number"
+        ? `Head and feet agree on ${Math.round(100 * trust)} % of the strip.`
+        : "";
     setText(byId("strip-note"), seen);
   }
 

@@ -14,13 +14,15 @@ export function createTravel(model, hand) {
   }
 
   function stepKeyframe(by) {
-    const frames = model.keyframes().map(({ frame }) => frame), at = frames.indexOf(doing.frame);
+    const frames = model.keyframes().map(({ frame }) => frame),
+      at = frames.indexOf(doing.frame);
     const next = frames[Math.max(0, Math.min(frames.length - 1, at + by))];
     if (next !== undefined && next !== doing.frame) open(next);
   }
 
   function stepJoint(by) {
-    const all = hand.joints(), at = all.indexOf(doing.joint);
+    const all = hand.joints(),
+      at = all.indexOf(doing.joint);
     hand.select(all[(at + by + all.length) % all.length] ?? all[0]);
   }
 
@@ -32,7 +34,8 @@ export function createTravel(model, hand) {
 
   function look(offset) {
     hand.keepHeld();
-    const reach = Math.round(model.project.fps), last = model.project.n_frames - 1 - doing.frame;
+    const reach = Math.round(model.project.fps),
+      last = model.project.n_frames - 1 - doing.frame;
     model.do({ look: Math.max(-reach, -doing.frame, Math.min(reach, last, offset)) });
   }
 
@@ -52,7 +55,13 @@ export function createTravel(model, hand) {
   }
 
   return {
-    open, stepKeyframe, stepJoint, nextKeyframe, look, addKeyframe,
-    undo: () => step(model.undo), redo: () => step(model.redo),
+    open,
+    stepKeyframe,
+    stepJoint,
+    nextKeyframe,
+    look,
+    addKeyframe,
+    undo: () => step(model.undo),
+    redo: () => step(model.redo),
   };
 }

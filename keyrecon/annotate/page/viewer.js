@@ -9,7 +9,9 @@ const MOST = 16; // screen pixels per picture pixel
 export function createViewer({ root, project, stills, changed }) {
   const [below, above] = root.querySelectorAll("canvas");
   const picture = [project.width, project.height];
-  let view = null, box = null, shown = null;
+  let view = null,
+    box = null,
+    shown = null;
 
   const size = () => [above.clientWidth, above.clientHeight];
   const whole = () => fit([0, 0, ...picture], size());
@@ -40,11 +42,15 @@ export function createViewer({ root, project, stills, changed }) {
     setView(zoomAt(view, at, factor, [whole().scale * 0.8, MOST]));
   }
 
-  above.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1; // Firefox counts in lines
-    zoom([event.offsetX, event.offsetY], Math.exp(-event.deltaY * lines * 0.0016));
-  }, { passive: false });
+  above.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1; // Firefox counts in lines
+      zoom([event.offsetX, event.offsetY], Math.exp(-event.deltaY * lines * 0.0016));
+    },
+    { passive: false },
+  );
   new ResizeObserver(() => view && setView(near())).observe(root);
 
   // grab(at) -> something to drag, or null to pan; drag(thing, at), drop(thing, at), click(at, event).
@@ -53,7 +59,12 @@ export function createViewer({ root, project, stills, changed }) {
     const at = (event) => [event.offsetX, event.offsetY];
     above.addEventListener("pointerdown", (event) => {
       above.setPointerCapture(event.pointerId);
-      press = { start: at(event), last: at(event), moved: false, thing: event.button === 0 ? grab(at(event)) : null };
+      press = {
+        start: at(event),
+        last: at(event),
+        moved: false,
+        thing: event.button === 0 ? grab(at(event)) : null,
+      };
     });
     above.addEventListener("pointermove", (event) => {
       const now = at(event);
@@ -71,17 +82,25 @@ export function createViewer({ root, project, stills, changed }) {
       if (done.moved && done.thing) drop(done.thing, toPicture(view, at(event)));
       else if (!done.moved && event.button === 0) click(at(event), event);
     });
-    above.addEventListener("pointercancel", () => { press = null; });
+    above.addEventListener("pointercancel", () => {
+      press = null;
+    });
     above.addEventListener("pointerleave", () => press || hover(null));
     above.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
   return {
-    listen, drawPicture, zoom,
+    listen,
+    drawPicture,
+    zoom,
     overlay: () => penOf(above),
     toScreen: (place) => toScreen(view, place),
     toPicture: (at) => toPicture(view, at),
-    middle: () => toPicture(view, size().map((extent) => extent / 2)),
+    middle: () =>
+      toPicture(
+        view,
+        size().map((extent) => extent / 2),
+      ),
     scale: () => view.scale,
     // Shows the surroundings of a box, or the whole picture.
     frameBox(next) {
