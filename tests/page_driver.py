@@ -14,11 +14,13 @@ import uvicorn
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.desk import open_desk
 from keyrecon.annotate.server import make_app
+from keyrecon.body import LSP14
 from keyrecon.serving import listen, make_door
 from keyrecon.workspace import Workspace
 
 CHROMIUM = Path("/usr/bin/chromium")
 SCREEN = {"width": 1366, "height": 768}
+SELECTED = "document.querySelector('.joint.selected')?.dataset.joint"
 SOON = 60_000
 """How long the page may take for anything, ms."""
 
@@ -85,6 +87,7 @@ class Person:
         self.complaints = []
         self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
         self.page.on("console", self._hear)
+        self.page.on("response", self._remember)
         self.page.goto(address)
         self.page.wait_for_selector("#saving[data-status]", state="attached")
 
@@ -132,8 +135,7 @@ class Person:
 
     def asked(self):
         """The joint that is asked for, if any."""
-        selected = "document.querySelector('.joint.selected')"
-        return self.page.evaluate(f"{selected}?.dataset.joint ?? null")
+        return self.page.evaluate(f"{SELECTED} ?? null")
 
     def await_text(self, selector, pattern):
         self.page.wait_for_function(
@@ -156,6 +158,39 @@ class Person:
         self.page.evaluate("frame => { location.hash = `frame=${frame}`; }", frame)
         self.await_text("#where", rf"frame {frame} of")
         self.page.wait_for_selector(f"#picture[data-frame='{frame}']")
+
+    def pose(self):
+        """What the server last told the page of the pose."""
+        self.await_drawn()
+        self.page.wait_for_selector("#space[aria-busy=false]")
+        return self._pose.json()
+
+    def _remember(self, response):
+        if response.url.endswith("/api/pose"):
+            self._pose = response
+
+    def mark_joints(self, place_of):
+        """Click every joint that is asked for where `place_of(joint)` says."""
+        while joint := self.asked():
+            self.click(place_of(joint))
+            self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
+
+    def settle_depths(self, signs, place_of):
+        """Take the best of the readings offered and turn the limbs that are wrong in it.
+
+        To point at a limb is no action: the key that turns it is.
+        """
+        offered = [reading["nearer"] for reading in self.pose()["alternatives"][:3]]
+        wrong = [
+            [limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered
+        ]
+        best = min(range(len(wrong)), key=lambda n: len(wrong[n]))
+        self.press(str(best + 1))
+        for limb in wrong[best]:
+            parent = LSP14.names[LSP14.parents[LSP14.index(limb)]]
+            self.point_at((place_of(limb) + place_of(parent)) / 2)
+            self.await_drawn()
+            self.press("f")
 
     def call(self, module, expression):
         """What an expression on a module of the page gives; the module is called `m`."""

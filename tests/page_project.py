@@ -11,6 +11,8 @@ from keyrecon.video_writer import write_video
 from keyrecon.workspace import Workspace
 
 FPS, FRAMES, SIZE = 25.0, 100, (640, 360)
+STATURE = 1.78
+"""Metres."""
 PIXELS = 150.0
 """Pixels per metre."""
 
@@ -42,7 +44,7 @@ def write_numbered_video(path):
 
 def truth():
     """Joints of a tennis player in camera axes (metres) and on the picture."""
-    world = play_tennis(MotionOptions(seconds=FRAMES / FPS, fps=FPS, seed=3))
+    world = play_tennis(MotionOptions(seconds=FRAMES / FPS, fps=FPS, stature=STATURE, seed=3))
     points3d = (world - world[:, 12:13]) * [1, -1, -1]
     points2d = points3d[..., :2] * PIXELS + [SIZE[0] / 2, 110]
     return points3d, points2d

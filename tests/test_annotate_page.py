@@ -1,11 +1,27 @@
 """The annotator's page in a real browser: what a person does there is what stands in the files."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from page_driver import CHROMIUM, SCREEN, Person, browser, far, serving
-from page_project import block, make_project, read_number, truth, write_numbered_video
+from page_project import (
+    FPS,
+    FRAMES,
+    PIXELS,
+    STATURE,
+    block,
+    make_project,
+    read_number,
+    true_signs,
+    truth,
+    write_numbered_video,
+)
 
 from keyrecon.annotate.assistant import Assistant
+from keyrecon.assist.assistant import describe_pose
+from keyrecon.assist.knowledge import learn_body
+from keyrecon.assist.study import Study
 from keyrecon.body import LSP14
 from keyrecon.formats.coco import read_coco
 
@@ -53,21 +69,13 @@ def place_of(frame, joint):
     return POINTS2D[frame, LSP14.names.index(joint)]
 
 
-def mark_all(person, frame):
-    while joint := person.asked():
-        person.click(place_of(frame, joint))
-        person.page.wait_for_function(
-            "j => document.querySelector('.joint.selected')?.dataset.joint !== j", arg=joint
-        )
-
-
 def marks_on_file(folder):
     return read_coco(folder / "annotations.json", LSP14, 100, (640, 360))
 
 
 def test_a_keyframe_without_help_is_fourteen_clicks(person, folder):
     person.open(10)
-    mark_all(person, 10)
+    person.mark_joints(partial(place_of, 10))
     person.await_saved()
     marks = marks_on_file(folder)
     assert (person.clicks, person.keys) == (14, 0)
@@ -195,7 +203,7 @@ def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
 
 def test_one_key_swaps_left_and_right_of_the_arms(person, folder):
     person.open(40)
-    mark_all(person, 40)
+    person.mark_joints(partial(place_of, 40))
     person.press("c")
     person.await_saved()
     joints = marks_on_file(folder).joints[0]
@@ -317,3 +325,36 @@ def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
     ]
     person.page.mouse.click(box["x"] + 300, box["y"] + 200)
     person.await_text("#pick-text", "Click the middle of the head")
+
+
+class Onlooker(Study):
+    """Knows the player's height, and nothing else before it is marked."""
+
+    def __init__(self):
+        """There is nothing prepared to study."""
+
+    def knowledge(self, annotations, wait=False):
+        return learn_body(annotations, {}, np.full(FRAMES, 0.9 * STATURE * PIXELS), FPS)
+
+    def any_ghost(self, annotations, frame):
+        return None
+
+
+def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, folder):
+    """Pointing at a limb costs nothing: what is turned is turned by a key."""
+    truth = true_signs(POINTS3D[70])
+    with serving(folder, Assistant(pose=partial(describe_pose, Onlooker()))) as server:
+        person = Person(context, server.door.address)
+        person.open(70)
+        person.mark_joints(partial(place_of, 70))
+        person.await_text("#guide-text", "Which ends are nearer")
+        person.settle_depths(truth, partial(place_of, 70))
+        person.await_text("#guide-text", "done|Next|All keyframes")
+        person.await_saved()
+        context.close()
+    marks = marks_on_file(folder)
+    found = {LSP14.names[c]: s for (_, c), s in zip(LSP14.bones, marks.nearer[0], strict=True)}
+    assert {name: found[name] for name in truth} == truth
+    assert (person.clicks, person.drags) == (14, 0)
+    assert person.keys <= 6
+    assert person.complaints == []

@@ -121,7 +121,7 @@ def ghost(desk: Desk, asked: Asked) -> Json:
 def pose(desk: Desk, asked: Asked) -> Json:
     """A frame's body in space."""
     ask, body = desk.assistant.pose, asked.body
-    marks = {name: list(place) for name, place in body.marks.items()}
+    marks = {name: [float(x) for x in place] for name, place in body.marks.items()}
     signs = {name: sign for name, sign in body.nearer.items() if sign}
     return ask(desk.store.annotations(), body.frame, marks, signs) if ask else {}
 

@@ -38,7 +38,10 @@ export function createDepth(model, placed) {
     const now = JSON.stringify([frame, marks, nearer]);
     if (frame === null || now === last) return;
     last = now;
-    settled = ask(frame, marks, nearer);
+    const asked = ask(frame, marks, nearer);
+    settled = asked;
+    byId("space").ariaBusy = "true";
+    asked.then(() => (byId("space").ariaBusy = String(settled !== asked)));
   }
 
   // The pose of what is marked at this moment.
