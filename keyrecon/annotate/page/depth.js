@@ -95,5 +95,5 @@ export function createDepth(model, placed) {
     drawReadings();
   }
 
-  return { draw, askGhost, space, readings };
+  return { draw, askGhost };
 }

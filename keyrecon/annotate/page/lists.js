@@ -101,7 +101,8 @@ export function createLists(model, actions) {
   }
 
   async function ask() {
-    [checks, suggestions] = await Promise.all([api.read("checks"), api.read("next")]);
+    checks = await api.read("checks");
+    suggestions = await api.read("next");
     model.changed();
   }
   model.onSettled(() => ask().catch(() => {})); // the server is gone: the lists stay as they are

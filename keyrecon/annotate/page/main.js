@@ -1,5 +1,6 @@
 // Wires the page together: one model, the parts that draw it, and the keys.
 import { createActions } from "./actions.js";
+import { keyframeCommands } from "./commands.js";
 import { byId, color } from "./dom.js";
 import { createDepth } from "./depth.js";
 import { createFiles } from "./files.js";
@@ -17,7 +18,6 @@ import { createStage, SMALL } from "./stage.js";
 import { createStills } from "./stills.js";
 import { createViewer } from "./viewer.js";
 
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const VIEWS = ["pick", "keyframes", "motion"];
 
 const model = await createModel();
@@ -93,6 +93,7 @@ function drawKeyframes() {
 }
 
 model.onDraw(() => {
+  if (doing.view === null) return;
   frame.draw();
   jobs.draw();
   if (doing.view === "keyframes") drawKeyframes();
@@ -106,10 +107,6 @@ function go(view) {
   if (view === "pick") pick.opened();
 }
 
-const mirrored = (half) =>
-  model.project.mirror.filter(([left]) => !half || model.project.halves[half].includes(left));
-const swaps = { swapBody: null, swapUpper: "upper", swapLower: "lower" };
-
 const commands = {
   any: {
     undo: actions.undo,
@@ -117,57 +114,48 @@ const commands = {
     help: frame.help,
     page: ({ place }) => go(VIEWS[place]),
   },
-  keyframes: {
-    primary: actions.primary,
-    put: actions.putDown,
-    visibility: () => actions.visibility(),
-    clear: actions.clear,
-    flip: () => actions.flip(),
-    automatic: actions.automaticDepth,
-    automaticAll: actions.automaticDepths,
-    open: actions.nextKeyframe,
-    lock: actions.lock,
-    check: lists.firstCheck,
-    suggestion: lists.firstSuggestion,
-    keyframe: ({ place }) => actions.stepKeyframe(place ? 1 : -1),
-    joint: ({ place }) => actions.stepJoint(place ? 1 : -1),
-    look: ({ place }) => actions.look(doing.look + (place ? 1 : -1)),
-    reading: ({ place }) => actions.reading(place),
-    nudge: ({ key, shift }) => actions.nudge(...ARROWS[key].map((step) => step * (shift ? 10 : 1))),
-    back: () => (doing.held ? model.do({ held: null }) : actions.look(0)),
-    zoom: viewer.toggleZoom,
-    zoomBy: ({ place }) =>
-      viewer.zoom(
-        [byId("picture").clientWidth / 2, byId("picture").clientHeight / 2],
-        place ? 0.8 : 1.25,
-      ),
-    hide: () => model.do({ hidden: true }),
-    ...Object.fromEntries(
-      Object.entries(swaps).map(([name, half]) => [name, () => actions.swap(mirrored(half))]),
-    ),
-  },
+  keyframes: keyframeCommands(model, { actions, viewer, lists }),
   pick: pick.commands,
   motion: motion.commands,
 };
 
+function obey(act, key) {
+  Promise.resolve(act(key)).catch((fault) =>
+    model.tell(fault.message || "The server does not answer."),
+  );
+}
+
 document.addEventListener("keydown", (event) => {
   if (document.querySelector("dialog[open]") && event.key !== "?") return;
-  const meant = meaning(event, doing.view);
-  if (!meant || belongsTo(event.target, event.key)) return;
+  const key = meaning(event, doing.view);
+  if (!key || belongsTo(event.target, event.key)) return;
   event.preventDefault();
-  const act = commands[doing.view][meant.action] ?? commands.any[meant.action];
-  Promise.resolve(act(meant)).catch((fault) => model.tell(fault.message));
+  obey(commands[doing.view][key.action] ?? commands.any[key.action], key);
 });
 document.addEventListener(
   "keyup",
-  (event) => event.key.toLowerCase() === "h" && model.do({ hidden: false }),
+  ({ key }) => key.toLowerCase() === "h" && model.do({ hidden: false }),
 );
 // A button pressed with the mouse does not keep the keys to itself.
 document.addEventListener(
   "click",
-  (event) => event.detail && event.target.closest("button")?.blur(),
+  ({ detail, target }) => detail && target.closest("button")?.blur(),
 );
-document.querySelectorAll("[data-swap]").forEach((button) => {
-  button.addEventListener("click", () => commands.keyframes[button.dataset.swap]());
-});
+
+function pressing(selector, act) {
+  document.querySelectorAll(selector).forEach((button, n) => {
+    button.addEventListener("click", () => obey(() => act(button, n)));
+  });
+}
+pressing("[data-swap]", (button) => commands.keyframes[button.dataset.swap]());
+pressing("#readings button", (_, n) => actions.reading(n));
+pressing("#undo", actions.undo);
+pressing("#redo", actions.redo);
+addEventListener("hashchange", () => addressed() !== null && actions.open(addressed()));
+addEventListener("pagehide", actions.keepHeld);
+
+await model.readState();
+model.listen();
+jobs.refresh();
+lists.ask().catch(() => {}); // asked again after the next edit
 go(model.keyframes().length ? "keyframes" : "pick");

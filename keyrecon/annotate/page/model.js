@@ -10,7 +10,7 @@ export async function createModel() {
   const model = {
     project: await api.read("project"),
     state: emptyState(),
-    doing: { view: "keyframes", frame: null, look: 0, joint: null, under: null, held: null },
+    doing: { view: null, frame: null, look: 0, joint: null, under: null, held: null },
     saving: { status: "saved", waiting: 0 },
     notice: null,
   };

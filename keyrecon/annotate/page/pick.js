@@ -1,5 +1,6 @@
 // The page where colours are picked: click a part on any frame, and see on a strip of other frames
 // whether head and feet are found.
+import { arrowStep } from "./commands.js";
 import { addPick, newId, removePick } from "./edits.js";
 import { byId, setText } from "./dom.js";
 import { placeUnder } from "./geometry.js";
@@ -9,7 +10,6 @@ import { drawCross, drawLabel } from "./skeleton.js";
 import { createStrip } from "./strip.js";
 import { createViewer } from "./viewer.js";
 
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const REACH = 8; // px around a pick
 
 export function createPick(model, { stills, jobs, frame: surround }) {
@@ -17,7 +17,7 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     last = project.n_frames - 1,
     root = byId("pick-picture");
   const viewer = createViewer({ root, project, stills, changed: model.changed });
-  const strip = createStrip(model, show);
+  const strip = createStrip(model, stills, show);
   const palette = createPalette({ choose, show, remove, name });
   const doing = {
     frame: Math.round(last / 2),
@@ -168,10 +168,10 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     step: ({ place, shift }) =>
       show(doing.frame + (place ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
     part: ({ place }) => parts()[place] && choose(parts()[place].part),
-    nudge({ key, shift }) {
-      const step = ARROWS[key].map((by) => by * (shift ? 10 : 1)),
+    nudge(key) {
+      const [dx, dy] = arrowStep(key),
         [x, y] = doing.cross ?? viewer.middle();
-      doing.cross = [x + step[0], y + step[1]];
+      doing.cross = [x + dx, y + dy];
       model.changed();
     },
     put: () => doing.cross && add(doing.cross),

@@ -1,12 +1,17 @@
 // Exact frames as pictures, fetched ahead and kept ready to draw while there is room.
 
 const ROOM = 260e6; // bytes of decoded pictures
-const SIDE_BY_SIDE = 4; // requests at a time
+// Requests at a time: a browser opens six connections to a server, and edits must never wait for
+// pictures.
+const AHEAD = 2;
+const URGENT = 3;
+const REMEMBERED = 8; // pictures that were to be drawn and are not here yet
 
 export function createStills(project, ready) {
   const kept = new Map(); // key -> picture, oldest use first
-  const coming = new Map();
+  const coming = new Set();
   let wanted = [],
+    urgent = [],
     room = 0;
 
   const key = (frame, width) => `${frame}/${width ?? 0}`;
@@ -38,31 +43,35 @@ export function createStills(project, ready) {
   function load(frame, width) {
     const name = key(frame, width);
     if (kept.has(name) || coming.has(name)) return;
-    const arrival = fetchOne(frame, width)
+    coming.add(name);
+    fetchOne(frame, width)
       .then((picture) => {
         keep(name, picture);
         ready(frame);
       })
-      .catch(() => {})
+      .catch(() => {}) // asked for again when it is to be drawn again
       .finally(() => {
-        // a picture that fails is asked for again when it is drawn
         coming.delete(name);
         work();
       });
-    coming.set(name, arrival);
   }
 
+  // What is to be drawn now comes first, the newest wish before older ones.
   function work() {
-    while (wanted.length && coming.size < SIDE_BY_SIDE) load(...wanted.shift());
+    while (urgent.length && coming.size < URGENT) load(...urgent.pop());
+    while (wanted.length && coming.size < AHEAD) load(...wanted.shift());
   }
 
   return {
-    // The picture if it is here; asks for it at once if not.
+    // The picture if it is here; asks for it before all others if not.
     get(frame, width) {
       const name = key(frame, width),
         picture = kept.get(name);
       if (!picture) {
-        load(frame, width);
+        urgent = [...urgent.filter((one) => key(...one) !== name), [frame, width]].slice(
+          -REMEMBERED,
+        );
+        work();
         return null;
       }
       kept.delete(name);

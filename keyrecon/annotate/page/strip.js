@@ -6,27 +6,17 @@ import { spread } from "./parts.js";
 const FRAMES = 7;
 const WIDTH = 320; // px of the stills
 
-export function createStrip(model, choose) {
+export function createStrip(model, stills, choose) {
   const { project } = model,
     frames = spread(project.n_frames, FRAMES);
   const found = new Map(); // frame -> {head, feet, box}
   let trust = null;
 
   const cells = frames.map((frame) => {
-    const picture = make("img", {
-      alt: `Frame ${frame}`,
-      src: `/api/still/${frame}?${new URLSearchParams({ width: WIDTH, v: project.version })}`,
-    });
-    const canvas = make("canvas");
-    const cell = make(
-      "button",
-      { title: `Frame ${frame}` },
-      picture,
-      canvas,
-      make("small", {}, String(frame)),
-    );
+    const canvas = make("canvas"),
+      number = make("small", {}, String(frame));
+    const cell = make("button", { title: `Frame ${frame}` }, canvas, number);
     cell.addEventListener("click", () => choose(frame));
-    picture.addEventListener("load", () => model.changed());
     return { frame, cell, canvas };
   });
   byId("strip").append(...cells.map(({ cell }) => cell));
@@ -52,9 +42,11 @@ export function createStrip(model, choose) {
 
   function draw(current) {
     for (const { frame, cell, canvas } of cells) {
-      const [pen, width] = penOf(canvas),
+      const [pen, width, height] = penOf(canvas),
         row = found.get(frame),
         scale = width / project.width;
+      const picture = stills.get(frame, WIDTH);
+      if (picture) pen.drawImage(picture, 0, 0, width, height);
       cell.setAttribute("aria-current", frame === current);
       if (row?.head) mark(pen, row.head, scale, "#56b4e9", 5);
       for (const foot of row?.feet ?? []) mark(pen, foot, scale, "#e69f00", 3.5);
