@@ -181,9 +181,7 @@ class Person:
         To point at a limb is no action: the key that turns it is.
         """
         offered = [reading["nearer"] for reading in self.pose()["alternatives"][:3]]
-        wrong = [
-            [limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered
-        ]
+        wrong = [[limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered]
         best = min(range(len(wrong)), key=lambda n: len(wrong[n]))
         self.press(str(best + 1))
         for limb in wrong[best]:
@@ -191,6 +189,51 @@ class Person:
             self.point_at((place_of(limb) + place_of(parent)) / 2)
             self.await_drawn()
             self.press("f")
+
+    def suggestion(self, frame):
+        """What the server suggests for a keyframe, once the page shows it: [x, y, confidence]."""
+        answer = self.page.evaluate(f"fetch('/api/ghost/{frame}').then((a) => a.json())")
+        offered = answer.get("joints", {})
+        if offered:
+            self.await_text("#guide-text", "suggestion|Which ends|done")
+        return offered
+
+    def add_keyframes(self, frames):
+        """Give the project keyframes of one's own, without the page's help."""
+        edits = [
+            {"id": f"own-{n}", "kind": "own", "frame": n, "to": "both", "from": None}
+            for n in frames
+        ]
+        self.page.evaluate(
+            "edits => fetch('/api/edits', {method: 'POST', body: JSON.stringify({edits}),"
+            " headers: {'Content-Type': 'application/json'}})",
+            edits,
+        )
+        self.await_text("#done-count", "of")
+
+    def durations(self, name):
+        """How long what the page measures under a name took each time, ms."""
+        return self.page.evaluate(
+            "name => performance.getEntriesByName(name).map((entry) => entry.duration)", name
+        )
+
+    def scroll_times(self, selector):
+        """Time from picture to picture while a list is scrolled from end to end, ms."""
+        return self.page.evaluate(
+            """async (selector) => {
+              const list = document.querySelector(selector), times = [];
+              const picture = () => new Promise(requestAnimationFrame);
+              let last = await picture();
+              for (let n = 0; n <= 100; n++) {
+                list.scrollTop = (n / 100) * list.scrollHeight;
+                const now = await picture();
+                times.push(now - last);
+                last = now;
+              }
+              return times;
+            }""",
+            selector,
+        )
 
     def call(self, module, expression):
         """What an expression on a module of the page gives; the module is called `m`."""

@@ -31,13 +31,13 @@ export function createStage(model, actions, viewer, colors) {
   function find(at) {
     if (!at || actions.away()) return null;
     const marks = onScreen(placed());
-    const joint =
-      placeUnder(at, marks, REACH) ?? placeUnder(at, onScreen(shortened(offered())), REACH);
+    const joint = placeUnder(at, { ...marks, ...onScreen(bare(offered())) }, REACH);
     if (joint) return { joint };
     const limb = limbUnder(at, model.project.limbs, marks, LIMB_REACH);
     return limb ? { limb } : null;
   }
-  const shortened = (ghost) =>
+  // Without the confidence.
+  const bare = (ghost) =>
     Object.fromEntries(Object.entries(ghost).map(([name, [x, y]]) => [name, [x, y]]));
 
   // A joint keeps its distance from the pointer that took it.
