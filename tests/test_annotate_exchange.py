@@ -1,5 +1,7 @@
 """Marks from and for other programs, through the page."""
 
+import random
+
 import pytest
 from annotator import ask
 from annotator_edits import mark, submit
@@ -52,3 +54,40 @@ def test_a_file_of_another_kind_is_refused_under_its_own_name(opened):
         answer = ask(desk, "POST", "/api/import", {"name": "../../marks.txt", "text": text})
         assert answer.status == 400
         assert answer.json()["error"].startswith("../../marks.txt ")
+
+
+SPOILT = (
+    "",
+    "NaN",
+    "1e999",
+    "-1",
+    "null",
+    "[]",
+    "{",
+    '"',
+    "<",
+    "é",
+    "\u0000",
+    "99999999999999999999",
+)
+
+
+def spoil(text, rng):
+    """The text cut off, or with a piece replaced."""
+    at = rng.randrange(len(text))
+    if rng.random() < 0.2:
+        return text[:at]
+    return text[:at] + rng.choice(SPOILT) + text[at + rng.randrange(12) :]
+
+
+@pytest.mark.parametrize("form", ["coco", "dlc", "cvat"])
+def test_a_spoilt_file_is_read_or_refused_and_changes_nothing(opened, form):
+    desk, rng = opened(), random.Random(form)
+    submit(desk.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
+    text = ask(desk, "GET", f"/api/export/{form}").content.decode()
+    before, statuses = desk.store.state, set()
+    for _ in range(150):
+        question = {"name": "a", "text": spoil(text, rng)}
+        statuses.add(ask(desk, "POST", "/api/import", question).status)
+    assert statuses == {200, 400}
+    assert desk.store.state == before
