@@ -1,7 +1,7 @@
 """Left-handed players: what was seen is mirrored for the right-handed model, the result back.
 
-Mirroring a picture about the principal point mirrors space about the plane x = 0 of the camera, so
-that nothing else of the camera changes.
+Exchanging left and right of a picture moves the principal point with it, and mirrors space about
+the plane x = 0 of the camera.
 """
 
 from collections.abc import Mapping
@@ -16,15 +16,15 @@ from keyrecon.golf.records import Camera, Capsules, Matches, Observations, Pose
 ACROSS = np.array([-1.0, 1.0, 1.0])
 
 
-def mirror_pixels(pixels: Float[np.ndarray, "*n 2"], camera: Camera) -> Float[np.ndarray, "*n 2"]:
-    """Points of the picture with left and right exchanged."""
+def mirror_pixels(pixels: Float[np.ndarray, "*n 2"], width: int) -> Float[np.ndarray, "*n 2"]:
+    """Points of a picture of some width with left and right exchanged."""
     mirrored = pixels.copy()
-    mirrored[..., 0] = 2 * camera.principal[0] - pixels[..., 0]
+    mirrored[..., 0] = width - 1 - pixels[..., 0]
     return mirrored
 
 
 def mirror_clicks(
-    clicked: Mapping[str, tuple[float, float]], camera: Camera
+    clicked: Mapping[str, tuple[float, float]], width: int
 ) -> dict[str, tuple[float, float]]:
     """Clicked joints of the mirrored player."""
     swap = {"left": "right", "right": "left"}
@@ -32,24 +32,23 @@ def mirror_clicks(
     for name, place in clicked.items():
         side, _, joint = name.partition("_")
         other = f"{swap[side]}_{joint}" if side in swap else name
-        x, y = mirror_pixels(np.array(place, float), camera)
-        mirrored[other] = (float(x), float(y))
+        mirrored[other] = (width - 1 - place[0], place[1])
     return mirrored
 
 
-def mirror_observations(observations: Observations) -> Observations:
-    """What would have been seen of the mirrored player."""
+def mirror_observations(observations: Observations, width: int) -> Observations:
+    """What would have been seen of the mirrored player in pictures of some width."""
     camera, matches = observations.camera, observations.matches
-    if observations.away:
-        raise ValueError("distance transforms are not mirrored; mirror before they are made")
     return replace(
         observations,
-        joints=mirror_pixels(observations.joints[:, LSP14.mirror], camera),
+        camera=Camera(camera.focal, mirror_pixels(camera.principal, width)),
+        joints=mirror_pixels(observations.joints[:, LSP14.mirror], width),
         spread=observations.spread[:, LSP14.mirror],
-        club=mirror_pixels(observations.club, camera),
-        foreground=tuple(mirror_pixels(f, camera) for f in observations.foreground),
+        club=mirror_pixels(observations.club, width),
+        foreground=tuple(mirror_pixels(f, width) for f in observations.foreground),
+        away=tuple(distance[:, ::-1] for distance in observations.away),
         matches=Matches(
-            matches.frame, mirror_pixels(matches.start, camera), mirror_pixels(matches.end, camera)
+            matches.frame, mirror_pixels(matches.start, width), mirror_pixels(matches.end, width)
         ),
     )
 
