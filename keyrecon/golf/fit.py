@@ -14,6 +14,7 @@ from jaxtyping import Float
 from keyrecon.golf.kinematics import place_body, pose_rates
 from keyrecon.golf.motion_model import posture_at
 from keyrecon.golf.point_residuals import club_residuals, joint_residuals
+from keyrecon.golf.primitives import build_capsules
 from keyrecon.golf.records import (
     Body,
     MotionModel,
@@ -30,6 +31,11 @@ from keyrecon.golf.regularise import (
     stack_rows,
 )
 from keyrecon.golf.solver import Expect, Kind, Problem, chain_rule, robust_weights, solve
+from keyrecon.golf.surface_residuals import (
+    away_residuals,
+    foreground_residuals,
+    match_residuals,
+)
 from keyrecon.golf.unknowns import Span, still_span, swing_span
 
 
@@ -43,6 +49,8 @@ class WeightOptions:
     """Ends of the club, in standard deviations."""
     foreground: float = 0.5
     """Lines of sight through the player's mask, made commensurate with the joints."""
+    away: float = 0.15
+    """Limbs that project outside of the mask, made commensurate with the joints."""
     matches: float = 0.5
     """Surface points matched between consecutive frames, made commensurate with the joints."""
 
@@ -67,9 +75,11 @@ class FitOptions:
     """Steps of the solver at most."""
 
 
-LOOKS = 5.0
-"""Independent looks at the player per second: errors of trackers and of the model's proportions
-last, so that more frames per second do not make them smaller."""
+LOOKS = 2.0
+"""Independent looks at the player per second: a tracker drifts and proportions are wrong for half a
+second or longer, so that more frames do not make these errors smaller."""
+FAR_SIGHT, FAR_AWAY, FAR_MATCH = 0.06, 12.0, 3.0
+"""Errors beyond which a line of sight (m), a limb off the mask (px) and a match (px) count less."""
 FIRST = 6
 """Alphas that move before all do: the largest styles first."""
 
@@ -113,7 +123,12 @@ def choose_kinds(
         Kind(partial(joint_residuals, observations, body), weights.joints, options.robust),
         Kind(partial(club_residuals, observations, body), weights.club, options.robust),
     ]
-    surfaces: list[Kind] = []
+    capsules = build_capsules(body)
+    surfaces = [
+        Kind(partial(foreground_residuals, observations, capsules), weights.foreground, FAR_SIGHT),
+        Kind(partial(away_residuals, observations, capsules), weights.away, FAR_AWAY),
+        Kind(partial(match_residuals, observations, capsules), weights.matches, FAR_MATCH),
+    ]
     points = [kind for kind in points if kind.weight]
     surfaces = [kind for kind in surfaces if kind.weight]
     reference = sum(kind.weight * _influence(kind, model, body, start) for kind in points)

@@ -32,7 +32,7 @@ class PriorOptions:
     """Metres that G shifts in a second beyond the learnt motion."""
     roll: float = 0.03
     """Radians by which the camera leans sideways."""
-    pitch: float = 0.12
+    pitch: float = 0.06
     """Radians by which the camera looks up or down."""
 
 

@@ -22,7 +22,7 @@ HEADINGS = 12
 """Sides of the player that are tried."""
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 """Swing axes as a level camera behind the player sees them."""
-LEAN = 0.1
+LEAN = 0.06
 """Radians by which a camera is usually off the level."""
 CLICK = 8.0
 """px by which a click, or the mean player's joint, is usually off."""
