@@ -6,9 +6,12 @@ from typing import Annotated
 from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.extras import SubcommandApp
 
+from keyrecon import golf_job
 from keyrecon import swings as mocap_swings
 from keyrecon.console import show
+from keyrecon.formats.motion_model import BUILT_IN
 from keyrecon.golf.train import TrainOptions
+from keyrecon.golf_job import GolfOptions
 
 golf = SubcommandApp()
 
@@ -28,3 +31,25 @@ def train_(
         out: File to write.
     """
     print(mocap_swings.train(swings, out, options, show))
+
+
+@golf.command
+def fit(
+    video: Positional[Path],
+    clicks: Path,
+    out: Path = Path("swing"),
+    prior: Path = BUILT_IN,
+    options: Annotated[GolfOptions, arg(name="")] = GolfOptions(),
+) -> None:
+    """Fit the swing prior to a video filmed by one camera that stands still.
+
+    Writes OUT/motion.npz, overlay.mp4 and report.html.
+
+    Args:
+        video: A whole swing, from the address to the finish.
+        clicks: JSON file with a few joints clicked in one frame, and the player's height.
+        out: Folder for the results; made if need be.
+        prior: A swing prior of `keyrecon golf train`.
+        options: How the video is looked at and the prior fitted.
+    """
+    print(golf_job.fit_file(video, clicks, out, prior, options, show))

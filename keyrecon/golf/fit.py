@@ -37,6 +37,13 @@ from keyrecon.golf.surface_residuals import (
     match_residuals,
 )
 from keyrecon.golf.unknowns import Span, still_span, swing_span
+from keyrecon.golf.windows import (
+    WindowOptions,
+    cut_observations,
+    free_root,
+    root_of,
+    slide_windows,
+)
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,8 @@ class FitOptions:
     """Seconds between knots of the player's place and turn."""
     steps: int = 25
     """Steps of the solver at most."""
+    windows: WindowOptions = field(default_factory=WindowOptions)
+    """The paper's sliding windows, where they are asked for."""
 
 
 LOOKS = 2.0
@@ -91,8 +100,8 @@ def fit_swing(
     start: SwingState,
     fps: float,
     options: FitOptions = FitOptions(),
-) -> SwingState:
-    """The swing that explains what was seen, from a rough start."""
+) -> tuple[MotionModel, Body, SwingState]:
+    """The swing that explains what was seen, from a rough start; and what it is made of."""
     frames = len(start.mu)
     kinds = choose_kinds(observations, model, body, start, options)
     kinds = [replace(kind, weight=kind.weight * min(1.0, LOOKS / fps)) for kind in kinds]
@@ -107,17 +116,38 @@ def fit_swing(
         wide = [replace(kind, robust=robust * kind.robust) for kind in kinds]
         state = solve(Problem(model, body, span, wide, expect), state, options.steps)
         state = replace(state, mu=np.clip(np.maximum.accumulate(state.mu), 0, 1))
-    return state
+    return model, body, state
+
+
+def slide_fit(
+    observations: Observations,
+    model: MotionModel,
+    body: Body,
+    start: SwingState,
+    fps: float,
+    options: FitOptions = FitOptions(),
+) -> tuple[MotionModel, Body, SwingState]:
+    """The fit as printed: windows of three frames, a free root, few components."""
+    free = free_root(model)
+    begin = root_of(replace(start, alpha=np.zeros(options.windows.components)), model, body)
+    kinds = choose_kinds(observations, free, body, begin, options)
+    weight = {kind.observe.func: kind.weight for kind in kinds}
+
+    def kinds_of(chosen: slice) -> list[Kind]:
+        own = choose_kinds(cut_observations(observations, chosen), free, body, None, options)
+        return [replace(kind, weight=weight[kind.observe.func]) for kind in own]
+
+    return free, body, slide_windows(begin, body, free, kinds_of, options.windows)
 
 
 def choose_kinds(
     observations: Observations,
     model: MotionModel,
     body: Body,
-    start: SwingState,
+    start: SwingState | None,
     options: FitOptions,
 ) -> list[Kind]:
-    """Kinds of observation that count, with their weights at the start."""
+    """Kinds of observation that count; made commensurate at the start, where there is one."""
     weights = options.weights
     points = [
         Kind(partial(joint_residuals, observations, body), weights.joints, options.robust),
@@ -131,6 +161,8 @@ def choose_kinds(
     ]
     points = [kind for kind in points if kind.weight]
     surfaces = [kind for kind in surfaces if kind.weight]
+    if start is None:
+        return points + surfaces
     reference = sum(kind.weight * _influence(kind, model, body, start) for kind in points)
     return points + [_make_commensurate(k, reference, model, body, start) for k in surfaces]
 

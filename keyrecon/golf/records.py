@@ -191,6 +191,9 @@ class FittedSwing:
     state: SwingState
     body: Body
     pose: Pose
+    """In the real camera, of the real player."""
+    capsules: Capsules
+    """On the segments of `pose`."""
     club: Float[np.ndarray, "T 2 3"]
     """Grip and head in camera axes, metres."""
     club_seen: Float[np.ndarray, "T 2 2"]

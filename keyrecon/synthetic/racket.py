@@ -61,8 +61,8 @@ def golf_club(length: float) -> Implement:
     """An iron; `length` is from between the hands to the end of the head, metres."""
     return Implement(
         (
-            Stroke(((-0.13, 0.0), (0.13, 0.0)), 0.026),
-            Stroke(((0.13, 0.0), (length - 0.03, 0.0)), 0.012),
+            Stroke(((-0.13, 0.0), (0.13, 0.0)), 0.024),
+            Stroke(((0.13, 0.0), (length - 0.03, 0.0)), 0.009),
             Stroke(((length - 0.04, 0.0), (length - 0.01, 0.075)), 0.04),
         ),
         length,

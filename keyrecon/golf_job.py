@@ -1,0 +1,97 @@
+"""`keyrecon golf fit`: from a video and a few clicks to a motion, an overlay and a report."""
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from keyrecon.formats.clicks import read_clicks
+from keyrecon.formats.motion_model import BUILT_IN, read_motion_model
+from keyrecon.formats.npz import write_motion
+from keyrecon.golf.clicks import Clicks
+from keyrecon.golf.fit import FitOptions, fit_swing, slide_fit
+from keyrecon.golf.look import LookOptions, look_at_swing
+from keyrecon.golf.mirror import mirror_clicks, mirror_observations
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.result import describe_fit
+from keyrecon.golf.skeleton import size_body
+from keyrecon.golf.start import place_player, start_state
+from keyrecon.progress import Progress, silent
+from keyrecon.report.golf_overlay import write_golf_overlay
+from keyrecon.video import Video, open_video
+
+
+@dataclass(frozen=True)
+class GolfOptions:
+    """From a video to a fitted swing."""
+
+    method: Literal["swing", "windows"] = "swing"
+    """'swing' fits all frames at once; 'windows' slides over three frames as in the paper."""
+    look: LookOptions = field(default_factory=LookOptions)
+    """What is followed in the video."""
+    fit: FitOptions = field(default_factory=FitOptions)
+    """How the model is fitted to it."""
+
+
+def fit_video(
+    video: Video,
+    clicks: Clicks,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    progress: Progress = silent,
+) -> tuple[FittedSwing, Observations]:
+    """Look at a swing and fit the model to it."""
+    observations = look_at_swing(video, clicks, model.keys, options.look, progress)
+    return fit_observations(observations, clicks, model, video, options), observations
+
+
+def fit_observations(
+    observations: Observations,
+    clicks: Clicks,
+    model: MotionModel,
+    video: Video,
+    options: GolfOptions = GolfOptions(),
+) -> FittedSwing:
+    """Fit the model to what was seen; left-handers are mirrored on the way in and out."""
+    seen, clicked = observations, dict(clicks.joints)
+    if clicks.left_handed:
+        seen, clicked = mirror_observations(seen, video.width), mirror_clicks(clicked, video.width)
+    body = size_body(clicks.stature)
+    placed = place_player(clicked, float(seen.mu[clicks.frame]), seen.camera, model, body)
+    fit = fit_swing if options.method == "swing" else slide_fit
+    found = fit(seen, model, body, start_state(placed, seen.mu), video.fps, options.fit)
+    return describe_fit(*found, observations, video.time, clicks.frame)
+
+
+def fit_file(
+    video_file: Path,
+    clicks_file: Path,
+    out: Path,
+    prior: Path = BUILT_IN,
+    options: GolfOptions = GolfOptions(),
+    progress: Progress = silent,
+) -> str:
+    """Fit a swing and write motion.npz, overlay.mp4 and report.html; returns what to tell."""
+    began = time.perf_counter()
+    video, clicks = open_video(video_file), read_clicks(clicks_file)
+    model = read_motion_model(prior)
+    fitted, observations = fit_video(video, clicks, model, options, progress)
+    out.mkdir(parents=True, exist_ok=True)
+    write_motion(out / "motion.npz", fitted.motion)
+    write_golf_overlay(out / "overlay.mp4", video, fitted, observations.camera, progress)
+    spent = time.perf_counter() - began
+    return (
+        f"{tell_tempo(fitted, video.fps)}\n"
+        f"{out}/motion.npz, overlay.mp4: {len(video)} frames, "
+        f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
+    )
+
+
+def tell_tempo(fitted: FittedSwing, fps: float) -> str:
+    """Key postures and tempo in words."""
+    start, top, hit, finish = fitted.keys
+    up, down = (top - start) / fps, (hit - top) / fps
+    return (
+        f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}; "
+        f"{up:.2f} s up, {down:.2f} s down, tempo {up / down:.1f} : 1."
+    )
