@@ -84,9 +84,9 @@ class FitOptions:
     """The paper's sliding windows, where they are asked for."""
 
 
-LOOKS = 2.0
-"""Independent looks at the player per second: a tracker drifts and proportions are wrong for half a
-second or longer, so that more frames do not make these errors smaller."""
+LOOKS = 3.0
+"""Independent looks at the player per second: trackers drift and proportions are wrong for a third of
+a second or longer, so that more frames do not make these errors smaller."""
 FAR_SIGHT, FAR_AWAY, FAR_MATCH = 0.06, 12.0, 3.0
 """Errors beyond which a line of sight (m), a limb off the mask (px) and a match (px) count less."""
 FIRST = 6

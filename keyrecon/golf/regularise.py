@@ -26,9 +26,9 @@ class PriorOptions:
     """Of the normalised time around its first guess."""
     pace: float = 1.5
     """Of the change of pace, normalised time per second squared, from what was guessed."""
-    turn: float = 0.05
+    turn: float = 0.07
     """Radians that G turns in a second beyond the learnt motion."""
-    shift: float = 0.02
+    shift: float = 0.04
     """Metres that G shifts in a second beyond the learnt motion."""
     roll: float = 0.03
     """Radians by which the camera leans sideways."""
