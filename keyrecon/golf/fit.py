@@ -85,8 +85,8 @@ class FitOptions:
 
 
 LOOKS = 3.0
-"""Independent looks at the player per second: trackers drift and proportions are wrong for a third of
-a second or longer, so that more frames do not make these errors smaller."""
+"""Independent looks at the player per second: trackers drift and proportions are wrong for a third
+of a second or longer, so that more frames do not make these errors smaller."""
 FAR_SIGHT, FAR_AWAY, FAR_MATCH = 0.06, 12.0, 3.0
 """Errors beyond which a line of sight (m), a limb off the mask (px) and a match (px) count less."""
 FIRST = 6

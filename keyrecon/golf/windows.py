@@ -100,7 +100,8 @@ def _cut(state: SwingState, chosen: slice) -> SwingState:
 def _go_on(found: SwingState, frame: int) -> None:
     """Enter a frame that goes on at the speed of the two before it."""
     last, before = frame - 1, frame - 2
-    found.rotation[frame] = found.rotation[last] @ found.rotation[before].T @ found.rotation[last]
+    now, then = (Rotation.from_matrix(found.rotation[t]) for t in (last, before))
+    found.rotation[frame] = (now * then.inv() * now).as_matrix()
     found.position[frame] = 2 * found.position[last] - found.position[before]
     found.mu[frame] = min(2 * found.mu[last] - found.mu[before], 1.0)
 
