@@ -150,13 +150,17 @@ class Workspace:
         )
 
     def picks(self) -> tuple[Pick, ...]:
-        """What a person clicked; KeyreconError when there is nothing yet."""
+        """What a person clicked, in one order: stage results do not hang on who clicked first.
+
+        Raises KeyreconError when there is nothing yet.
+        """
         if not self.picks_file.is_file():
             raise KeyreconError(
                 f"{self.folder} has no picks yet; click the player's head, feet and clothes with: "
                 f"keyrecon pick {self.folder} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
             )
-        return read_picks(self.picks_file)
+        picks = read_picks(self.picks_file)
+        return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))
 
     def add_picks(self, picks: Sequence[Pick]) -> tuple[Pick, ...]:
         """Add clicks to those there are."""
@@ -232,5 +236,3 @@ def _apply(options: Any, changes: dict, where: str) -> Any:
         else:
             new[name] = tuple(value) if isinstance(value, list) else value
     return replace(options, **new)
-
-

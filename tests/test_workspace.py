@@ -78,3 +78,12 @@ def test_picks_that_do_not_parse_are_left_alone(project):
     with pytest.raises(KeyreconError, match="not a file of picks"):
         project.add_picks([Pick(0, "head", 1.0, 1.0)])
     assert project.picks_file.read_text() == '{"picks": ['
+
+
+def test_the_order_of_clicks_makes_no_difference(project):
+    clicks = [Pick(3, "shirt", 4.0, 5.0), Pick(3, "head", 1.0, 2.0), Pick(0, "shirt", 4.0, 5.0)]
+    project.add_picks(clicks)
+    found = project.picks()
+    project.picks_file.unlink()
+    project.add_picks(clicks[::-1])
+    assert project.picks() == found
