@@ -17,6 +17,7 @@ from keyrecon import project as work
 from keyrecon.console import show
 from keyrecon.errors import KeyreconError
 from keyrecon.golf_commands import golf
+from keyrecon.golf_demo import run_golf_demo
 from keyrecon.pipeline import Options
 from keyrecon.records import Pick
 from keyrecon.serving import serve_annotator
@@ -31,18 +32,23 @@ app = tyro.extras.SubcommandApp()
 
 
 @app.command
-def demo(name: Positional[Literal["tennis"]] = "tennis", out: Path = Path("demo")) -> None:
+def demo(
+    name: Positional[Literal["tennis", "golf"]] = "tennis", out: Path = Path("demo")
+) -> None:
     """Run the whole job on the built-in synthetic sequence and print its accuracy.
 
-    Renders 36 s of tennis whose truth is known, finds the player, chooses keyframes, takes the
-    marks kept in annotations/, reconstructs the motion and writes OUT/report.html. Needs no
-    network and no display.
+    Tennis renders 36 s whose truth is known, finds the player, chooses keyframes, takes the marks
+    kept in annotations/, reconstructs the motion and writes OUT/project/report.html. Golf renders
+    a swing and fits the swing prior to it from six clicks. Needs no network and no display.
 
     Args:
         name: Which sequence.
         out: Folder for the video, the project and the report.
     """
-    demonstration.run_demo(name, out, show, print)
+    if name == "golf":
+        run_golf_demo(out, show, print)
+    else:
+        demonstration.run_demo(name, out, show, print)
 
 
 @app.command

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from keyrecon.golf.kinematics import place_body, pose_rates
 from keyrecon.golf.motion_model import posture_at
-from keyrecon.golf.point_residuals import club_residuals, joint_residuals
+from keyrecon.golf.point_residuals import club_residuals, joint_residuals, mark_residuals
 from keyrecon.golf.primitives import build_capsules
 from keyrecon.golf.records import (
     Body,
@@ -54,6 +54,8 @@ class WeightOptions:
     """Tracked joints; their errors are in standard deviations."""
     club: float = 1.0
     """Ends of the club, in standard deviations."""
+    marks: float = 1.0
+    """Joints that a person marked; every marked frame counts as a look of its own."""
     foreground: float = 0.5
     """Lines of sight through the player's mask, made commensurate with the joints."""
     away: float = 0.15
@@ -104,7 +106,10 @@ def fit_swing(
     """The swing that explains what was seen, from a rough start; and what it is made of."""
     frames = len(start.mu)
     kinds = choose_kinds(observations, model, body, start, options)
-    kinds = [replace(kind, weight=kind.weight * min(1.0, LOOKS / fps)) for kind in kinds]
+    share = min(1.0, LOOKS / fps)
+    kinds = [replace(kind, weight=kind.weight * share) for kind in kinds] + [
+        Kind(partial(mark_residuals, observations, body), options.weights.marks, options.robust)
+    ]
     alphas = min(options.components, len(model.components))
     state = replace(start, alpha=np.zeros(alphas))
     knots = (options.time_knots * fps, options.root_knots * fps)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
-from keyrecon.golf.records import Camera, Capsules, Matches, Observations, Pose
+from keyrecon.golf.records import Camera, Capsules, Marks, Matches, Observations, Pose
 
 ACROSS = np.array([-1.0, 1.0, 1.0])
 
@@ -38,7 +38,9 @@ def mirror_clicks(
 
 def mirror_observations(observations: Observations, width: int) -> Observations:
     """What would have been seen of the mirrored player in pictures of some width."""
-    camera, matches = observations.camera, observations.matches
+    camera, matches, marks = observations.camera, observations.matches, observations.marks
+    if marks is not None:
+        marks = Marks(marks.frames, mirror_pixels(marks.joints[:, LSP14.mirror], width))
     return replace(
         observations,
         camera=Camera(camera.focal, mirror_pixels(camera.principal, width)),
@@ -50,6 +52,7 @@ def mirror_observations(observations: Observations, width: int) -> Observations:
         matches=Matches(
             matches.frame, mirror_pixels(matches.start, width), mirror_pixels(matches.end, width)
         ),
+        marks=marks,
     )
 
 

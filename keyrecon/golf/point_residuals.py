@@ -8,13 +8,18 @@ the shaft lies is surer than where it ends.
 import numpy as np
 from jaxtyping import Float, Int
 
+from keyrecon.body import LSP14
 from keyrecon.golf.kinematics import find_club, find_joints
-from keyrecon.golf.records import Body, Camera, Observations, Pose, Residuals
+from keyrecon.golf.records import Body, Camera, Marks, Observations, Pose, Residuals
 from keyrecon.golf.skeleton import CLUB
 
 MODEL_ERROR = 0.03
 """Metres by which joints of the model miss the player's even at best: his proportions and what is
 called a joint differ. Added to the tracker's error, it keeps the fit from explaining them away."""
+
+
+MARK = 3.0
+"""Standard deviation of a person's mark, px."""
 
 
 def joint_residuals(observations: Observations, body: Body, pose: Pose) -> Residuals:
@@ -24,6 +29,21 @@ def joint_residuals(observations: Observations, body: Body, pose: Pose) -> Resid
     pixels, slope = project(points, observations.camera)
     spread = _total_spread(observations.spread[frame, joint], slope)
     values = (pixels - observations.joints[frame, joint]) / spread[:, None]
+    return pair_rows(values, slope / spread[:, None, None], points,
+                     frame, body.joint_segment[joint])  # fmt: skip
+
+
+def mark_residuals(observations: Observations, body: Body, pose: Pose) -> Residuals:
+    """Projected joints minus those that a person marked, in standard deviations."""
+    marks = observations.marks
+    if marks is None:
+        marks = Marks(np.zeros(0, np.int64), np.zeros((0, len(LSP14.names), 2)))
+    row, joint = np.nonzero(np.isfinite(marks.joints).all(axis=2))
+    frame = marks.frames[row]
+    points = find_joints(body, pose)[frame, joint]
+    pixels, slope = project(points, observations.camera)
+    spread = _total_spread(np.full(len(row), MARK), slope)
+    values = (pixels - marks.joints[row, joint]) / spread[:, None]
     return pair_rows(values, slope / spread[:, None, None], points,
                      frame, body.joint_segment[joint])  # fmt: skip
 

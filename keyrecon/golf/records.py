@@ -139,6 +139,15 @@ class Matches:
 
 
 @dataclass(frozen=True, eq=False)
+class Marks:
+    """Joints that a person marked in some frames."""
+
+    frames: Int[np.ndarray, "K"]
+    joints: Float[np.ndarray, "K 14 2"]
+    """px; NaN where not marked; in the order of LSP14."""
+
+
+@dataclass(frozen=True, eq=False)
 class Observations:
     """What was seen in the video, px; NaN where nothing was."""
 
@@ -164,6 +173,8 @@ class Observations:
     mu: Float[np.ndarray, "T"]
     """First guess of the normalised time."""
     left_handed: bool
+    marks: Marks | None = None
+    """Annotated keyframes, where a person made some."""
 
 
 @dataclass(frozen=True, eq=False)

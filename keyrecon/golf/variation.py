@@ -76,6 +76,11 @@ def vary_swing(
     return carry_swing(change_swing(swing, theirs, turns, place + sway, stance), body)
 
 
+def tilt_arms(swing: Swing, turns: Turns, degrees: float) -> None:
+    """Make the plane of the arms steeper at top and finish."""
+    _tilt(turns, UPPER_ARMS, _bumps(swing, len(turns)) @ np.full(2, degrees))
+
+
 def _retime(
     swing: Swing, options: VariationOptions, rng: np.random.Generator
 ) -> tuple[Turns, Float[np.ndarray, "T 3"]]:

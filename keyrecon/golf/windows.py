@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.golf.kinematics import place_body
 from keyrecon.golf.motion_model import posture_at
-from keyrecon.golf.records import Body, Matches, MotionModel, Observations, SwingState
+from keyrecon.golf.records import Body, Marks, Matches, MotionModel, Observations, SwingState
 from keyrecon.golf.regularise import Rows, expect_alphas, stack_rows
 from keyrecon.golf.solver import Expect, Kind, Problem, solve
 from keyrecon.golf.unknowns import ROOT, Span, window_span
@@ -145,4 +145,10 @@ def cut_observations(observations: Observations, chosen: slice) -> Observations:
             matches.frame[inside] - chosen.start, matches.start[inside], matches.end[inside]
         ),
         mu=observations.mu[chosen],
+        marks=None if observations.marks is None else _cut_marks(observations.marks, chosen),
     )
+
+
+def _cut_marks(marks: Marks, chosen: slice) -> Marks:
+    inside = (marks.frames >= chosen.start) & (marks.frames < chosen.stop)
+    return Marks(marks.frames[inside] - chosen.start, marks.joints[inside])
