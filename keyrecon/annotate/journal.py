@@ -4,7 +4,9 @@ Why SQLite and not a text file with fsync: a batch of edits is one transaction, 
 whole or not at all; every frame of the write-ahead log has a checksum, so the torn end that a
 loss of power leaves is dropped at the next start; and a full disk rolls back to what was there.
 With synchronous=FULL the log has reached the disk before a commit returns: what was
-acknowledged survives kill -9 and a loss of power. All of it is the standard library's.
+acknowledged survives kill -9 and a loss of power. All of it is the standard library's. The
+database is held exclusively: then SQLite needs no memory shared between processes, which WAL mode
+otherwise has in a mapped file that network drives do not do well.
 
 Rows are only ever added. `notes` holds small facts beside them: which revision each file shows.
 """
@@ -12,7 +14,7 @@ Rows are only ever added. `notes` holds small facts beside them: which revision 
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from keyrecon.annotate.cells import Change
@@ -40,21 +42,28 @@ class Journal:
         self.path = path
         try:
             self._base = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-            self._base.execute("PRAGMA journal_mode=WAL")
-            self._base.execute("PRAGMA synchronous=FULL")
-            version = self._base.execute("PRAGMA user_version").fetchone()[0]
-            if version not in (0, VERSION):
-                raise KeyreconError(
-                    f"{path} was written by a newer keyrecon (journal version {version}); "
-                    "use that one."
-                )
-            self._base.executescript(SCHEMA + f"PRAGMA user_version={VERSION};")
+            with ExitStack() as held:
+                held.callback(self._base.close)
+                self._prepare()
+                held.pop_all()
         except sqlite3.Error as fault:
             raise KeyreconError(
                 f"{path} cannot be used as a journal of edits ({fault}). Free some space if the "
                 "disk is full; if the file is damaged, move it away: the marks themselves are in "
                 "annotations.json, only undo is lost."
             ) from fault
+
+    def _prepare(self) -> None:
+        self._base.execute("PRAGMA locking_mode=EXCLUSIVE")
+        self._base.execute("PRAGMA journal_mode=WAL")
+        self._base.execute("PRAGMA synchronous=FULL")
+        version = self._base.execute("PRAGMA user_version").fetchone()[0]
+        if version not in (0, VERSION):
+            raise KeyreconError(
+                f"{self.path} was written by a newer keyrecon (journal version {version}); use "
+                "that one."
+            )
+        self._base.executescript(SCHEMA + f"PRAGMA user_version={VERSION};")
 
     def entries(self, up_to: int | None = None) -> Iterator[Entry]:
         """All entries in order, or those up to a revision."""

@@ -8,6 +8,7 @@ and its id makes sure that it counts once. Listeners hear of every accepted entr
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from threading import RLock
 from typing import Any
 
@@ -38,30 +39,18 @@ class Store:
         person made cannot be read.
         """
         self._workspace, self._limits = workspace, limits
-        self._lock = RLock()
-        self._alone = FileLock(workspace.folder / ".annotate.lock", thread_local=False)
-        try:
-            self._alone.acquire(timeout=0)
-        except Timeout as fault:
-            raise KeyreconError(
-                f"{workspace.folder} is being annotated already; use the page that is open, or "
-                "stop that keyrecon annotate first."
-            ) from fault
-        try:
-            self._open()
-        except BaseException:
-            self._alone.release()
-            raise
-
-    def _open(self) -> None:
-        folder = self._workspace.folder
         self._listeners: list[Listener] = []
-        self._journal = Journal(folder / "annotate.sqlite")
-        self.state = advance(State(), self._journal.entries())
-        check_fit(self.state.cells, self._limits.skeleton, self._limits.n_frames)
-        forms = (annotations_form(self._workspace, self._limits), picks_form(self._workspace))
-        self._mirrors = [Mirror(form, self._journal.note(form.path.name)) for form in forms]
-        self.refresh()
+        self._lock = RLock()
+        with ExitStack() as held:
+            held.callback(_hold(workspace).release)
+            self._journal = Journal(workspace.folder / "annotate.sqlite")
+            held.callback(self._journal.close)
+            self.state = advance(State(), self._journal.entries())
+            check_fit(self.state.cells, limits.skeleton, limits.n_frames)
+            forms = (annotations_form(workspace, limits), picks_form(workspace))
+            self._mirrors = [Mirror(form, self._journal.note(form.path.name)) for form in forms]
+            self.refresh()
+            self._held = held.pop_all()
 
     def annotations(self) -> Annotations:
         """The marks as the rest of keyrecon reads them."""
@@ -193,5 +182,17 @@ class Store:
     def close(self) -> None:
         """Let go of the project."""
         with self._lock:
-            self._journal.close()
-            self._alone.release()
+            self._held.close()
+
+
+def _hold(workspace: Workspace) -> FileLock:
+    """The lock that only one server of a project can have; gone when its process ends."""
+    alone = FileLock(workspace.folder / ".annotate.lock", thread_local=False)
+    try:
+        alone.acquire(timeout=0)
+    except Timeout as fault:
+        raise KeyreconError(
+            f"{workspace.folder} is being annotated already; use the page that is open, or "
+            "stop that keyrecon annotate first."
+        ) from fault
+    return alone
