@@ -132,7 +132,7 @@ def annotate(
     project: Positional[Path],
     port: int = 0,
     host: str = "127.0.0.1",
-    no_browser: Annotated[bool, arg(name="no-browser")] = False,
+    browser: bool = True,
 ) -> None:
     """Open the page on which a person picks colours and marks the keyframes.
 
@@ -143,10 +143,10 @@ def annotate(
         project: Project folder.
         port: Port of the address; any free one by default.
         host: Address to listen on; any other than this machine's own lets others in.
-        no_browser: Only print the address.
+        browser: Open the address; --no-browser only prints it.
     """
     say = partial(print, flush=True)  # whoever starts this from a script waits for the address
-    serve_annotator(Workspace(project), (host, port), not no_browser, say)
+    serve_annotator(Workspace(project), (host, port), browser, say)
 
 
 @app.command(name="import")

@@ -79,8 +79,9 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
             door = address.make_door(listener, host)
             assert door.hosts[0] == f"{first}:{port}"
             assert f"localhost:{port}" in door.hosts
-            with pytest.raises(KeyreconError, match="choose another --port"):
-                address.listen(host, port)
+            for taken in (port, 99_999):
+                with pytest.raises(KeyreconError, match="choose another --port"):
+                    address.listen(host, taken)
 
 
 @pytest.mark.parametrize(

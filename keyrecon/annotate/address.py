@@ -66,11 +66,11 @@ def _bound(host: str, port: int) -> socket.socket:
     try:
         listener.bind((host, port))
         listener.listen()  # from now on a browser waits instead of being turned away
-    except OSError as fault:
+    except (OSError, OverflowError) as fault:
         listener.close()
         raise KeyreconError(
-            f"Nothing can be served at {host} port {port} ({fault.strerror or fault}); choose "
-            "another --port, or none for any that is free."
+            f"Nothing can be served at {host} port {port} ({getattr(fault, 'strerror', fault)}); "
+            "choose another --port, or none for any that is free."
         ) from fault
     return listener
 
