@@ -1,5 +1,6 @@
 """annotations.json and picks.json show the state, and what other programs change comes in."""
 
+import json
 from threading import Thread
 
 import pytest
@@ -70,6 +71,23 @@ def test_the_first_start_takes_what_is_there_and_keeps_a_copy(open_store, bare):
     assert store.state.cells == {NECK: [10, 20, 2]}
     assert store.undo("u") is None
     assert (bare / "annotations.old-1.json").read_text() == text
+
+
+def test_opening_a_project_changes_none_of_its_files(open_store, bare):
+    write_coco(bare / "annotations.json", *one_mark())
+    rows = [
+        {"frame": 7, "part": "shirt", "x": 5, "y": 6},
+        {"frame": 2, "part": "head", "x": 1, "y": 2},
+    ]
+    (bare / "picks.json").write_text(json.dumps({"picks": rows}))
+    before = {path: path.read_bytes() for path in bare.glob("*.json")}
+    for _ in range(2):
+        assert len(open_store().state.cells) == 3
+        assert {path: path.read_bytes() for path in bare.glob("*.json")} == before
+    open_store().undo("nothing")
+    submit(open_store(), mark(4, "neck", [11, 21, 2]))
+    assert (bare / "picks.json").read_bytes() == before[bare / "picks.json"]
+    assert len(on_file(bare)) == 2
 
 
 def test_a_file_of_our_own_needs_no_copy(open_store, bare):

@@ -22,7 +22,7 @@ def annotations_form(workspace: Workspace, limits: Limits) -> FileForm:
     def write(cells: Cells) -> str:
         return coco_text(annotations_from_cells(cells, skeleton), limits.size)
 
-    return FileForm(path, FILE_CELLS, written_cells, write, read)
+    return FileForm(path, FILE_CELLS, written_cells, write, True, read)
 
 
 def picks_form(workspace: Workspace) -> FileForm:
@@ -33,6 +33,7 @@ def picks_form(workspace: Workspace) -> FileForm:
         ("pick",),
         lambda cells: of_kind(cells, "pick"),
         lambda cells: picks_text(picks_from_cells(cells)),
+        False,
         lambda cells: _read_picks(path, cells),
     )
 

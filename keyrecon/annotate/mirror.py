@@ -36,6 +36,8 @@ class FileForm:
     """The cells of the sheet that the file holds."""
     write: Callable[[Cells], str]
     """The sheet as text."""
+    may_hold_more: bool
+    """Whether other programs may keep things there that the sheet does not know."""
     read: Callable[[Cells], Cells]
     """What the file holds; of equal values the keys of the cells given are used."""
 
@@ -59,6 +61,7 @@ class Mirror:
         self.wanted: Version = tuple(told.get("wanted", UNKNOWN))
         self._text: str | None = None
         self._seen: Signature = None
+        self._outside: tuple[str, Cells] | None = None
 
     @property
     def name(self) -> str:
@@ -88,11 +91,11 @@ class Mirror:
         if digest in ours:
             self.shown = ours[digest]
         else:
-            changes = self._read(current, at)
+            changes = self._read(digest, current, at)
         self._seen = signature
         return changes
 
-    def _read(self, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
+    def _read(self, digest: str, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
         try:
             found = self.form.read(current)
         except KeyreconError as fault:
@@ -102,8 +105,14 @@ class Mirror:
             ) from fault
         known = {version[0] for version in (self.wanted, self.shown) if version != UNKNOWN} or {0}
         bases = [self.form.pick_out(at(revision)) for revision in known]
-        self.shown = UNKNOWN
+        self.shown, self._outside = UNKNOWN, (digest, found)
         return min((difference(base, found) for base in bases), key=len)
+
+    def accept(self, cells: Cells) -> None:
+        """Leave the file as another program wrote it if it says the same as the sheet."""
+        if self._outside is not None and self._outside[1] == self.form.pick_out(cells):
+            self.shown = self.wanted = (self.wanted[0], self._outside[0])
+        self._outside = None
 
     def plan(self, cells: Cells, revision: int) -> Plan | None:
         """What the file shall show after an edit; None while there is nothing to write."""

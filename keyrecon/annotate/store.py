@@ -144,8 +144,9 @@ class Store:
         if changes:
             role: Role = "fixed" if first else "edit"
             self._commit([Draft(f"file-{uuid.uuid4().hex}", "file", changes, role)])
-        if changes and first and not mirror.is_shown():
-            self._workspace.put_aside(mirror.form.path)  # it may hold what we do not know
+        if changes and first and mirror.form.may_hold_more and not mirror.is_shown():
+            self._workspace.put_aside(mirror.form.path)
+        mirror.accept(self.state.cells)
 
     def _commit(
         self, drafts: Iterable[Draft], notes: Mapping[str, str] | None = None
