@@ -1,24 +1,27 @@
 """Accuracy on rendered tennis with known truth, sequence by sequence: paper's form beside ours.
 
     python benchmarks/accuracy.py [--work DIR] [--mocap DIR] [--only NAME ...] [--other]
+        [--mediapipe PYTHON]
 
 Renders what is missing in the work folder, annotates the chosen keyframes from the truth with
-click noise, reconstructs and prints a table. Nothing is asserted.
+click noise, reconstructs and prints a table. Nothing is asserted. With an interpreter that has
+mediapipe 0.10.21 installed, MediaPipe Pose is measured on the same videos.
 """
 
 import argparse
 import resource
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from peer import score_mediapipe
 from sequences import DATA, OTHER, TENNIS, Sequence, render
 
 from keyrecon.console import show
 from keyrecon.formats.picks import read_picks
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, Preparation, as_printed, prepare, reconstruct, with_height
-from keyrecon.records import Motion
+from keyrecon.records import Annotations, Motion
 from keyrecon.report.summary import annotation_cost
 from keyrecon.stages import StageStore
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
@@ -28,6 +31,8 @@ CLICK_NOISE = 3.0 / 400
 """Standard deviation of a click, player heights."""
 HEIGHT_ERROR = 0.03
 """The height that a user types is off by up to this share."""
+SHORT = 20.0
+"""Seconds up to which a clip repeats too little for the usual budget; it gets twice as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +54,24 @@ def prepare_case(sequence: Sequence, folder: Path, options: Options) -> Case:
     return Case(sequence, preparation, read_truth(folder / "truth.npz"), store)
 
 
-def solve(case: Case, options: Options, signs: bool = True) -> Motion:
-    """The part after the person, with marks from the truth."""
+def mark(case: Case, signs: bool = True) -> Annotations:
+    """What a person would mark: the truth at the keyframes, with click noise."""
     truth = case.truth
-    seed = case.sequence.seed
     noise = CLICK_NOISE * float(np.median(case.preparation.track.height))
-    marks = mark_from_truth(
+    return mark_from_truth(
         case.preparation.keyframes,
         truth["points2d"],
         truth["points3d"],
         truth.get("visible"),
-        MarkOptions(noise, signs, seed),
+        MarkOptions(noise, signs, case.sequence.seed),
     )
-    error = np.random.default_rng(seed).uniform(-HEIGHT_ERROR, HEIGHT_ERROR)
-    options = with_height(options, float(truth["height_m"]) * (1 + error))
-    return reconstruct(case.preparation, marks, options, case.store.keep, show)
+
+
+def solve(case: Case, options: Options, signs: bool = True) -> Motion:
+    """The part after the person, with marks from the truth."""
+    error = np.random.default_rng(case.sequence.seed).uniform(-HEIGHT_ERROR, HEIGHT_ERROR)
+    options = with_height(options, float(case.truth["height_m"]) * (1 + error))
+    return reconstruct(case.preparation, mark(case, signs), options, case.store.keep, show)
 
 
 def judge_track(case: Case) -> float:
@@ -110,6 +118,9 @@ def report(sequence: Sequence, folder: Path, forms: list[str]) -> None:
     """Print the rows of one sequence."""
     for form in forms:
         options, signs = FORMS[form]
+        if sequence.seconds <= SHORT:
+            budget = 2 * options.keyframes.budget
+            options = replace(options, keyframes=replace(options.keyframes, budget=budget))
         case = prepare_case(sequence, folder, options)
         motion = solve(case, options, signs)
         scores = evaluate_motion(motion, case.truth)
@@ -126,6 +137,16 @@ def report(sequence: Sequence, folder: Path, forms: list[str]) -> None:
         )
 
 
+def report_mediapipe(sequence: Sequence, folder: Path, python: Path) -> None:
+    """Print the row of MediaPipe Pose; `cost` is nothing, `track` the frames with a person."""
+    peer = score_mediapipe(folder, python, read_truth(folder / "truth.npz"))
+    print(
+        f"{sequence.name:<22}{'MediaPipe Pose':<23}{'-':>6}{'-':>7}{peer.found:7.1%}{peer.pck:7.1%}"
+        f"{'-':>7}{'-':>8}{peer.pa_mpjpe:7.1f}{peer.n_mpjpe:7.1f}{peer.acceleration:7.1f}",
+        flush=True,
+    )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -134,11 +155,15 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names of sequences")
     parser.add_argument("--form", nargs="*", default=list(FORMS), choices=list(FORMS))
     parser.add_argument("--other", action="store_true", help="motion other than tennis")
+    parser.add_argument("--mediapipe", type=Path, help="an interpreter with mediapipe")
     words = parser.parse_args()
     print(COLUMNS)
     for sequence in OTHER if words.other else TENNIS:
         if not words.only or sequence.name in words.only:
-            report(sequence, render(sequence, words.work, words.mocap), words.form)
+            folder = render(sequence, words.work, words.mocap)
+            report(sequence, folder, words.form)
+            if words.mediapipe:
+                report_mediapipe(sequence, folder, words.mediapipe)
     print(f"Peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB.")
 
 

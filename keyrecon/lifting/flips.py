@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.anatomy import (
@@ -26,6 +26,7 @@ from keyrecon.lifting.anatomy import (
     trunk_axes,
     trunk_cost,
 )
+from keyrecon.lifting.occlusion import hidden_cost
 
 _MOST_ALIKE = 24
 """Key poses that are asked per frame; those further away weigh nothing."""
@@ -144,23 +145,30 @@ def follow_signs(
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
     options: FlipOptions = FlipOptions(),
+    hidden: Bool[np.ndarray, "T J"] | None = None,
 ) -> Signs:
-    """Signs in every frame of a sequence, group by group: trunk first, then what hangs on it."""
+    """Signs in every frame of a sequence, group by group: trunk first, then what hangs on it.
+
+    `hidden` tells of joints that were marked though they could not be seen.
+    """
     anatomy = anatomy_of(skeleton)
     trunk, limbs = _costs(shown, breadths, anatomy)
+    limbs = [options.limits * cost for cost in limbs]
+    if hidden is not None:
+        limbs = _with_hidden(limbs, shown, hidden, skeleton)
     sign = np.ones(shown.depth.shape, dtype=np.int64)
     probability = np.ones(shown.depth.shape)
     rows = np.arange(len(sign))
     best = np.zeros(len(sign), dtype=np.int64)
     if anatomy.trunk:
-        total = options.limits * (trunk + sum(cost.min(axis=-1) for cost in limbs))
+        total = options.limits * trunk + sum(cost.min(axis=-1) for cost in limbs)
         total += votes.cost(anatomy.trunk, shown, options)
         total += votes.guided(anatomy.trunk, shown, options)
         best = second_order_path(total, *_depths(anatomy.trunk, shown), options)
         bones = list(anatomy.trunk)
         sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
-        given = options.limits * cost[rows, best % cost.shape[1]]
+        given = cost[rows, best % cost.shape[1]]
         given += votes.cost(limb.bones, shown, options)
         given += votes.guided(limb.bones, shown, options)
         path = second_order_path(given, *_depths(limb.bones, shown), options)
@@ -287,6 +295,30 @@ def _costs(
         axes = hips if limb.kind == "leg" else shoulders
         limbs.append(_limb_cost(limb, bones, axes[:, :, None], up[:, :, None]))
     return trunk, limbs
+
+
+def _with_hidden(
+    limbs: list[Float[np.ndarray, "T S L"]],
+    shown: Shown,
+    hidden: Bool[np.ndarray, "T J"],
+    skeleton: Skeleton,
+) -> list[Float[np.ndarray, "T S L"]]:
+    """Costs of the arms with those of hidden joints that would lie before the trunk."""
+    anatomy = anatomy_of(skeleton)
+    frames = np.flatnonzero(hidden.any(axis=1))
+    if not anatomy.trunk or not len(frames):
+        return limbs
+    seen = Shown(shown.flat[frames], shown.depth[frames], shown.doubt[frames])
+    corners = _candidates(anatomy.trunk, seen)
+    result = []
+    for limb, cost in zip(anatomy.limbs, limbs, strict=True):
+        if limb.kind == "arm":
+            joints = list(skeleton.bones[list(limb.bones), 1])
+            shoulder = corners[:, :, 2 if limb.side > 0 else 3]
+            bones = _candidates(limb.bones, seen)
+            cost[frames] += hidden_cost(corners, shoulder, bones, hidden[frames][:, joints])
+        result.append(cost)
+    return result
 
 
 def _limb_cost(

@@ -44,6 +44,8 @@ def follow_key_signs(
     shown = _show_all(observed, annotations, size, fps)
     vectors = np.concatenate([shown.flat, shown.depth[..., None]], axis=-1)[frames]
     vectors[..., 2] *= -nearer
+    hidden = np.zeros(observed.joints.shape[:2], dtype=bool)
+    hidden[frames] = np.isfinite(annotations.joints[..., 0]) & ~annotations.visible
     alone = replace(at_rate(options, fps), votes=0.0, guide=0.0)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
@@ -61,7 +63,7 @@ def follow_key_signs(
             np.zeros(seen.depth.shape),
             annotations.skeleton,
         )
-        signs = follow_signs(seen, votes, size.breadths, annotations.skeleton, alone)
+        signs = follow_signs(seen, votes, size.breadths, annotations.skeleton, alone, hidden[piece])
         sign[inside] = signs.sign[frames[inside] - start]
         probability[inside] = signs.probability[frames[inside] - start]
     confirmed = nearer != 0

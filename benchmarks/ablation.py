@@ -1,0 +1,206 @@
+"""Where the error in space comes from: the lift with one thing after another made perfect.
+
+    python benchmarks/ablation.py [--work DIR] [--mocap DIR] [--only NAME ...]
+
+Rendered sequences as in accuracy.py; the mean over them is printed last. Perfect means taken from
+the truth: `2D` every joint in every frame; `signs` which end of a bone is nearer in every frame;
+`lengths` bones and breadths; `scale` of every frame; `all of these` leaves the solver alone. Then
+what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of the carried
+joints thrown anywhere on the player. `signs` in the table: share of limb bones whose depth sign
+is right at the keyframes.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+from accuracy import HEIGHT_ERROR, Case, mark, prepare_case
+from sequences import DATA, TENNIS, render
+
+from keyrecon.console import show
+from keyrecon.lifting import follow, lift
+from keyrecon.lifting.chain import bone_vectors, breadths
+from keyrecon.lifting.flips import Signs
+from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
+from keyrecon.matching.keyframes import KeyframeOptions
+from keyrecon.matching.propagate import PropagateOptions, propagate_joints
+from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
+from keyrecon.pipeline import Options
+from keyrecon.records import Annotations, JointTracks, Keyframes
+
+OUTLIERS = 0.03
+"""Share of carried joints that are replaced."""
+LIMBS = ("knee", "ankle", "elbow", "wrist")
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What the lift is given, and the truth to hold it against."""
+
+    tracks: JointTracks
+    marks: Annotations
+    keyframes: Keyframes
+    height_px: np.ndarray
+    fps: float
+    truth: dict[str, np.ndarray]
+    height: float
+    """Stature as typed, metres."""
+
+
+def carry(case: Case) -> Trial:
+    """Joints of a sequence carried from its keyframes, as the pipeline does."""
+    prepared, truth = case.preparation, case.truth
+    marks = mark(case)
+    tracks = case.store.keep(
+        "propagate",
+        propagate_joints,
+        prepared.video,
+        prepared.survey,
+        marks,
+        options=PropagateOptions(),
+        progress=show,
+    )
+    error = np.random.default_rng(case.sequence.seed).uniform(-HEIGHT_ERROR, HEIGHT_ERROR)
+    height = float(truth["height_m"]) * (1 + error)
+    seen, fps = prepared.track.height, prepared.video.fps
+    return Trial(tracks, marks, prepared.keyframes, seen, fps, truth, height)
+
+
+def lift_trial(trial: Trial) -> LiftResult:
+    """The lift as it is."""
+    given = trial.tracks, trial.marks, trial.keyframes, trial.height_px, trial.fps
+    return lift_motion(*given, LiftOptions(height=trial.height))
+
+
+def true_signs(trial: Trial) -> np.ndarray:
+    """1 where the child end of a bone is farther from the camera, else -1."""
+    depth = bone_vectors(trial.truth["points3d"], trial.marks.skeleton)[..., 2]
+    return np.where(depth > 0, 1, -1)
+
+
+def true_size(trial: Trial) -> BodySize:
+    """Lengths, breadths and scale of the truth."""
+    points, skeleton = trial.truth["points3d"] / trial.height, trial.marks.skeleton
+    lengths = np.median(np.linalg.norm(bone_vectors(points, skeleton), axis=-1), axis=0)
+    across = [points[:, left] - points[:, right] for left, right, _ in breadths(skeleton)]
+    broad = np.median(np.linalg.norm(across, axis=-1), axis=1)
+    return BodySize(lengths, broad, trial.truth["focal"] / points[..., 2].mean(axis=1))
+
+
+@contextmanager
+def perfect_size(trial: Trial, lengths: bool = True, scale: bool = True) -> Iterator[None]:
+    """Lengths or scale, or both, from the truth."""
+    estimate, true = lift.estimate_lengths, true_size(trial)
+
+    def know(*given: object) -> BodySize:
+        found = estimate(*given)
+        bones = true if lengths else found
+        return BodySize(bones.lengths, bones.breadths, (true if scale else found).scale)
+
+    with patch.object(lift, "estimate_lengths", know):
+        yield
+
+
+@contextmanager
+def perfect_signs(trial: Trial) -> Iterator[None]:
+    """Depth signs of every frame from the truth."""
+    signs = true_signs(trial)
+    known = Signs(signs, np.ones(signs.shape))
+    with patch.object(follow, "follow_signs", lambda *given: known):
+        yield
+
+
+def with_true_joints(trial: Trial) -> Trial:
+    """Every joint of every frame at its place in the picture."""
+    joints = trial.truth["points2d"]
+    return replace(trial, tracks=replace(trial.tracks, joints=joints.copy()))
+
+
+def with_outliers(trial: Trial) -> Trial:
+    """Some carried joints thrown anywhere within the player's height of their place."""
+    rng = np.random.default_rng(0)
+    joints = trial.tracks.joints.copy()
+    thrown = rng.random(joints.shape[:2]) < OUTLIERS
+    thrown[trial.marks.frames] = False
+    reach = np.median(trial.height_px) / 2
+    joints[thrown] += rng.uniform(-reach, reach, (int(thrown.sum()), 2))
+    return replace(trial, tracks=replace(trial.tracks, joints=joints))
+
+
+def _under(trial: Trial, *perfect: object) -> LiftResult:
+    if not perfect:
+        return lift_trial(trial)
+    with perfect[0]:
+        return _under(trial, *perfect[1:])
+
+
+CONDITIONS: dict[str, Callable[[Trial], LiftResult]] = {
+    "as it is": lift_trial,
+    "perfect 2D": lambda t: lift_trial(with_true_joints(t)),
+    "perfect signs": lambda t: _under(t, perfect_signs(t)),
+    "perfect lengths": lambda t: _under(t, perfect_size(t, scale=False)),
+    "perfect scale": lambda t: _under(t, perfect_size(t, lengths=False)),
+    "perfect lengths and scale": lambda t: _under(t, perfect_size(t)),
+    "all of these": lambda t: _under(with_true_joints(t), perfect_size(t), perfect_signs(t)),
+    "3 % outliers": lambda t: lift_trial(with_outliers(t)),
+}
+
+
+def judge(trial: Trial, found: LiftResult) -> list[float]:
+    """PA-MPJPE, N-MPJPE, acceleration error (mm) and the share of limb signs right."""
+    skeleton, frames = trial.marks.skeleton, trial.marks.frames
+    root = [skeleton.index("right_hip"), skeleton.index("left_hip")]
+    points, truth = 1000 * found.points3d, 1000 * trial.truth["points3d"]
+    right = -found.signs == true_signs(trial)[frames]
+    marked = np.isfinite(trial.marks.joints[:, skeleton.bones, 0]).all(axis=2)
+    limb = [skeleton.names[child].split("_")[-1] in LIMBS for _, child in skeleton.bones]
+    scores = pa_mpjpe(points, truth), n_mpjpe(points, truth, root)
+    return [*scores, acceleration_error(points, truth, root), right[marked & limb].mean()]
+
+
+def measure(folder: Path, case: Case) -> dict[str, list[float]]:
+    """Scores of one sequence under every condition."""
+    trial = carry(case)
+    rows = {name: judge(trial, run(trial)) for name, run in CONDITIONS.items()}
+    blind = replace(trial, marks=replace(trial.marks, nearer=0 * trial.marks.nearer))
+    rows["no signs from the person"] = judge(blind, lift_trial(blind))
+    half = replace(Options(), keyframes=KeyframeOptions(budget=KeyframeOptions().budget / 2))
+    fewer = carry(prepare_case(case.sequence, folder, half))
+    rows["half the keyframes"] = judge(fewer, lift_trial(fewer))
+    return rows
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--work", type=Path, default=Path("benchmarks/work"))
+    parser.add_argument("--mocap", type=Path, default=DATA / "mocap")
+    parser.add_argument("--only", nargs="*", help="names of sequences")
+    words = parser.parse_args()
+    print(f"{'sequence':<22}{'condition':<28}{'PA':>7}{'N':>7}{'accel':>7}{'signs':>8}")
+    every: dict[str, list[list[float]]] = {}
+    for sequence in TENNIS:
+        if not words.only or sequence.name in words.only:
+            folder = render(sequence, words.work, words.mocap)
+            for name, row in measure(folder, prepare_case(sequence, folder, Options())).items():
+                every.setdefault(name, []).append(row)
+                print_row(sequence.name, name, row)
+    for name, rows in every.items():
+        print_row("mean", name, np.mean(rows, axis=0))
+
+
+def print_row(sequence: str, condition: str, row: list[float] | np.ndarray) -> None:
+    """One line of the table."""
+    pa, n, acceleration, right = row
+    print(
+        f"{sequence:<22}{condition:<28}{pa:7.1f}{n:7.1f}{acceleration:7.1f}{right:8.1%}", flush=True
+    )
+
+
+if __name__ == "__main__":
+    main()
