@@ -124,7 +124,7 @@ def sign_costs(
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
     options: FlipOptions = FlipOptions(),
-) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S L"]]]:
+) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of every trunk state, and of every state of each limb given it, nats.
 
     States as `sign_states` lists them, limbs in the order of `anatomy_of`.
@@ -279,7 +279,7 @@ def _depths(
 
 def _costs(
     shown: Shown, breadths: Float[np.ndarray, "P"], anatomy: Anatomy
-) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S L"]]]:
+) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of joint limits for every trunk state, and of every limb state given it."""
     frames = len(shown.flat)
     if not anatomy.trunk:
@@ -298,11 +298,11 @@ def _costs(
 
 
 def _with_hidden(
-    limbs: list[Float[np.ndarray, "T S L"]],
+    limbs: list[Float[np.ndarray, "T S _"]],
     shown: Shown,
     hidden: Bool[np.ndarray, "T J"],
     skeleton: Skeleton,
-) -> list[Float[np.ndarray, "T S L"]]:
+) -> list[Float[np.ndarray, "T S _"]]:
     """Costs of the arms with those of hidden joints that would lie before the trunk."""
     anatomy = anatomy_of(skeleton)
     frames = np.flatnonzero(hidden.any(axis=1))
