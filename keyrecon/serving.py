@@ -88,7 +88,12 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
 
 
 def _find_keyframes(folder: Path, told: dict[str, Any], progress: Progress) -> str:
-    chosen = {name: told.get(name) for name in ("budget", "coverage", "reach")}
+    reach = told.get("reach")
+    chosen = {
+        "budget": told.get("budget"),
+        "coverage": told.get("coverage"),
+        "reach": None if reach is None else round(reach),
+    }
     return project.find_keyframes(Workspace(folder), Options(), chosen, progress)
 
 

@@ -4,7 +4,7 @@ What comes out can be written as JSON. The route table itself is in server.py.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 from starlette.responses import Response
@@ -61,7 +61,7 @@ class JobQuestion(Struct, forbid_unknown_fields=True):
     """Work to begin."""
 
     kind: Name
-    options: dict[Name, float | str | bool | None] = {}
+    options: dict[Literal["budget", "coverage", "reach", "height"], float | None] = {}
 
 
 class ImportQuestion(Struct, forbid_unknown_fields=True):
