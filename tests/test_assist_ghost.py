@@ -68,6 +68,15 @@ def test_a_half_that_nobody_marked_has_no_ghost(game):
     assert (ghost.source[LSP14.is_lower] == -1).all()
 
 
+def test_a_half_of_which_a_joint_was_never_marked_has_no_ghost_yet(game):
+    survey, truth = game
+    annotations = marks(truth, (0, 6))
+    annotations.joints[:, LSP14.index("left_elbow")] = np.nan
+    ghost = foresee_joints(survey, annotations, 8)
+    assert np.isnan(ghost.joints[~LSP14.is_lower]).all()
+    assert np.isfinite(ghost.joints[LSP14.is_lower]).all()
+
+
 def test_a_frame_is_never_foreseen_from_its_own_marks(game):
     survey, truth = game
     sources = choose_sources(survey, marks(truth, (0, 6, 12)), 6)

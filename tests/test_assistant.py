@@ -12,6 +12,7 @@ from keyrecon.assist.assistant import make_assistant
 from keyrecon.assist.preview import cut_strip
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.formats.picks import write_picks
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.records import Annotations
@@ -157,6 +158,13 @@ def test_the_last_preparation_helps_on_while_the_picks_are_changed(prepared, unt
     untouched.picks_file.write_text(text.replace('"shirt"', '"vest"'))
     assert prepared.keyframes({}) == before
     untouched.picks_file.write_text(text)
+
+
+def test_picks_in_another_order_are_the_same_picks(prepared, untouched):
+    before = untouched.picks()
+    write_picks(untouched.picks_file, before[::-1])
+    assert make_assistant(Workspace(untouched.folder)).keyframes({}) == prepared.keyframes({})
+    write_picks(untouched.picks_file, before)
 
 
 def test_a_strip_shows_the_frames_it_says(write_numbered):

@@ -99,9 +99,10 @@ def _dress(scene: Scene, poses: Poses, frames: Int[np.ndarray, "N"]) -> Puppets:
 
 
 def marked_figures(annotations: Annotations, half: Half) -> Int[np.ndarray, "K"]:
-    """Frames that serve as figures of one half of the body."""
+    """Frames that serve as figures of one half of the body; none until each joint is seen once."""
     marked = np.isfinite(annotations.joints[:, half.joints[half.own], 0])
-    return annotations.frames[marked.mean(axis=1) >= LEAST_MARKED]
+    served = marked.mean(axis=1) >= LEAST_MARKED
+    return annotations.frames[served & marked[served].any(axis=0).all()]
 
 
 def stand_in(scene: Scene, joints: Complex[np.ndarray, "T J"], upper: Half) -> None:

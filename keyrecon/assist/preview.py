@@ -20,8 +20,8 @@ from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.player import track_player
 from keyrecon.video import Video
 
-SAMPLES = 48
-"""Pictures of a strip: enough for the scene behind the player to show everywhere."""
+SAMPLES = 24
+"""Pictures beside those asked for: enough for the scene behind the player to show everywhere."""
 KEPT_WIDTH = 960
 """Pictures are kept at most this wide, px."""
 TINT = (255, 0, 200)

@@ -49,6 +49,7 @@ class Study:
         self._looks: tuple[str, tuple[Lookalikes, ...]] | None = None
         self._colors: tuple[tuple[Pick, ...], Colors] | None = None
         self._strip: tuple[tuple[int, ...], Strip, CameraPath] | None = None
+        self._learner.submit(self.preparation)
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
@@ -119,20 +120,28 @@ class Study:
             if self._learnt is None or self._learnt[0] != key:
                 work = self._learner.submit(self._learn, preparation, annotations)
                 self._learnt = key, work
+                self._learner.submit(self._foresee_halves, annotations, key)
             work = self._learnt[1]
         if wait or self._knowledge is None or work.done():
             self._knowledge = work.result()
         return self._knowledge
 
     def _learn(self, preparation: Preparation, annotations: Annotations) -> Knowledge:
-        """Marks, and ghosts where a frame shows only half of the body."""
-        halves = ~np.isfinite(annotations.joints[:, :, 0]).all(axis=1)
-        for frame in annotations.frames[halves].tolist():
-            if frame not in self._ghosts:
-                self.ghost(annotations, frame)
+        """From marks, and from such ghosts as there are where a frame shows half of the body."""
         ghosts = {frame: ghost for frame, (_, ghost) in [*self._ghosts.items()]}
         video, track = preparation.video, preparation.track
         return learn_body(annotations, ghosts, track.height, video.fps)
+
+    def _foresee_halves(self, annotations: Annotations, key: str) -> None:
+        """Make the ghosts that are lacking, until there are other marks; then learn anew."""
+        half = ~np.isfinite(annotations.joints[:, :, 0]).all(axis=1)
+        lacking = [t for t in annotations.frames[half].tolist() if t not in self._ghosts]
+        for frame in lacking:
+            if self._learnt is None or self._learnt[0] != key:
+                return
+            self.ghost(annotations, frame)
+        if lacking:
+            self._learnt = None
 
     def _prepared(self) -> Preparation:
         """The stored results of the automatic part, with the keyframes that were asked for."""

@@ -65,9 +65,8 @@ def _describe(half: HalfName, mine: Bool[np.ndarray, "T"], alone: int) -> str:
     where = f"frame {first}" if first == last else f"frames {first}-{last}"
     count = int(mine.sum())
     frames = "1 frame" if count == 1 else f"{count} frames"
-    longest = "" if last - first + 1 == count else ", the longest stretch"
-    text = f"Best {half} body for {frames}{longest} {where}"
-    return f"{text}; {alone} that no other covers." if alone else f"{text}."
+    text = f"Shows the {half} body of {frames} best, most in a row {where}"
+    return f"{text}; {alone} of them no other keyframe covers." if alone else f"{text}."
 
 
 def _longest_stretch(flags: Bool[np.ndarray, "T"]) -> tuple[int, int]:
