@@ -176,9 +176,10 @@ def fit_all(scene: Scene, swings: tuple[Swing, ...], out: Path) -> Iterator[tupl
     seen = look(video, clicks, model, folder)
     off = club_angle(seen.club, truth["club2d"])
     found = np.isfinite(off)
+    spent = (folder / "seconds.txt").read_text()
     apart = np.round((seen.keys - truth["keys"]) * 60 / scene.fps, 1)
     print(
-        f"{scene.name}: {len(video)} frames, looked at in {(folder / 'seconds.txt').read_text()} s; "
+        f"{scene.name}: {len(video)} frames, looked at in {spent} s; "
         f"club seen in {found.mean():.0%}, within 5 degrees in {(off[found] < 5).mean():.0%} of "
         f"these; keys off by {apart} frames at 60/s"
     )

@@ -8,14 +8,16 @@ runs them; the command line passes one that returns stored results where nothing
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from keyrecon.background import BackgroundOptions, build_background
 from keyrecon.colors import ColorOptions, learn_colors
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
+from keyrecon.formats.motion_model import read_motion_model
+from keyrecon.golf.follow import SwingPriorOptions, follow_swing
+from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_expected, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
 from keyrecon.matching.keyframes import KeyframeOptions, adopt_keyframes, choose_keyframes
 from keyrecon.matching.matrix import CompareOptions, compare_frames
@@ -55,6 +57,10 @@ class Options:
     compare: CompareOptions = field(default_factory=CompareOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     propagate: PropagateOptions = field(default_factory=PropagateOptions)
+    prior: Literal["none", "golf"] = "none"
+    """'golf' lets the swing prior tell depth signs and what nobody saw between keyframes."""
+    swing: SwingPriorOptions = field(default_factory=SwingPriorOptions)
+    """How the golf prior is fitted, where it is asked for."""
     lift: LiftOptions = field(default_factory=LiftOptions)
 
 
@@ -142,17 +148,14 @@ def reconstruct(
         options=options.propagate,
         progress=progress,
     )
-    lifted = keep(
-        "lift",
-        lift_motion,
-        tracks,
-        annotations,
-        keyframes,
-        preparation.track.height,
-        video.fps,
-        options=options.lift,
-        progress=progress,
-    )
+    inputs = (tracks, annotations, keyframes, preparation.track.height, video.fps)
+    lift: Callable[..., LiftResult] = lift_motion
+    if options.prior == "golf":
+        pictures = preparation.track.height, (video.width, video.height)
+        known = (tracks, annotations, read_motion_model(), pictures, video.time)
+        expected = keep("swing", follow_swing, *known, options=options.swing, progress=progress)
+        lift, inputs = lift_expected, (expected, *inputs)
+    lifted = keep("lift", lift, *inputs, options=options.lift, progress=progress)
     return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.camera import project_orthographic
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.chain import bone_vectors, pose_from_directions
+from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
 from keyrecon.lifting.flips import FlipOptions
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
@@ -83,10 +83,12 @@ def lift_motion(  # noqa: PLR0913
     fps: float,
     options: LiftOptions = LiftOptions(),
     progress: Progress = silent,
+    expected: Float[np.ndarray, "T J 3"] | None = None,
 ) -> LiftResult:
     """Lift tracked joints to 3D with the help of annotated keyframes.
 
-    `height_px` is the tracked standing height. Raises KeyreconError without annotations.
+    `height_px` is the tracked standing height. `expected`, poses of a motion prior in camera axes,
+    take the place of the slerped key poses. Raises KeyreconError without annotations.
     """
     _check(tracks, annotations)
     skeleton = annotations.skeleton
@@ -97,7 +99,8 @@ def lift_motion(  # noqa: PLR0913
     slerped = interpolate_poses(
         keys.directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
     )
-    guide = _place(slerped.directions, observed, size, skeleton)
+    between = slerped.directions if expected is None else _directions(expected, skeleton)
+    guide = _place(between, observed, size, skeleton)
     residual = observed.joints - _flat(guide, size, skeleton)
     slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, 1.4 * options.lengths.track_noise)
     slips[annotations.frames] = False
@@ -112,19 +115,41 @@ def lift_motion(  # noqa: PLR0913
         state = follow_motion(guide, clean, figure, fps, follow, progress)
     points = pose_from_directions(state.directions, size.lengths, skeleton)
     points[..., :2] += state.root[:, None]
-    unit = 1.0 if options.height is None else options.height
+    metres = 1.0 if options.height is None else options.height
     return LiftResult(
-        points3d=points * unit,
+        points3d=points * metres,
         points2d=project_orthographic(points, size.scale),
-        scale=size.scale / unit,
-        lengths=size.lengths * unit,
-        key_poses=pose_from_directions(keys.directions, size.lengths, skeleton) * unit,
+        scale=size.scale / metres,
+        lengths=size.lengths * metres,
+        key_poses=pose_from_directions(keys.directions, size.lengths, skeleton) * metres,
         signs=np.where(keys.directions[..., 2] > 0, -1, 1),
         sign_margin=keys.probability,
         rejected=slips,
         upper_controls=slerped.upper,
         lower_controls=slerped.lower,
     )
+
+
+def lift_expected(  # noqa: PLR0913
+    expected: Float[np.ndarray, "T J 3"],
+    tracks: JointTracks,
+    annotations: Annotations,
+    keyframes: Keyframes,
+    height_px: Float[np.ndarray, "T"],
+    fps: float,
+    options: LiftOptions = LiftOptions(),
+    progress: Progress = silent,
+) -> LiftResult:
+    """`lift_motion` with poses of a motion prior as its guide."""
+    return lift_motion(
+        tracks, annotations, keyframes, height_px, fps, options, progress, expected=expected
+    )
+
+
+def _directions(
+    points: Float[np.ndarray, "T J 3"], skeleton: Skeleton
+) -> Float[np.ndarray, "T B 3"]:
+    return unit(bone_vectors(points, skeleton))
 
 
 def _place(
