@@ -3,7 +3,8 @@
 The two sides of a shaft are close parallel edges of opposite direction, whether it is darker or
 brighter than what is behind it (Lepetit, Shahrokni and Fua, CVPR 2003). Line segments come from
 the Line Segment Detector (Grompone von Gioi et al., PAMI 32, 2010), which orients every segment by
-its gradient; only those on the foreground are paired. Bars in one line are joined where the
+its gradient; they are sought in the picture and in its foreground, and only those on the
+foreground are paired. Bars in one line are joined where the
 foreground continues between them, as a shaft does that crosses the player or a bright cloud.
 """
 
@@ -23,6 +24,8 @@ OVERLAP = 0.5
 """Share of the shorter side that lies beside the longer one."""
 STEPS = 9
 """Places along a segment or a gap where the foreground is asked."""
+KNOWN = 0.7
+"""Share of a segment of the foreground that must lie where the scene is known."""
 END_PART = 10
 """The beginning and the end of a video are this part of it."""
 SAME = 0.02
@@ -37,7 +40,7 @@ class BarOptions:
 
     thinnest: float = 0.0015
     """Least width of the shaft."""
-    thickest: float = 0.018
+    thickest: float = 0.024
     """Greatest width of the shaft, with the blur of motion."""
     shortest: float = 0.03
     """Least length of a side."""
@@ -66,13 +69,31 @@ def find_bars(
 ) -> Bars:
     """Bars of a full picture, in px; `frame` is its number."""
     height = foreground.height
-    found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD, 0.8).detect(grey)[0]
-    sides = np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(float)
-    long = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1) > options.shortest * height
-    sides = sides[long]
-    sides = sides[_along(foreground, frame, sides) > options.moving]
-    bars = _pair(sides, options.thinnest * height, options.thickest * height)
-    return _join(bars, foreground, frame, options)
+    widths = options.thinnest * height, options.thickest * height
+    found = []
+    for sides, both in ((_find_segments(grey), True), (_mask_segments(foreground, frame), False)):
+        long = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1) > options.shortest * height
+        kept = sides[long]
+        kept = kept[_along(foreground, frame, kept) > options.moving]
+        bars, bright = _pair(kept, *widths)
+        found.append(bars[bright | both])
+    return _join(np.concatenate(found), foreground, frame, options)
+
+
+def _find_segments(picture: UInt8[np.ndarray, "h w"]) -> Float[np.ndarray, "n 2 2"]:
+    """Line segments, the darker side always on the same hand."""
+    found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD, 0.8).detect(picture)[0]
+    return np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(float)
+
+
+def _mask_segments(foreground: Foreground, frame: int) -> Float[np.ndarray, "n 2 2"]:
+    """Segments of the foreground: they show a shaft that differs from the scene in colour only."""
+    found = _find_segments(foreground.likely[frame])
+    share = np.linspace(0, 1, STEPS)[:, None]
+    places = np.round(found[:, None, 0] * (1 - share) + found[:, None, 1] * share).astype(int)
+    x, y = (np.clip(places[..., k], 0, foreground.known.shape[1 - k] - 1) for k in (0, 1))
+    found = found[foreground.known[y, x].mean(axis=1) > KNOWN]
+    return (found - (foreground.shrink - 1) / 2) / foreground.shrink
 
 
 def drop_scenery(bars: Sequence[Bars], height: float) -> list[Bars]:
@@ -104,8 +125,8 @@ def _along(
 
 def _pair(
     sides: Float[np.ndarray, "n 2 2"], thinnest: float, thickest: float
-) -> Float[np.ndarray, "m 2 2"]:
-    """Middle lines of close, overlapping sides of opposite direction."""
+) -> tuple[Float[np.ndarray, "m 2 2"], Bool[np.ndarray, "m"]]:
+    """Middle lines of close, overlapping sides of opposite direction, and which are bright."""
     length = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
     unit = (sides[:, 1] - sides[:, 0]) / length[:, None]
     i, j = np.nonzero(np.triu(unit @ unit.T < -np.cos(PARALLEL), 1))
@@ -123,7 +144,7 @@ def _pair(
     good &= shared > OVERLAP * np.minimum(length[i], length[j])
     center = middle[i] + normal * gap[:, None] / 2
     ends = np.stack([low.min(axis=0), high.max(axis=0)], axis=1)[..., None]
-    return (center[:, None] + ends * axis[:, None])[good]
+    return (center[:, None] + ends * axis[:, None])[good], gap[good] < 0
 
 
 def _join(

@@ -38,10 +38,10 @@ class ClubOptions:
     """Usual speed of the club head, heights per second."""
     jump: float = 4.0
     """Greatest cost of a movement from one frame to the next."""
-    miss: float = 1.0
+    miss: float = 0.5
     """Cost of a frame without a shaft."""
-    gap: float = 0.4
-    """Longest time that is bridged."""
+    gap: float = 1.2
+    """Longest time that is bridged: at the top a club may point at the camera for long."""
     window: float = 0.07
     """Time on either side that the local motion is fitted over."""
     off: float = 0.035

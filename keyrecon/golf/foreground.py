@@ -40,6 +40,10 @@ ABOVE, ASIDE, BELOW = 0.35, 0.5, 0.08
 """How far the player's trunk, head and legs may get from the clicks, player heights."""
 CUT_HEIGHT = 160.0
 """Height of the player in the pictures that are cut out, px; time goes with its square."""
+LIMB, HAND = 0.032, 0.03
+"""A forearm is thicker, and a hand reaches no farther from it, player heights."""
+RIM = 2
+"""Scenery around the reach that GrabCut sees, px."""
 SAFE = 0.012
 """Width of the rim around the player that belongs to nobody, player heights."""
 SMALLEST, LARGEST = 0.01, 0.7
@@ -73,6 +77,8 @@ class Foreground:
 
     likely: UInt8[np.ndarray, "T h w"]
     """Probability in 1/255 that a pixel is player or club."""
+    known: Bool[np.ndarray, "h w"]
+    """Where the scene was seen; elsewhere colours alone told the player from it."""
     shrink: float
     """Pixels of these pictures per pixel of the video."""
     height: float
@@ -85,10 +91,18 @@ class Foreground:
         return (read.ravel() / 255.0).reshape(points.shape[:-1])
 
     def body(self, frame: int) -> Bool[np.ndarray, "h w"]:
-        """The player without what is thinner than a hand: without the club."""
-        size = max(3, round(0.022 * self.height * self.shrink)) | 1
-        disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-        return cv2.morphologyEx(self.mask(frame), cv2.MORPH_OPEN, disk) > 0
+        """The player without what is thinner than a limb: without the club.
+
+        Hands, feet and what else is thin but short comes back with the limb it hangs on.
+        """
+        mask = self.mask(frame)
+        limbs = cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._disk(LIMB))
+        return cv2.dilate(limbs, self._disk(2 * HAND)) & mask > 0
+
+    def _disk(self, size: float) -> UInt8[np.ndarray, "n n"]:
+        """A disk of a diameter in player heights."""
+        pixels = max(3, round(size * self.height * self.shrink)) | 1
+        return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (pixels, pixels))
 
     def mask(self, frame: int) -> UInt8[np.ndarray, "h w"]:
         """1 where a pixel is rather player or club than scenery."""
@@ -107,11 +121,16 @@ class _Cutter:
 
     def __call__(self, picture: UInt8[np.ndarray, "h w 3"]) -> Bool[np.ndarray, "h w"]:
         small = reduce_picture(picture, self.width)
-        reach = _reach(small.shape[:2], self.clicks)
-        trimap = np.where(reach, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
+        mask = np.zeros(small.shape[:2], np.uint8)
+        x0, y0, x1, y1 = _reach(self.clicks, self.width / self.clicks.size[0])
+        part = np.s_[max(0, y0 - RIM) : y1 + RIM, max(0, x0 - RIM) : x1 + RIM]
+        trimap = np.full(mask.shape, cv2.GC_BGD, np.uint8)
+        trimap[y0:y1, x0:x1] = cv2.GC_PR_FGD
+        trimap = np.ascontiguousarray(trimap[part])
         models = (m.copy() for m in self.models)
-        cv2.grabCut(small, trimap, None, *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
-        mask = (trimap == cv2.GC_PR_FGD).astype(np.uint8)
+        cropped = np.ascontiguousarray(small[part])
+        cv2.grabCut(cropped, trimap, None, *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
+        mask[part] = trimap == cv2.GC_PR_FGD
         return cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_NEAREST) > 0
 
 
@@ -132,7 +151,7 @@ def separate_player(
     compare = partial(_likely, scene, cutter)
     pictures = progress(read_small(video, width), "Separating the player", len(video))
     likely = np.stack(list(side_by_side(compare, pictures)))
-    return Foreground(likely, width / video.width, clicks.height)
+    return Foreground(likely, plate.known, width / video.width, clicks.height)
 
 
 def _likely(
@@ -140,7 +159,8 @@ def _likely(
 ) -> UInt8[np.ndarray, "h w"]:
     to_picture = np.linalg.inv(scene.background.from_reference)
     likely = scene.foreground(to_lab(picture), 0, to_picture)
-    unknown = ~scene.background.known
+    # A scene is compared with the pixels around too: next to the unknown it is unknown as well.
+    unknown = cv2.dilate((~scene.background.known).astype(np.uint8), np.ones((3, 3))) > 0
     likely[unknown] = cutter(picture)[unknown]
     return (255 * cv2.GaussianBlur(likely, (0, 0), SOFT)).astype(np.uint8)
 
@@ -191,8 +211,10 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], clicks: Clicks) -> _Cutte
 
 def _seed(shape: tuple[int, int], clicks: Clicks) -> UInt8[np.ndarray, "h w"]:
     """GrabCut's beginning: lines through the body, what is around it, and the scene."""
-    trimap = np.where(_reach(shape, clicks), cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
     shrink = shape[1] / clicks.size[0]
+    trimap = np.full(shape, cv2.GC_BGD, np.uint8)
+    x0, y0, x1, y1 = _reach(clicks, shrink)
+    trimap[y0:y1, x0:x1] = cv2.GC_PR_BGD
     for width, label in ((LIKELY, cv2.GC_PR_FGD), (SURE, cv2.GC_FGD)):
         thick = max(1, round(width * clicks.height * shrink))
         for names in BONES:
@@ -202,16 +224,13 @@ def _seed(shape: tuple[int, int], clicks: Clicks) -> UInt8[np.ndarray, "h w"]:
     return trimap
 
 
-def _reach(shape: tuple[int, int], clicks: Clicks) -> Bool[np.ndarray, "h w"]:
-    """Where trunk, head and legs may come during the swing."""
-    reach = np.zeros(shape, bool)
-    shrink = shape[1] / clicks.size[0]
+def _reach(clicks: Clicks, shrink: float) -> tuple[int, int, int, int]:
+    """Left, top, right and bottom of where trunk, head and legs may come during the swing."""
     places = np.array([clicks.place(n) for n in clicks.joints])
     low = places.min(axis=0) - clicks.height * np.array([ASIDE, ABOVE])
     high = places.max(axis=0) + clicks.height * np.array([ASIDE, BELOW])
     (x0, y0), (x1, y1) = np.maximum(low * shrink, 0).astype(int), (high * shrink).astype(int)
-    reach[y0:y1, x0:x1] = True
-    return reach
+    return int(x0), int(y0), int(x1), int(y1)
 
 
 def _check_player(trimap: UInt8[np.ndarray, "h w"], clicks: Clicks) -> None:

@@ -33,12 +33,12 @@ def plain_name(name: str) -> str:
 
 def keyframe_chart(keyframes: Keyframes, comparison: Comparison) -> go.Figure:
     """Which keyframe stands for which frame (Fig. 6), both halves of the body."""
-    figure = _rows(("Upper body", "Lower body"), len(comparison.row))
+    figure = stack_charts(("Upper body", "Lower body"), len(comparison.row))
     halves = ((keyframes.upper, comparison.upper), (keyframes.lower, comparison.lower))
     for row, (half, distances) in enumerate(halves, start=1):
         _add_occurrence(figure, row, half, _between_keyframes(half, comparison, distances))
         figure.update_yaxes(title_text="keyframe", row=row, col=1, rangemode="tozero")
-    return _styled(figure, 460, legend=False)
+    return style_chart(figure, 460, legend=False)
 
 
 def _between_keyframes(
@@ -75,7 +75,7 @@ def _add_occurrence(
 
 def joint_chart(frames: int, has_truth: bool) -> go.Figure:
     """An empty chart of one joint's position; the page fills in the chosen joint."""
-    figure = _rows(("Across the picture (x), px", "Down the picture (y), px"), frames)
+    figure = stack_charts(("Across the picture (x), px", "Down the picture (y), px"), frames)
     for row in (1, 2):
         shown = row == 1
         traces: list[dict[str, Any]] = [
@@ -92,7 +92,7 @@ def joint_chart(frames: int, has_truth: bool) -> go.Figure:
             figure.add_scatter(x=[], y=[], showlegend=shown, legendgroup=trace["name"],
                                row=row, col=1, **trace)
         figure.update_yaxes(autorange="reversed", row=row, col=1)
-    return _styled(figure, 460)
+    return style_chart(figure, 460)
 
 
 def angle_chart(motion: Motion) -> go.Figure:
@@ -101,7 +101,7 @@ def angle_chart(motion: Motion) -> go.Figure:
     joints, sides = hinges(skeleton), joint_sides(skeleton)
     degrees = np.degrees(hinge_angles(motion.points3d, skeleton)).astype(np.float32)
     titles = list(dict.fromkeys(_pair_name(skeleton, joint) for joint in joints))
-    figure = _rows(tuple(title.capitalize() for title in titles), len(degrees))
+    figure = stack_charts(tuple(title.capitalize() for title in titles), len(degrees))
     for column, joint in enumerate(joints):
         row = titles.index(_pair_name(skeleton, joint)) + 1
         figure.add_scatter(
@@ -111,7 +111,7 @@ def angle_chart(motion: Motion) -> go.Figure:
             line={"width": 1.6, "color": SIDE_COLORS[sides[joint]]},
         )
     figure.update_yaxes(range=[0, 185], dtick=45, ticksuffix="°")
-    return _styled(figure, 60 + 190 * len(titles))
+    return style_chart(figure, 60 + 190 * len(titles))
 
 
 def _pair_name(skeleton: Skeleton, joint: int) -> str:
@@ -141,7 +141,7 @@ def source_chart(motion: Motion) -> go.Figure:
     figure.update_yaxes(autorange="reversed")
     for title, axis in zip(figure.layout.annotations, ("xaxis", "xaxis2"), strict=True):
         title.update(x=figure.layout[axis].domain[0], xanchor="left")
-    return _styled(figure, 440).update_layout(
+    return style_chart(figure, 440).update_layout(
         barmode="stack", bargap=0.25, hovermode="closest", margin={"l": 110, "b": 70},
         legend={"y": -0.1, "x": 0, "xanchor": "left", "yanchor": "top", "traceorder": "normal"},
     )
@@ -151,16 +151,16 @@ def trust_chart(
     values: Float[np.ndarray, "T"], keyframes: Int[np.ndarray, "K"], title: str
 ) -> go.Figure:
     """One number of every frame that tells how good it is, with the annotated frames marked."""
-    figure = _rows((title,), len(values))
+    figure = stack_charts((title,), len(values))
     figure.add_scatter(x=np.arange(len(values)), y=values.astype(np.float32).round(4), mode="lines",
                        line={"width": 1.4, "color": "var(--accent)"}, name="every frame")
     figure.add_scatter(x=keyframes, y=values[keyframes].round(4), mode="markers", name="annotated",
                        marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"})
     figure.update_yaxes(rangemode="tozero")
-    return _styled(figure, 250)
+    return style_chart(figure, 250)
 
 
-def _rows(titles: tuple[str, ...], frames: int) -> go.Figure:
+def stack_charts(titles: tuple[str, ...], frames: int) -> go.Figure:
     """Charts over the same frames, one above the other."""
     count = max(1, len(titles))
     figure = make_subplots(
@@ -172,7 +172,7 @@ def _rows(titles: tuple[str, ...], frames: int) -> go.Figure:
     return figure.update_xaxes(title_text="frame", row=count, col=1)
 
 
-def _styled(figure: go.Figure, height: int, legend: bool = True) -> go.Figure:
+def style_chart(figure: go.Figure, height: int, legend: bool = True) -> go.Figure:
     """Quiet axes, no frame, room for nothing but the data."""
     line = {"gridcolor": "var(--rule)", "zeroline": False, "linecolor": "var(--rule)"}
     figure.update_xaxes(**line).update_yaxes(**line)

@@ -110,9 +110,9 @@ def cut_pictures(
         for frame, picture in enumerate(frames):
             if frame in annotations.frames:
                 row = int(np.searchsorted(annotations.frames, frame))
-                marked[frame] = _jpeg(_marked_still(windows, picture, annotations, row))
+                marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
             if frame in even:
-                stills[frame] = _jpeg(_posed_crop(windows, frame, picture, motion, STILL))
+                stills[frame] = jpeg_uri(_posed_crop(windows, frame, picture, motion, STILL))
             yield _posed_crop(windows, frame, picture, motion, CLIP)
 
     with tempfile.TemporaryDirectory() as folder:
@@ -166,7 +166,8 @@ def _bridge(values: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
     return bridged
 
 
-def _jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> str:
+def jpeg_uri(picture: UInt8[np.ndarray, "h w 3"]) -> str:
+    """A picture as a JPEG data URI."""
     quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), quality)[1]
     return _data_uri("image/jpeg", data.tobytes())

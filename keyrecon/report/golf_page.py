@@ -1,0 +1,142 @@
+"""The report of a fitted swing: one HTML file that opens without a network.
+
+It answers, in this order: how the swing was timed, whether the model lies on the player, where the
+club and the hands went, how shoulders and hips turned, and how the swing differs from the mean of
+those that the model was learnt from.
+"""
+
+from importlib.resources import files
+from pathlib import Path
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from keyrecon import __version__
+from keyrecon.durable import write_durably
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.report.golf_charts import KEY_NAMES, style_bars, time_chart, turn_chart
+from keyrecon.report.golf_measures import SwingMeasures, measure_swing
+from keyrecon.report.golf_pictures import key_pictures, overlay_strip, path_picture
+from keyrecon.report.markup import data_block, note, number, section, text
+from keyrecon.report.page import POLICY
+from keyrecon.video import Video
+
+
+def write_golf_report(
+    path: Path, fitted: FittedSwing, observations: Observations, model: MotionModel, video: Video
+) -> None:
+    """Write the report of a swing to one HTML file."""
+    measures = measure_swing(fitted, observations)
+    body = "".join((
+        _headline(fitted, measures, video),
+        _key_postures(fitted, observations, video),
+        _timing(fitted, observations, model),
+        _strip(fitted, observations, video),
+        _paths(fitted, observations, video),
+        _turns(fitted, measures),
+        _style(fitted, model),
+    ))  # fmt: skip
+    write_durably(path, _page(video.path.name, body))
+
+
+def _page(title: str, body: str) -> str:
+    own = files("keyrecon.report")
+    scripts = (get_plotlyjs(), (own / "golf.js").read_text("utf-8"))
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{text(title)}: keyrecon swing report</title>"
+        f"<style>{(own / 'report.css').read_text('utf-8')}</style></head><body><main>{body}</main>"
+        f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>"
+    )
+
+
+def _headline(fitted: FittedSwing, measures: SwingMeasures, video: Video) -> str:
+    """The figures that matter, first."""
+    top = min(round(float(fitted.keys[1])), len(measures.hips) - 1)
+    cards = [
+        ("Tempo", f"{number(measures.tempo, '.1f')} : 1",
+         f"{measures.upswing:.2f} s up, {measures.downswing:.2f} s down"),
+        ("Shoulder turn", f"{measures.shoulders[top]:.0f}°", "at the top, about the vertical"),
+        ("Hip turn", f"{measures.hips[top]:.0f}°", "at the top"),
+        ("X-factor", f"{measures.x_factor[top]:.0f}°",
+         f"at the top; most {measures.x_factor.max():.0f}°"),
+        ("Club found", f"{measures.club_found:.0%}", "of the frames"),
+    ]  # fmt: skip
+    tiles = "".join(
+        f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
+        for name, value, more in cards
+    )
+    return (
+        f'<header><p class="kicker">keyrecon swing report</p><h1>{text(video.path.name)}</h1>'
+        f'<p class="lead">{video.width} &times; {video.height} px, {len(video)} frames, '
+        f'{video.fps:.4g} per second</p></header><dl class="cards">{tiles}</dl>'
+    )
+
+
+def _key_postures(fitted: FittedSwing, observations: Observations, video: Video) -> str:
+    cards = "".join(
+        f'<div class="still">{_image(uri, f"{name}, frame {frame}")}'
+        f"<span>{name} <small>frame {frame}</small></span>"
+        f"{_image(above, f'{name} from above')}</div>"
+        for name, (frame, uri, above) in zip(
+            KEY_NAMES, key_pictures(video, fitted, observations), strict=True
+        )
+    )
+    about = note("The fitted primitives on the picture, and from above with the camera below.")
+    return section("keys", "Key postures", about, f'<div class="strip wide">{cards}</div>')
+
+
+def _timing(fitted: FittedSwing, observations: Observations, model: MotionModel) -> str:
+    about = note(
+        "Where in the learnt motion every frame is. The dotted line is the first guess, from the "
+        "frames in which the club passes the key postures."
+    )
+    chart = _chart("time", time_chart(fitted, observations, model))
+    return section("timing", "Normalised time", about, chart)
+
+
+def _strip(fitted: FittedSwing, observations: Observations, video: Video) -> str:
+    stills = "".join(
+        f'<div class="still">{_image(uri, f"Frame {frame} with the golfer")}'
+        f"<span>{frame}</span></div>"
+        for frame, uri in overlay_strip(video, fitted, observations)
+    )
+    about = note("Judge the fit here: the primitives should lie on the player in every frame.")
+    return section("fit", "The fit through the swing", about, f'<div class="strip">{stills}</div>')
+
+
+def _paths(fitted: FittedSwing, observations: Observations, video: Video) -> str:
+    about = note(
+        "Lines are the fitted paths of club head (vermillion) and hands (blue), dots what was seen."
+    )
+    picture = _image(path_picture(video, fitted, observations), "Paths of club and hands")
+    return section("paths", "Club and hands", about, f"<figure>{picture}</figure>")
+
+
+def _turns(fitted: FittedSwing, measures: SwingMeasures) -> str:
+    about = note(
+        "Lines between both shoulders and both hips, turned about the vertical. From one camera "
+        "the motion model has a large share in these angles."
+    )
+    return section("turns", "Turns", about, _chart("turns", turn_chart(measures, fitted.keys)))
+
+
+def _style(fitted: FittedSwing, model: MotionModel) -> str:
+    about = note(
+        "How the swing differs from the mean of the model, in standard deviations of the swings "
+        f"it was learnt from: {text(model.provenance)}."
+    )
+    made = note(f"keyrecon {text(__version__)}")
+    return section("style", "Style", about, _chart("style", style_bars(fitted)), made)
+
+
+def _chart(name: str, figure: go.Figure) -> str:
+    block = data_block(f"chart-{name}", figure.to_json())
+    height = figure.layout.height
+    return f'<div class="chart" data-chart="{name}" style="min-height:{height}px"></div>{block}'
+
+
+def _image(uri: str, about: str) -> str:
+    return f'<img style="aspect-ratio:auto;width:100%" src="{uri}" alt="{text(about)}">'
