@@ -18,6 +18,7 @@ from keyrecon.golf.skeleton import size_body
 from keyrecon.golf.start import place_player, start_state
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_overlay import write_golf_overlay
+from keyrecon.report.golf_page import write_golf_report
 from keyrecon.video import Video, open_video
 
 
@@ -79,10 +80,11 @@ def fit_file(
     out.mkdir(parents=True, exist_ok=True)
     write_motion(out / "motion.npz", fitted.motion)
     write_golf_overlay(out / "overlay.mp4", video, fitted, observations.camera, progress)
+    write_golf_report(out / "report.html", fitted, observations, model, video)
     spent = time.perf_counter() - began
     return (
         f"{tell_tempo(fitted, video.fps)}\n"
-        f"{out}/motion.npz, overlay.mp4: {len(video)} frames, "
+        f"{out}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
         f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
     )
 

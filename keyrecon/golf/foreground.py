@@ -86,6 +86,8 @@ class Foreground:
 
     def sample(self, frame: int, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
         """Probability at points given in pixels of the video; 0 outside the picture."""
+        if not points.size:
+            return np.zeros(points.shape[:-1])
         flat = (points.reshape(-1, 2) * self.shrink + (self.shrink - 1) / 2).astype(np.float32)
         read = cv2.remap(self.likely[frame], flat[:, None], None, cv2.INTER_LINEAR)
         return (read.ravel() / 255.0).reshape(points.shape[:-1])

@@ -12,9 +12,9 @@ of the body outside of the mask, pulls by the mask's distance transform. Matched
 frames are carried by the surface that the first one lies on.
 """
 
-import cv2
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.ndimage import map_coordinates
 
 from keyrecon.golf.point_residuals import pair_rows, project
 from keyrecon.golf.records import Camera, Capsules, Observations, Pose, Residuals
@@ -157,14 +157,12 @@ def _look_up(
     """Values of each frame's distance picture at its pixels, and their slopes."""
     values, slopes = [], []
     for picture, places in zip(pictures, pixels, strict=True):
-        at = np.clip((places - (AWAY_SCALE - 1) / 2) / AWAY_SCALE, -1e4, 1e4).astype(np.float32)
-        read = [
-            cv2.remap(layer, at[:, None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            for layer in (picture, *np.gradient(picture)[::-1])
-        ]
-        values.append(read[0].ravel())
-        slopes.append(np.stack([r.ravel() for r in read[1:]], axis=1) / AWAY_SCALE)
-    return np.concatenate(values).astype(float), np.concatenate(slopes).astype(float)
+        at = (places[:, ::-1] - (AWAY_SCALE - 1) / 2).T / AWAY_SCALE
+        layers = (picture, *np.gradient(picture)[::-1])
+        value, *slope = (map_coordinates(a, at, order=1, mode="nearest") for a in layers)
+        values.append(value)
+        slopes.append(np.stack(slope, axis=1) / AWAY_SCALE)
+    return np.concatenate(values), np.concatenate(slopes)
 
 
 def _no_residuals() -> Residuals:

@@ -1,9 +1,11 @@
 """Joints that are followed through the video: head, knees and ankles (CVPR 2005, Section 4.2).
 
 Every clicked one of them that can be seen is followed by its appearance, forwards and backwards
-from the clicked frame. Where the left and the right one come to lie at the same place, one hides
-the other and a tracker cannot but hold on to the nearer one: the one that had moved less before
-counts as hidden from then on.
+from the clicked frame. Three things that appearance cannot tell are told by what is known of legs.
+Seen along the line of the feet, the farther leg is behind the nearer one: it is not followed. Where
+the left and the right one come to lie at the same place, a tracker cannot but hold on to the nearer
+one: the one that had moved less before counts as hidden from then on. And a knee that slips along
+the thigh changes the length of the shank.
 """
 
 from collections.abc import Sequence
@@ -18,8 +20,12 @@ from keyrecon.golf.foreground import Foreground
 from keyrecon.pictures import side_by_side
 from keyrecon.progress import Progress, silent
 
-SPREAD = {"head_top": 0.012, "knee": 0.016, "ankle": 0.012}
+SPREAD = {"head_top": 0.02, "knee": 0.02, "ankle": 0.018}
 """Standard deviation of a tracked joint, player heights: cloth slides over knees."""
+IN_LINE = 0.12
+"""Feet closer than this across the picture are seen in line, player heights."""
+SHANK = (0.6, 1.25)
+"""Least and greatest length of the shank, in lengths of the clicked one."""
 HIDDEN_SPREAD = 0.04
 """The same of a joint that was clicked behind something."""
 CLICK_SPREAD = 0.015
@@ -50,7 +56,8 @@ def track_joints(
     joints = np.full((len(pictures), len(LSP14.names), 2), np.nan)
     spread = np.full(joints.shape[:2], np.inf)
     names = [n for n in clicks.joints if n in LSP14.names]
-    tracked = [n for n in names if _kind(n) in SPREAD and n not in clicks.hidden]
+    behind = {*clicks.hidden, *_farther_leg(clicks)}
+    tracked = [n for n in names if _kind(n) in SPREAD and n not in behind]
 
     def follow(name: str) -> Trail:
         start = clicks.head if name == "head_top" else clicks.place(name)
@@ -71,11 +78,30 @@ def track_joints(
         spread[clicks.frame, index] = own * foreground.height
     for pair in LSP14.mirrored:
         _hide_dragged(joints, pair, clicks.frame, foreground.height, fps)
+    for side in ("left", "right"):
+        _drop_slipped(joints, side, clicks.frame)
     return joints, np.where(np.isfinite(joints[..., 0]), spread, np.inf)
 
 
 def _kind(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
+
+
+def _farther_leg(clicks: Clicks) -> tuple[str, ...]:
+    """The leg behind the other one, if any: the nearer foot stands lower in the picture."""
+    apart = clicks.place("right_ankle") - clicks.place("left_ankle")
+    if abs(apart[0]) > IN_LINE * clicks.height:
+        return ()
+    side = "left" if apart[1] > 0 else "right"
+    return f"{side}_knee", f"{side}_ankle"
+
+
+def _drop_slipped(joints: Joints, side: str, clicked: int) -> None:
+    """Forget knees where the shank has an impossible length."""
+    knee, ankle = LSP14.index(f"{side}_knee"), LSP14.index(f"{side}_ankle")
+    length = np.linalg.norm(joints[:, knee] - joints[:, ankle], axis=1)
+    share = length / length[clicked]
+    joints[(share < SHANK[0]) | (share > SHANK[1]), knee] = np.nan
 
 
 def _track_both_ways(
