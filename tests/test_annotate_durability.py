@@ -21,10 +21,10 @@ from keyrecon.formats.coco import read_coco
 from keyrecon.workspace import Workspace
 
 LIMITS = Limits(LSP14, 100, (128, 64))
-KILLS = int(os.environ.get("KEYRECON_KILLS", "8"))
-"""How often the editing program is killed; 200 takes two minutes."""
+KILLS = int(os.environ.get("KEYRECON_KILLS", "25"))
+"""How often the editing program is killed."""
 EDITING = """
-import sys
+import itertools, os, sys
 from pathlib import Path
 from annotator_edits import mark, submit
 from keyrecon.annotate.edits import Limits
@@ -32,20 +32,43 @@ from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14
 from keyrecon.workspace import Workspace
 
-store = Store(Workspace(Path(sys.argv[1])), Limits(LSP14, 100, (128, 64)))
-print("open", flush=True)
-for line in sys.stdin:
-    number = int(line)
-    if number % 7 == 5:
-        store.undo(f"edit {number}")
-    elif number % 7 == 6:
-        store.redo(f"edit {number}")
-    else:
-        before = store.state.cells.get(("mark", number % 100, "neck"))
-        late = mark(number % 100, "neck", [number % 120, 7.5, 2], was=before)
-        assert submit(store, {**late, "id": f"edit {number}"})[0]["ok"]
-    print(number, flush=True)
+def edit_forever(folder, first):
+    print(os.getpid(), flush=True)
+    store = Store(Workspace(folder), Limits(LSP14, 100, (128, 64)))
+    for number in itertools.count(first):
+        if number % 7 == 5:
+            store.undo(f"edit {number}")
+        elif number % 7 == 6:
+            store.redo(f"edit {number}")
+        else:
+            before = store.state.cells.get(("mark", number % 100, "neck"))
+            late = mark(number % 100, "neck", [number % 120, 7.5, 2], was=before)
+            assert submit(store, {**late, "id": f"edit {number}"})[0]["ok"]
+        print(number, flush=True)
+
+for first in sys.stdin:
+    child = os.fork()
+    if not child:
+        edit_forever(Path(sys.argv[1]), int(first))
+    os.waitpid(child, 0)
+    print("dead", flush=True)
 """
+"""Begins to edit at the number it is told, in a process that can be killed, again and again."""
+
+
+@pytest.fixture
+def editing(bare):
+    """The editing program, and pipes to and from it."""
+    paths = os.pathsep.join([os.path.dirname(__file__), *sys.path])
+    with subprocess.Popen(
+        [sys.executable, "-c", EDITING, str(bare)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": paths},
+    ) as program:
+        yield program
+        program.kill()
 
 
 def cells_now(bare):
@@ -59,22 +82,15 @@ def cells_now(bare):
     return cells
 
 
-def edit_and_be_killed(bare, first, seconds):
-    """Numbers of the edits that were acknowledged before the kill."""
-    paths = os.pathsep.join([os.path.dirname(__file__), *sys.path])
-    with subprocess.Popen(
-        [sys.executable, "-c", EDITING, str(bare)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": paths},
-    ) as program:
-        assert program.stdout.readline() == "open\n"
-        program.stdin.write("".join(f"{n}\n" for n in range(first, first + 2000)))
-        program.stdin.flush()
-        time.sleep(seconds)
-        program.send_signal(signal.SIGKILL)
-        return [int(line) for line in program.stdout if line.endswith("\n")]
+def edit_and_be_killed(editing, first, least, seconds):
+    """Numbers of the edits that were acknowledged before the kill, `least` and some seconds on."""
+    print(first, file=editing.stdin, flush=True)
+    process = int(editing.stdout.readline())
+    heard = [editing.stdout.readline() for _ in range(least)]
+    time.sleep(seconds)
+    os.kill(process, signal.SIGKILL)
+    heard += iter(editing.stdout.readline, "dead\n")
+    return [int(line) for line in heard]
 
 
 def cells_after(count):
@@ -85,15 +101,15 @@ def cells_after(count):
     return {("mark", n % 100, "neck"): [n % 120, 7.5, 2] for n in edits}
 
 
-def test_no_kill_loses_an_acknowledged_edit(bare):
+def test_no_kill_loses_an_acknowledged_edit(bare, editing):
     rng, done = random.Random(KILLS), 0
     for _ in range(KILLS):
-        heard = edit_and_be_killed(bare, done, rng.uniform(0.0, 0.15))
+        heard = edit_and_be_killed(editing, done, rng.randrange(10), rng.uniform(0.0, 0.02))
         done = heard[-1] + 1 if heard else done
         assert heard == [*range(done - len(heard), done)]
         one_ahead = cells_after(done + 1)  # accepted, and killed before it was acknowledged
         assert cells_now(bare) in (cells_after(done), one_ahead)
-    assert done > KILLS
+    assert done > 3 * KILLS
 
 
 @contextmanager
