@@ -25,6 +25,9 @@ from keyrecon.workspace import Workspace
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
 
+IDLE_SECONDS = 75
+"""How long a connection may rest: a person looks at a picture longer than a program would."""
+
 
 def serve_annotator(
     workspace: Workspace, place: tuple[str, int], open_browser: bool, say: Callable[[str], None]
@@ -71,6 +74,7 @@ class _Server(uvicorn.Server):
             log_level="warning",
             access_log=False,
             server_header=False,
+            timeout_keep_alive=IDLE_SECONDS,
             timeout_graceful_shutdown=GRACE_SECONDS,
         )
         super().__init__(config)
