@@ -24,7 +24,6 @@ from keyrecon.workspace import Workspace
 
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
-
 IDLE_SECONDS = 75
 """How long a connection may rest: a person looks at a picture longer than a program would."""
 

@@ -89,7 +89,7 @@ def random_edit(store, rng):
 def test_undoing_everything_leads_back_through_every_state_and_redoing_forward(open_store, bare):
     store, rng = open_store(), random.Random(5)
     states = [store.state.cells]
-    while len(states) < 40:
+    while len(states) < 25:
         assert submit(store, random_edit(store, rng))[0]["ok"]
         if store.state.cells != states[-1]:
             states.append(store.state.cells)
