@@ -52,7 +52,7 @@ def run_apart(work):
         return pool.submit(asyncio.run, work).result()
 
 
-def request(app, method, address, headers, body=b""):
+async def call(app, method, address, headers, body=b""):
     """Ask an ASGI application, with exactly these headers: a list of pairs, or a dict."""
     path, _, query = address.partition("?")
     pairs = headers.items() if isinstance(headers, dict) else headers
@@ -77,10 +77,15 @@ def request(app, method, address, headers, body=b""):
         sent.append(message)
 
     with suppress(Exception):  # the server logs it; what counts is what was answered
-        run_apart(app(scope, receive, send))
+        await app(scope, receive, send)
     told = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
     content = b"".join(message.get("body", b"") for message in sent[1:])
     return Answer(sent[0]["status"], told, content)
+
+
+def request(*question):
+    """The answer to one question."""
+    return run_apart(call(*question))
 
 
 def ask(desk, method, path, body=None):

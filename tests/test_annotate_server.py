@@ -1,15 +1,18 @@
 """What the page asks the server, and what the server answers."""
 
+import asyncio
+import json
 import threading
 
 import numpy as np
-from annotator import ask, run_apart
+from annotator import DOOR, HEADERS, ask, call, run_apart
 from annotator_edits import edit, mark, submit
 
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.cells import by_frame
 from keyrecon.annotate.describe import guided_order
 from keyrecon.annotate.events import Events
+from keyrecon.annotate.server import make_app
 from keyrecon.annotate.watch import Watch
 from keyrecon.body import LSP14
 from keyrecon.formats.keyframes import keyframes_to_json
@@ -105,6 +108,34 @@ def test_the_assistant_hears_what_is_marked_and_taken(opened, folder):
     assert ask(desk, "GET", "/api/checks").json() == [{"frame": 3, "suspicion": None}]
     ask(desk, "GET", "/api/next")
     assert heard == {"marks": [3], "absent": {(3, "left_hip")}, "taken": {10, 20}}
+
+
+def test_help_that_takes_long_keeps_no_edit_waiting(opened):
+    held, asked = threading.Event(), []
+
+    def checks(annotations, absent):
+        asked.append(1)
+        assert held.wait(20)
+        return []
+
+    desk = opened(Assistant(checks=checks))
+    app = make_app(desk, DOOR)
+
+    async def many():
+        questions = [
+            asyncio.create_task(call(app, "GET", "/api/checks", HEADERS)) for _ in range(60)
+        ]
+        body = json.dumps({"edits": [mark(3, "neck", [10, 20, 2])]}).encode()
+        saved = await call(app, "POST", "/api/edits", HEADERS, body)
+        waiting = len(asked)
+        held.set()
+        await asyncio.gather(*questions)
+        return saved, waiting
+
+    saved, waiting = run_apart(many())
+    assert saved.json()["results"][0]["ok"]
+    assert waiting <= 1
+    assert len(asked) == 60
 
 
 def test_a_new_choice_of_keyframes_drops_none_that_was_worked_on_or_locked(opened, folder):

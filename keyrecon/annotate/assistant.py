@@ -6,9 +6,7 @@ server calls them in worker threads, one call of each kind at a time; KeyreconEr
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from functools import wraps
-from threading import Lock
+from dataclasses import dataclass
 from typing import Any
 
 from keyrecon.records import Annotations, Pick
@@ -38,20 +36,3 @@ class Assistant:
     """Head and feet found on a few frames with these picks."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None
     """How much each pixel of a frame looks like a part: RGBA, (h, w, 4)."""
-
-
-def one_at_a_time(assistant: Assistant) -> Assistant:
-    """The same help, but a second question of a kind waits for the answer to the first."""
-    given = {field.name: getattr(assistant, field.name) for field in fields(assistant)}
-    return Assistant(**{name: _queued(ask) for name, ask in given.items() if ask is not None})
-
-
-def _queued(ask: Callable[..., Any]) -> Callable[..., Any]:
-    lock = Lock()
-
-    @wraps(ask)
-    def asked(*arguments: object) -> Any:
-        with lock:
-            return ask(*arguments)
-
-    return asked

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from keyrecon.annotate.assistant import Assistant, one_at_a_time
+from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.cells import Change, by_frame, picks_of
 from keyrecon.annotate.describe import (
     describe_keyframes,
@@ -58,7 +58,7 @@ def open_desk(workspace: Workspace, assistant: Assistant, commands: Mapping[str,
         jobs=Jobs(commands, lambda job: events.tell({"job": describe_job(job)})),
         events=events,
         keyframes=KeptKeyframes(workspace, store),
-        assistant=one_at_a_time(assistant),
+        assistant=assistant,
     )
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from anyio import CapacityLimiter
+from anyio.to_thread import run_sync
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
@@ -38,20 +39,23 @@ class Way:
     path: str
     answer: Callable[..., Any]
     body: type | None = None
+    alone: bool = False
+    """Whether one question at a time is answered. The others wait outside the worker threads, so
+    that slow help never keeps an edit waiting."""
 
 
 WAYS = (
-    Way("GET", "/api/project", ask.project),
+    Way("GET", "/api/project", ask.project, alone=True),
     Way("GET", "/api/state", ask.state),
     Way("POST", "/api/edits", ask.edits, EditList),
     Way("POST", "/api/undo", ask.undo, ask.Turn),
     Way("POST", "/api/redo", ask.redo, ask.Turn),
-    Way("GET", "/api/ghost/{frame:int}", ask.ghost),
-    Way("POST", "/api/pose", ask.pose, ask.PoseQuestion),
-    Way("GET", "/api/checks", ask.checks),
-    Way("GET", "/api/next", ask.suggestions),
-    Way("POST", "/api/picks/preview", ask.preview, ask.StripQuestion),
-    Way("GET", "/api/backprojection/{frame:int}", ask.backprojection),
+    Way("GET", "/api/ghost/{frame:int}", ask.ghost, alone=True),
+    Way("POST", "/api/pose", ask.pose, ask.PoseQuestion, alone=True),
+    Way("GET", "/api/checks", ask.checks, alone=True),
+    Way("GET", "/api/next", ask.suggestions, alone=True),
+    Way("POST", "/api/picks/preview", ask.preview, ask.StripQuestion, alone=True),
+    Way("GET", "/api/backprojection/{frame:int}", ask.backprojection, alone=True),
     Way("GET", "/api/jobs", ask.jobs),
     Way("POST", "/api/jobs", ask.begin_job, ask.JobQuestion),
     Way("DELETE", "/api/jobs/{job:int}", ask.cancel_job),
@@ -116,11 +120,12 @@ def _page_file(page: dict[str, Response], name: str) -> Response:
 
 def _endpoint(desk: Desk, way: Way) -> Callable[[Request], Any]:
     """An endpoint that parses what was asked, answers in a worker thread, and writes JSON."""
+    limiter = CapacityLimiter(1) if way.alone else None
 
     async def endpoint(request: Request) -> Response:
         body = _parsed(await request.body(), way.body) if way.body else None
         asked = ask.Asked(request.path_params, dict(request.query_params), body)
-        answer = await run_in_threadpool(way.answer, desk, asked)
+        answer = await run_sync(way.answer, desk, asked, limiter=limiter)
         return answer if isinstance(answer, Response) else _json(answer)
 
     return endpoint
