@@ -4,10 +4,10 @@
 
 Rendered sequences as in accuracy.py; the mean over them is printed last. Perfect means taken from
 the truth: `2D` every joint in every frame; `signs` which end of a bone is nearer in every frame;
-`lengths` bones and breadths; `scale` of every frame; `all of these` leaves the solver alone. Then
-what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of the carried
-joints thrown anywhere on the player. `signs` in the table: share of limb bones whose depth sign
-is right at the keyframes.
+`lengths` of bones and breadths; `scale` of every frame; `all of these` leaves the solver alone.
+Then what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of the
+carried joints thrown anywhere on the player. `signs` in the table: share of limb bones whose depth
+sign is right at the keyframes.
 """
 
 import argparse
@@ -94,13 +94,18 @@ def true_size(trial: Trial) -> BodySize:
 
 @contextmanager
 def perfect_size(trial: Trial, lengths: bool = True, scale: bool = True) -> Iterator[None]:
-    """Lengths or scale, or both, from the truth."""
+    """Proportions of the body or the scale of every frame, or both, from the truth.
+
+    Only the product of lengths and scale shows in the picture: where one is found, the other is
+    brought to the same size of the whole body.
+    """
     estimate, true = lift.estimate_lengths, true_size(trial)
 
     def know(*given: object) -> BodySize:
         found = estimate(*given)
-        bones = true if lengths else found
-        return BodySize(bones.lengths, bones.breadths, (true if scale else found).scale)
+        bones, seen = true if lengths else found, true if scale else found
+        factor = seen.lengths.sum() / bones.lengths.sum()
+        return BodySize(bones.lengths, bones.breadths, seen.scale * factor)
 
     with patch.object(lift, "estimate_lengths", know):
         yield
