@@ -8,6 +8,7 @@ runs them; the command line passes one that returns stored results where nothing
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any, Literal
 
 import numpy as np
@@ -39,6 +40,7 @@ from keyrecon.records import (
     Track,
 )
 from keyrecon.tracking.camera_motion import CameraOptions, follow_camera
+from keyrecon.tracking.find import FindOptions, find_player
 from keyrecon.tracking.player import TrackOptions, track_player
 from keyrecon.video import Video
 
@@ -51,6 +53,7 @@ class Options:
 
     camera: CameraOptions = field(default_factory=CameraOptions)
     colors: ColorOptions = field(default_factory=ColorOptions)
+    find: FindOptions = field(default_factory=FindOptions)
     track: TrackOptions = field(default_factory=TrackOptions)
     background: BackgroundOptions = field(default_factory=BackgroundOptions)
     edges: EdgeOptions = field(default_factory=EdgeOptions)
@@ -115,8 +118,9 @@ def prepare(
 
     camera = make("camera", follow_camera, video)
     colors = make("colors", learn_colors, video, picks)
-    track = make("track", track_player, video, colors, camera)
-    background = make("background", build_background, video, camera, track)
+    rough = make("find", find_player, video, colors, camera)
+    background = make("background", build_background, video, camera, rough)
+    track = make("track", track_player, video, rough, camera, background, colors)
     figures = make("edges", find_edges, video, track, camera, background, colors)
     comparison = make("compare", compare_frames, figures.edges, track)
     keyframes = make("keyframes", choose_keyframes, comparison, video.fps)
@@ -214,6 +218,8 @@ def as_printed(options: Options = Options()) -> Options:
     """The forms that the paper prints, for every stage that has another default."""
     return replace(
         options,
+        find=replace(options.find, pace=inf),
+        track=replace(options.track, method="paper"),
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
         lift=replace(options.lift, method="paper"),

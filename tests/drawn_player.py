@@ -26,19 +26,35 @@ def scene(seed: int = 0, size: tuple[int, int] = (240, 480)) -> np.ndarray:
     return cv2.GaussianBlur(picture, (3, 3), 0)
 
 
-def draw_player(picture: np.ndarray, x: float, y: float, stride: float = 12.0) -> None:
-    """Draw the player with the centre of the head at x, y."""
+def draw_player(
+    picture: np.ndarray, x: float, y: float, stride: float = 12.0, lift: float = 0.0
+) -> None:
+    """Draw the player with the centre of the head at x, y and the right foot lifted."""
 
     def at(dx: float, dy: float) -> tuple[int, int]:
         return round(x + dx), round(y + dy)
 
     for side in (-1, 1):
-        cv2.line(picture, at(side * 5, 45), at(side * stride, HEIGHT - 4), SKIN, 7)
-        cv2.ellipse(picture, at(side * stride, HEIGHT), (7, 4), 0, 0, 360, SHOE, -1)
+        low = HEIGHT - (lift if side == 1 else 0)
+        cv2.line(picture, at(side * 5, 45), at(side * stride, low - 4), SKIN, 7)
+        cv2.ellipse(picture, at(side * stride, low), (7, 4), 0, 0, 360, SHOE, -1)
         cv2.line(picture, at(side * 10, 12), at(side * 17, 38), SKIN, 5)
     cv2.rectangle(picture, at(-10, 8), at(10, 38), SHIRT, -1)
     cv2.rectangle(picture, at(-10, 38), at(10, 52), SHORTS, -1)
     cv2.circle(picture, at(0, 0), 6, SKIN, -1)
+
+
+def draw_racket(picture: np.ndarray, x: float, y: float) -> None:
+    """Draw a racket with strings of the colour of the shoes, below the right hand."""
+    hand, strings = (round(x + 17), round(y + 38)), (round(x + 28), round(y + 58))
+    cv2.line(picture, hand, strings, (40, 40, 44), 2)
+    cv2.ellipse(picture, strings, (6, 9), -30, 0, 360, SHOE, -1)
+    cv2.ellipse(picture, strings, (6, 9), -30, 0, 360, (40, 40, 44), 1)
+
+
+def lifts(count: int) -> np.ndarray:
+    """How high the right foot is: down at first, then lifted twice."""
+    return 16 * np.maximum(0, np.sin(np.linspace(-np.pi, 3 * np.pi, count)))
 
 
 def heads(count: int) -> np.ndarray:
@@ -53,14 +69,22 @@ def corners(count: int, panning: bool) -> np.ndarray:
     return np.stack([x.round(), np.full(count, 30.0)], axis=1)
 
 
-def film(path: Path, count: int, panning: bool = False, empty: bool = False) -> Video:
-    """A video of the player (or of the empty scene); the camera stands still or pans."""
+def film(
+    path: Path, count: int, panning: bool = False, empty: bool = False, playing: bool = False
+) -> Video:
+    """A video of the player (or of the empty scene); the camera stands still or pans.
+
+    While `playing`, the player holds a racket and lifts a foot.
+    """
+    lifted = lifts(count) if playing else np.zeros(count)
 
     def frames():
-        for head, corner in zip(heads(count), corners(count, panning), strict=True):
+        for head, corner, lift in zip(heads(count), corners(count, panning), lifted, strict=True):
             picture = scene()
             if not empty:
-                draw_player(picture, *head)
+                draw_player(picture, *head, lift=lift)
+            if playing:
+                draw_racket(picture, *head)
             x, y = corner.astype(int)
             yield picture[y : y + SIZE[0], x : x + SIZE[1]]
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from drawn_player import HEIGHT, corners, film, heads, picks
+from drawn_player import HEIGHT, corners, film, heads, lifts, picks
 
 from keyrecon.background import Scene, build_background
 from keyrecon.camera import warp_points
@@ -10,7 +10,8 @@ from keyrecon.matching.edges import find_edges
 from keyrecon.pictures import read_small
 from keyrecon.records import CameraPath
 from keyrecon.tracking.camera_motion import follow_camera
-from keyrecon.tracking.player import track_player
+from keyrecon.tracking.find import find_player
+from keyrecon.tracking.player import TrackOptions, track_player
 from keyrecon.tracking.scale import standing_height, zoom
 
 COUNT = 40
@@ -22,7 +23,10 @@ def found(request, tmp_path_factory):
     video = film(tmp_path_factory.mktemp("film") / "player.mp4", COUNT, request.param)
     camera = follow_camera(video)
     colors = learn_colors(video, picks(COUNT, request.param))
-    return request.param, video, camera, colors, track_player(video, colors, camera)
+    rough = find_player(video, colors, camera)
+    background = build_background(video, camera, rough)
+    track = track_player(video, rough, camera, background, colors)
+    return request.param, video, camera, colors, track
 
 
 def test_a_camera_on_a_tripod_has_the_identity_for_a_path_and_a_panning_one_its_pan(found):
@@ -42,6 +46,27 @@ def test_head_and_feet_are_found_in_every_frame(found):
     truth = heads(COUNT) - corners(COUNT, panning)
     assert np.linalg.norm(track.head - truth, axis=1).max() < 0.05 * HEIGHT
     assert np.linalg.norm(track.mid_feet - truth - (0, HEIGHT), axis=1).max() < 0.06 * HEIGHT
+
+
+def test_neither_a_racket_like_a_shoe_nor_a_lifted_foot_misleads(tmp_path):
+    video = film(tmp_path / "playing.mp4", COUNT, playing=True)
+    camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
+    colors = learn_colors(video, picks(COUNT))
+    rough = find_player(video, colors, camera)
+    track = track_player(video, rough, camera, build_background(video, camera, rough), colors)
+    head = heads(COUNT) - corners(COUNT, False)
+    left = head + np.array([-12, HEIGHT])
+    right = head + np.stack([np.full(COUNT, 12), HEIGHT - lifts(COUNT)], axis=1)
+    for foot in (left, right):
+        off = np.linalg.norm(track.feet - foot[:, None], axis=2).min(axis=1)
+        assert (off < 0.1 * HEIGHT).mean() > 0.97
+
+
+def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
+    _, video, camera, colors, track = found
+    options = TrackOptions(method="paper")
+    background = build_background(video, camera, track)
+    assert track_player(video, track, camera, background, colors, options) is track
 
 
 def test_the_standing_height_is_that_of_the_player(found):
@@ -103,5 +128,5 @@ def test_a_crouch_does_not_change_the_standing_height():
 def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):
     panning, _, camera, colors, _ = found
     empty = film(tmp_path / "empty.mp4", COUNT, panning, empty=True)
-    with pytest.raises(KeyreconError, match=r"0 of 40 frames; pick .* again"):
-        track_player(empty, colors, camera)
+    with pytest.raises(KeyreconError, match=r"0 of 21 frames; pick .* again"):
+        find_player(empty, colors, camera)

@@ -17,7 +17,7 @@ from keyrecon.colors import color_bins, posterior_tables, to_lab
 from keyrecon.errors import KeyreconError
 from keyrecon.pictures import reduce_picture
 from keyrecon.records import CameraPath, Colors, Track
-from keyrecon.tracking.player import track_player
+from keyrecon.tracking import find
 from keyrecon.video import Video
 
 SAMPLES = 24
@@ -89,7 +89,7 @@ def find_player(
     strip: Strip, colors: Colors, camera: CameraPath, frames: tuple[int, ...]
 ) -> Found:
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
-    track: Track = track_player(strip, colors, camera)
+    track: Track = find.find_player(strip, colors, camera)
     rows = np.searchsorted(strip.numbers, np.unique(frames))
     seen = track.trust > 0
     unseen = ~seen[rows]

@@ -10,7 +10,12 @@ from jaxtyping import Float, Int
 SHOE_RADIUS = 0.045
 """Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
 ONE_SHOE = 1.8
-"""Cost of both feet in one place."""
+"""Cost of both feet in one place, found by colour."""
+ONE_PLACE = 2.5
+"""The same where filters found them, which are surer."""
+RAISED = 0.1
+"""Foot that is lifted this far costs as much as one deviation, player heights: a racket is there
+more often."""
 
 
 def foot_pairs(count: int) -> Int[np.ndarray, "s 2"]:
@@ -42,3 +47,17 @@ def pair_costs(
     uneven = np.maximum(0, np.abs(both[:, 0, 1] - both[:, 1, 1]) - 0.1 * height)
     off += ((lifted**2).sum(axis=1) + uneven**2) / (2 * (0.1 * height) ** 2)
     return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
+
+
+def stance_costs(
+    both: Float[np.ndarray, "s 2 2"], head: Float[np.ndarray, "2"], height: float
+) -> Float[np.ndarray, "s"]:
+    """Cost of where two sure feet are below the head and beside one another."""
+    middle = (both.mean(axis=1) - head) / height
+    apart = np.linalg.norm(both[:, 0] - both[:, 1], axis=1) / height
+    off = np.maximum(0, 0.7 - middle[:, 1]) ** 2 + np.maximum(0, middle[:, 1] - 1.15) ** 2
+    off += np.maximum(0, np.abs(middle[:, 0]) - 0.5) ** 2 + np.maximum(0, apart - 0.85) ** 2
+    near = np.exp(-((apart / (1.2 * SHOE_RADIUS)) ** 2))
+    lifted = np.maximum(0, 0.8 - (both[..., 1] - head[1]) / height)
+    raised = (lifted**2).sum(axis=1) / (2 * RAISED**2)
+    return ONE_PLACE * near + np.minimum(off / (2 * 0.1**2) + raised, 12.0)

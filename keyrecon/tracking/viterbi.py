@@ -50,6 +50,8 @@ def cheapest_path(
             before = t - g
             if not len(own) or not len(total[before]):
                 continue
+            if total[before].min() + (g - 1) * motion.miss >= best.max():
+                continue  # no gap this long can be cheaper
             moved = _movement(points[before], points[t]) / (2 * g * motion.sigma**2)
             through = total[before][:, None] + np.minimum(moved, motion.jump)
             through += (g - 1) * motion.miss

@@ -1,0 +1,144 @@
+"""The track from what the filters saw: the head's path, then that of both feet.
+
+The path of the feet runs over pairs. A foot that is hidden behind the other leg cannot be seen,
+but it was seen a moment ago or will be in a moment: where a sure candidate of a frame nearby lies
+on the player now, it is a weak candidate of this frame too. A foot that stands therefore stays,
+while one in the air is soon forgotten.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from keyrecon.camera import warp_points
+from keyrecon.records import CameraPath
+from keyrecon.tracking.crops import Cropping
+from keyrecon.tracking.feet import foot_pairs, stance_costs
+from keyrecon.tracking.path import fill_gaps, stabilise, taken_places, trust_states
+from keyrecon.tracking.viterbi import Motion, cheapest_path
+
+EVEN, DOUBT = 0.43, 0.07
+"""Strength that is as likely a part as not, and how fast the odds change with it: responses beside
+the parts stay below a third of the usual one."""
+HIDDEN = 1.5
+"""Cost of a foot that is not seen, but was nearby in time."""
+APART = 0.07
+"""Two candidates nearer to one another are one foot, player heights."""
+LOOKS = 6
+"""Frames looked up before and after for hidden feet."""
+REMEMBERED = 8
+"""Remembered feet of a frame, at most."""
+PAIRS = 30
+"""Pairs of feet kept, per frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the filters saw in one frame, in pixels of its crop."""
+
+    heads: Float[np.ndarray, "m 2"]
+    head_strength: Float[np.ndarray, "m"]
+    """1 is usual."""
+    feet: Float[np.ndarray, "n 2"]
+    foot_strength: Float[np.ndarray, "n"]
+    covered: Bool[np.ndarray, "y x"]
+    """Where the player covers the scene, at half the resolution of the crop."""
+
+
+def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """-log of the probability that a response comes from the part."""
+    return np.logaddexp(0.0, (EVEN - strength) / DOUBT)
+
+
+def connect_head(
+    seen: list[Seen], camera: CameraPath, cropping: Cropping, sigma: float
+) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
+    """The head in the picture of every frame, and its trust; `sigma` is its usual step, px."""
+    places = [cropping.to_picture(s.heads, t) for t, s in enumerate(seen)]
+    stable = [h[:, None] for h in stabilise(places, camera.to_reference)]
+    costs = [part_costs(s.head_strength) for s in seen]
+    chosen = cheapest_path(costs, stable, Motion(sigma))
+    back = np.linalg.inv(camera.to_reference)
+    head = fill_gaps(taken_places(stable, chosen), np.arange(len(seen)), back)[:, 0]
+    return head, trust_states(costs, chosen)
+
+
+def connect_feet(
+    seen: list[Seen],
+    camera: CameraPath,
+    cropping: Cropping,
+    head: Float[np.ndarray, "T 2"],
+    sigma: float,
+    memory: int,
+) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
+    """Both feet in the picture of every frame, and their trust.
+
+    `sigma` is the usual step, px; hidden feet are looked up `memory` frames around.
+    """
+    places = [cropping.to_picture(s.feet, t) for t, s in enumerate(seen)]
+    back = np.linalg.inv(camera.to_reference)
+    stable = stabilise(places, camera.to_reference)
+    hidden = remember_feet(seen, stable, back, cropping, memory)
+    costs, pairs = [], []
+    for t, look in enumerate(seen):
+        own = np.concatenate([part_costs(look.foot_strength), np.full(len(hidden[t]), HIDDEN)])
+        feet = np.concatenate([stable[t], hidden[t]])
+        in_picture = warp_points(back[t], feet) if len(feet) else feet
+        every = foot_pairs(len(feet))
+        tall = float(cropping.track.height[t])
+        cost = own[every].sum(axis=1) + stance_costs(in_picture[every], head[t], tall)
+        best = np.argsort(cost)[:PAIRS]
+        costs.append(cost[best])
+        pairs.append(feet[every[best]])
+    taken = cheapest_path(costs, pairs, Motion(sigma, gap=12, miss=7.0))
+    feet = fill_gaps(taken_places(pairs, taken), np.arange(len(seen)), back)
+    return feet, trust_states([c / 2 for c in costs], taken)
+
+
+def remember_feet(
+    seen: list[Seen],
+    stable: list[Float[np.ndarray, "_ 2"]],
+    from_reference: Float[np.ndarray, "T 3 3"],
+    cropping: Cropping,
+    memory: int,
+) -> list[Float[np.ndarray, "_ 2"]]:
+    """Stabilised places of sure feet of frames nearby that the player covers in each frame."""
+    sure = [s[look.foot_strength > EVEN] for s, look in zip(stable, seen, strict=True)]
+    offsets = np.unique(np.rint(np.geomspace(1, max(1, memory), LOOKS)).astype(int))
+    hidden = []
+    for t, look in enumerate(seen):
+        near = [t + side * k for k in offsets for side in (-1, 1) if 0 <= t + side * k < len(seen)]
+        known = np.concatenate([sure[u] for u in near]) if near else np.zeros((0, 2))
+        if len(known):
+            known = known[_on_player(known, look, from_reference[t], cropping, t)]
+        hidden.append(_new_places(known, stable[t], APART * float(cropping.track.height[t])))
+    return hidden
+
+
+def _on_player(
+    places: Float[np.ndarray, "m 2"],
+    look: Seen,
+    from_reference: Float[np.ndarray, "3 3"],
+    cropping: Cropping,
+    t: int,
+) -> Bool[np.ndarray, "m"]:
+    """Which stabilised places the player covers in frame t."""
+    spots = cropping.from_picture(warp_points(from_reference, places), t)
+    x, y = np.rint((spots - 0.5) / 2).astype(int).T
+    rows, columns = look.covered.shape
+    inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    return inside & look.covered[y.clip(0, rows - 1), x.clip(0, columns - 1)]
+
+
+def _new_places(
+    places: Float[np.ndarray, "m 2"], known: Float[np.ndarray, "n 2"], least: float
+) -> Float[np.ndarray, "k 2"]:
+    """The first few places that are no known ones, and not one another."""
+    taken, count = known, len(known)
+    for place in places:
+        if len(taken) == count + REMEMBERED:
+            break
+        if not len(taken) or np.linalg.norm(taken - place, axis=1).min() > least:
+            taken = np.concatenate([taken, place[None]])
+    return taken[count:]
