@@ -13,7 +13,7 @@ ONE_SHOE = 1.8
 """Cost of both feet in one place, found by colour."""
 ONE_PLACE = 2.5
 """The same where filters found them, which are surer."""
-RAISED = 0.1
+RAISED = 0.2
 """Foot that is lifted this far costs as much as one deviation, player heights: a racket is there
 more often."""
 

@@ -39,8 +39,8 @@ LEAST_OWN = 0.5
 """Less foreground around a foot makes it doubtful."""
 BELOW_HEAD = 0.4
 """Feet are farther below the head than this, player heights."""
-MEMORY = 1.0
-"""A hidden foot is remembered for this long, seconds: a stance may last as long."""
+MEMORY = 0.24
+"""A hidden foot is remembered for this long, seconds: a step lasts about as long."""
 HEADS, FEET = 4, 8
 """Candidates kept of each, per frame."""
 
