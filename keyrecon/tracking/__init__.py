@@ -1,1 +1,1 @@
-"""Where the player is: camera motion, colours, radial symmetry, Viterbi path, background."""
+"""Where the player is: camera motion, colours, radial symmetry, filters, Viterbi path."""

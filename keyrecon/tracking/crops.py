@@ -18,12 +18,11 @@ from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
 from keyrecon.pictures import read_small, shrinking, side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Colors, Track
+from keyrecon.tracking.evidence import STILL_WEIGHT
 from keyrecon.video import Video
 
 ABOVE, BELOW, ASIDE = 0.3, 1.25, 0.86
 """Reach of a crop from the head, player heights: a jump or a deep lunge stays inside."""
-STILL_WEIGHT = 0.2
-"""Weight of colour where nothing differs from the background."""
 FAINT = 8.0
 """Grey-level slope per pixel that counts half: noise counts for little, all edges alike."""
 

@@ -42,7 +42,8 @@ def fill_gaps(
     seen = np.flatnonzero(np.isfinite(stable).all(axis=(1, 2)))
     if not len(seen):
         raise KeyreconError(
-            "No feet were found below the head in any frame; pick the colour of the shoes again."
+            "Neither a head nor two feet below it make a path through the video; pick the colours "
+            "of head and shoes again, on another frame too."
         )
     known = keep_order(stable[seen]).reshape(len(seen), -1)
     every = np.arange(len(from_reference))
