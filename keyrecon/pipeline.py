@@ -8,7 +8,6 @@ runs them; the command line passes one that returns stored results where nothing
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
 from typing import Any, Literal
 
 import numpy as np
@@ -40,7 +39,7 @@ from keyrecon.records import (
     Track,
 )
 from keyrecon.tracking.camera_motion import CameraOptions, follow_camera
-from keyrecon.tracking.find import FindOptions, find_player
+from keyrecon.tracking.find import EVERY_FRAME, FindOptions, find_player
 from keyrecon.tracking.player import TrackOptions, track_player
 from keyrecon.video import Video
 
@@ -218,7 +217,7 @@ def as_printed(options: Options = Options()) -> Options:
     """The forms that the paper prints, for every stage that has another default."""
     return replace(
         options,
-        find=replace(options.find, pace=inf),
+        find=replace(options.find, pace=EVERY_FRAME),
         track=replace(options.track, method="paper"),
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),

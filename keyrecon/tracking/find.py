@@ -7,7 +7,7 @@ whole:
 
 round for the head, elliptical for the shoes. The cheapest path through the candidates (see
 `viterbi`) gives the head, then the feet given the head; between the searched frames both are
-interpolated. Searched in every frame (`pace` infinite), this is the tracker that the paper prints.
+interpolated. Searched in every frame (`EVERY_FRAME`), this is the tracker that the paper prints.
 
 The unit of length is the standing height from head to mid-feet. Players crouch, lunge and jump, so
 it is an upper envelope over time, divided by the camera's zoom, not the distance of the moment.
@@ -32,6 +32,8 @@ from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 from keyrecon.video import Video
 
+EVERY_FRAME = 1e4
+"""A pace that no video has: every frame is searched."""
 PAIRS = 30
 """Pairs of feet kept, per frame."""
 NO_SHOE = 2.0
