@@ -100,11 +100,18 @@ def test_a_file_of_our_own_needs_no_copy(open_store, bare):
 def test_a_file_that_does_not_parse_never_becomes_an_empty_project(open_store, bare, text):
     submit(open_store(), mark(3, "neck", [10, 20, 2]))
     (bare / "annotations.json").write_text(text)
-    with pytest.raises(KeyreconError, match=r"annotations\.json was changed .* move it away"):
+    with pytest.raises(KeyreconError, match=r"annotations\.json cannot be read .* move it away"):
         open_store()
     assert (bare / "annotations.json").read_text() == text
     (bare / "annotations.json").unlink()
     assert open_store().state.cells == {NECK: [10, 20, 2]} == on_file(bare)
+
+
+def test_a_new_project_does_not_begin_over_a_file_that_does_not_parse(open_store, bare):
+    (bare / "annotations.json").write_text("{")
+    with pytest.raises(KeyreconError, match="move it away to begin without it"):
+        open_store()
+    assert (bare / "annotations.json").read_text() == "{"
 
 
 def test_a_file_that_stops_parsing_meanwhile_is_not_written_over(open_store, bare):

@@ -99,10 +99,7 @@ class Mirror:
         try:
             found = self.form.read(current)
         except KeyreconError as fault:
-            raise NotSaved(
-                f"{self.name} was changed by another program and cannot be read ({fault}). Mend "
-                "the file, or move it away to have it written anew from what this page knows."
-            ) from fault
+            raise NotSaved(f"{self.name} cannot be read ({fault}). {self._remedy}") from fault
         known = {version[0] for version in (self.wanted, self.shown) if version != UNKNOWN} or {0}
         bases = [self.form.pick_out(at(revision)) for revision in known]
         self.shown, self._outside = UNKNOWN, (digest, found)
@@ -113,6 +110,15 @@ class Mirror:
         if self._outside is not None and self._outside[1] == self.form.pick_out(cells):
             self.shown = self.wanted = (self.wanted[0], self._outside[0])
         self._outside = None
+
+    @property
+    def _remedy(self) -> str:
+        if self.is_new:
+            return "Mend the file, or move it away to begin without it."
+        return (
+            "Another program changed it: mend the file, or move it away to have it written anew "
+            "with all that was marked on the page."
+        )
 
     def plan(self, cells: Cells, revision: int) -> Plan | None:
         """What the file shall show after an edit; None while there is nothing to write."""
