@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from threading import RLock
+from threading import RLock, Thread
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,8 @@ class Study:
         self._looks: tuple[str, tuple[Lookalikes, ...]] | None = None
         self._colors: tuple[tuple[Pick, ...], Colors] | None = None
         self._strip: tuple[tuple[int, ...], Strip, CameraPath] | None = None
-        self._learner.submit(self.preparation)
+        # ready when the page asks, and in nobody's way when the server is stopped
+        Thread(target=self.preparation, daemon=True).start()
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
