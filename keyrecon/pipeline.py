@@ -108,8 +108,7 @@ def prepare(
     Raises KeyreconError when a pick is off the picture, the player is not found in most frames,
     or the annotation budget cannot be met.
     """
-    # in one order, so that the same picks find the same stored results
-    picks = tuple(sorted(picks, key=lambda pick: (pick.frame, pick.part, pick.x, pick.y)))
+    picks = tuple(picks)
 
     def make(name: str, stage: Callable[..., Any], *inputs: object) -> Any:
         stage_options = getattr(options, name)

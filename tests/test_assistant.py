@@ -127,6 +127,18 @@ def test_true_marks_are_not_suspected_and_a_forgotten_joint_is(prepared):
     assert prepared.checks(annotations, {(20, "left_knee")}) == []
 
 
+def test_help_comes_while_the_first_frames_are_being_marked(prepared):
+    annotations = annotated(5, 20)
+    order = np.argsort(LSP14.is_lower, kind="stable")
+    for count in (1, 4, 6, 11):
+        annotations.joints[1] = JOINTS[20]
+        annotations.joints[1, order[count:]] = np.nan
+        named = {LSP14.names[j]: marked(20)[LSP14.names[j]] for j in order[:count]}
+        assert prepared.pose(annotations, 20, named, {})["points3d"]
+        assert {told["frame"] for told in prepared.checks(annotations, set())} == {20}
+        assert prepared.ghost(annotations, 40)["joints"]
+
+
 def test_without_a_result_nothing_is_suggested(prepared):
     assert prepared.suggest(annotated(5, 20), frozenset()) == []
 

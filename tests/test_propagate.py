@@ -102,3 +102,13 @@ def test_a_joint_left_out_on_one_frame_comes_from_another():
     found = carry(survey, annotations)
     away = np.linalg.norm(found.joints - truth, axis=-1) / survey.track.height[:, None]
     assert away.max() < 0.03
+
+
+def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
+    survey, truth = scene(bending(), (2, 9))
+    annotations = marks(truth, (2, 9))
+    hidden = [LSP14.index(n) for n in ("neck", "head_top", "left_elbow", "left_wrist")]
+    annotations.joints[1, hidden] = np.nan
+    found = carry(survey, annotations)
+    away = np.linalg.norm(found.joints - truth, axis=-1) / survey.track.height[:, None]
+    assert away.max() < 0.03

@@ -5,7 +5,7 @@ left out, and depths have the camera's axes in body heights.
 """
 
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 import numpy as np
@@ -180,7 +180,7 @@ def describe_checks(
     preparation, knowledge = study.preparation(), study.knowledge(annotations, wait=True)
     if preparation is None or knowledge is None:
         return []
-    looks = study.lookalikes(annotations)
+    looks = study.lookalikes(_decided(annotations, absent))
     return [
         {
             "frame": check.frame,
@@ -191,6 +191,20 @@ def describe_checks(
         }
         for check in find_checks(annotations, knowledge.size, looks, absent)
     ]
+
+
+def _decided(annotations: Annotations, absent: set[tuple[int, str]]) -> Annotations:
+    """Halves of the body of which every joint is marked or said to be absent.
+
+    A frame in the middle of being marked is not compared with others yet.
+    """
+    skeleton, joints = annotations.skeleton, annotations.joints.copy()
+    open_ = np.isnan(joints[:, :, 0])
+    for row, joint in np.argwhere(open_):
+        open_[row, joint] = (annotations.frames[row], skeleton.names[joint]) not in absent
+    for half in (skeleton.is_lower, ~skeleton.is_lower):
+        joints[np.ix_(open_[:, half].any(axis=1), half)] = np.nan
+    return replace(annotations, joints=joints)
 
 
 def describe_suggestions(

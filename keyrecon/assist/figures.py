@@ -99,10 +99,12 @@ def _dress(scene: Scene, poses: Poses, frames: Int[np.ndarray, "N"]) -> Puppets:
 
 
 def marked_figures(annotations: Annotations, half: Half) -> Int[np.ndarray, "K"]:
-    """Frames that serve as figures of one half of the body; none until each joint is seen once."""
-    marked = np.isfinite(annotations.joints[:, half.joints[half.own], 0])
-    served = marked.mean(axis=1) >= LEAST_MARKED
-    return annotations.frames[served & marked[served].any(axis=0).all()]
+    """Frames that serve as figures of one half of the body; none until each bone is seen once."""
+    marked = np.isfinite(annotations.joints[:, half.joints, 0])
+    served = marked[:, half.own].mean(axis=1) >= LEAST_MARKED
+    bones = half.bones[~half.given[half.bones].any(axis=1)]
+    whole = marked[served][:, bones].all(axis=2).any(axis=0).all()
+    return annotations.frames[served & whole]
 
 
 def stand_in(scene: Scene, joints: Complex[np.ndarray, "T J"], upper: Half) -> None:

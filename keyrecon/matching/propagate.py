@@ -129,8 +129,8 @@ def gather_poses(
     rows = np.flatnonzero(known[:, half.own].mean(axis=1) >= LEAST_MARKED)
     frames, poses, known = annotations.frames[rows], marks[rows], known[rows]
     poses[:, half.given], known[:, half.given] = settled[frames], True
-    # from the joints that are there outwards, and back for parents that are not
-    for parent, child in [*half.bones, *half.bones[::-1, ::-1]]:
+    # from the joints that are there outwards, back for parents that are not, and out from these
+    for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
         usual = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
         missing = np.isnan(poses[:, child])
         poses[missing, child] = poses[missing, parent] + usual
