@@ -135,7 +135,7 @@ def test_help_comes_while_the_first_frames_are_being_marked(prepared):
         annotations.joints[1, order[count:]] = np.nan
         named = {LSP14.names[j]: marked(20)[LSP14.names[j]] for j in order[:count]}
         assert prepared.pose(annotations, 20, named, {})["points3d"]
-        assert {told["frame"] for told in prepared.checks(annotations, set())} == {20}
+        assert 20 in {told["frame"] for told in prepared.checks(annotations, set())}
         assert prepared.ghost(annotations, 40)["joints"]
 
 
