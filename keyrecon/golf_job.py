@@ -5,6 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
+from keyrecon.camera import warp_points
+from keyrecon.errors import KeyreconError
 from keyrecon.formats.clicks import read_clicks
 from keyrecon.formats.motion_model import BUILT_IN, read_motion_model
 from keyrecon.formats.npz import write_motion
@@ -19,7 +23,12 @@ from keyrecon.golf.start import place_player, start_state
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_overlay import write_golf_overlay
 from keyrecon.report.golf_page import write_golf_report
+from keyrecon.tracking.camera_motion import follow_camera
 from keyrecon.video import Video, open_video
+
+SHAKE = 0.04
+"""Share of the picture's width by which a standing camera may seem to move: a player who fills
+the picture and a hand on the tripod move it by half of that."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +41,8 @@ class GolfOptions:
     """What is followed in the video."""
     fit: FitOptions = field(default_factory=FitOptions)
     """How the model is fitted to it."""
+    slowmo: float = 1.0
+    """How many times slower than real the video plays."""
 
 
 def fit_video(
@@ -74,8 +85,9 @@ def fit_file(
 ) -> str:
     """Fit a swing and write motion.npz, overlay.mp4 and report.html; returns what to tell."""
     began = time.perf_counter()
-    video, clicks = open_video(video_file), read_clicks(clicks_file)
-    model = read_motion_model(prior)
+    clicks, model = read_clicks(clicks_file), read_motion_model(prior)
+    video = open_video(video_file, slow_motion=options.slowmo)
+    require_still_camera(video, progress)
     fitted, observations = fit_video(video, clicks, model, options, progress)
     out.mkdir(parents=True, exist_ok=True)
     write_motion(out / "motion.npz", fitted.motion)
@@ -87,6 +99,19 @@ def fit_file(
         f"{out}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
         f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
     )
+
+
+def require_still_camera(video: Video, progress: Progress = silent) -> None:
+    """Raises KeyreconError where the camera moves: the model stands in one place before it."""
+    to_middle = follow_camera(video, progress=progress).to_reference
+    corners = np.array([(0.0, 0.0), (video.width, 0.0), (0.0, video.height)])
+    moved = np.linalg.norm(warp_points(to_middle[:, None], corners[None]) - corners, axis=2)
+    usual = float(np.percentile(moved.max(axis=1), 90))
+    if usual > SHAKE * video.width:
+        raise KeyreconError(
+            f"The camera moves: the scene shifts by {usual:.0f} px and more. A golf fit needs a "
+            "camera that stands still; film from a tripod or stabilise the video first."
+        )
 
 
 def tell_tempo(fitted: FittedSwing, fps: float) -> str:

@@ -85,7 +85,7 @@ def _key_postures(fitted: FittedSwing, observations: Observations, video: Video)
         )
     )
     about = note("The fitted primitives on the picture, and from above with the camera below.")
-    return section("keys", "Key postures", about, f'<div class="strip wide">{cards}</div>')
+    return section("keys", "Key postures", about, f'<div class="strip four">{cards}</div>')
 
 
 def _timing(fitted: FittedSwing, observations: Observations, model: MotionModel) -> str:

@@ -15,6 +15,8 @@ HANDS = (0, 114, 178)
 """Blue of Okabe and Ito."""
 WIDTH = 520
 """Of a picture in the page, px."""
+ROOM = 0.12
+"""Around the player, shares of his height."""
 ABOVE = 260
 """Side of a view from above, px."""
 
@@ -24,9 +26,10 @@ def key_pictures(
 ) -> list[tuple[int, str, str]]:
     """Frame, picture with the golfer, and view from above, of the four key postures."""
     frames = np.clip(fitted.keys.round().astype(int), 0, len(video) - 1).tolist()
+    part = _around_swing(video, fitted)
     rows = []
     for frame, picture in _chosen(video, frames):
-        drawn = draw_golfer(picture, fitted, observations.camera, frame)
+        drawn = draw_golfer(picture, fitted, observations.camera, frame)[part]
         rows.append((frame, _small(drawn), jpeg_uri(draw_from_above(fitted, frame, ABOVE))))
     return rows
 
@@ -38,8 +41,9 @@ def overlay_strip(
     first, last = fitted.keys[[0, 3]]
     frames = np.unique(np.linspace(first, last, count).round().astype(int))
     frames = frames[(frames >= 0) & (frames < len(video))].tolist()
+    part = _around_swing(video, fitted)
     return [
-        (frame, _small(draw_golfer(picture, fitted, observations.camera, frame)))
+        (frame, _small(draw_golfer(picture, fitted, observations.camera, frame)[part]))
         for frame, picture in _chosen(video, frames)
     ]
 
@@ -55,6 +59,15 @@ def path_picture(video: Video, fitted: FittedSwing, observations: Observations) 
             if np.isfinite(point).all():
                 cv2.circle(drawn, _pixel(point), 3, color, -1, cv2.LINE_AA)
     return _small(drawn, 2 * WIDTH)
+
+
+def _around_swing(video: Video, fitted: FittedSwing) -> tuple[slice, slice]:
+    """The part of the picture, rows and columns, that the player is in at any time."""
+    points = fitted.motion.points2d.reshape(-1, 2)
+    room = ROOM * np.ptp(points[:, 1])
+    low = np.maximum(points.min(axis=0) - room, 0).astype(int)
+    high = np.minimum(points.max(axis=0) + room, (video.width, video.height)).astype(int)
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def _draw_path(
