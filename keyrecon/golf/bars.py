@@ -3,8 +3,8 @@
 The two sides of a shaft are close parallel edges of opposite direction, whether it is darker or
 brighter than what is behind it (Lepetit, Shahrokni and Fua, CVPR 2003). Line segments come from
 the Line Segment Detector (Grompone von Gioi et al., PAMI 32, 2010), which orients every segment by
-its gradient; they are sought in the picture and in its foreground, and only those on the
-foreground are paired. Bars in one line are joined where the
+its gradient; only those on the foreground are paired. Where a shaft is as bright as what is behind
+it, lines of faint foreground stand in (Hough transform). Bars in one line are joined where the
 foreground continues between them, as a shaft does that crosses the player or a bright cloud.
 """
 
@@ -15,22 +15,33 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.spatial import cKDTree
+from skimage.transform import probabilistic_hough_line
 
 from keyrecon.golf.foreground import Foreground
 
 PARALLEL = np.deg2rad(6.0)
-"""Two sides of a bar, and two bars of a shaft, differ by no more."""
+"""Two sides of a bar differ by no more."""
+COLLINEAR = np.deg2rad(3.0)
+"""Two bars of a shaft differ by no more: a forearm may be nearly in line with it."""
 OVERLAP = 0.5
 """Share of the shorter side that lies beside the longer one."""
 STEPS = 9
 """Places along a segment or a gap where the foreground is asked."""
-KNOWN = 0.7
-"""Share of a segment of the foreground that must lie where the scene is known."""
+EDGE = 0.4
+"""Probability of foreground at the side of a bar, against its middle."""
+FAINT = 40
+"""Probability of foreground, of 255, that a line may consist of."""
+VOTES, LINE, LINE_GAP = 0.05, 0.08, 0.02
+"""Pixels on such a line, its length and its gaps, player heights."""
+ANGLES = np.arange(-90.0, 90.0, 0.5) * np.pi / 180
+"""Directions in which lines are sought."""
+MOST_LINES = 24
+"""Lines of a frame that are looked at, the longest first."""
 END_PART = 10
 """The beginning and the end of a video are this part of it."""
 SAME = 0.02
 """Distance between the ends of two bars that are one, player heights."""
-SPREAD = 0.02
+SPREAD = 0.008
 """Distance from their common line at which two bars still are one shaft, lengths of the bar."""
 
 
@@ -45,7 +56,7 @@ class BarOptions:
     shortest: float = 0.03
     """Least length of a side."""
     moving: float = 0.12
-    """Least mean probability of foreground along a side: a club at rest hardly differs from a
+    """Least mean probability of foreground along a bar: a club at rest hardly differs from a
     scene that was learnt while it lay there, but the scene itself differs by nothing."""
     bridge: float = 0.3
     """Longest gap between two bars of one shaft."""
@@ -69,15 +80,14 @@ def find_bars(
 ) -> Bars:
     """Bars of a full picture, in px; `frame` is its number."""
     height = foreground.height
-    widths = options.thinnest * height, options.thickest * height
-    found = []
-    for sides, both in ((_find_segments(grey), True), (_mask_segments(foreground, frame), False)):
-        long = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1) > options.shortest * height
-        kept = sides[long]
-        kept = kept[_along(foreground, frame, kept) > options.moving]
-        bars, bright = _pair(kept, *widths)
-        found.append(bars[bright | both])
-    return _join(np.concatenate(found), foreground, frame, options)
+    sides = _find_segments(grey)
+    long = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1) > options.shortest * height
+    sides = sides[long]
+    sides = sides[_along(foreground, frame, sides) > EDGE * options.moving]
+    bars = _pair(sides, options.thinnest * height, options.thickest * height)
+    bars = bars[_along(foreground, frame, bars) > options.moving]
+    both = np.concatenate([bars, _thin_lines(foreground, frame)])
+    return _join(both, foreground, frame, options)
 
 
 def _find_segments(picture: UInt8[np.ndarray, "h w"]) -> Float[np.ndarray, "n 2 2"]:
@@ -86,14 +96,18 @@ def _find_segments(picture: UInt8[np.ndarray, "h w"]) -> Float[np.ndarray, "n 2 
     return np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(float)
 
 
-def _mask_segments(foreground: Foreground, frame: int) -> Float[np.ndarray, "n 2 2"]:
-    """Segments of the foreground: they show a shaft that differs from the scene in colour only."""
-    found = _find_segments(foreground.likely[frame])
-    share = np.linspace(0, 1, STEPS)[:, None]
-    places = np.round(found[:, None, 0] * (1 - share) + found[:, None, 1] * share).astype(int)
-    x, y = (np.clip(places[..., k], 0, foreground.known.shape[1 - k] - 1) for k in (0, 1))
-    found = found[foreground.known[y, x].mean(axis=1) > KNOWN]
-    return (found - (foreground.shrink - 1) / 2) / foreground.shrink
+def _thin_lines(foreground: Foreground, frame: int) -> Float[np.ndarray, "n 2 2"]:
+    """Lines of faint foreground beside the player: a shaft as pale as the sky behind it."""
+    height = foreground.height * foreground.shrink
+    player = cv2.dilate(foreground.body(frame).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    thin = (foreground.likely[frame] > FAINT) & ~player & foreground.known
+    found = probabilistic_hough_line(
+        thin, threshold=round(VOTES * height), line_length=round(LINE * height),
+        line_gap=round(LINE_GAP * height), theta=ANGLES, rng=frame,
+    )  # fmt: skip
+    lines = np.array(found, float).reshape(-1, 2, 2)
+    longest = np.argsort(-np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))[:MOST_LINES]
+    return (lines[longest] - (foreground.shrink - 1) / 2) / foreground.shrink
 
 
 def drop_scenery(bars: Sequence[Bars], height: float) -> list[Bars]:
@@ -125,8 +139,8 @@ def _along(
 
 def _pair(
     sides: Float[np.ndarray, "n 2 2"], thinnest: float, thickest: float
-) -> tuple[Float[np.ndarray, "m 2 2"], Bool[np.ndarray, "m"]]:
-    """Middle lines of close, overlapping sides of opposite direction, and which are bright."""
+) -> Float[np.ndarray, "m 2 2"]:
+    """Middle lines of close, overlapping sides of opposite direction."""
     length = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
     unit = (sides[:, 1] - sides[:, 0]) / length[:, None]
     i, j = np.nonzero(np.triu(unit @ unit.T < -np.cos(PARALLEL), 1))
@@ -144,7 +158,7 @@ def _pair(
     good &= shared > OVERLAP * np.minimum(length[i], length[j])
     center = middle[i] + normal * gap[:, None] / 2
     ends = np.stack([low.min(axis=0), high.max(axis=0)], axis=1)[..., None]
-    return (center[:, None] + ends * axis[:, None])[good], gap[good] < 0
+    return (center[:, None] + ends * axis[:, None])[good]
 
 
 def _join(
@@ -158,11 +172,12 @@ def _join(
     for k in range(len(bars)):
         if taken[k]:
             continue
-        whole, members = _grow(k, bars, (foreground, frame), options)
+        members = _grow(k, bars, (foreground, frame), options)
         taken |= members
         if members.sum() > 1:
-            ends.append(whole)
-            support.append(_covered(whole, bars[members]))
+            fitted = _fit_line(bars[members], length[members])
+            ends.append(fitted)
+            support.append(_covered(fitted, bars[members]))
     return Bars(np.array(ends).reshape(-1, 2, 2), np.array(support, float))
 
 
@@ -171,8 +186,8 @@ def _grow(
     bars: Float[np.ndarray, "m 2 2"],
     seen: tuple[Foreground, int],
     options: BarOptions,
-) -> tuple[Float[np.ndarray, "2 2"], Bool[np.ndarray, "m"]]:
-    """A bar lengthened by others in its line, nearest first, and which these are."""
+) -> Bool[np.ndarray, "m"]:
+    """The bars in the line of one, which grows by the nearest ones first."""
     whole, members = bars[start], np.arange(len(bars)) == start
     limit = options.bridge * seen[0].height
     while True:
@@ -184,13 +199,13 @@ def _grow(
         turn = bars[:, 1] - bars[:, 0]
         turn = np.abs(turn @ normal) / np.linalg.norm(turn, axis=1)
         off = np.abs((bars - whole[0]) @ normal).max(axis=1)
-        near = (off < 2.0 + SPREAD * (length + np.maximum(gap, 0))) & (turn < np.sin(PARALLEL))
+        near = (off < 2.0 + SPREAD * (length + np.maximum(gap, 0))) & (turn < np.sin(COLLINEAR))
         near &= ~members & (gap < limit)
         inside = near & (place[:, 0] > 0) & (place[:, 1] < length)
         members = members | inside
         near &= ~inside
         if not near.any():
-            return whole, members
+            return members
         chosen = int(np.where(near, gap, np.inf).argmin())
         members = members | (np.arange(len(bars)) == chosen)
         both = np.concatenate([whole, bars[chosen]])
@@ -199,6 +214,17 @@ def _grow(
         if _is_open(whole, bars[chosen], seen):
             continue
         whole = joined
+
+
+def _fit_line(
+    bars: Float[np.ndarray, "m 2 2"], length: Float[np.ndarray, "m"]
+) -> Float[np.ndarray, "2 2"]:
+    """The line nearest to all bars, as far as they reach; long ones count more."""
+    middle = np.average(bars.mean(axis=1), axis=0, weights=length)
+    off = (bars - middle).reshape(-1, 2)
+    axis = np.linalg.eigh((off * np.repeat(length, 2)[:, None]).T @ off)[1][:, 1]
+    along = off @ axis
+    return middle + np.array([along.min(), along.max()])[:, None] * axis
 
 
 def _covered(whole: Float[np.ndarray, "2 2"], bars: Float[np.ndarray, "m 2 2"]) -> float:

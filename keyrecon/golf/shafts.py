@@ -40,6 +40,10 @@ class ShaftOptions:
     """Weight of what lies on the player against what lies beside."""
     rim: float = 0.008
     """What lies no farther from the player's outline still lies on the player."""
+    free: float = 0.02
+    """Least distance of the head from the player: what ends at him is a gap between his arms."""
+    loose: float = 0.5
+    """Weight of a shaft that does not meet the player where it would be held."""
     bridged: float = 0.3
     """Cost of each length between the joined bars of a shaft."""
     least: float = 0.05
@@ -74,7 +78,8 @@ def suppose_shafts(
     rows = []
     for bar, support in zip(bars.ends, bars.support / foreground.height, strict=True):
         line = bar[0] + np.linspace(0, 1, 12)[:, None] * (bar[1] - bar[0])
-        beside = (_look(outside, foreground, line) > rim).mean()
+        sure = _look(foreground.known.astype(np.uint8), foreground, line) > 0
+        beside = ((_look(outside, foreground, line) > rim) & sure).mean()
         weight = support * (options.on_player + (1 - options.on_player) * beside)
         span = float(np.linalg.norm(bar[1] - bar[0])) / foreground.height
         weight -= options.bridged * max(0.0, span - support)
@@ -82,17 +87,30 @@ def suppose_shafts(
             continue
         for held, other in (bar, bar[::-1]):
             head = _follow_to_head(held, other, (foreground, frame), options)
-            hand = _follow_to_hands(held, head, (outside, foreground), options)
-            long = np.linalg.norm(head - hand) < options.longest * foreground.height
-            if long and np.linalg.norm(hand - shoulders) < options.arms * foreground.height:
+            hand, attached = _follow_to_hands(held, head, (outside, foreground), options)
+            if _possible(np.stack([hand, head]), (outside, foreground), shoulders, options):
                 tip = _is_tip(hand, head, (outside, foreground), rim)
-                rows.append((weight, hand, head, tip))
+                rows.append((weight if attached else options.loose * weight, hand, head, tip))
     rows = sorted(rows, key=lambda r: -r[0])[: options.most]
     return Shafts(
         np.array([r[1:3] for r in rows]).reshape(-1, 2, 2),
         np.array([r[0] for r in rows], float),
         np.array([r[3] for r in rows], bool),
     )
+
+
+def _possible(
+    ends: Float[np.ndarray, "2 2"],
+    player: tuple[Float[np.ndarray, "h w"], Foreground],
+    shoulders: Float[np.ndarray, "2"],
+    options: ShaftOptions,
+) -> bool:
+    """Whether arms reach the hand end, and the club reaches its head, away from the player."""
+    outside, foreground = player
+    height = foreground.height
+    away = _look(outside, foreground, ends[1:])[0] > options.free * height * foreground.shrink
+    near = np.linalg.norm(ends[0] - shoulders) < options.arms * height
+    return bool(away and near and np.linalg.norm(ends[1] - ends[0]) < options.longest * height)
 
 
 def _is_tip(
@@ -151,10 +169,10 @@ def _follow_to_hands(
     head: Float[np.ndarray, "2"],
     player: tuple[Float[np.ndarray, "h w"], Foreground],
     options: ShaftOptions,
-) -> Float[np.ndarray, "2"]:
-    """Where the line of a shaft meets the player; its end, if that is too far away."""
+) -> tuple[Float[np.ndarray, "2"], bool]:
+    """Where the line of a shaft meets the player, or else its end; and whether it meets him."""
     outside, foreground = player
     unit = (held - head) / np.linalg.norm(held - head)
     steps = np.arange(0, options.reach, STEP) * foreground.height
     there = _look(outside, foreground, held + steps[:, None] * unit) <= 1.0
-    return held + unit * (steps[there.argmax()] if there.any() else 0.0)
+    return held + unit * (steps[there.argmax()] if there.any() else 0.0), bool(there.any())

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.golf.records import FittedSwing, Observations
+from keyrecon.records import Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def measure_swing(fitted: FittedSwing, observations: Observations) -> SwingMeasu
     return SwingMeasures(times[1] - times[0], times[2] - times[1], *turns, seen)
 
 
-def _pair(motion: object, part: str) -> tuple[int, int]:
+def _pair(motion: Motion, part: str) -> tuple[int, int]:
     names = motion.skeleton.names
     return names.index(f"left_{part}"), names.index(f"right_{part}")
 
