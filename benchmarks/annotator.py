@@ -217,6 +217,15 @@ def describe_difference(folder: Path, marks: Annotations, size: tuple[int, int])
     return f"marks within {np.nanmax(off):.2f} px of those meant, {signs.mean():.1%} of the signs"
 
 
+def known_answers(demo: Path) -> Answers:
+    """The truth with click noise on the demo's keyframes."""
+    truth = read_truth(demo / "sequence" / "truth.npz")
+    keyframes = keyframes_from_json((demo / "project" / "keyframes.json").read_text())
+    noise = MarkOptions(CLICK_NOISE)
+    marks = mark_from_truth(keyframes, truth["points2d"], truth["points3d"], None, noise)
+    return Answers(on_both_ends(marks))
+
+
 def main() -> None:
     """Everything, in order."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -224,12 +233,7 @@ def main() -> None:
     demo = parser.parse_args().demo
     if not (demo / "project" / "keyframes.json").is_file():
         run_demo("tennis", demo, show, print)
-    truth = read_truth(demo / "sequence" / "truth.npz")
-    keyframes = keyframes_from_json((demo / "project" / "keyframes.json").read_text())
-    marks = mark_from_truth(
-        keyframes, truth["points2d"], truth["points3d"], None, MarkOptions(CLICK_NOISE)
-    )
-    compare(demo, Answers(on_both_ends(marks)), demo / "sequence" / "truth.npz")
+    compare(demo, known_answers(demo), demo / "sequence" / "truth.npz")
     for name, times in time_switching(demo).items():
         print(describe_times(name, times))
 

@@ -180,8 +180,10 @@ class Person:
 
         To point at a limb is no action: the key that turns it is.
         """
-        offered = [reading["nearer"] for reading in self.pose()["alternatives"][:3]]
+        offered = [reading["nearer"] for reading in self.pose().get("alternatives", [])[:3]]
         wrong = [[limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered]
+        if not offered:
+            return
         best = min(range(len(wrong)), key=lambda n: len(wrong[n]))
         self.press(str(best + 1))
         for limb in wrong[best]:
@@ -191,9 +193,13 @@ class Person:
             self.press("f")
 
     def suggestion(self, frame):
-        """What the server suggests for a keyframe, once the page shows it: [x, y, confidence]."""
+        """What is suggested for the open joints of a keyframe, once the page shows it."""
         answer = self.page.evaluate(f"fetch('/api/ghost/{frame}').then((a) => a.json())")
-        offered = answer.get("joints", {})
+        open_joints = self.page.evaluate(
+            "[...document.querySelectorAll('.joint[data-joint]:not([hidden]):not(.marked)')]"
+            ".map((row) => row.dataset.joint)"
+        )
+        offered = {name: at for name, at in answer.get("joints", {}).items() if name in open_joints}
         if offered:
             self.await_text("#guide-text", "suggestion|Which ends|done")
         return offered

@@ -1,5 +1,7 @@
 """A project to be marked in a browser: a short video, keyframes, and a body that is known."""
 
+import time
+
 import numpy as np
 
 from keyrecon.body import LSP14
@@ -73,3 +75,10 @@ def make_project(folder, video_file, upper=(10, 40, 70), lower=(10, 55, 70)):
     keyframes = Keyframes(_half(upper), _half(lower), reach=10, alpha=0.95)
     workspace.keyframes_file.write_text(keyframes_to_json(keyframes))
     return folder
+
+
+def count_slowly(options, progress):
+    """Work that takes longer than anybody waits."""
+    for _ in progress(range(600), "Counting"):
+        time.sleep(0.1)
+    return "Counted."

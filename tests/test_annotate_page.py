@@ -11,6 +11,7 @@ from page_project import (
     PIXELS,
     STATURE,
     block,
+    count_slowly,
     make_project,
     read_number,
     true_signs,
@@ -357,4 +358,20 @@ def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, fol
     assert {name: found[name] for name in truth} == truth
     assert (person.clicks, person.drags) == (14, 0)
     assert person.keys <= 6
+    assert person.complaints == []
+
+
+def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
+    with serving(folder, commands={"run": count_slowly}) as server:
+        person = Person(context, server.door.address)
+        person.open(40)
+        person.mark_joints(partial(place_of, 40))
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Make the motion")
+        person.press("Enter")
+        person.await_text("#job-text", "Counting")
+        person.page.click("#job-cancel")
+        person.await_text("#notice-text", "Cancelled")
+        person.await_text("#motion-text", "Make the motion")
+        context.close()
     assert person.complaints == []

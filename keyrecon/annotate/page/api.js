@@ -40,8 +40,8 @@ export function listen(hears) {
 }
 
 // Asks at most one question at a time; of those that wait only the newest is asked. The promise is
-// kept when nothing waits any more.
-export function latestOnly(ask) {
+// kept when nothing waits any more; `failed` hears what the server said instead of an answer.
+export function latestOnly(ask, failed) {
   let waiting = null,
     asking = null;
   async function work() {
@@ -49,7 +49,7 @@ export function latestOnly(ask) {
       const question = waiting;
       waiting = null;
       await ask(...question).catch((fault) => {
-        if (!(fault instanceof Gone)) throw fault;
+        if (!(fault instanceof Gone)) failed(fault, ...question);
       });
     }
     asking = null;

@@ -4,6 +4,8 @@ import * as api from "./api.js";
 import { byId, make, setText, toggle } from "./dom.js";
 import { createSpace } from "./space.js";
 
+const EMPTY = "The body in space appears here as joints are placed.";
+
 export function createDepth(model, placed) {
   const space = createSpace(byId("space"), model.project.limbs, model.sides);
   const poses = new Map(),
@@ -18,11 +20,15 @@ export function createDepth(model, placed) {
       ? null
       : (ghosts.get(model.doing.frame) ?? null);
 
-  const ask = api.latestOnly(async (frame, marks, nearer) => {
+  async function askPose(frame, marks, nearer) {
     const began = performance.now();
     poses.set(frame, await api.send("pose", { frame, marks, nearer }));
     model.changed();
     performance.measure("pose", { start: began, end: performance.now() });
+  }
+  const ask = api.latestOnly(askPose, (fault, frame) => {
+    poses.set(frame, { trouble: fault.message });
+    model.changed();
   });
 
   async function askGhost(frame) {
@@ -40,8 +46,8 @@ export function createDepth(model, placed) {
     last = now;
     const asked = ask(frame, marks, nearer);
     settled = asked;
-    byId("space").ariaBusy = "true";
-    asked.then(() => (byId("space").ariaBusy = String(settled !== asked)));
+    byId("space").setAttribute("aria-busy", true);
+    asked.then(() => byId("space").setAttribute("aria-busy", settled !== asked));
   }
 
   // The pose of what is marked at this moment.
@@ -92,6 +98,7 @@ export function createDepth(model, placed) {
       other = pose?.alternatives?.[hovered]?.points3d;
     space.show(other ?? pose?.points3d, other ? pose?.points3d : null);
     byId("space-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
+    setText(byId("space-empty"), pose?.trouble ?? EMPTY);
     drawReadings();
   }
 

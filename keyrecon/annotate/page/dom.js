@@ -16,6 +16,12 @@ export function make(tag, properties = {}, ...children) {
 
 export const toggle = (element, name, on) => element.classList.toggle(name, Boolean(on));
 
+// The number in a field of text; null when it is empty, NaN when it holds something else.
+export function numberIn(field) {
+  const text = field.value.trim().replace(",", ".");
+  return text ? Number(text) : null;
+}
+
 // Sets text only where it differs, so that nothing is laid out anew without need.
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

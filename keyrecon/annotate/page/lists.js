@@ -100,12 +100,16 @@ export function createLists(model, actions) {
     if (suggestion) actions.addKeyframe(suggestion.frame, suggestion.half);
   }
 
-  async function ask() {
-    checks = await api.read("checks");
-    suggestions = await api.read("next");
-    model.changed();
-  }
-  model.onSettled(() => ask().catch(() => {})); // the server is gone: the lists stay as they are
+  // The server takes a while over these: one question at a time, or edits would wait for it.
+  const ask = api.latestOnly(
+    async () => {
+      checks = await api.read("checks");
+      suggestions = await api.read("next");
+      model.changed();
+    },
+    (fault) => model.tell(fault.message),
+  );
+  model.onSettled(ask);
 
   document.querySelectorAll("[data-tab]").forEach((button) =>
     button.addEventListener("click", () => {

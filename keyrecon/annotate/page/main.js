@@ -157,5 +157,5 @@ addEventListener("pagehide", actions.keepHeld);
 await model.readState();
 model.listen();
 jobs.refresh();
-lists.ask().catch(() => {}); // asked again after the next edit
+lists.ask();
 go(model.keyframes().length ? "keyframes" : "pick");

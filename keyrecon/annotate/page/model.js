@@ -6,6 +6,8 @@ import { apply, emptyState, fromCell, marksOf, nearerOf, slots } from "./state.j
 import { inverse, newId, rebased } from "./edits.js";
 import { allKeyframes, isDone, sidesOf } from "./guide.js";
 
+const REST = 800; // ms without an edit after which what follows from edits is asked anew
+
 export async function createModel() {
   const model = {
     project: await api.read("project"),
@@ -35,7 +37,7 @@ export async function createModel() {
   model.onSettled = (react) => settled.push(react);
   model.settle = () => {
     clearTimeout(settling);
-    settling = setTimeout(() => settled.forEach((react) => react()), 400);
+    settling = setTimeout(() => settled.forEach((react) => react()), REST);
   };
 
   model.onProject = (react) => readers.push(react);

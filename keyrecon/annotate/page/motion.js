@@ -1,5 +1,5 @@
 // The motion played over the picture, with the skeleton in space beside it.
-import { byId, color, setText } from "./dom.js";
+import { byId, color, numberIn, setText } from "./dom.js";
 import { createPlayer } from "./player.js";
 import { drawJoint, drawLimb } from "./skeleton.js";
 import { createSpace } from "./space.js";
@@ -54,11 +54,9 @@ export function createMotion(model, { stills, jobs, frame: surround, actions }) 
   }
 
   function primary() {
-    const text = byId("height").value.trim().replace(",", "."),
-      height = text ? Number(text) : null;
-    if (Number.isNaN(height))
-      model.tell(`The height is a number of metres, such as 1.80; "${text}" is not.`);
-    else if (!surround.runningJob()) jobs.start("run", { height });
+    const height = numberIn(byId("height"));
+    if (Number.isNaN(height)) model.tell("The height is a number of metres, such as 1.80.");
+    else if (!surround.runningJob()) jobs.start("run", height === null ? {} : { height });
   }
 
   slider.max = last;

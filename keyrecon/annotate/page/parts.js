@@ -34,6 +34,10 @@ export function stillNeeded(parts) {
   return regions.some(({ picked }) => picked) ? open : [...open, regions[0]];
 }
 
+// Share of the frames to mark that is usual for a video: some 25 keyframes, which is 1.5 % of half a
+// minute, and less where little repeats because there is little.
+export const usualBudget = (count) => Math.max(0.015, Math.min(0.05, 25 / count));
+
 // Frames spread over the video, to see how well the picks do elsewhere.
 export function spread(count, n) {
   return Array.from({ length: n }, (_, k) => Math.round(((k + 0.5) * count) / n));

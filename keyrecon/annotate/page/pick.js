@@ -2,10 +2,10 @@
 // whether head and feet are found.
 import { arrowStep } from "./commands.js";
 import { addPick, newId, removePick } from "./edits.js";
-import { byId, setText } from "./dom.js";
+import { byId, numberIn, setText } from "./dom.js";
 import { placeUnder } from "./geometry.js";
 import { createPalette } from "./palette.js";
-import { partsOf, stillNeeded } from "./parts.js";
+import { partsOf, stillNeeded, usualBudget } from "./parts.js";
 import { drawCross, drawLabel } from "./skeleton.js";
 import { createStrip } from "./strip.js";
 import { createViewer } from "./viewer.js";
@@ -106,10 +106,15 @@ export function createPick(model, { stills, jobs, frame: surround }) {
   byId("pick-primary").addEventListener("click", primary);
   byId("show-map").addEventListener("change", askMap);
 
+  byId("budget").value = String(Math.round(1000 * usualBudget(project.n_frames)) / 10);
+
   function primary() {
-    const [next] = stillNeeded(parts());
+    const [next] = stillNeeded(parts()),
+      budget = (numberIn(byId("budget")) ?? NaN) / 100;
     if (next) choose(next.part);
-    else if (!surround.runningJob()) jobs.start("keyframes");
+    else if (!(budget > 0))
+      model.tell("The share of frames to mark is a number of per cent, such as 1.5.");
+    else if (!surround.runningJob()) jobs.start("keyframes", { budget });
   }
 
   function drawPicture() {
@@ -152,7 +157,8 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     setText(byId("pick-where"), `frame ${doing.frame} of ${project.n_frames}`);
     setText(byId("pick-text"), text);
     setText(byId("pick-more"), more);
-    byId("pick-primary").hidden = stillNeeded(parts()).length > 0 || Boolean(surround.runningJob());
+    byId("pick-primary").hidden = byId("budget-row").hidden =
+      stillNeeded(parts()).length > 0 || Boolean(surround.runningJob());
     setText(
       byId("pick-primary"),
       model.project.has.keyframes ? "Choose the keyframes again" : "Choose the keyframes",

@@ -21,13 +21,16 @@ export function createStrip(model, stills, choose) {
   });
   byId("strip").append(...cells.map(({ cell }) => cell));
 
-  const ask = api.latestOnly(async () => {
-    const answer = await api.send("picks/preview", { frames }).catch(() => null); // too few picks so far
-    found.clear();
-    for (const row of answer?.frames ?? []) found.set(row.frame, row);
-    trust = answer?.trust ?? null;
-    model.changed();
-  });
+  const ask = api.latestOnly(
+    async () => {
+      const answer = await api.send("picks/preview", { frames });
+      found.clear();
+      for (const row of answer.frames ?? []) found.set(row.frame, row);
+      trust = answer.trust ?? null;
+      model.changed();
+    },
+    () => found.clear(),
+  ); // too few picks so far
 
   function mark(pen, [x, y], scale, style, size) {
     pen.beginPath();
