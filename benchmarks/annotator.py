@@ -121,8 +121,11 @@ def spent(person: Person, before: tuple[int, int, int], frame: int) -> Work:
 
 
 def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work], list[float]]:
-    """Mark the keyframes of a project through its page; work by keyframe, pose answers in ms."""
-    assistant = make_assistant(Workspace(folder))
+    """Mark the keyframes of a project through its page; work by keyframe, pose answers in ms.
+
+    Nobody looks at the lists of checks meanwhile, so they are not computed.
+    """
+    assistant = replace(make_assistant(Workspace(folder)), checks=None, suggest=None)
     with browser() as chromium, serving(folder, assistant) as server:
         person = Person(chromium.new_context(viewport=SCREEN), server.door.address)
         work = [way(person, frame) for frame in show(frames, "Marking keyframes", len(frames))]

@@ -171,9 +171,14 @@ class Person:
 
     def mark_joints(self, place_of):
         """Click every joint that is asked for where `place_of(joint)` says."""
-        while joint := self.asked():
-            self.click(place_of(joint))
-            self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
+        while self.asked():
+            self.mark_one(place_of)
+
+    def mark_one(self, place_of):
+        """Click the joint that is asked for."""
+        joint = self.asked()
+        self.click(place_of(joint))
+        self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
 
     def settle_depths(self, signs, place_of):
         """Take the best of the readings offered and turn the limbs that are wrong in it.

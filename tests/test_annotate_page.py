@@ -375,3 +375,16 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
         person.await_text("#motion-text", "Make the motion")
         context.close()
     assert person.complaints == []
+
+
+def test_edits_made_without_the_server_can_be_taken_back(person, folder):
+    person.open(10)
+    person.server.stop()
+    for _ in range(3):
+        person.mark_one(partial(place_of, 10))
+    person.await_text("#saving", "Not saved")
+    person.press("Control+z")
+    person.press("Control+z")
+    person.server.start()
+    person.await_saved()
+    assert np.isfinite(marks_on_file(folder).joints[0, :, 0]).sum() == 1

@@ -6,6 +6,7 @@ import { apply, emptyState, fromCell, marksOf, nearerOf, slots } from "./state.j
 import { inverse, newId, rebased } from "./edits.js";
 import { allKeyframes, isDone, sidesOf } from "./guide.js";
 
+const READ = 10000; // ms that a notice is shown
 const REST = 800; // ms without an edit after which what follows from edits is asked anew
 
 export async function createModel() {
@@ -19,9 +20,11 @@ export async function createModel() {
   const drawers = [],
     settled = [],
     readers = [],
-    sent = new Set();
+    sent = new Set(),
+    takenBack = new Set();
   let asked = false,
-    settling = null;
+    settling = null,
+    hiding = null;
 
   // A hidden page gets no animation frames; it is drawn when it is shown.
   model.changed = () => {
@@ -105,6 +108,8 @@ export async function createModel() {
 
   model.tell = (text, offer = null) => {
     model.notice = { text, offer };
+    clearTimeout(hiding);
+    if (text && !offer) hiding = setTimeout(model.tell, READ, null);
     model.changed();
   };
 
@@ -121,12 +126,19 @@ export async function createModel() {
     model.settle();
   }
 
-  // Undo belongs to the server, so that it survives a restart; what has not got there is undone here.
+  function takeBack(edit) {
+    const back = inverse(edit);
+    takenBack.add(edit.id).add(back.id);
+    model.edit(back);
+    return edit;
+  }
+
+  // Undo belongs to the server, so that it survives a restart; while it is gone, edits that wait for it
+  // are taken back here.
   async function step(direction) {
-    const last = outbox.waiting().at(-1);
-    if (last && direction === "undo") {
-      model.edit(inverse(last));
-      return last;
+    if (direction === "undo" && !(await outbox.drained())) {
+      const last = outbox.waiting().findLast(({ id }) => !takenBack.has(id));
+      if (last) return takeBack(last);
     }
     const id = newId();
     sent.add(id);

@@ -32,6 +32,7 @@ export function keptEdits(storage, project) {
 // "unsaved", how many wait, and why), `answered` the answer and the edits that were sent, `refused` an edit
 // that the server will never take and why.
 export function createOutbox({ send, kept, status, answered, refused, wait = setTimeout }) {
+  const drains = [];
   let waiting = kept.all(),
     sending = false,
     failures = 0,
@@ -43,6 +44,8 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
   function tell() {
     if (failures || (cut && !waiting.length)) status("unsaved", waiting.length, why);
     else status(waiting.length ? "saving" : "saved", waiting.length);
+    if (!waiting.length || failures || cut)
+      drains.splice(0).forEach((done) => done(!waiting.length));
   }
 
   function forget(edits) {
@@ -107,5 +110,11 @@ export function createOutbox({ send, kept, status, answered, refused, wait = set
       flush();
     },
     waiting: () => waiting,
+    // True once nothing waits any more, false when that may take long.
+    drained() {
+      const drained = new Promise((done) => drains.push(done));
+      tell();
+      return drained;
+    },
   };
 }

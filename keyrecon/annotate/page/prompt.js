@@ -25,16 +25,10 @@ function sureness(model, limbs) {
 
 const prompts = {
   accept(model, { joints, joint }) {
-    const ghost = model.ghost();
-    const source = ghost.from?.length
-      ? ` carried over from frame ${ghost.from.slice(0, 3).join(", ")}`
-      : "";
+    const from = model.ghost().from?.slice(0, 3).join(", ");
     return {
       text: `Take the suggestion for ${counted(joints.length, "joint")}?`,
-      more: `It is${source}. Drag what is wrong, or click ${named(model, joint)} yourself.`.replace(
-        "is.",
-        "is dashed.",
-      ),
+      more: `${from ? `From frame ${from}. ` : ""}Drag what is wrong, or click ${named(model, joint)}.`,
       button: "Take it",
     };
   },
@@ -44,7 +38,7 @@ const prompts = {
   }),
   depth: (model, { limbs }) => ({
     text: "Which ends are nearer the camera?",
-    more: `${sureness(model, limbs)}`,
+    more: sureness(model, limbs),
     button: "Right as shown",
   }),
   next(model) {
@@ -69,7 +63,8 @@ function stretched(model) {
   const [limb, ratio] = found.sort((a, b) => b[1] - a[1])[0];
   const joints = asked(model.project, model.keyframe()?.half);
   if (unmarked(joints, model.marks()).length) return null;
-  return `The limb to ${named(model, limb)} is ${Math.round(100 * (ratio - 1))} % longer than it can be: check its ends.`;
+  const share = Math.round(100 * (ratio - 1));
+  return `The limb to ${named(model, limb)} is ${share} % longer than it can be: check its ends.`;
 }
 
 export function createPrompt(model, actions) {
