@@ -33,7 +33,7 @@ export function keyframeCommands(model, { actions, viewer, lists }) {
     automaticAll: () => actions.automaticDepths(),
     open: () => actions.nextKeyframe(),
     lock: () => actions.lock(),
-    check: () => lists.firstCheck(),
+    check: () => lists.nextCheck(),
     suggestion: () => lists.firstSuggestion(),
     keyframe: (key) => actions.stepKeyframe(way(key)),
     joint: (key) => actions.stepJoint(way(key)),

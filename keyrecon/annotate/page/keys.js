@@ -33,7 +33,7 @@ export const KEYS = {
     [["z"], "the player or the whole picture", "zoom"],
     [["+", "-"], "zoom in, out", "zoomBy"],
     [["h"], "hide the skeleton while held", "hide"],
-    [["g"], "go to the most suspicious place", "check"],
+    [["g"], "go to the most suspicious place, then to the next", "check"],
     [["y"], "add the frame that would help most", "suggestion"],
     [["l"], "lock or unlock the keyframe", "lock"],
   ],

@@ -96,6 +96,13 @@ export function createLists(model, actions) {
   function goTo(check) {
     if (check) actions.open(check.frame, { joint: check.joint ?? check.limb ?? null });
   }
+  // Number of the check whose place is open, -1 if none is.
+  function openCheck() {
+    const { frame, joint } = model.doing;
+    return checks.findIndex((check) => {
+      return check.frame === frame && (check.joint ?? check.limb ?? null) === joint;
+    });
+  }
   function add(suggestion) {
     if (suggestion) actions.addKeyframe(suggestion.frame, suggestion.half);
   }
@@ -121,7 +128,9 @@ export function createLists(model, actions) {
   function explain() {
     const keyframe = model.keyframe();
     if (tab === "checks")
-      return checks.length ? "Most suspicious first. G goes to the first." : "Nothing looks wrong.";
+      return checks.length
+        ? "Most suspicious first. G goes from one to the next."
+        : "Nothing looks wrong.";
     if (tab === "next") {
       if (suggestions.length)
         return "Frames where one more keyframe would help most. Y adds the first.";
@@ -143,21 +152,14 @@ export function createLists(model, actions) {
         keyframes,
         keyframes.findIndex(({ frame }) => frame === model.doing.frame),
       );
-    if (tab === "checks")
-      checkList.show(
-        checks,
-        checks.findIndex(
-          ({ frame, joint, limb }) =>
-            frame === model.doing.frame && (joint ?? limb ?? null) === model.doing.joint,
-        ),
-      );
+    if (tab === "checks") checkList.show(checks, openCheck());
     if (tab === "next") nextList.show(suggestions, -1);
   }
 
   return {
     draw,
     ask,
-    firstCheck: () => goTo(checks[0]),
+    nextCheck: () => goTo(checks[(openCheck() + 1) % checks.length]),
     firstSuggestion: () => add(suggestions[0]),
   };
 }
