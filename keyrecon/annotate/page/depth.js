@@ -12,6 +12,7 @@ export function createDepth(model, placed) {
     ghosts = new Map();
   let last = "",
     hovered = null,
+    inSpace = {},
     settled = Promise.resolve();
 
   model.pose = () => poses.get(model.doing.frame) ?? null;
@@ -92,11 +93,18 @@ export function createDepth(model, placed) {
     });
   }
 
+  // Drawn when it changes, not with every move of the pointer.
+  function showInSpace(points, faint) {
+    if (inSpace.points === points && inSpace.faint === faint) return;
+    inSpace = { points, faint };
+    space.show(points, faint);
+  }
+
   function draw() {
     follow();
     const pose = model.pose(),
       other = pose?.alternatives?.[hovered]?.points3d;
-    space.show(other ?? pose?.points3d, other ? pose?.points3d : null);
+    showInSpace(other ?? pose?.points3d, other ? pose?.points3d : null);
     byId("space-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
     setText(byId("space-empty"), pose?.trouble ?? EMPTY);
     drawReadings();
