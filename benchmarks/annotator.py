@@ -50,10 +50,13 @@ class Work:
     clicks: int
     drags: int
     keys: int
+    """To take the suggestion."""
+    depth_keys: int
+    """To settle which ends are nearer."""
 
     @property
-    def actions(self) -> int:
-        """Everything a person did."""
+    def placing(self) -> int:
+        """Everything done until the joints were right."""
         return self.clicks + self.drags + self.keys
 
 
@@ -89,35 +92,32 @@ def begin(demo: Path, name: str) -> Path:
 
 def mark_by_clicks(person: Person, frame: int, answers: Answers) -> Work:
     """Every joint by a click, every depth settled; suggestions are not looked at."""
-    before = person.clicks, person.drags, person.keys
     person.open(frame)
-    person.mark_joints(partial(answers.place, frame))
-    person.settle_depths(answers.signs(frame), partial(answers.place, frame))
-    return spent(person, before, frame)
+    return finish(person, frame, answers, (person.clicks, person.drags, person.keys))
 
 
 def correct_suggestion(person: Person, frame: int, answers: Answers, seen: float) -> Work:
-    """Joints that are off by more than `seen` px are dragged or clicked, the rest is taken."""
-    before = person.clicks, person.drags, person.keys
+    """Joints that are off by more than `seen` px are dragged, the rest is taken."""
     person.open(frame)
+    before = person.clicks, person.drags, person.keys
     offered = person.suggestion(frame)
     for joint, (x, y, _) in offered.items():
         place = answers.place(frame, joint)
-        if np.isfinite(place).all() and np.hypot(x - place[0], y - place[1]) > seen:
+        if np.hypot(x - place[0], y - place[1]) > seen:
             person.drag((x, y), place)
     if offered:
         person.press("Enter")
+    return finish(person, frame, answers, before)
+
+
+def finish(person: Person, frame: int, answers: Answers, before: tuple[int, int, int]) -> Work:
+    """Click what is still asked for, settle the depths; what was done since `before`."""
     person.mark_joints(partial(answers.place, frame))
+    clicks, drags, keys = person.clicks - before[0], person.drags - before[1], person.keys
     person.settle_depths(answers.signs(frame), partial(answers.place, frame))
-    return spent(person, before, frame)
-
-
-def spent(person: Person, before: tuple[int, int, int], frame: int) -> Work:
-    """What was done since `before`."""
     person.await_saved()
-    now = person.clicks, person.drags, person.keys
-    clicks, drags, keys = (b - a for a, b in zip(before, now, strict=True))
-    return Work(person.page.locator("#joints .marked").count(), clicks, drags, keys)
+    joints = person.page.locator("#joints .marked").count()
+    return Work(joints, clicks, drags, keys - before[2], person.keys - keys)
 
 
 def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work], list[float]]:
@@ -171,9 +171,9 @@ def time_switching(demo: Path) -> dict[str, list[float]]:
 
 def describe_work(name: str, work: list[Work]) -> str:
     """One line of the table."""
-    columns = [statistics.mean(getattr(one, part) for one in work)
-               for part in ("joints", "clicks", "drags", "keys", "actions")]  # fmt: skip
-    worst = max(one.actions for one in work)
+    parts = ("joints", "clicks", "drags", "keys", "placing", "depth_keys")
+    columns = [statistics.mean(getattr(one, part) for one in work) for part in parts]
+    worst = max(one.placing for one in work)
     return f"{name:<26}" + "".join(f"{value:>9.2f}" for value in columns) + f"{worst:>9}"
 
 
@@ -203,7 +203,7 @@ def compare(demo: Path, answers: Answers, truth: Path) -> None:
         corrected, frames, partial(correct_suggestion, answers=answers, seen=tall)
     )
     print(f"\n{'per keyframe':<26}{'joints':>9}{'clicks':>9}{'drags':>9}{'keys':>9}"
-          f"{'all':>9}{'worst':>9}")  # fmt: skip
+          f"{'placing':>9}{'depth':>9}{'worst':>9}")  # fmt: skip
     print(describe_work("clicks alone", by_clicks))
     print(describe_work("suggestions corrected", by_taking))
     print(describe_times("\npose in space after an edit", poses))

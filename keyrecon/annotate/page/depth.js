@@ -32,11 +32,14 @@ export function createDepth(model, placed) {
     model.changed();
   });
 
-  async function askGhost(frame) {
-    const answer = await api.read(`ghost/${frame}`);
-    ghosts.set(frame, answer?.joints ? answer : null);
-    model.changed();
-  }
+  const askGhost = api.latestOnly(
+    async (frame) => {
+      const answer = await api.read(`ghost/${frame}`);
+      ghosts.set(frame, answer.joints ? answer : null);
+      model.changed();
+    },
+    (fault, frame) => ghosts.delete(frame), // nothing is known yet that could be suggested
+  );
 
   function follow() {
     const { frame } = model.doing,

@@ -55,7 +55,7 @@ model.opened = (number) => {
   opening = { frame: number, at: performance.now() };
   viewer.frameBox(model.keyframe()?.box);
   history.replaceState(null, "", `#frame=${number}`);
-  depth.askGhost(number).catch(() => {}); // without the server there is no suggestion
+  depth.askGhost(number);
   lookAhead();
 };
 
