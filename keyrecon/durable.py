@@ -9,6 +9,8 @@ import os
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from filelock import FileLock, Timeout
+
 from keyrecon.errors import KeyreconError
 
 
@@ -43,6 +45,25 @@ def _replace(path: Path, data: bytes) -> None:
             Path(file.name).unlink(missing_ok=True)
             raise
     _synchronise_folder(path.parent)
+
+
+def hold_lock(path: Path, seconds: float = -1.0) -> FileLock:
+    """A lock that one process at a time has; to be released, and gone when the process ends.
+
+    Waits as long as it takes, or some seconds; then raises filelock's Timeout. Raises
+    KeyreconError where no file can be written.
+    """
+    lock = FileLock(path, thread_local=False)
+    try:
+        lock.acquire(timeout=seconds)
+    except Timeout:
+        raise
+    except OSError as fault:
+        raise KeyreconError(
+            f"{path.parent} cannot be written ({fault.strerror or fault}); make it writable, or "
+            "copy the project to a folder that is."
+        ) from fault
+    return lock
 
 
 def _umask() -> int:

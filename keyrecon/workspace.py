@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
-from keyrecon.durable import write_durably
+from keyrecon.durable import hold_lock, write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.picks import read_picks, write_picks
 from keyrecon.records import Pick
@@ -177,10 +177,11 @@ class Workspace:
         Commands and the annotator may change one project at the same time; each sees the
         other's marks whole.
         """
-        from filelock import FileLock
-
-        with FileLock(self.folder / ".change.lock"):
+        lock = hold_lock(self.folder / ".change.lock")
+        try:
             yield
+        finally:
+            lock.release()
 
     def put_aside(self, file: Path) -> None:
         """Keep a copy of a file that a person made, before it changes."""

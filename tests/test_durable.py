@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from keyrecon.durable import write_durably
+from keyrecon.durable import hold_lock, write_durably
 from keyrecon.errors import KeyreconError
 
 
@@ -42,6 +42,12 @@ def test_a_failed_write_leaves_the_old_content_and_nothing_else(tmp_path, monkey
         write_durably(tmp_path / "a.txt", "new")
     assert (tmp_path / "a.txt").read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_where_no_lock_can_be_written_the_folder_is_named(tmp_path):
+    (tmp_path / "lock").mkdir()
+    with pytest.raises(KeyreconError, match="make it writable"):
+        hold_lock(tmp_path / "lock")
 
 
 def test_a_killed_writer_leaves_a_whole_file(tmp_path):

@@ -22,6 +22,7 @@ from keyrecon.annotate.journal import Journal
 from keyrecon.annotate.judging import Draft, judge
 from keyrecon.annotate.marks import annotations_from_cells
 from keyrecon.annotate.mirror import Mirror
+from keyrecon.durable import hold_lock
 from keyrecon.errors import KeyreconError
 from keyrecon.records import Annotations
 from keyrecon.workspace import Workspace
@@ -188,12 +189,10 @@ class Store:
 
 def _hold(workspace: Workspace) -> FileLock:
     """The lock that only one server of a project can have; gone when its process ends."""
-    alone = FileLock(workspace.folder / ".annotate.lock", thread_local=False)
     try:
-        alone.acquire(timeout=0)
+        return hold_lock(workspace.folder / ".annotate.lock", seconds=0.0)
     except Timeout as fault:
         raise KeyreconError(
             f"{workspace.folder} is being annotated already; use the page that is open, or "
             "stop that keyrecon annotate first."
         ) from fault
-    return alone
