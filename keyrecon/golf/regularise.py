@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from keyrecon.golf.records import SwingState
@@ -22,8 +23,10 @@ class PriorOptions:
 
     alpha: float = 1.0
     """Of every alpha; 1 is the spread of the database."""
-    mu: float = 0.04
-    """Of the normalised time around its first guess."""
+    timing: float = 0.08
+    """Seconds by which the first guess of the normalised time is early or late."""
+    rest: float = 0.005
+    """Of the normalised time where the player stands still by that guess."""
     pace: float = 1.5
     """Of the change of pace, normalised time per second squared, from what was guessed."""
     turn: float = 0.07
@@ -54,9 +57,13 @@ def expect_alphas(state: SwingState, span: Span, mean: np.ndarray, spread: float
 def expect_times(
     state: SwingState, span: Span, guess: Float[np.ndarray, "T"], options: PriorOptions, fps: float
 ) -> Rows:
-    """mu close to its guess, and at its pace; weighed so that the frame rate does not matter."""
+    """mu close to its guess, and at its pace; weighed so that the frame rate does not matter.
+
+    A guess that comes too early is wrong by the pace of the swing at that time.
+    """
     frames = len(guess)
-    near = np.eye(frames) / (options.mu * np.sqrt(fps))
+    pace = gaussian_filter1d(np.gradient(guess) * fps, options.timing * fps)
+    near = np.diag(1 / ((options.rest + options.timing * pace) * np.sqrt(fps)))
     bend = np.diff(np.eye(frames), n=2, axis=0) * fps**2 / (options.pace * np.sqrt(fps))
     rows = np.concatenate([near, bend])
     return Rows(rows @ (state.mu - guess), _on_mu(span, rows))

@@ -64,7 +64,7 @@ def vary_swing(
     """One variation of a swing, made by a player with a body of its own and carried to `body`."""
     turns, place = _retime(swing, options, rng)
     bumps = _bumps(swing, len(turns))
-    _turn_further(turns, bumps, swing.keys[0], options.turn * rng.normal(0, 1, 2), rng)
+    _turn_further(turns, bumps, int(swing.keys[0]), options.turn * rng.normal(0, 1, 2), rng)
     _tilt(turns, UPPER_ARMS, bumps @ rng.normal(0, options.plane, 2))
     _tilt(turns, (CLUB,), bumps @ rng.normal(0, options.cock, 2))
     _add_habits(turns, swing, options.habit, rng)
