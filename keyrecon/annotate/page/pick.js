@@ -147,7 +147,7 @@ export function createPick(model, { stills, jobs, frame: surround }) {
     }
     return [
       "The colours are known",
-      "Look at the strip: are head and feet on the player? Clicks on more frames make it surer.",
+      "Are head and feet on the player in the strip? More clicks make it surer.",
     ];
   }
 
