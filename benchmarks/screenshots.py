@@ -48,9 +48,9 @@ def show_keyframe(person: Person, answers: Answers, frame: int, out: Path) -> No
         person.press("Enter")
     person.mark_joints(partial(answers.place, frame))
     person.pose()
-    limb = "right_wrist" if frame in answers.marks.frames else "head_top"
-    elbow = LSP14.names[LSP14.parents[LSP14.index(limb)]]
-    person.point_at((answers.place(frame, limb) + answers.place(frame, elbow)) / 2)
+    limb = list(answers.signs(frame))[-1]
+    parent = LSP14.names[LSP14.parents[LSP14.index(limb)]]
+    person.point_at((answers.place(frame, limb) + answers.place(frame, parent)) / 2)
     photograph(person, out, "depth")
 
 
