@@ -2,13 +2,17 @@
 
 The unknowns of a window are S = [alpha, mu_1..mu_f, G_1..G_f]. G is the player's root itself: its
 motion is not part of the model. What is expected of a window comes from the one before: frames
-that it shares keep their estimate, the new one goes on at the last speed of mu and G, alphas stay.
+that it shares keep their estimate, alphas stay. Printed is that the new frame goes on at the last
+speed of mu and G; errors of these speeds add up until the windows run away. Ours goes on at the
+pace of the first guess of mu and at half the speed of G (`inertia` 1 and `pace` "last" as printed).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from keyrecon.golf.kinematics import place_body
@@ -36,6 +40,10 @@ class WindowOptions:
     """Normalised time by which a frame is off the last pace."""
     alpha: float = 0.3
     """Change of every alpha from window to window."""
+    inertia: float = 0.5
+    """Share of the root's last speed at which the next frame is expected; 1 as printed."""
+    pace: Literal["guess", "last"] = "guess"
+    """Whether mu goes on at the pace of its first guess, or at its last one as printed."""
     steps: int = 12
     """Steps of the solver for each window."""
 
@@ -77,7 +85,7 @@ def slide_windows(
     span = window_span(len(found.alpha), size)
     for first in progress(range(frames - size + 1), "Fitting windows", frames - size + 1):
         if first:
-            _go_on(found, first + size - 1)
+            _go_on(found, first + size - 1, start.mu, options)
         chosen = slice(first, first + size)
         expected = _cut(found, chosen)
         guess = replace(expected, mu=0.5 * (expected.mu + start.mu[chosen]))
@@ -97,13 +105,20 @@ def _cut(state: SwingState, chosen: slice) -> SwingState:
     return SwingState(state.alpha, *(values[chosen].copy() for values in _arrays(state)))
 
 
-def _go_on(found: SwingState, frame: int) -> None:
-    """Enter a frame that goes on at the speed of the two before it."""
+def _go_on(
+    found: SwingState, frame: int, guess: Float[np.ndarray, "T"], options: WindowOptions
+) -> None:
+    """Enter a frame that goes on from the two before it."""
     last, before = frame - 1, frame - 2
     now, then = (Rotation.from_matrix(found.rotation[t]) for t in (last, before))
-    found.rotation[frame] = (now * then.inv() * now).as_matrix()
-    found.position[frame] = 2 * found.position[last] - found.position[before]
-    found.mu[frame] = min(2 * found.mu[last] - found.mu[before], 1.0)
+    turn = Rotation.from_rotvec(options.inertia * (now * then.inv()).as_rotvec())
+    shift = options.inertia * (found.position[last] - found.position[before])
+    found.rotation[frame] = (turn * now).as_matrix()
+    found.position[frame] = found.position[last] + shift
+    pace = guess[frame] - guess[last]
+    if options.pace == "last":
+        pace = found.mu[last] - found.mu[before]
+    found.mu[frame] = min(found.mu[last] + pace, 1.0)
 
 
 def _expect(span: Span, expected: SwingState, options: WindowOptions) -> Expect:
