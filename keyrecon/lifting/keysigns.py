@@ -3,8 +3,9 @@
 A single picture often fits two poses that are each other's mirror image. Over time one of them
 becomes absurd: the signs of a whole sequence are followed first, by what bodies do and by how
 depth moves, with the person's signs pinned, and the keyframes adopt what they passed through
-(automatic default A: continuity first, then key poses). Long motions are taken in pieces, with
-frames on both sides that are only looked at.
+(automatic default A: continuity first, then key poses). Joints marked as hidden within the trunk's
+outline speak for an arm behind it. Long motions are taken in pieces, with frames on both sides that
+are only looked at.
 """
 
 from dataclasses import replace
