@@ -44,6 +44,8 @@ LIMB, HAND = 0.032, 0.03
 """A forearm is thicker, and a hand reaches no farther from it, player heights."""
 RIM = 2
 """Scenery around the reach that GrabCut sees, px."""
+ISLAND = 0.06
+"""What is farther from the player than half of this does not belong to it, player heights."""
 SAFE = 0.012
 """Width of the rim around the player that belongs to nobody, player heights."""
 SMALLEST, LARGEST = 0.01, 0.7
@@ -100,6 +102,13 @@ class Foreground:
         mask = self.mask(frame)
         limbs = cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._disk(LIMB))
         return cv2.dilate(limbs, self._disk(2 * HAND)) & mask > 0
+
+    def player(self, frame: int) -> Bool[np.ndarray, "h w"]:
+        """The body without what lies apart: balls, people far away, the head of the club."""
+        body = self.body(frame).astype(np.uint8)
+        _, labels = cv2.connectedComponents(cv2.dilate(body, self._disk(ISLAND)))
+        counts = np.bincount(labels[body > 0], minlength=2)
+        return (body > 0) & (labels == counts.argmax())
 
     def _disk(self, size: float) -> UInt8[np.ndarray, "n n"]:
         """A disk of a diameter in player heights."""
@@ -207,8 +216,9 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], clicks: Clicks) -> _Cutte
     models = np.zeros((1, 65)), np.zeros((1, 65))
     trimap = _seed(small.shape[:2], clicks)
     cv2.grabCut(small, trimap, None, *models, 5, cv2.GC_INIT_WITH_MASK)
-    _check_player(trimap, clicks)
-    return _Cutter(clicks, width, models)
+    cutter = _Cutter(clicks, width, models)
+    _check_player(cutter(small), clicks)
+    return cutter
 
 
 def _seed(shape: tuple[int, int], clicks: Clicks) -> UInt8[np.ndarray, "h w"]:
@@ -235,10 +245,10 @@ def _reach(clicks: Clicks, shrink: float) -> tuple[int, int, int, int]:
     return int(x0), int(y0), int(x1), int(y1)
 
 
-def _check_player(trimap: UInt8[np.ndarray, "h w"], clicks: Clicks) -> None:
-    """The cut-out figure must look like one."""
-    height = clicks.height * trimap.shape[1] / clicks.size[0]
-    area = float(np.isin(trimap, (cv2.GC_FGD, cv2.GC_PR_FGD)).sum() / height**2)
+def _check_player(mask: Bool[np.ndarray, "h w"], clicks: Clicks) -> None:
+    """What has the colours of the clicked figure must be as large as one, not the scene."""
+    height = clicks.height * mask.shape[1] / clicks.size[0]
+    area = float(mask.sum() / height**2)
     if not SMALLEST < area < LARGEST:
         raise KeyreconError(
             f"Around the clicks of frame {clicks.frame} no player stands out from the scene "

@@ -38,8 +38,6 @@ INTO_HANDS = 0.025
 """From where the shaft leaves the hands to between them, player heights."""
 SAMPLE = 0.03
 """Distance between samples of the mask, player heights."""
-ISLAND = 0.06
-"""What is farther from the player than this does not belong to it, player heights."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def look_at_swing(
     joints, spread = track_joints(
         pictures, foreground, clicks, video.fps, options.appearance, progress
     )
-    bodies = [_main_part(foreground, t) for t in range(len(video))]
+    bodies = [foreground.player(t) for t in range(len(video))]
     ends, along = _describe_club(club, foreground.height, (video.width, video.height))
     return Observations(
         camera=rough_camera(clicks),
@@ -143,16 +141,6 @@ def _describe_club(
     inside = ((ends[:, 1] > border) & (ends[:, 1] < np.array(size) - border)).all(axis=1)
     hands = np.where(club.tip, TIP, NO_TIP) * height
     return ends, np.stack([hands, np.where(inside, HEAD * height, np.inf)], axis=1)
-
-
-def _main_part(foreground: Foreground, frame: int) -> Bool[np.ndarray, "h w"]:
-    """The player without the club and without what lies apart."""
-    body = foreground.body(frame).astype(np.uint8)
-    size = max(3, round(ISLAND * foreground.height * foreground.shrink)) | 1
-    joined = cv2.dilate(body, np.ones((size, size), np.uint8))
-    _, labels = cv2.connectedComponents(joined)
-    counts = np.bincount(labels[body > 0], minlength=2)
-    return (body > 0) & (labels == counts.argmax())
 
 
 def _sample_mask(body: Bool[np.ndarray, "h w"], foreground: Foreground) -> Float[np.ndarray, "n 2"]:

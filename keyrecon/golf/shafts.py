@@ -43,7 +43,7 @@ class ShaftOptions:
     free: float = 0.02
     """Least distance of the head from the player: what ends at him is a gap between his arms."""
     loose: float = 0.5
-    """Weight of a shaft that does not meet the player where it would be held."""
+    """Weight of a shaft whose head would be nearer to the player than the hands that hold it."""
     bridged: float = 0.3
     """Cost of each length between the joined bars of a shaft."""
     least: float = 0.05
@@ -87,10 +87,11 @@ def suppose_shafts(
             continue
         for held, other in (bar, bar[::-1]):
             head = _follow_to_head(held, other, (foreground, frame), options)
-            hand, attached = _follow_to_hands(held, head, (outside, foreground), options)
+            hand = _follow_to_hands(held, head, (outside, foreground), options)
             if _possible(np.stack([hand, head]), (outside, foreground), shoulders, options):
                 tip = _is_tip(hand, head, (outside, foreground), rim)
-                rows.append((weight if attached else options.loose * weight, hand, head, tip))
+                near, far = _look(outside, foreground, np.stack([hand, head]))
+                rows.append((weight if near < far else options.loose * weight, hand, head, tip))
     rows = sorted(rows, key=lambda r: -r[0])[: options.most]
     return Shafts(
         np.array([r[1:3] for r in rows]).reshape(-1, 2, 2),
@@ -128,7 +129,7 @@ def _is_tip(
 
 def _beside_player(foreground: Foreground, frame: int) -> Float[np.ndarray, "h w"]:
     """Distance of every pixel to the player without the club, pixels of the mask."""
-    free = (~foreground.body(frame)).astype(np.uint8)
+    free = (~foreground.player(frame)).astype(np.uint8)
     return cv2.distanceTransform(free, cv2.DIST_L2, 3)
 
 
@@ -169,10 +170,10 @@ def _follow_to_hands(
     head: Float[np.ndarray, "2"],
     player: tuple[Float[np.ndarray, "h w"], Foreground],
     options: ShaftOptions,
-) -> tuple[Float[np.ndarray, "2"], bool]:
-    """Where the line of a shaft meets the player, or else its end; and whether it meets him."""
+) -> Float[np.ndarray, "2"]:
+    """Where the line of a shaft meets the player; its end, if that is too far away."""
     outside, foreground = player
     unit = (held - head) / np.linalg.norm(held - head)
     steps = np.arange(0, options.reach, STEP) * foreground.height
     there = _look(outside, foreground, held + steps[:, None] * unit) <= 1.0
-    return held + unit * (steps[there.argmax()] if there.any() else 0.0), bool(there.any())
+    return held + unit * (steps[there.argmax()] if there.any() else 0.0)
