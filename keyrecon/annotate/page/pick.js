@@ -164,8 +164,8 @@ export function createPick(model, { stills, jobs, frame: surround }) {
       model.project.has.keyframes ? "Choose the keyframes again" : "Choose the keyframes",
     );
     palette.draw(parts(), picks(), doing.part);
-    drawPicture();
     strip.draw(doing.frame);
+    drawPicture(); // asked for last, so that its still comes first
   }
 
   const commands = {

@@ -5,7 +5,7 @@ const ROOM = 260e6; // bytes of decoded pictures
 // pictures.
 const AHEAD = 2;
 const URGENT = 3;
-const REMEMBERED = 8; // pictures that were to be drawn and are not here yet
+const REMEMBERED = 16; // pictures that were to be drawn and are not here yet
 
 export function createStills(project, ready) {
   const kept = new Map(); // key -> picture, oldest use first
