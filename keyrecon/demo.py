@@ -16,7 +16,7 @@ import numpy as np
 from keyrecon.body import LSP14
 from keyrecon.formats.coco import read_coco, write_coco
 from keyrecon.formats.picks import read_picks
-from keyrecon.merging import merge_annotations, missing_marks
+from keyrecon.merging import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
@@ -74,8 +74,10 @@ def _mark(
     fresh = mark_from_truth(
         found, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(CLICK_NOISE)
     )
+    asked = (found.upper.frames, found.lower.frames)
     known = read_coco(kept, LSP14, len(video), size) if kept.is_file() else None
-    missing = missing_marks(known, found.upper.frames, found.lower.frames)
+    known = marks_asked_for(known, *asked) if known else None
+    missing = missing_marks(known, *asked)
     marks = merge_annotations(fresh, known) if known else fresh
     write_coco(workspace.annotations_file, marks, size)
     text = f"Marks of {len(found.frames) - len(missing)} keyframes from {kept.name}"

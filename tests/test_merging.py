@@ -1,7 +1,12 @@
 import numpy as np
 
 from keyrecon.body import LSP14
-from keyrecon.merging import find_conflicts, merge_annotations, missing_marks
+from keyrecon.merging import (
+    find_conflicts,
+    marks_asked_for,
+    merge_annotations,
+    missing_marks,
+)
 from keyrecon.records import Annotations
 
 
@@ -40,3 +45,10 @@ def test_a_keyframe_needs_marks_for_its_half_only():
     done = marks([3, 5], 1.0, joints=upper)
     assert missing_marks(done, np.array([3]), np.array([5])) == {5: ["lower body"]}
     assert missing_marks(None, np.array([3]), np.array([3])) == {3: ["upper body", "lower body"]}
+
+
+def test_of_all_marks_those_of_the_halves_asked_for_are_kept():
+    kept = marks_asked_for(marks([3, 5, 9], 1.0), np.array([3]), np.array([3, 5]))
+    assert kept.frames.tolist() == [3, 5]
+    assert np.isfinite(kept.joints[0]).all()
+    assert np.flatnonzero(kept.visible[1]).tolist() == np.flatnonzero(LSP14.is_lower).tolist()
