@@ -24,9 +24,9 @@ from sequences import DATA, TENNIS, render
 from keyrecon.console import show
 from keyrecon.lifting import follow, lift
 from keyrecon.lifting.chain import bone_vectors, breadths
-from keyrecon.lifting.flips import Signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
+from keyrecon.lifting.signs import Signs
 from keyrecon.matching.keyframes import KeyframeOptions
 from keyrecon.matching.propagate import PropagateOptions, propagate_joints
 from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
@@ -74,7 +74,7 @@ def carry(case: Case) -> Trial:
 def lift_trial(trial: Trial) -> LiftResult:
     """The lift as it is."""
     given = trial.tracks, trial.marks, trial.keyframes, trial.height_px, trial.fps
-    return lift_motion(*given, LiftOptions(height=trial.height))
+    return lift_motion(*given, options=LiftOptions(height=trial.height))
 
 
 def true_signs(trial: Trial) -> np.ndarray:

@@ -17,7 +17,7 @@ from keyrecon.colors import ColorOptions, learn_colors
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.motion_model import read_motion_model
 from keyrecon.golf.follow import SwingPriorOptions, follow_swing
-from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_expected, lift_motion
+from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
 from keyrecon.matching.keyframes import KeyframeOptions, adopt_keyframes, choose_keyframes
 from keyrecon.matching.matrix import CompareOptions, compare_frames
@@ -150,14 +150,13 @@ def reconstruct(
         options=options.propagate,
         progress=progress,
     )
-    inputs = (tracks, annotations, keyframes, preparation.track.height, video.fps)
-    lift: Callable[..., LiftResult] = lift_motion
+    height, expected = preparation.track.height, None
     if options.prior == "golf":
-        pictures = preparation.track.height, (video.width, video.height)
+        pictures = height, (video.width, video.height)
         known = (tracks, annotations, read_motion_model(), pictures, video.time)
         expected = keep("swing", follow_swing, *known, options=options.swing, progress=progress)
-        lift, inputs = lift_expected, (expected, *inputs)
-    lifted = keep("lift", lift, *inputs, options=options.lift, progress=progress)
+    inputs = (tracks, annotations, keyframes, height, video.fps, expected)
+    lifted = keep("lift", lift_motion, *inputs, options=options.lift, progress=progress)
     return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
 
 

@@ -20,7 +20,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.storage import load_record, save_record
 from keyrecon.video import Video
 
-SHARED_CODE = ("background", "body", "camera", "colors", "pictures", "records", "video")
+SHARED_CODE = ("background", "body", "camera", "colors", "paths", "pictures", "records", "video")
 """Modules whose change makes the results of every stage anew."""
 KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""
@@ -48,8 +48,7 @@ class StageStore:
         progress: Progress = silent,
     ) -> Any:
         """The result of a stage: stored if the same inputs and options made it, else made."""
-        key = self._key((_code_of(stage), name, options, *inputs))
-        path = self.folder / f"{name}-{key}.npz"
+        key, path = self._place(name, stage, inputs, options)
         if path.is_file() and not self.force:
             result = load_record(path)
         else:
@@ -71,13 +70,19 @@ class StageStore:
         progress: Progress = silent,
     ) -> Any:
         """The stored result of a stage, as `keep` would find it; KeyreconError if there is none."""
-        key = self._key((_code_of(stage), name, options, *inputs))
-        path = self.folder / f"{name}-{key}.npz"
+        key, path = self._place(name, stage, inputs, options)
         if not path.is_file():
             raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
         result = load_record(path)
         self._keys[id(result)] = (result, key)
         return result
+
+    def _place(
+        self, name: str, stage: Callable[..., Any], inputs: tuple, options: object
+    ) -> tuple[str, Path]:
+        """What tells this result from others, and its file."""
+        key = self._key((_code_of(stage), name, options, *inputs))
+        return key, self.folder / f"{name}-{key}.npz"
 
     def _forget(self, name: str) -> None:
         """Drop all but the latest few results of a stage."""

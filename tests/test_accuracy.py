@@ -42,7 +42,7 @@ def lift(carried, marks):
     prepared, _, tracks, truth = carried
     options = LiftOptions(height=float(truth["height_m"]))
     height = prepared.track.height
-    found = lift_motion(tracks, marks, prepared.keyframes, height, FPS, options)
+    found = lift_motion(tracks, marks, prepared.keyframes, height, FPS, options=options)
     points, known = 1000 * found.points3d, 1000 * truth["points3d"]
     scores = pa_mpjpe(points, known), n_mpjpe(points, known, HIPS)
     return *scores, acceleration_error(points, known, HIPS)

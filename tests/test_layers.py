@@ -9,7 +9,7 @@ PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "matching", "lifting", "golf"}
 OUTER = {"cli", "pipeline", "workspace", "report", "synthetic"}
 BASE = {"records", "body", "camera", "video", "metrics", "errors"}
-BASE |= {"colors", "background", "pictures"}
+BASE |= {"colors", "background", "pictures", "paths"}
 
 
 def imported(path):

@@ -9,16 +9,10 @@ from keyrecon.body import HIP_BREADTH, LSP14, SHOULDER_BREADTH
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting import anatomy
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
-from keyrecon.lifting.flips import (
-    FlipOptions,
-    Shown,
-    at_rate,
-    choose_signs,
-    second_order_path,
-    sign_states,
-)
+from keyrecon.lifting.flips import choose_signs, second_order_path
 from keyrecon.lifting.lengths import estimate_lengths
 from keyrecon.lifting.lift import LiftOptions, lift_motion
+from keyrecon.lifting.signs import FlipOptions, Shown, at_rate, sign_states
 from keyrecon.lifting.taylor import lift_shown, show_bones
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
 
@@ -259,7 +253,7 @@ def test_bone_lengths_are_constant_and_alike_left_and_right():
     _, tracks, marks, keys = scene(frames=120, noise=0.01)
     for method in ("trajectory", "paper"):
         options = LiftOptions(height=1.8, method=method)
-        found = lift_motion(tracks, marks, keys, np.full(120, 0.88 * SCALE), 50.0, options)
+        found = lift_motion(tracks, marks, keys, np.full(120, 0.88 * SCALE), 50.0, options=options)
         lengths = np.linalg.norm(bone_vectors(found.points3d, LSP14), axis=-1)
         assert (lengths.std(axis=0) / lengths.mean(axis=0)).max() < 1e-6
         np.testing.assert_allclose(lengths[0], lengths[0][LSP14.bone_mirror], rtol=1e-6)
@@ -269,7 +263,7 @@ def test_a_height_in_metres_scales_the_motion_and_nothing_else():
     _, tracks, marks, keys = scene(frames=100, noise=0.005)
     height = np.full(100, 0.88 * SCALE)
     plain = lift_motion(tracks, marks, keys, height, 50.0)
-    metres = lift_motion(tracks, marks, keys, height, 50.0, LiftOptions(height=1.9))
+    metres = lift_motion(tracks, marks, keys, height, 50.0, options=LiftOptions(height=1.9))
     np.testing.assert_allclose(metres.points3d, 1.9 * plain.points3d, rtol=1e-9)
     np.testing.assert_allclose(metres.points2d, plain.points2d, rtol=1e-9)
 

@@ -15,9 +15,10 @@ from keyrecon.assist.ghost import Ghost
 from keyrecon.assist.pose import Sighting
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import breadths
-from keyrecon.lifting.flips import Votes, choose_signs
+from keyrecon.lifting.flips import choose_signs
 from keyrecon.lifting.lengths import BodySize, LengthOptions, estimate_lengths
 from keyrecon.lifting.taylor import show_bones
+from keyrecon.lifting.votes import Votes
 from keyrecon.records import Annotations, JointTracks
 
 HEAD_TO_FEET = 0.9

@@ -16,9 +16,11 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.lifting.anatomy import anatomy_of
 from keyrecon.lifting.chain import ancestry
-from keyrecon.lifting.flips import FlipOptions, Shown, Votes, sign_costs, sign_states
+from keyrecon.lifting.flips import sign_costs
 from keyrecon.lifting.lengths import BodySize
+from keyrecon.lifting.signs import FlipOptions, Shown, sign_states
 from keyrecon.lifting.taylor import show_bones
+from keyrecon.lifting.votes import Votes
 
 ALTERNATIVES = 3
 """Other poses offered at most."""

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.shafts import Shafts
+from keyrecon.paths import find_cheapest_path
 
 NOWHERE = np.full((2, 2), np.nan)
 FEWEST = 5
@@ -173,25 +174,12 @@ def choose_shafts(
     shafts: Sequence[Shafts], height: float, fps: float, options: ClubOptions = ClubOptions()
 ) -> Int[np.ndarray, "T"]:
     """Hypothesis taken in every frame, -1 where none."""
-    total: list[np.ndarray] = []
-    came: list[np.ndarray] = []
-    gap = max(1, round(options.gap * fps))
-    for t, now in enumerate(shafts):
-        best = np.full(len(now.weight), t * options.miss)
-        source = np.full((len(now.weight), 2), -1)
-        for before in range(max(0, t - gap), t):
-            if not len(now.weight) or not len(total[before]):
-                continue
-            moved = _movement(shafts[before], now, height, (t - before) / fps, options)
-            through = total[before][:, None] + moved + (t - before - 1) * options.miss
-            last = through.argmin(axis=0)
-            cost = through[last, np.arange(len(last))]
-            better = cost < best
-            best = np.where(better, cost, best)
-            source[better] = np.stack([np.full(len(last), before), last], axis=1)[better]
-        total.append(best - options.gain * now.weight)
-        came.append(source)
-    return _trace_back(total, came, options.miss)
+
+    def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
+        return _movement(shafts[before], shafts[t], height, (t - before) / fps, options)
+
+    own = [-options.gain * now.weight for now in shafts]
+    return find_cheapest_path(own, moving, max(1, round(options.gap * fps)), options.miss)
 
 
 def _movement(
@@ -200,18 +188,3 @@ def _movement(
     moved = np.linalg.norm(before.ends[:, None] - after.ends[None], axis=3) / height
     usual = np.array([options.hands, options.head]) * seconds
     return np.minimum(0.5 * ((moved / usual) ** 2).sum(axis=2), options.jump)
-
-
-def _trace_back(
-    total: list[np.ndarray], came: list[np.ndarray], miss: float
-) -> Int[np.ndarray, "T"]:
-    path = np.full(len(total), -1)
-    ends = [(c.min() + (len(total) - 1 - t) * miss, t) for t, c in enumerate(total) if len(c)]
-    if not ends or min(ends)[0] >= len(total) * miss:
-        return path
-    t = min(ends)[1]
-    state = int(total[t].argmin())
-    while t >= 0:
-        path[t] = state
-        t, state = came[t][state]
-    return path

@@ -9,9 +9,6 @@ plane, which a first-order one would take for a bounce. The key poses vote, wher
 alike in the picture, for the depths that the person confirmed there.
 """
 
-from dataclasses import dataclass, replace
-from itertools import product
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -27,67 +24,8 @@ from keyrecon.lifting.anatomy import (
     trunk_cost,
 )
 from keyrecon.lifting.occlusion import hidden_cost
-
-_MOST_ALIKE = 24
-"""Key poses that are asked per frame; those further away weigh nothing."""
-
-
-@dataclass(frozen=True)
-class FlipOptions:
-    """What speaks for a sign, and how loudly; per frame at 50 frames a second."""
-
-    confirmed: float = 8.0
-    """Cost of contradicting the annotated sign of a bone, nats."""
-    limits: float = 0.15
-    """Weight of joint limits per frame; errors stay alike over several frames."""
-    votes: float = 0.3
-    """Weight of the key poses per frame."""
-    guide: float = 1.0
-    """Weight of the slerped key poses per frame."""
-    alike: float = 0.08
-    """Difference of shown bone vectors at which two poses look alike, statures."""
-    jerk: float = 0.1
-    """Second difference of depth between frames to be expected, statures."""
-    reach: float = 6.0
-    """Largest cost of one jump, nats."""
-
-
-def at_rate(options: FlipOptions, fps: float) -> FlipOptions:
-    """The same evidence per second, and the same accelerations, at another frame rate."""
-    step = 50.0 / fps
-    return replace(
-        options,
-        limits=options.limits * step,
-        votes=options.votes * step,
-        guide=options.guide * step,
-        jerk=options.jerk * step**2,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """Bones as the picture shows them: everything but the sign of their depth."""
-
-    flat: Float[np.ndarray, "T B 2"]
-    """In-plane part of the bone vectors, statures."""
-    depth: Float[np.ndarray, "T B"]
-    """|dz|, statures."""
-    doubt: Float[np.ndarray, "T B"]
-    """Standard deviation of |dz|, statures."""
-
-
-@dataclass(frozen=True, eq=False)
-class Signs:
-    """Depth signs: 1 where the child end is farther from the camera (dz > 0)."""
-
-    sign: Int[np.ndarray, "T B"]
-    probability: Float[np.ndarray, "T B"]
-    """0.5-1: how likely the sign is."""
-
-
-def sign_states(bones: int) -> Int[np.ndarray, "S g"]:
-    """All sign vectors of a group of bones."""
-    return np.array(list(product((1, -1), repeat=bones)))
+from keyrecon.lifting.signs import FlipOptions, Shown, Signs, sign_depths, sign_states
+from keyrecon.lifting.votes import Votes
 
 
 def choose_signs(
@@ -141,7 +79,7 @@ def sign_costs(
 
 def follow_signs(
     shown: Shown,
-    votes: "Votes",
+    votes: Votes,
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
     options: FlipOptions = FlipOptions(),
@@ -164,84 +102,17 @@ def follow_signs(
         total = options.limits * trunk + sum(cost.min(axis=-1) for cost in limbs)
         total += votes.cost(anatomy.trunk, shown, options)
         total += votes.guided(anatomy.trunk, shown, options)
-        best = second_order_path(total, *_depths(anatomy.trunk, shown), options)
+        best = second_order_path(total, *sign_depths(anatomy.trunk, shown), options)
         bones = list(anatomy.trunk)
         sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         given = cost[rows, best % cost.shape[1]]
         given += votes.cost(limb.bones, shown, options)
         given += votes.guided(limb.bones, shown, options)
-        path = second_order_path(given, *_depths(limb.bones, shown), options)
+        path = second_order_path(given, *sign_depths(limb.bones, shown), options)
         bones = list(limb.bones)
         sign[:, bones], probability[:, bones] = _read(path, given, len(bones))
     return Signs(sign, probability)
-
-
-@dataclass(frozen=True, eq=False)
-class Votes:
-    """Key poses that vote for depths where they look alike."""
-
-    vectors: Float[np.ndarray, "K B 3"]
-    """Bone vectors of the key poses, statures."""
-    frames: Int[np.ndarray, "K"]
-    """Row of each key pose among the frames; others vote too."""
-    trust: Float[np.ndarray, "K B"]
-    """0-1: how sure the sign of each bone is."""
-    guide: Float[np.ndarray, "T B"]
-    """Depth of the slerped key poses in each frame, statures."""
-    skeleton: Skeleton
-
-    def cost(
-        self, bones: tuple[int, ...], shown: Shown, options: FlipOptions
-    ) -> Float[np.ndarray, "T S"]:
-        """Cost of each sign vector of a group of bones in each frame, nats."""
-        members = list(bones)
-        alike, apart = self._most_alike(members, shown, options)
-        states = sign_states(len(bones))
-        depth = (states * shown.depth[:, None, members])[:, :, None]  # (T, S, 1, g)
-        wanted = self.vectors[:, members, 2][alike][:, None]  # (T, 1, n, g)
-        spread = options.alike**2 + shown.doubt[:, members] ** 2
-        trust = self.trust[:, members][alike][:, None]
-        off = (trust * (depth - wanted) ** 2 / (2 * spread[:, None, None])).sum(-1)
-        likelihood = np.exp(-apart[:, None] - off).sum(-1)
-        cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
-        return cost + self._confirmed(members, shown, options)
-
-    def guided(
-        self, bones: tuple[int, ...], shown: Shown, options: FlipOptions
-    ) -> Float[np.ndarray, "T S"]:
-        """Cost of leaving the slerped key poses, nats."""
-        depth, doubt = _depths(bones, shown)
-        off = (depth - self.guide[:, None, list(bones)]) ** 2
-        off = off / (2 * (options.alike**2 + doubt[:, None] ** 2))
-        return options.guide * np.minimum(off.sum(-1), options.reach)
-
-    def _most_alike(
-        self, bones: list[int], shown: Shown, options: FlipOptions
-    ) -> tuple[Int[np.ndarray, "T n"], Float[np.ndarray, "T n"]]:
-        """The key poses in which a group and the trunk look most like each frame's."""
-        context = sorted({*bones, *anatomy_of(self.skeleton).trunk})
-        flat = shown.flat[:, context].reshape(len(shown.flat), -1)
-        keys = self.vectors[:, context, :2].reshape(len(self.vectors), -1)
-        apart = (flat**2).sum(-1)[:, None] + (keys**2).sum(-1) - 2 * flat @ keys.T
-        most = min(_MOST_ALIKE, len(keys))
-        alike = np.argpartition(apart, most - 1, axis=1)[:, :most]
-        near = np.maximum(np.take_along_axis(apart, alike, axis=1), 0.0)
-        return alike, near / (2 * options.alike**2)
-
-    def _confirmed(
-        self, bones: list[int], shown: Shown, options: FlipOptions
-    ) -> Float[np.ndarray, "T S"]:
-        """Cost of contradicting a keyframe at its own frame."""
-        states = sign_states(len(bones))
-        cost = np.zeros((len(shown.flat), len(states)))
-        for row, frame in enumerate(self.frames):
-            if 0 <= frame < len(cost):
-                wanted = self.vectors[row, bones, 2]
-                wrong = self.trust[row, bones] * (states * wanted < 0)
-                deep = np.minimum(np.abs(shown.depth[frame, bones]) / options.alike, 1.0)
-                cost[frame] = options.confirmed * (wrong * deep).sum(-1)
-        return cost
 
 
 def second_order_path(
@@ -268,13 +139,6 @@ def second_order_path(
     for t in range(frames - 1, 1, -1):
         path[t - 2] = back[t, path[t - 1], path[t]]
     return path
-
-
-def _depths(
-    bones: tuple[int, ...], shown: Shown
-) -> tuple[Float[np.ndarray, "T S g"], Float[np.ndarray, "T g"]]:
-    states = sign_states(len(bones))
-    return states * shown.depth[:, None, list(bones)], shown.doubt[:, list(bones)]
 
 
 def _costs(
@@ -338,7 +202,7 @@ def _limb_cost(
 
 def _candidates(bones: tuple[int, ...], shown: Shown) -> Float[np.ndarray, "T S g 3"]:
     """Bone vectors for every sign vector of a group."""
-    depth, _ = _depths(bones, shown)
+    depth, _ = sign_depths(bones, shown)
     flat = np.broadcast_to(shown.flat[:, None, list(bones)], (*depth.shape, 2))
     return np.concatenate([flat, depth[..., None]], axis=-1)
 

@@ -14,12 +14,14 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import pose_from_directions, unit
-from keyrecon.lifting.flips import FlipOptions, Votes, at_rate, follow_signs
+from keyrecon.lifting.flips import follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
 from keyrecon.lifting.refine import RefineOptions, refine_motion
+from keyrecon.lifting.signs import FlipOptions, at_rate
 from keyrecon.lifting.solver import State
 from keyrecon.lifting.taylor import KeyPoses, lift_shown, show_bones
+from keyrecon.lifting.votes import Votes
 from keyrecon.progress import Progress, silent
 
 WINDOW, OVERLAP = 2000, 100

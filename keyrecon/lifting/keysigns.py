@@ -13,17 +13,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.lifting.flips import (
-    FlipOptions,
-    Shown,
-    Signs,
-    Votes,
-    at_rate,
-    follow_signs,
-)
+from keyrecon.lifting.flips import follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
+from keyrecon.lifting.signs import FlipOptions, Shown, Signs, at_rate
 from keyrecon.lifting.taylor import show_bones
+from keyrecon.lifting.votes import Votes
 from keyrecon.records import Annotations
 
 _SMOOTH_SECONDS = 0.03

@@ -15,7 +15,6 @@ from keyrecon.body import Skeleton
 from keyrecon.camera import project_orthographic
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
-from keyrecon.lifting.flips import FlipOptions
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import interpolate_poses
 from keyrecon.lifting.keysigns import follow_key_signs
@@ -28,6 +27,7 @@ from keyrecon.lifting.lengths import (
 )
 from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
 from keyrecon.lifting.refine import RefineOptions, descend_motion
+from keyrecon.lifting.signs import FlipOptions
 from keyrecon.lifting.solver import State
 from keyrecon.lifting.taylor import lift_keyframes
 from keyrecon.progress import Progress, silent
@@ -81,9 +81,9 @@ def lift_motion(  # noqa: PLR0913
     keyframes: Keyframes,
     height_px: Float[np.ndarray, "T"],
     fps: float,
+    expected: Float[np.ndarray, "T J 3"] | None = None,
     options: LiftOptions = LiftOptions(),
     progress: Progress = silent,
-    expected: Float[np.ndarray, "T J 3"] | None = None,
 ) -> LiftResult:
     """Lift tracked joints to 3D with the help of annotated keyframes.
 
@@ -101,9 +101,7 @@ def lift_motion(  # noqa: PLR0913
     )
     between = slerped.directions if expected is None else _directions(expected, skeleton)
     guide = _place(between, observed, size, skeleton)
-    residual = observed.joints - _flat(guide, size, skeleton)
-    slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, 1.4 * options.lengths.track_noise)
-    slips[annotations.frames] = False
+    slips = _find_slips(observed, guide, size, annotations, options)
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
     if options.method == "paper":
         upright = _rolled(guide.directions, clean, size, skeleton)
@@ -115,13 +113,14 @@ def lift_motion(  # noqa: PLR0913
         state = follow_motion(guide, clean, figure, fps, follow, progress)
     points = pose_from_directions(state.directions, size.lengths, skeleton)
     points[..., :2] += state.root[:, None]
+    key_poses = pose_from_directions(keys.directions, size.lengths, skeleton)
     metres = 1.0 if options.height is None else options.height
     return LiftResult(
         points3d=points * metres,
         points2d=project_orthographic(points, size.scale),
         scale=size.scale / metres,
         lengths=size.lengths * metres,
-        key_poses=pose_from_directions(keys.directions, size.lengths, skeleton) * metres,
+        key_poses=key_poses * metres,
         signs=np.where(keys.directions[..., 2] > 0, -1, 1),
         sign_margin=keys.probability,
         rejected=slips,
@@ -130,20 +129,14 @@ def lift_motion(  # noqa: PLR0913
     )
 
 
-def lift_expected(  # noqa: PLR0913
-    expected: Float[np.ndarray, "T J 3"],
-    tracks: JointTracks,
-    annotations: Annotations,
-    keyframes: Keyframes,
-    height_px: Float[np.ndarray, "T"],
-    fps: float,
-    options: LiftOptions = LiftOptions(),
-    progress: Progress = silent,
-) -> LiftResult:
-    """`lift_motion` with poses of a motion prior as its guide."""
-    return lift_motion(
-        tracks, annotations, keyframes, height_px, fps, options, progress, expected=expected
-    )
+def _find_slips(
+    observed: Observed, guide: State, size: BodySize, annotations: Annotations, options: LiftOptions
+) -> Bool[np.ndarray, "T J"]:
+    """Tracked joints that leap away from where the guide puts them; marks are never slips."""
+    residual = observed.joints - _flat(guide, size, annotations.skeleton)
+    slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, 1.4 * options.lengths.track_noise)
+    slips[annotations.frames] = False
+    return slips
 
 
 def _directions(

@@ -12,10 +12,11 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import bone_vectors, unit
-from keyrecon.lifting.flips import FlipOptions, Shown, Signs, choose_signs
+from keyrecon.lifting.flips import choose_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.shown import depth_doubt, depth_share
+from keyrecon.lifting.signs import FlipOptions, Shown, Signs
 from keyrecon.records import Annotations
 
 _GUESS = 0.3

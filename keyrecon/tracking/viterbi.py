@@ -8,7 +8,7 @@ apart and costs
 
 so that a player who was lost is remembered where they were last seen. Paths start and end
 anywhere at `miss` per frame left out. Positions are given in stabilised coordinates, where a
-camera's own motion is already undone. Dynamic programming finds the cheapest path exactly.
+camera's own motion is already undone. `keyrecon/paths.py` finds the cheapest path exactly.
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+
+from keyrecon.paths import find_cheapest_path
 
 
 @dataclass(frozen=True)
@@ -41,28 +43,12 @@ def cheapest_path(
 
     Two points per state are an unordered pair: the cheaper assignment counts.
     """
-    total: list[np.ndarray] = []
-    came: list[np.ndarray] = []
-    for t, own in enumerate(costs):
-        best = np.full(len(own), t * motion.miss)
-        source = np.full((len(own), 2), -1)
-        for g in range(1, min(motion.gap, t) + 1):
-            before = t - g
-            if not len(own) or not len(total[before]):
-                continue
-            if total[before].min() + (g - 1) * motion.miss >= best.max():
-                continue  # no gap this long can be cheaper
-            moved = _movement(points[before], points[t]) / (2 * g * motion.sigma**2)
-            through = total[before][:, None] + np.minimum(moved, motion.jump)
-            through += (g - 1) * motion.miss
-            last = through.argmin(axis=0)
-            cost = through[last, np.arange(len(own))]
-            better = cost < best
-            best = np.where(better, cost, best)
-            source[better] = np.stack([np.full(len(own), before), last], axis=1)[better]
-        total.append(best + own)
-        came.append(source)
-    return _trace_back(total, came, motion.miss)
+
+    def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
+        usual = 2 * (t - before) * motion.sigma**2
+        return np.minimum(_movement(points[before], points[t]) / usual, motion.jump)
+
+    return find_cheapest_path(costs, moving, motion.gap, motion.miss)
 
 
 def _movement(
@@ -82,21 +68,3 @@ def _squares(
     a, b = before.reshape(len(before), -1), after.reshape(len(after), -1)
     square = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T
     return np.maximum(square, 0.0) / before.shape[1]
-
-
-def _trace_back(
-    total: list[np.ndarray], came: list[np.ndarray], miss: float
-) -> Int[np.ndarray, "T"]:
-    """Follow the cheapest path back from its end."""
-    path = np.full(len(total), -1)
-    ends = [
-        (cost.min() + (len(total) - 1 - t) * miss, t) for t, cost in enumerate(total) if len(cost)
-    ]
-    if not ends or min(ends)[0] >= len(total) * miss:
-        return path
-    t = min(ends)[1]
-    state = int(total[t].argmin())
-    while t >= 0:
-        path[t] = state
-        t, state = came[t][state]
-    return path
