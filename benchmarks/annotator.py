@@ -136,8 +136,9 @@ def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work],
 
 def reconstruct(folder: Path, truth: Path, height: float) -> str:
     """Run what follows the marks, and its accuracy."""
-    options = project.settings(Options(), height, None)
-    project.run(Workspace(folder), options, show, partial=True)
+    workspace = Workspace(folder)
+    options = project.settings(workspace, Options(), height)
+    project.run(workspace, options, show, partial=True)
     return project.evaluate(folder, truth)
 
 

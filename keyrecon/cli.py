@@ -18,7 +18,7 @@ from keyrecon.console import show
 from keyrecon.errors import KeyreconError
 from keyrecon.golf_commands import golf
 from keyrecon.golf_demo import run_golf_demo
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, as_printed
 from keyrecon.records import Pick
 from keyrecon.serving import serve_annotator
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
@@ -118,7 +118,8 @@ def keyframes(
 
     Args:
         project: Project folder.
-        budget: Half-body labels per frame that a person will mark (default 0.015).
+        budget: Share of frames that a person will mark; a half body is half a frame
+            (default 0.015).
         coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
         reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
         force: Make every stage again.
@@ -185,7 +186,8 @@ def run(
         force: Make every stage again.
     """
     workspace = Workspace(project, force)
-    chosen = work.settings(workspace.options(options), height, method)
+    chosen = work.settings(workspace, options, height)
+    chosen = as_printed(chosen) if method == "paper" else chosen
     print(work.run(workspace, chosen, show, partial))
 
 

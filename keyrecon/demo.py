@@ -46,7 +46,7 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     workspace.add_picks(read_picks(KEPT / f"demo_{name}.picks.json"))
     say(find_keyframes(workspace, Options(), {}, progress).split("\nNext")[0])
     say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
-    options = settings(Options(), round(float(truth["height_m"]), 2), None)
+    options = settings(workspace, Options(), round(float(truth["height_m"]), 2))
     say(run(workspace, options, progress, truth=truth))
     say("\nAccuracy against the truth")
     say(evaluate(workspace.folder, sequence / "truth.npz"))

@@ -18,7 +18,7 @@ from keyrecon.formats.npz import read_motion, write_motion
 from keyrecon.formats.review import implausible_bones, joints_outside
 from keyrecon.merging import find_conflicts, merge_annotations, missing_marks
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, Preparation, as_printed, prepare, reconstruct, with_height
+from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_height
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Motion, Pick
 from keyrecon.report.material import ReportMaterial
@@ -101,7 +101,7 @@ def find_keyframes(
 ) -> str:
     """Run the automatic part; write keyframes.json and a picture of each keyframe."""
     wanted = {name: value for name, value in chosen.items() if value is not None}
-    options = workspace.options(options)
+    options = workspace.options(options, Options())
     options = replace(options, keyframes=replace(options.keyframes, **wanted))
     keep = workspace.stages.keep
     preparation = prepare(workspace.video(), workspace.picks(), options, keep, progress)
@@ -126,8 +126,8 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
             *halves,
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
-            "Next: mark the joints (COCO keypoints, DeepLabCut or CVAT), then "
-            f"keyrecon import {workspace.folder} FILE",
+            f"Next: keyrecon annotate {workspace.folder}, or mark the joints in another tool (COCO "
+            f"keypoints, DeepLabCut or CVAT) and keyrecon import {workspace.folder} FILE",
         ]
     )
 
@@ -184,12 +184,14 @@ def load_annotations(workspace: Workspace, video: Video) -> Annotations:
     return read_coco(workspace.annotations_file, workspace.skeleton, len(video), size)
 
 
-def settings(options: Options, height: float | None, method: str | None) -> Options:
-    """Options with the athlete's height in metres and the method set, where they are given."""
+def settings(workspace: Workspace, told: Options, height: float | None = None) -> Options:
+    """The project's options and what is told now, with the height in metres; remembered."""
     if height is not None and not 0.5 < height < 2.6:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
+    options = workspace.options(told, Options())
     options = options if height is None else with_height(options, height)
-    return as_printed(options) if method == "paper" else options
+    workspace.remember(options, Options())
+    return options
 
 
 def run(

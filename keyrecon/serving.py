@@ -102,5 +102,5 @@ def _find_keyframes(folder: Path, told: dict[str, Any], progress: Progress) -> s
 
 def _run(folder: Path, told: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
-    options = project.settings(workspace.options(Options()), told.get("height"), None)
+    options = project.settings(workspace, Options(), told.get("height"))
     return project.run(workspace, options, progress, partial=True)

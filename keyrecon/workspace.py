@@ -188,9 +188,10 @@ class Workspace:
         number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
         write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
 
-    def options(self, defaults: Any) -> Any:
-        """`defaults` with the options that this project has set."""
-        return _apply(defaults, self.project.get("options", {}), "options")
+    def options(self, told: Any, defaults: Any) -> Any:
+        """Options that this project has set, and on top of them what `told` has set otherwise."""
+        kept = _apply(defaults, self.project.get("options", {}), "options")
+        return _apply(kept, _nested(_differences(told, defaults)), "options")
 
     def remember(self, options: Any, defaults: Any) -> None:
         """Write the options that differ from the defaults into project.toml."""
@@ -217,6 +218,18 @@ def _differences(options: Any, defaults: Any, prefix: str = "") -> dict[str, Any
         elif value != default and value is not None:
             changed[prefix + field.name] = value
     return changed
+
+
+def _nested(changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables within tables from names with dots, as TOML reads them."""
+    tables: dict[str, Any] = {}
+    for name, value in changes.items():
+        *path, last = name.split(".")
+        table = tables
+        for part in path:
+            table = table.setdefault(part, {})
+        table[last] = value
+    return tables
 
 
 def _apply(options: Any, changes: dict, where: str) -> Any:

@@ -105,7 +105,7 @@ def test_the_report_and_exports_are_written(clip, solved, tmp_path):
 
 def test_a_second_run_makes_no_stage_again(clip, solved):
     workspace = Workspace(clip / "project")
-    chosen = project.settings(workspace.options(Options()), 1.7, None)
+    chosen = project.settings(workspace, Options(), 1.7)
     project.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
 
@@ -126,10 +126,10 @@ def test_keyframes_without_marks_are_named(clip, solved):
     try:
         workspace.annotations_file.write_text(json.dumps(data))
         with pytest.raises(KeyreconError, match=rf"1 of .* not annotated: frame {gone} "):
-            project.run(workspace, workspace.options(Options()), silent)
+            project.run(workspace, workspace.options(Options(), Options()), silent)
         workspace.annotations_file.unlink()
         with pytest.raises(KeyreconError, match="not annotated"):
-            project.run(workspace, workspace.options(Options()), silent)
+            project.run(workspace, workspace.options(Options(), Options()), silent)
     finally:
         (clip / "aside.json").rename(workspace.annotations_file)
 

@@ -2,6 +2,9 @@ import pytest
 
 from keyrecon import KeyreconError
 from keyrecon.formats.picks import read_picks
+from keyrecon.matching.keyframes import KeyframeOptions
+from keyrecon.pipeline import Options
+from keyrecon.project import settings
 from keyrecon.records import Pick
 from keyrecon.video import open_video
 from keyrecon.workspace import Workspace
@@ -87,3 +90,26 @@ def test_the_order_of_clicks_makes_no_difference(project):
     project.picks_file.unlink()
     project.add_picks(clicks[::-1])
     assert project.picks() == found
+
+
+def test_what_is_told_now_goes_before_what_the_project_has_set(project):
+    def options(budget, reach):
+        return Options(keyframes=KeyframeOptions(budget=budget, reach=reach))
+
+    usual = Options().keyframes
+    project.remember(options(0.05, 12), Options())
+    told = options(0.03, usual.reach)
+    assert project.options(told, Options()) == options(0.03, 12)
+    assert project.options(Options(), Options()) == options(0.05, 12)
+
+
+def test_the_athletes_height_is_remembered(project):
+    assert settings(project, Options(), 1.7).lift.height == 1.7
+    assert settings(Workspace(project.folder), Options()).lift.height == 1.7
+
+
+@pytest.mark.parametrize("height", [0.2, 170.0])
+def test_a_height_that_nobody_has_is_not_remembered(project, height):
+    with pytest.raises(KeyreconError, match="height in metres"):
+        settings(project, Options(), height)
+    assert settings(Workspace(project.folder), Options()) == Options()

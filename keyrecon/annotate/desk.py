@@ -75,11 +75,21 @@ def describe_project(desk: Desk) -> Json:
         "version": desk.stills.identity,
         "keyframes": describe_keyframes(keyframes, cells, skeleton, known.get("frames", {})),
         "height_px": known.get("height_px"),
+        "settings": describe_settings(Workspace(desk.workspace.folder)),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),
             "motion": desk.workspace.motion_file.is_file(),
         },
+    }
+
+
+def describe_settings(workspace: Workspace) -> Json:
+    """Options of earlier runs that the page asks for; None where none was set."""
+    options = workspace.project.get("options", {})
+    return {
+        "budget": options.get("keyframes", {}).get("budget"),
+        "height": options.get("lift", {}).get("height"),
     }
 
 

@@ -147,7 +147,7 @@ class Study:
     def _prepared(self) -> Preparation:
         """The stored results of the automatic part, with the keyframes that were asked for."""
         workspace = Workspace(self._workspace.folder)
-        options = workspace.options(Options())
+        options = workspace.options(Options(), Options())
         recall = workspace.stages.recall
         found = prepare(workspace.video(), workspace.picks(), options, recall)
         asked = keyframes_from_json(workspace.keyframes_file.read_text())

@@ -5,10 +5,10 @@
      "cost": 0.015, "printed_count": {..}, "nearest": {..}, "distance": {..},
      "represented": {..}}
 
-`cost` counts half-body labels per frame, `printed_count` the keyframes that the choice as
-printed (Eq. 2-4) would take at the same beta. `nearest` has the keyframe of every frame,
-`distance` how far it is (player heights), `represented` the frames closer than beta, as
-[first, end) stretches.
+`cost` is the share of frames to mark, a half body counted half, `printed_count` the keyframes
+that the choice as printed (Eq. 2-4) would take at the same beta. `nearest` has the keyframe of
+every frame, `distance` how far it is (player heights), `represented` the frames closer than beta,
+as [first, end) stretches.
 """
 
 import json

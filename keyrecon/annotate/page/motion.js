@@ -59,6 +59,7 @@ export function createMotion(model, { stills, jobs, frame: surround, actions }) 
     else if (!surround.runningJob()) jobs.start("run", height === null ? {} : { height });
   }
 
+  byId("height").value = project.settings.height ?? "";
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);

@@ -106,15 +106,16 @@ export function createPick(model, { stills, jobs, frame: surround }) {
   byId("pick-primary").addEventListener("click", primary);
   byId("show-map").addEventListener("change", askMap);
 
-  byId("budget").value = String(Math.round(1000 * usualBudget(project.n_frames)) / 10);
+  const budget = project.settings.budget ?? usualBudget(project.n_frames);
+  byId("budget").value = String(Math.round(10000 * budget) / 100);
 
   function primary() {
     const [next] = stillNeeded(parts()),
-      budget = (numberIn(byId("budget")) ?? NaN) / 100;
+      wanted = (numberIn(byId("budget")) ?? NaN) / 100;
     if (next) choose(next.part);
-    else if (!(budget > 0))
+    else if (!(wanted > 0))
       model.tell("The share of frames to mark is a number of per cent, such as 1.5.");
-    else if (!surround.runningJob()) jobs.start("keyframes", { budget });
+    else if (!surround.runningJob()) jobs.start("keyframes", { budget: wanted });
   }
 
   function drawPicture() {
