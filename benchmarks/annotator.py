@@ -107,6 +107,7 @@ def correct_suggestion(person: Person, frame: int, answers: Answers, seen: float
             person.drag((x, y), place)
     if offered:
         person.press("Enter")
+        person.await_text("#guide-text", "Which ends|done|Click")
     return finish(person, frame, answers, before)
 
 

@@ -179,6 +179,17 @@ def test_picks_in_another_order_are_the_same_picks(prepared, untouched):
     write_picks(untouched.picks_file, before)
 
 
+def test_help_comes_back_with_results_that_were_deleted_and_made_again(prepared, untouched):
+    cache, aside = untouched.stages.folder, untouched.folder / "aside"
+    cache.rename(aside)
+    help_ = make_assistant(Workspace(untouched.folder))
+    assert help_.keyframes({}) == {}
+    cache.mkdir()
+    for file in aside.glob("*.npz"):
+        file.rename(cache / file.name)
+    assert help_.keyframes({})["frames"]
+
+
 def test_a_strip_shows_the_frames_it_says(write_numbered):
     video = open_video(write_numbered("strip.mp4", [12 * n for n in range(90)]))
     strip = cut_strip(video, (17, 71))

@@ -9,8 +9,7 @@ only for the first.
 import hashlib
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from threading import RLock, Thread
@@ -42,7 +41,7 @@ class Study:
         self._workspace = workspace
         self._loading = RLock()
         self._learner = ThreadPoolExecutor(1)
-        self._loaded: dict[str, tuple[object, object]] = {}
+        self._loaded: dict[str, _Loaded] = {}
         self._ghosts: dict[int, tuple[str, Ghost]] = {}
         self._learnt: tuple[str, Future[Knowledge]] | None = None
         self._knowledge: Knowledge | None = None
@@ -156,15 +155,36 @@ class Study:
         return replace(found, keyframes=asked)
 
     def _load(self, name: str, files: tuple[Path, ...], read: Callable[[], Any]) -> Any:
-        """What `read` gives, read again when a file changes; the last there was if it cannot be."""
-        stamps = tuple(file.stat().st_mtime_ns if file.is_file() else None for file in files)
+        """What `read` gives, read again when a file changes; the last there was if it cannot be.
+
+        What could not be read is tried again when stage results are added.
+        """
+        stamps = tuple(_stamp(file) for file in files)
+        at_hand = stamps, _stamp(self._workspace.stages.folder)
         with self._loading:
-            known = self._loaded.get(name, (None, None))
-            if None not in stamps and known[0] != stamps:
-                with suppress(KeyreconError):
-                    known = stamps, read()
-                self._loaded[name] = stamps, known[1]
-            return self._loaded.get(name, (None, None))[1]
+            known = self._loaded.get(name, _Loaded())
+            if None not in stamps and stamps != known.stamps and at_hand != known.failed_with:
+                try:
+                    known = _Loaded(read(), stamps)
+                except KeyreconError:
+                    known = replace(known, failed_with=at_hand)
+                self._loaded[name] = known
+            return known.value
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """What was read from files."""
+
+    value: Any = None
+    stamps: tuple[int | None, ...] = ()
+    """When the files that it was read from had last changed."""
+    failed_with: tuple = ()
+    """Files and stage results of the last attempt that failed."""
+
+
+def _stamp(path: Path) -> int | None:
+    return path.stat().st_mtime_ns if path.exists() else None
 
 
 def _marks_of(annotations: Annotations, frame: int) -> Float[np.ndarray, "J 2"]:

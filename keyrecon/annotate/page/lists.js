@@ -126,7 +126,10 @@ export function createLists(model, actions) {
   );
 
   function explain() {
-    const keyframe = model.keyframe();
+    const keyframe = model.keyframe(),
+      { has } = model.project;
+    if (tab !== "frames" && has.keyframes && !has.help)
+      return "The stored results are missing or of another version. Make the motion, and this works again.";
     if (tab === "checks")
       return checks.length
         ? "Most suspicious first. G goes from one to the next."
