@@ -121,7 +121,11 @@ class StageStore:
 
 
 def _code_of(stage: Callable[..., Any]) -> str:
-    """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    folder, base = Path(inspect.getfile(stage)).parent, Path(__file__).parent
-    sources = sorted({*folder.glob("*.py"), *(base / f"{name}.py" for name in SHARED_CODE)})
+    """Hash of the stage's folder and of what all stages share: new code makes new results.
+
+    A stage beside this module shares nothing else with what lies there.
+    """
+    file, base = Path(inspect.getfile(stage)), Path(__file__).parent
+    own = [file] if file.parent == base else file.parent.glob("*.py")
+    sources = sorted({*own, *(base / f"{name}.py" for name in SHARED_CODE)})
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
