@@ -1,6 +1,7 @@
 """What the command line says to wrong input: one line, exit code 1, nothing written over."""
 
 import json
+import subprocess
 import sys
 
 import pytest
@@ -155,3 +156,12 @@ def test_a_motion_that_is_not_there(keyrecon, project, tmp_path):
     assert one_line(code, err, "keyrecon run")
     code, _, err = keyrecon("evaluate", project, "--truth", tmp_path / "truth.npz")
     assert one_line(code, err, "keyrecon run")
+
+
+def test_the_package_runs_as_a_module():
+    told = subprocess.run(
+        [sys.executable, "-m", "keyrecon", "keyframes", "nowhere"], capture_output=True, text=True
+    )
+    assert told.returncode == 1
+    assert "nowhere" in told.stderr
+    assert told.stderr.count("\n") == 1
