@@ -192,8 +192,7 @@ class Person:
         best = min(range(len(wrong)), key=lambda n: len(wrong[n]))
         self.press(str(best + 1))
         for limb in wrong[best]:
-            parent = LSP14.names[LSP14.parents[LSP14.index(limb)]]
-            self.point_at((place_of(limb) + place_of(parent)) / 2)
+            self.point_at(clearest_place(limb, place_of))
             self.await_drawn()
             self.press("f")
 
@@ -249,6 +248,16 @@ class Person:
     def call(self, module, expression):
         """What an expression on a module of the page gives; the module is called `m`."""
         return self.page.evaluate(f"import('/page/{module}.js').then((m) => ({expression}))")
+
+
+def clearest_place(limb, place_of):
+    """Where along a limb a person points, so that no joint of another limb is meant."""
+    parent = LSP14.names[LSP14.parents[LSP14.index(limb)]]
+    others = [place_of(name) for name in LSP14.names if name not in (limb, parent)]
+    others = [place for place in others if math.isfinite(place[0])]
+    start, end = place_of(parent), place_of(limb)
+    places = [start + share * (end - start) for share in (0.5, 0.4, 0.6, 0.3, 0.7)]
+    return max(places, key=lambda place: min((far(place, other) for other in others), default=0))
 
 
 def far(one, other):
