@@ -7,11 +7,13 @@ directions inside the cone, positions within reach) is worked out once for all f
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
-from scipy.spatial import cKDTree
+from jaxtyping import Complex, Complex64, Float, Float32, Int
 
 from keyrecon.matching.distance import CONE, Half, align_edges
 from keyrecon.records import Edges, Track
+
+STRIP = 512
+"""Cells whose neighbours are found together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +35,8 @@ class Cells:
 
     of_element: Int[np.ndarray, "E"]
     """Cell of each element."""
-    center: Float32[np.ndarray, "G 2"]
-    """Mean position of the members, player heights."""
+    center: Complex64[np.ndarray, "G"]
+    """Mean position of the members, x + iy in player heights."""
     first: Int[np.ndarray, "G+1"]
     """Where each cell's neighbours start in `neighbor`, and the end of the last."""
     neighbor: Int[np.ndarray, "P"]
@@ -54,61 +56,87 @@ def gather_elements(edges: tuple[Edges, ...], track: Track, half: Half) -> Eleme
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Numbers of the places that a cell may have: colour, turn, column and row, one in another."""
+
+    place: Int[np.ndarray, "E"]
+    """Of each element."""
+    directions: int
+    near: int
+    """Columns and rows between cells within reach at most: so many more are free all around."""
+    columns: int
+    rows: int
+
+    @property
+    def layer(self) -> int:
+        """Places of one colour and turn."""
+        return self.columns * self.rows
+
+    def beside(
+        self, place: Int[np.ndarray, "n"]
+    ) -> tuple[Int[np.ndarray, "n D"], Int[np.ndarray, "n D"]]:
+        """Runs of places, from and up to, with all that may correspond."""
+        apart = int(np.ceil(CONE * self.directions / (2 * np.pi)))
+        turn = place // self.layer % self.directions
+        turned = (turn[:, None] + np.arange(-apart, apart + 1)) % self.directions
+        turned = place[:, None] + (turned - turn[:, None]) * self.layer
+        sideways = np.arange(-self.near, self.near + 1) * self.rows
+        middle = (turned[:, :, None] + sideways).reshape(len(place), -1)
+        return middle - self.near, middle + self.near + 1
+
+
 def group_elements(elements: Elements, pitch: float, directions: int, reach: float) -> Cells:
     """Share the elements out to cells `pitch` wide and a turn / `directions` deep."""
-    spatial = np.floor(elements.points / pitch).astype(np.int64)
-    turn = np.floor(elements.angle * (directions / (2 * np.pi))).astype(np.int64) % directions
-    key = np.stack([elements.color, turn, spatial[:, 0], spatial[:, 1]], axis=1)
-    used, of_element = np.unique(_packed(key), return_inverse=True)
+    reach = reach + pitch / 2
+    grid = _lay_grid(elements, pitch, directions, reach)
+    used, of_element = np.unique(grid.place, return_inverse=True)
     weight = 1 / np.bincount(of_element, minlength=len(used))
 
     def mean(values: Float[np.ndarray, "E"]) -> Float[np.ndarray, "G"]:
         return np.bincount(of_element, values, minlength=len(used)) * weight
 
-    center = np.stack([mean(elements.points[:, 0]), mean(elements.points[:, 1])], axis=1)
-    angle = np.arctan2(mean(np.sin(elements.angle)), mean(np.cos(elements.angle)))
-    color = np.zeros(len(used), dtype=np.int64)
-    color[of_element] = elements.color
-    first, neighbor = _neighborhoods(center, angle, color, reach + pitch / 2)
-    return Cells(of_element, center.astype(np.float32), first, neighbor)
+    center = mean(elements.points[:, 0]) + 1j * mean(elements.points[:, 1])
+    heading = mean(np.cos(elements.angle)) + 1j * mean(np.sin(elements.angle))
+    heading /= np.maximum(np.abs(heading), 1e-9)
+    first, neighbor = _neighborhoods(used, grid, center, heading, reach)
+    return Cells(of_element, center.astype(np.complex64), first, neighbor)
 
 
-def _packed(key: Int[np.ndarray, "E 4"]) -> Int[np.ndarray, "E"]:
-    """One number per row, different for different rows."""
-    low = key.min(axis=0, initial=0)
-    span = key.max(axis=0, initial=0) - low + 1
-    packed = np.zeros(len(key), dtype=np.int64)
-    for column in range(key.shape[1]):
-        packed = packed * span[column] + key[:, column] - low[column]
-    return packed
+def _lay_grid(elements: Elements, pitch: float, directions: int, reach: float) -> _Grid:
+    spatial = np.floor(elements.points / pitch).astype(np.int64)
+    turn = np.floor(elements.angle * (directions / (2 * np.pi))).astype(np.int64) % directions
+    near = int(np.ceil(reach / pitch))
+    low = spatial.min(axis=0, initial=0) - near
+    columns, rows = (spatial.max(axis=0, initial=0) - low + near + 1).tolist()
+    column, row = (spatial - low).T
+    place = ((elements.color * directions + turn) * columns + column) * rows + row
+    return _Grid(place, directions, near, columns, rows)
 
 
 def _neighborhoods(
-    center: Float[np.ndarray, "G 2"],
-    angle: Float[np.ndarray, "G"],
-    color: Int[np.ndarray, "G"],
+    used: Int[np.ndarray, "G"],
+    grid: _Grid,
+    center: Complex[np.ndarray, "G"],
+    heading: Complex[np.ndarray, "G"],
     reach: float,
 ) -> tuple[Int[np.ndarray, "G+1"], Int[np.ndarray, "P"]]:
     """Cells of the same colour, within reach and inside the cone, for each cell."""
-    # In the maximum norm of (position, scaled direction) a ball holds every pair that counts,
-    # and few others: chords longer than the cone's are out before their cosine is taken.
-    chord = reach / (2 * np.sin(CONE / 2))
-    lifted = np.column_stack([center, chord * np.cos(angle), chord * np.sin(angle)])
-    rows, columns = [], []
-    for one in np.unique(color):
-        members = np.flatnonzero(color == one)
-        pairs = cKDTree(lifted[members]).query_pairs(reach, p=np.inf, output_type="ndarray")
-        pairs = members[pairs]
-        apart = center[pairs[:, 0]] - center[pairs[:, 1]]
-        close = (apart**2).sum(axis=1) < reach**2
-        aligned = np.cos(angle[pairs[:, 0]] - angle[pairs[:, 1]]) > np.cos(CONE)
-        pairs = pairs[close & aligned]
-        rows += [pairs[:, 0], pairs[:, 1], members]
-        columns += [pairs[:, 1], pairs[:, 0], members]
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    order = np.argsort(row, kind="stable")
-    first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(center)))])
-    return first, column[order].astype(np.int32)
+    counts, neighbors = [np.zeros(1, int)], []
+    for at in range(0, len(used), STRIP):
+        strip = slice(at, at + STRIP)
+        # the cells are in order of their places, so that a run of places is a run of cells
+        start, stop = (np.searchsorted(used, p) for p in grid.beside(used[strip]))
+        room = (stop - start).sum(axis=1)
+        column = ranges(start.ravel(), (stop - start).ravel())
+        row = np.repeat(np.arange(len(room)), room)
+        away = center[column] - center[strip][row]
+        close = np.flatnonzero(away.real**2 + away.imag**2 < reach**2)
+        row, column = row[close], column[close]
+        aligned = (heading[column] * np.conj(heading[strip])[row]).real > np.cos(CONE)
+        neighbors.append(column[aligned].astype(np.int32))
+        counts.append(np.bincount(row[aligned], minlength=len(room)))
+    return np.cumsum(np.concatenate(counts)), np.concatenate(neighbors)
 
 
 def ranges(start: Int[np.ndarray, "E"], count: Int[np.ndarray, "E"]) -> Int[np.ndarray, "P"]:

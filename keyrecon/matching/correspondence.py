@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float32, Int
+from jaxtyping import Bool, Complex, Float32, Int
 
 from keyrecon.matching.window import Window, to_complex
 from keyrecon.records import Edges

@@ -190,9 +190,9 @@ def offer_distances(
     cell = cells.of_element[part]
     count = cells.first[cell + 1] - cells.first[cell]
     target = cells.neighbor[ranges(cells.first[cell], count)]
-    dx = cells.center[target, 0] - np.repeat(elements.points[part, 0], count)
-    dy = cells.center[target, 1] - np.repeat(elements.points[part, 1], count)
-    squared = dx * dx + dy * dy
+    away = cells.center[target]
+    away -= np.repeat(elements.points[part].view(np.complex64)[:, 0], count)
+    squared = np.square(away.real) + np.square(away.imag)
     slot = target.astype(np.int64) * len(frames)
     slot += np.repeat(elements.frame[part] - frames.start, count)
     nearest = np.full(len(cells.center) * len(frames), reach * reach, dtype=np.float32)
