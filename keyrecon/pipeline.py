@@ -19,7 +19,12 @@ from keyrecon.formats.motion_model import read_motion_model
 from keyrecon.golf.follow import SwingPriorOptions, follow_swing
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
-from keyrecon.matching.keyframes import KeyframeOptions, adopt_keyframes, choose_keyframes
+from keyrecon.matching.keyframes import (
+    KeyframeOptions,
+    adopt_keyframes,
+    choose_keyframes,
+    count_labels,
+)
 from keyrecon.matching.matrix import CompareOptions, compare_frames
 from keyrecon.matching.propagate import LEAST_MARKED, PropagateOptions, propagate_joints
 from keyrecon.progress import Progress, silent
@@ -109,6 +114,7 @@ def prepare(
     or the annotation budget cannot be met.
     """
     picks = tuple(picks)
+    count_labels(options.keyframes, len(video))  # a person waits minutes for the choice itself
 
     def make(name: str, stage: Callable[..., Any], *inputs: object) -> Any:
         stage_options = getattr(options, name)

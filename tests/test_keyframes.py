@@ -9,7 +9,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.matching.assignment import find_neighborhoods
 from keyrecon.matching.exchange import Goal, exchange_for_coverage
-from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes
+from keyrecon.matching.keyframes import KeyframeOptions, choose_keyframes, count_labels
 from keyrecon.records import Comparison
 
 
@@ -197,3 +197,13 @@ def test_inputs_are_left_as_they_were(comparison):
     for array in (frozen.upper, frozen.lower, frozen.step, frozen.clarity, frozen.row):
         array.setflags(write=False)
     choose_keyframes(frozen, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("coverage", 1.5), ("coverage", float("nan")), ("budget", -1.0), ("budget", 3.0),
+     ("budget", float("nan")), ("reach", -5)],
+)  # fmt: skip
+def test_what_cannot_be_asked_of_keyframes_is_told_by_its_name(option, value):
+    with pytest.raises(KeyreconError, match=f"--{option} is"):
+        count_labels(KeyframeOptions(**{option: value}), 1000)

@@ -97,6 +97,31 @@ class Half:
         return Goal(hoods, self.reach, self.uncovered, clarity)
 
 
+def count_labels(options: KeyframeOptions, n_frames: int) -> int:
+    """Half-body labels that the budget allows in a video of `n_frames`.
+
+    Raises KeyreconError where it is less than one for each half, and for impossible options.
+    """
+    if not 0 < options.coverage <= 1:
+        raise KeyreconError(
+            f"--coverage is a share of the frames, 0.95 for 95 %, not {options.coverage:g}."
+        )
+    if options.reach < 0:
+        raise KeyreconError(f"--reach is a number of frames, not {options.reach}.")
+    if not 0 < options.budget <= 1:
+        raise KeyreconError(
+            f"--budget is a share of the frames, 0.015 for 1.5 %, not {options.budget:g}."
+        )
+    labels = int(2 * options.budget * n_frames + 1e-9)
+    if labels < 2 and None in (options.beta_upper, options.beta_lower):
+        raise KeyreconError(
+            f"A budget of {options.budget:.2%} of {n_frames} frames is {labels} half-body "
+            f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
+            "allows that."
+        )
+    return labels
+
+
 def choose_keyframes(
     comparison: Comparison,
     fps: float,
@@ -105,17 +130,10 @@ def choose_keyframes(
 ) -> Keyframes:
     """Keyframes of both halves of the body within the budget.
 
-    Raises KeyreconError where the budget is less than one keyframe for each half.
+    Raises KeyreconError where the options ask for what cannot be (`count_labels`).
     """
-    n_frames = len(comparison.row)
+    labels = count_labels(options, len(comparison.row))
     reach = max(1, round(options.reach * fps / 50))
-    labels = int(2 * options.budget * n_frames + 1e-9)
-    if labels < 2 and None in (options.beta_upper, options.beta_lower):
-        raise KeyreconError(
-            f"A budget of {options.budget:.2%} of {n_frames} frames is {labels} half-body "
-            f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
-            "allows that."
-        )
     halves = []
     wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
