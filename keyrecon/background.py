@@ -34,6 +34,9 @@ DEEPEST_SHADOW = 0.45
 """Share of the light that a cast shadow leaves, at least."""
 TRUNK, LEGS = 0.7, 0.5
 """Widths of the player, arms close and knees bent, in heights: beyond it is background."""
+ONE_FOOT, STRIDE = 0.1, 0.45
+"""Feet nearer than this may be one foot taken twice; the other is then up to a stride aside. A leg
+that is left out here and stands for long would become background. Player heights."""
 HIPS = 0.45
 """Where trunk becomes legs, share of the way from head to mid-feet."""
 UNKNOWN = 255
@@ -210,6 +213,8 @@ def _body(
     head, feet, height = track.head[frame], track.feet[frame], track.height[frame]
     hips = head + HIPS * (track.mid_feet[frame] - head)
     top = head - (0.0, 0.05 * height)
+    if np.linalg.norm(feet[0] - feet[1]) < ONE_FOOT * height:
+        feet = feet.mean(axis=0) + STRIDE * height * np.array([(-1, 0), (0, 0), (1, 0)])
     for start, end, width in ((top, hips, TRUNK), *((hips, foot, LEGS) for foot in feet)):
         x0, y0, x1, y1 = (round(float(c) * shrink) for c in (*start, *end))
         cv2.line(mask, (x0, y0), (x1, y1), 1, max(2, round(width * height * shrink)))

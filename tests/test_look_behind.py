@@ -1,8 +1,12 @@
 import cv2
 import numpy as np
+from drawn_player import HEIGHT, draw_player, scene
 
-from keyrecon.background import combine_plate
+from keyrecon.background import build_background, combine_plate
 from keyrecon.colors import to_lab
+from keyrecon.records import CameraPath, Track
+from keyrecon.video import open_video
+from keyrecon.video_writer import write_video
 
 
 def scene_with_limb(shift, rng):
@@ -39,3 +43,25 @@ def test_what_the_player_always_covers_stays_unknown():
     background = combine_plate(looks, [free] * 40, paths, 1.0, look_behind=True)
     assert background.known[:, :10].all()
     assert not background.known[:, 12:].any()
+
+
+def test_a_leg_that_the_track_lacks_does_not_become_background(tmp_path):
+    count, stride = 40, 0.25 * HEIGHT
+    head = np.tile([120.0, 60.0], (count, 1))
+    head[28:, 0] = 260.0
+
+    def frames():
+        for x, y in head:
+            picture = scene()
+            draw_player(picture, x, y, stride)
+            yield picture[:180, :360]
+
+    write_video(tmp_path / "stands.mp4", frames(), 30.0, crf=18)
+    right = head + np.array([stride, HEIGHT])
+    tall = np.full(count, HEIGHT)
+    track = Track(head, np.stack([right, right], 1), tall, np.zeros((count, 4)), np.ones(count))
+    still = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
+    background = build_background(open_video(tmp_path / "stands.mp4"), still, track)
+    left = tuple((head[0] + np.array([-stride, HEIGHT])).round().astype(int)[::-1])
+    off = background.plate[left].astype(int) - to_lab(scene())[left]
+    assert not background.known[left] or np.abs(off).max() < 12

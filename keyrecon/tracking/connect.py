@@ -1,9 +1,10 @@
 """The track from what the filters saw: the head's path, then that of both feet.
 
-The path of the feet runs over pairs. A foot that is hidden behind the other leg cannot be seen,
-but it was seen a moment ago or will be in a moment: where a sure candidate of a frame nearby lies
-on the player now, it is a weak candidate of this frame too. A foot that stands therefore stays,
-while one in the air is soon forgotten.
+The path of the feet runs over pairs. A foot that cannot be seen is behind the other leg, so one
+candidate alone makes a pair too, with the hidden foot on the shin above it. Or it was seen a moment
+ago, or will be in a moment: where a sure candidate of a frame nearby lies on the player now, it is
+a weak candidate of this frame too. A foot that stands therefore stays, while one in the air is soon
+forgotten.
 """
 
 from dataclasses import dataclass
@@ -21,8 +22,12 @@ from keyrecon.tracking.viterbi import Motion, cheapest_path
 EVEN, DOUBT = 0.43, 0.07
 """Strength that is as likely a part as not, and how fast the odds change with it: responses beside
 the parts stay below a third of the usual one."""
-HIDDEN = 1.5
-"""Cost of a foot that is not seen, but was nearby in time."""
+HIDDEN, BEHIND = 1.5, 1.0
+"""Costs of a foot that is not seen: where it was nearby in time, and behind the other foot, which
+is where a foot that cannot be seen nearly always is."""
+FARTHER_UP = 0.07
+"""A hidden foot is this far above the one that hides it, player heights: floor farther away is
+higher up in the picture, and it is the shin that covers the foot."""
 APART = 0.07
 """Two candidates nearer to one another are one foot, player heights."""
 LOOKS = 6
@@ -85,15 +90,29 @@ def connect_feet(
         own = np.concatenate([part_costs(look.foot_strength), np.full(len(hidden[t]), HIDDEN)])
         feet = np.concatenate([stable[t], hidden[t]])
         in_picture = warp_points(back[t], feet) if len(feet) else feet
-        every = foot_pairs(len(feet))
-        tall = float(cropping.track.height[t])
-        cost = own[every].sum(axis=1) + stance_costs(in_picture[every], head[t], tall)
-        best = np.argsort(cost)[:PAIRS]
-        costs.append(cost[best])
-        pairs.append(feet[every[best]])
+        both, cost = _pair(in_picture, own, head[t], float(cropping.track.height[t]))
+        costs.append(cost)
+        pairs.append(warp_points(camera.to_reference[t], both))
     taken = cheapest_path(costs, pairs, Motion(sigma, gap=12, miss=7.0))
     feet = fill_gaps(taken_places(pairs, taken), np.arange(len(seen)), back)
     return feet, trust_states([c / 2 for c in costs], taken)
+
+
+def _pair(
+    feet: Float[np.ndarray, "n 2"],
+    cost: Float[np.ndarray, "n"],
+    head: Float[np.ndarray, "2"],
+    height: float,
+) -> tuple[Float[np.ndarray, "s 2 2"], Float[np.ndarray, "s"]]:
+    """The best pairs of feet in one picture, and their costs; a place alone hides another foot."""
+    every = foot_pairs(len(feet))
+    both = feet[every]
+    alone = every[:, 0] == every[:, 1]
+    both[alone, 1, 1] -= FARTHER_UP * height
+    own = cost[every[:, 0]] + np.where(alone, BEHIND, cost[every[:, 1]])
+    total = own + stance_costs(both, head, height)
+    best = np.argsort(total)[:PAIRS]
+    return both[best], total[best]
 
 
 def remember_feet(

@@ -12,7 +12,7 @@ SHOE_RADIUS = 0.045
 ONE_SHOE = 1.8
 """Cost of both feet in one place, found by colour."""
 ONE_PLACE = 2.5
-"""The same where filters found them, which are surer."""
+"""Cost of two candidates in one place where filters found them: they may be one shoe."""
 RAISED = 0.2
 """Foot that is lifted this far costs as much as one deviation, player heights: a racket is there
 more often."""
