@@ -22,9 +22,8 @@ from keyrecon.tracking.viterbi import Motion, cheapest_path
 EVEN, DOUBT = 0.43, 0.07
 """Strength that is as likely a part as not, and how fast the odds change with it: responses beside
 the parts stay below a third of the usual one."""
-HIDDEN, BEHIND = 1.5, 1.0
-"""Costs of a foot that is not seen: where it was nearby in time, and behind the other foot, which
-is where a foot that cannot be seen nearly always is."""
+HIDDEN = 1.5
+"""Cost of a foot that is not seen, but was nearby in time."""
 FARTHER_UP = 0.07
 """A hidden foot is this far above the one that hides it, player heights: floor farther away is
 higher up in the picture, and it is the shin that covers the foot."""
@@ -51,6 +50,18 @@ class Seen:
     """Where the player covers the scene, at half the resolution of the crop."""
 
 
+@dataclass(frozen=True)
+class Gait:
+    """How feet move and hide."""
+
+    step: float
+    """Usual movement from one frame to the next, px."""
+    memory: int
+    """Frames before and after in which a hidden foot is looked up."""
+    behind: float
+    """Cost of a foot that is not seen and taken to be behind the other."""
+
+
 def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """-log of the probability that a response comes from the part."""
     return np.logaddexp(0.0, (EVEN - strength) / DOUBT)
@@ -74,26 +85,23 @@ def connect_feet(
     camera: CameraPath,
     cropping: Cropping,
     head: Float[np.ndarray, "T 2"],
-    sigma: float,
-    memory: int,
+    gait: Gait,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Both feet in the picture of every frame, and their trust.
-
-    `sigma` is the usual step, px; hidden feet are looked up `memory` frames around.
-    """
+    """Both feet in the picture of every frame, and their trust."""
     places = [cropping.to_picture(s.feet, t) for t, s in enumerate(seen)]
     back = np.linalg.inv(camera.to_reference)
     stable = stabilise(places, camera.to_reference)
-    hidden = remember_feet(seen, stable, back, cropping, memory)
+    hidden = remember_feet(seen, stable, back, cropping, gait.memory)
     costs, pairs = [], []
     for t, look in enumerate(seen):
         own = np.concatenate([part_costs(look.foot_strength), np.full(len(hidden[t]), HIDDEN)])
         feet = np.concatenate([stable[t], hidden[t]])
         in_picture = warp_points(back[t], feet) if len(feet) else feet
-        both, cost = _pair(in_picture, own, head[t], float(cropping.track.height[t]))
+        tall = float(cropping.track.height[t])
+        both, cost = _pair(in_picture, own, gait.behind, (head[t], tall))
         costs.append(cost)
         pairs.append(warp_points(camera.to_reference[t], both))
-    taken = cheapest_path(costs, pairs, Motion(sigma, gap=12, miss=7.0))
+    taken = cheapest_path(costs, pairs, Motion(gait.step, gap=12, miss=7.0))
     feet = fill_gaps(taken_places(pairs, taken), np.arange(len(seen)), back)
     return feet, trust_states([c / 2 for c in costs], taken)
 
@@ -101,15 +109,19 @@ def connect_feet(
 def _pair(
     feet: Float[np.ndarray, "n 2"],
     cost: Float[np.ndarray, "n"],
-    head: Float[np.ndarray, "2"],
-    height: float,
+    behind: float,
+    body: tuple[Float[np.ndarray, "2"], float],
 ) -> tuple[Float[np.ndarray, "s 2 2"], Float[np.ndarray, "s"]]:
-    """The best pairs of feet in one picture, and their costs; a place alone hides another foot."""
+    """The best pairs of feet below a head and of a height, and their costs.
+
+    A place alone hides another foot, at the cost `behind`.
+    """
+    head, height = body
     every = foot_pairs(len(feet))
     both = feet[every]
     alone = every[:, 0] == every[:, 1]
     both[alone, 1, 1] -= FARTHER_UP * height
-    own = cost[every[:, 0]] + np.where(alone, BEHIND, cost[every[:, 1]])
+    own = cost[every[:, 0]] + np.where(alone, behind, cost[every[:, 1]])
     total = own + stance_costs(both, head, height)
     best = np.argsort(total)[:PAIRS]
     return both[best], total[best]

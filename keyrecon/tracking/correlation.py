@@ -27,38 +27,40 @@ RIDGE = 0.02
 class Filters:
     """Filters of P parts over C channels, for pictures of one size."""
 
-    transfer: Complex64[np.ndarray, "F C P"]
-    """H; F frequencies."""
+    transfer: Complex64[np.ndarray, "P C h f"]
+    """H, for the spatial frequencies that a real picture has."""
     size: tuple[int, int]
     """Rows and columns of the pictures."""
 
 
-def spectrum(channels: Float[np.ndarray, "h w C"]) -> Complex64[np.ndarray, "F C"]:
-    """The spatial frequencies of all channels of a picture."""
-    found = scipy.fft.rfft2(channels.astype(np.float32), axes=(0, 1))
-    return found.reshape(-1, channels.shape[2])
+def spectrum(channels: Float[np.ndarray, "*n h w"]) -> Complex64[np.ndarray, "*n h f"]:
+    """The spatial frequencies of every channel."""
+    return scipy.fft.rfft2(channels.astype(np.float32, copy=False))
 
 
 def learn_filters(
-    spectra: Complex64[np.ndarray, "N F C"], targets: Float[np.ndarray, "N h w P"]
+    spectra: Complex64[np.ndarray, "N C h f"], targets: Float[np.ndarray, "N P h w"]
 ) -> Filters:
     """Filters that turn each example into its targets."""
-    count, size = len(spectra), targets.shape[1:3]
-    wanted = scipy.fft.rfft2(targets.astype(np.float32), axes=(1, 2))
-    wanted = wanted.reshape(count, -1, targets.shape[3]).transpose(1, 0, 2)
-    seen = spectra.transpose(1, 0, 2)
+    count, shape = len(spectra), spectra.shape[2:]
+    seen, wanted = (_by_frequency(s) for s in (spectra, spectrum(targets)))
     mirrored = np.conj(seen.transpose(0, 2, 1))
     power, common = mirrored @ seen / count, mirrored @ wanted / count
     ridge = RIDGE * float(np.trace(power, axis1=1, axis2=2).real.mean()) / power.shape[1]
     power += np.float32(ridge) * np.eye(power.shape[1], dtype=np.float32)
-    return Filters(np.linalg.solve(power, common), size)
+    transfer = np.linalg.solve(power, common).transpose(2, 1, 0)
+    return Filters(transfer.reshape(*transfer.shape[:2], *shape), targets.shape[2:])
 
 
-def respond(filters: Filters, seen: Complex64[np.ndarray, "F C"]) -> Float[np.ndarray, "h w P"]:
+def _by_frequency(spectra: Complex64[np.ndarray, "N C h f"]) -> Complex64[np.ndarray, "F N C"]:
+    """One matrix of examples and channels for each frequency."""
+    return spectra.reshape(*spectra.shape[:2], -1).transpose(2, 0, 1)
+
+
+def respond(filters: Filters, seen: Complex64[np.ndarray, "C h f"]) -> Float[np.ndarray, "P h w"]:
     """The response of every filter to one picture."""
-    found = np.einsum("fc,fcp->fp", seen, filters.transfer)
-    rows, columns = filters.size
-    return scipy.fft.irfft2(found.reshape(rows, columns // 2 + 1, -1), filters.size, axes=(0, 1))
+    found = np.stack([(seen * part).sum(axis=0) for part in filters.transfer])
+    return scipy.fft.irfft2(found, filters.size)
 
 
 def peaks_at(

@@ -12,6 +12,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
+from scipy.fft import next_fast_len
 
 from keyrecon.background import Scene
 from keyrecon.colors import color_bins, foot_table, posterior_tables, to_lab
@@ -23,6 +24,8 @@ from keyrecon.video import Video
 
 ABOVE, BELOW, ASIDE = 0.3, 1.25, 0.86
 """Reach of a crop from the head, player heights: a jump or a deep lunge stays inside."""
+DIRECTIONS = 4
+"""Of edges: level, upright and the two diagonals."""
 FAINT = 8.0
 """Grey-level slope per pixel that counts half: noise counts for little, all edges alike."""
 
@@ -38,9 +41,9 @@ class Cropping:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Rows and columns, even."""
+        """Rows and columns, even, and quick to transform."""
         rows, columns = (ABOVE + BELOW) * self.player, 2 * ASIDE * self.player
-        return 2 * round(rows / 2), 2 * round(columns / 2)
+        return 2 * next_fast_len(round(rows / 2)), 2 * next_fast_len(round(columns / 2))
 
     @cached_property
     def scale(self) -> Float[np.ndarray, "T"]:
@@ -102,30 +105,33 @@ def cut_crops(video: Video, cropping: Cropping, scene: Scene, progress: Progress
 class Channels:
     """What filters see of a crop."""
 
-    tables: Float[np.ndarray, "bins C"]
+    tables: Float[np.ndarray, "C bins"]
     """Posterior of each part by colour bin."""
-    border: Float[np.ndarray, "h w 1"]
+    border: Float[np.ndarray, "h w"]
     """Falls to zero towards the border, as filters take a crop for periodic."""
 
     @classmethod
     def of(cls, colors: Colors, size: tuple[int, int]) -> "Channels":
         """Channels for the colours of a player and crops of one size."""
-        tables = np.stack([*posterior_tables(colors), foot_table(colors)], axis=1)
+        tables = np.stack([*posterior_tables(colors), foot_table(colors)])
         rows, columns = (np.hanning(n + 2)[1:-1] ** 0.25 for n in size)
-        border = np.outer(rows, columns).astype(np.float32)[..., None]
-        return cls(np.ascontiguousarray(tables, np.float32), border)
+        return cls(tables.astype(np.float32), np.outer(rows, columns).astype(np.float32))
 
     def see(
         self, lab: UInt8[np.ndarray, "h w 3"], foreground: UInt8[np.ndarray, "h w"]
-    ) -> Float[np.ndarray, "h w D"]:
+    ) -> Float[np.ndarray, "D h w"]:
         """All channels of a crop."""
-        differs = foreground.astype(np.float32) / 255
-        weight = STILL_WEIGHT + (1 - STILL_WEIGHT) * differs
-        parts = self.tables[color_bins(lab)] * weight[..., None]
-        light = lab[..., 0].astype(np.float32)
+        parts = len(self.tables)
+        seen = np.empty((1 + parts + DIRECTIONS, *foreground.shape), np.float32)
+        np.multiply(foreground, np.float32(1 / 255), out=seen[0])
+        np.take(self.tables, color_bins(lab), axis=1, out=seen[1 : 1 + parts])
+        seen[1 : 1 + parts] *= STILL_WEIGHT + (1 - STILL_WEIGHT) * seen[0]
+        light = np.ascontiguousarray(lab[..., 0])
         gx, gy = (cv2.Sobel(light, cv2.CV_32F, *d, scale=0.25) for d in ((1, 0), (0, 1)))
         size = cv2.magnitude(gx, gy)
         share = 1 / ((size + FAINT) * (size + 1e-6))
         along, across = (gx * gx - gy * gy) * share, 2 * gx * gy * share
-        edges = [np.maximum(m, 0) for m in (along, -along, across, -across)]
-        return np.dstack([differs, parts, *edges]) * self.border
+        for channel, map_ in zip(seen[-DIRECTIONS:], (along, -along, across, -across), strict=True):
+            np.maximum(map_, 0, out=channel)
+        seen *= self.border
+        return seen

@@ -5,11 +5,12 @@ by how far a pixel is from the background. The background is learnt before the p
 what lacks the player's colours.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from keyrecon.background import (
     BackgroundOptions,
@@ -19,11 +20,11 @@ from keyrecon.background import (
     sample_frames,
 )
 from keyrecon.colors import color_bins, to_lab
-from keyrecon.pictures import read_small
 from keyrecon.records import CameraPath
 from keyrecon.tracking.feet import SHOE_RADIUS
-from keyrecon.video import Video
 
+Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]
+"""Gives the reduced pictures of the frames with the given numbers, in order."""
 HEAD_RADIUS = 0.062
 """Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
 STILL_WEIGHT = 0.2
@@ -46,15 +47,19 @@ class Evidence:
 
 
 def first_scene(
-    video: Video, camera: CameraPath, width: int, player: Float[np.ndarray, "bins"]
+    pictures: Reader,
+    numbers: Int[np.ndarray, "n"],
+    camera: CameraPath,
+    shrink: float,
+    player: Float[np.ndarray, "bins"],
 ) -> Scene:
     """A plate before the player is known: the median of what does not have their colours.
 
-    Where everything has, the background does, and the median of all it is.
+    Where everything has, the background does, and the median of all it is. `pictures` gives the
+    frames with some of the `numbers`, reduced by `shrink`.
     """
-    used = sample_frames(len(video), BackgroundOptions.samples)
-    lab = [to_lab(p) for p in read_small(video, width, set(used.tolist()))]
-    shrink = width / video.width
+    used = numbers[sample_frames(len(numbers), BackgroundOptions.samples)]
+    lab = [to_lab(p) for p in pictures(used)]
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]

@@ -25,7 +25,7 @@ from keyrecon.pictures import read_small, shrinking, side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.candidates import Candidates, search_frame
-from keyrecon.tracking.evidence import first_scene, weigh_evidence
+from keyrecon.tracking.evidence import Reader, first_scene, weigh_evidence
 from keyrecon.tracking.feet import foot_pairs, pair_costs
 from keyrecon.tracking.path import fill_gaps, stabilise, taken_places, trust_states
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
@@ -34,6 +34,8 @@ from keyrecon.video import Video
 
 EVERY_FRAME = 1e4
 """A pace that no video has: every frame is searched."""
+MOST_KEPT = 2**28
+"""Pictures that take no more memory than this are kept rather than read twice, bytes."""
 PAIRS = 30
 """Pairs of feet kept, per frame."""
 NO_SHOE = 2.0
@@ -74,24 +76,36 @@ def find_player(
     width = reduced_width(video, colors.height, BackgroundOptions(player=options.player))
     shrink = width / video.width
     parts = posterior_tables(colors)
-    scene = first_scene(video, camera, width, parts.max(axis=0))
+    every = max(1, round(video.fps / options.pace))
+    numbers = np.unique(np.append(np.arange(0, len(video), every), len(video) - 1))
+    pictures = _read_pictures(video, width, numbers, progress)
+    scene = first_scene(pictures, numbers, camera, shrink, parts.max(axis=0))
     tall = colors.height * shrink
     head = parts[colors.names.index("head")]
     tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
     to_picture = np.linalg.inv(shrinking(shrink))
-    every = max(1, round(video.fps / options.pace))
-    numbers = np.unique(np.append(np.arange(0, len(video), every), len(video) - 1))
 
     def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Candidates:
         lab = to_lab(entry[1])
         foreground = scene.foreground(lab, entry[0], to_picture)
         return search_frame(weigh_evidence(lab, tables, foreground, tall), tall)
 
-    pictures = read_small(video, width, set(numbers.tolist()))
-    pictures = progress(pictures, "Finding the player", len(numbers))
-    small = list(side_by_side(look, zip(numbers.tolist(), pictures, strict=True)))
+    shown = progress(pictures(numbers), "Finding the player", len(numbers))
+    small = list(side_by_side(look, zip(numbers.tolist(), shown, strict=True)))
     found = [_enlarge(c, shrink) for c in small]
     return _connect(found, numbers, video, camera, colors.height, options)
+
+
+def _read_pictures(
+    video: Video, width: int, numbers: Int[np.ndarray, "n"], progress: Progress
+) -> Reader:
+    """Reduced pictures of some frames: kept if they take little memory, else read when wanted."""
+    if 3 * len(numbers) * width * round(video.height * width / video.width) > MOST_KEPT:
+        return lambda wanted: read_small(video, width, set(wanted.tolist()))
+    pictures = read_small(video, width, set(numbers.tolist()))
+    pictures = progress(pictures, "Reading pictures of the player", len(numbers))
+    kept = dict(zip(numbers.tolist(), pictures, strict=True))
+    return lambda wanted: (kept[number] for number in wanted.tolist())
 
 
 def _enlarge(found: Candidates, shrink: float) -> Candidates:

@@ -14,8 +14,9 @@ from keyrecon.tracking.crops import Channels, Cropping, Crops
 
 UPRIGHT = 0.85, 1.15
 """A foot of a clear frame is this far below the head, player heights: a racket seldom is."""
-TWO_FEET = 0.07
-"""Feet nearer to one another may be one foot taken twice, player heights."""
+TWO_FEET = 0.09
+"""Feet nearer to one another may be one foot taken twice, or one that hides the other, player
+heights."""
 FEWEST = 12
 """Fewer clear frames teach nothing; then all count."""
 SPREAD = 0.027
@@ -39,19 +40,19 @@ def learn_parts(
     places = np.stack([cropping.from_picture(parts[t], t) for t in frames])
     size, spread = cropping.size, SPREAD * cropping.player
     targets = [[peaks_at(p, size, spread) for p in (own[:1], own[1:])] for own in places]
-    filters = learn_filters(spectra, np.stack(targets).transpose(0, 2, 3, 1))
+    filters = learn_filters(spectra, np.stack([np.stack(t) for t in targets]))
     usual = np.median([_strength(filters, *e) for e in zip(spectra, places, strict=True)], axis=0)
-    scaled = filters.transfer / np.maximum(usual, LEAST_RESPONSE).astype(np.float32)
-    return Filters(scaled, size)
+    usual = np.maximum(usual, LEAST_RESPONSE).astype(np.float32)[:, None, None, None]
+    return Filters(filters.transfer / usual, size)
 
 
 def _strength(
-    filters: Filters, seen: Complex64[np.ndarray, "F C"], places: Float[np.ndarray, "3 2"]
+    filters: Filters, seen: Complex64[np.ndarray, "C h f"], places: Float[np.ndarray, "3 2"]
 ) -> tuple[float, float]:
     """Response of each filter at its part."""
     response = respond(filters, seen)
     row, column = np.rint(places[:, ::-1]).astype(int).clip(0, np.array(filters.size) - 1).T
-    return float(response[row[0], column[0], 0]), float(response[row[1:], column[1:], 1].max())
+    return float(response[0, row[0], column[0]]), float(response[1, row[1:], column[1:]].max())
 
 
 def clear_frames(track: Track) -> Int[np.ndarray, "n"]:

@@ -5,13 +5,14 @@ other leg passes for a shoe. Its clear frames teach correlation filters what thi
 feet look like (see `learn`, `correlation`): leg above the shoe, shoe, court beneath. Every frame is
 cut out around the rough head, the peaks of the filters' responses are candidates, and the cheapest
 path through them is the track (see `connect`). It is right more often than the rough one, in
-frames that are not clear too, so the filters are learnt once more from it.
+frames that are not clear too, so the filters are learnt once more from it. What they are learnt
+from the second time needs no more than some frames of every second.
 
 `method="paper"` keeps the path through colour and radial symmetry as it was found.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Literal, TypeVar
 
 import cv2
 import numpy as np
@@ -21,7 +22,7 @@ from keyrecon.background import Scene
 from keyrecon.pictures import side_by_side
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Track
-from keyrecon.tracking.connect import Seen, connect_feet, connect_head
+from keyrecon.tracking.connect import Gait, Seen, connect_feet, connect_head
 from keyrecon.tracking.correlation import Filters, respond, spectrum
 from keyrecon.tracking.crops import ABOVE, Channels, Cropping, Crops, cut_crops
 from keyrecon.tracking.learn import clear_frames, learn_parts, sound_frames
@@ -29,8 +30,10 @@ from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.symmetry import find_peaks
 from keyrecon.video import Video
 
-ROUNDS = 2
-"""Times that filters are learnt: from clear frames, then from all on the track that these gave."""
+Record = TypeVar("Record", Crops, CameraPath, Track)
+
+PACE = 16.0
+"""Frames per second that filters learnt from clear frames look at: examples for the next ones."""
 OWN = 0.035
 """Foreground is asked for this far around a foot, player heights."""
 STILL_SHARE = 0.3
@@ -41,6 +44,9 @@ BELOW_HEAD = 0.4
 """Feet are farther below the head than this, player heights."""
 MEMORY = 0.24
 """A hidden foot is remembered for this long, seconds: a step lasts about as long."""
+UNSURE, SURE = 2.0, 1.0
+"""Costs of taking a foot for hidden behind the other: filters that know clear frames only respond
+weakly to a foot in a rarer place, the next ones do not."""
 HEADS, FEET = 4, 8
 """Candidates kept of each, per frame."""
 
@@ -77,26 +83,58 @@ def track_player(  # noqa: PLR0913
         return rough
     cropping = Cropping(rough, options.player)
     crops = cut_crops(video, cropping, Scene(background, camera), progress)
+    shot = _Shot(crops, cropping, camera, zoom(camera, video), video.fps)
     channels = Channels.of(colors, cropping.size)
-    track, chosen = rough, clear_frames(rough)
-    for _ in range(ROUNDS):
-        filters = learn_parts(crops, channels, cropping, track, _thin(chosen, options.examples))
-        seen = _look(crops, channels, filters, options.player, progress)
-        track = _connect(seen, video, camera, cropping, options)
-        chosen = sound_frames(track)
-    return track
+    few = shot.every(max(1, round(video.fps / PACE)))
+    filters = _learn(few, channels, few.cropping.track, clear_frames(few.cropping.track), options)
+    first = _connect(_look(few, channels, filters, progress), few, UNSURE, options)
+    filters = _learn(few, channels, first, sound_frames(first), options)
+    return _connect(_look(shot, channels, filters, progress), shot, SURE, options)
 
 
-def _thin(frames: Int[np.ndarray, "n"], most: int) -> Int[np.ndarray, "m"]:
-    """At most so many of the frames, spread evenly."""
-    rows = np.linspace(0, len(frames) - 1, min(most, len(frames)))
-    return frames[np.unique(rows.astype(int))]
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """The frames that are looked at."""
+
+    crops: Crops
+    cropping: Cropping
+    camera: CameraPath
+    magnification: Float[np.ndarray, "T"]
+    """By the camera's zoom."""
+    fps: float
+
+    def every(self, step: int) -> "_Shot":
+        """Each `step`-th of the frames."""
+        return _Shot(
+            _thinned(self.crops, step),
+            Cropping(_thinned(self.cropping.track, step), self.cropping.player),
+            _thinned(self.camera, step),
+            self.magnification[::step],
+            self.fps / step,
+        )
 
 
-def _look(
-    crops: Crops, channels: Channels, filters: Filters, tall: float, progress: Progress
-) -> list[Seen]:
+def _thinned(record: Record, step: int) -> Record:
+    """Each `step`-th frame of a record of arrays."""
+    return type(record)(*(getattr(record, field.name)[::step] for field in fields(record)))
+
+
+def _learn(
+    shot: _Shot,
+    channels: Channels,
+    track: Track,
+    frames: Int[np.ndarray, "n"],
+    options: TrackOptions,
+) -> Filters:
+    """Filters from some of the frames, spread evenly."""
+    rows = np.linspace(0, len(frames) - 1, min(options.examples, len(frames)))
+    chosen = frames[np.unique(rows.astype(int))]
+    return learn_parts(shot.crops, channels, shot.cropping, track, chosen)
+
+
+def _look(shot: _Shot, channels: Channels, filters: Filters, progress: Progress) -> list[Seen]:
     """Candidates of all frames."""
+    crops, tall = shot.crops, shot.cropping.player
 
     def look(t: int) -> Seen:
         lab, foreground = crops.lab[t], crops.foreground[t]
@@ -107,32 +145,30 @@ def _look(
     return list(side_by_side(look, frames))
 
 
-def _connect(
-    seen: list[Seen], video: Video, camera: CameraPath, cropping: Cropping, options: TrackOptions
-) -> Track:
-    """The track that the candidates give."""
-    step = float(np.median(cropping.track.height)) / video.fps
+def _connect(seen: list[Seen], shot: _Shot, behind: float, options: TrackOptions) -> Track:
+    """The track that the candidates give; a foot behind the other one costs `behind`."""
+    camera, cropping, fps = shot.camera, shot.cropping, shot.fps
+    step = float(np.median(cropping.track.height)) / fps
     head, head_trust = connect_head(seen, camera, cropping, options.head_speed * step)
-    feet, feet_trust = connect_feet(
-        seen, camera, cropping, head, options.foot_speed * step, round(MEMORY * video.fps)
-    )
-    frames = round(options.envelope * video.fps)
-    height = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
+    gait = Gait(options.foot_speed * step, round(MEMORY * fps), behind)
+    feet, feet_trust = connect_feet(seen, camera, cropping, head, gait)
+    frames = round(options.envelope * fps)
+    height = standing_height(head, feet.mean(axis=1), shot.magnification, frames)
     trust = np.sqrt(head_trust * feet_trust)
     return Track(head, feet, height, player_boxes(head, feet, height), trust)
 
 
 def search_crop(
-    response: Float[np.ndarray, "h w 2"], foreground: UInt8[np.ndarray, "h w"], tall: float
+    response: Float[np.ndarray, "2 h w"], foreground: UInt8[np.ndarray, "h w"], tall: float
 ) -> Seen:
     """Candidates in one crop, in its pixels."""
-    heads, head_strength = find_peaks(np.maximum(response[..., 0], 0), 2 * OWN * tall, HEADS)
+    heads, head_strength = find_peaks(np.maximum(response[0], 0), 2 * OWN * tall, HEADS)
     low = np.zeros(foreground.shape, bool)
     low[round((ABOVE + BELOW_HEAD) * tall) :] = True
     reach = 2 * max(1, round(OWN * tall)) + 1
     differs = foreground.astype(np.float32) / 255
     own = np.minimum(cv2.blur(differs, (reach, reach)) / LEAST_OWN, 1)
     own = STILL_SHARE + (1 - STILL_SHARE) * own
-    feet, foot_strength = find_peaks(np.maximum(response[..., 1], 0) * own, OWN * tall, FEET, low)
+    feet, foot_strength = find_peaks(np.maximum(response[1], 0) * own, OWN * tall, FEET, low)
     covered = cv2.resize(differs, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) > 0.5
     return Seen(heads, head_strength, feet, foot_strength, covered)
