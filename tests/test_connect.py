@@ -31,7 +31,7 @@ def see(covered):
         mask = np.full([n // 2 for n in cropping.size], covered)
         seen.append(Seen(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
-    return connect_feet(seen, camera, cropping, track().head, Gait(0.04 * TALL, 50, 1.0))
+    return connect_feet(seen, camera, cropping, track().head, Gait(0.04 * TALL, 50, 1.0, 1.0))
 
 
 def test_a_foot_behind_the_other_leg_stays_where_it_stood():

@@ -4,10 +4,10 @@ The path of the feet runs over pairs. A foot that cannot be seen is behind the o
 candidate alone makes a pair too, with the hidden foot on the shin above it. Or it was seen a moment
 ago, or will be in a moment: where a sure candidate of a frame nearby lies on the player now, it is
 a weak candidate of this frame too. A foot that stands therefore stays, while one in the air is soon
-forgotten.
+forgotten. What was guessed gives way to what was seen before and after it (see `smooth`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,10 +16,11 @@ from keyrecon.camera import warp_points
 from keyrecon.records import CameraPath
 from keyrecon.tracking.crops import Cropping
 from keyrecon.tracking.feet import foot_pairs, stance_costs
-from keyrecon.tracking.path import fill_gaps, stabilise, taken_places, trust_states
+from keyrecon.tracking.path import fill_gaps, stabilise, taken_states, trust_states
+from keyrecon.tracking.smooth import smooth_pairs
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 
-EVEN, DOUBT = 0.43, 0.07
+EVEN, DOUBT = 0.40, 0.07
 """Strength that is as likely a part as not, and how fast the odds change with it: responses beside
 the parts stay below a third of the usual one."""
 HIDDEN = 1.5
@@ -60,6 +61,19 @@ class Gait:
     """Frames before and after in which a hidden foot is looked up."""
     behind: float
     """Cost of a foot that is not seen and taken to be behind the other."""
+    stiffness: float
+    """How smooth the paths of feet are, see `smooth`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """What a frame offers for both feet."""
+
+    places: Float[np.ndarray, "s 2 2"]
+    each: Float[np.ndarray, "s 2"]
+    """Cost of each foot by itself."""
+    cost: Float[np.ndarray, "s"]
+    """Cost of both together."""
 
 
 def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
@@ -76,7 +90,7 @@ def connect_head(
     costs = [part_costs(s.head_strength) for s in seen]
     chosen = cheapest_path(costs, stable, Motion(sigma))
     back = np.linalg.inv(camera.to_reference)
-    head = fill_gaps(taken_places(stable, chosen), np.arange(len(seen)), back)[:, 0]
+    head = fill_gaps(taken_states(stable, chosen), np.arange(len(seen)), back)[:, 0]
     return head, trust_states(costs, chosen)
 
 
@@ -92,18 +106,19 @@ def connect_feet(
     back = np.linalg.inv(camera.to_reference)
     stable = stabilise(places, camera.to_reference)
     hidden = remember_feet(seen, stable, back, cropping, gait.memory)
-    costs, pairs = [], []
+    pairs = []
     for t, look in enumerate(seen):
         own = np.concatenate([part_costs(look.foot_strength), np.full(len(hidden[t]), HIDDEN)])
         feet = np.concatenate([stable[t], hidden[t]])
         in_picture = warp_points(back[t], feet) if len(feet) else feet
-        tall = float(cropping.track.height[t])
-        both, cost = _pair(in_picture, own, gait.behind, (head[t], tall))
-        costs.append(cost)
-        pairs.append(warp_points(camera.to_reference[t], both))
-    taken = cheapest_path(costs, pairs, Motion(gait.step, gap=12, miss=7.0))
-    feet = fill_gaps(taken_places(pairs, taken), np.arange(len(seen)), back)
-    return feet, trust_states([c / 2 for c in costs], taken)
+        body = head[t], float(cropping.track.height[t])
+        both = _pair(in_picture, own, gait.behind, body)
+        pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
+    costs, places = [p.cost for p in pairs], [p.places for p in pairs]
+    taken = cheapest_path(costs, places, Motion(gait.step, gap=12, miss=7.0))
+    each = taken_states([p.each for p in pairs], taken)
+    smooth = smooth_pairs(taken_states(places, taken), each, gait.stiffness)
+    return warp_points(back[:, None], smooth), trust_states([c / 2 for c in costs], taken)
 
 
 def _pair(
@@ -111,20 +126,20 @@ def _pair(
     cost: Float[np.ndarray, "n"],
     behind: float,
     body: tuple[Float[np.ndarray, "2"], float],
-) -> tuple[Float[np.ndarray, "s 2 2"], Float[np.ndarray, "s"]]:
+) -> Pairs:
     """The best pairs of feet below a head and of a height, and their costs.
 
     A place alone hides another foot, at the cost `behind`.
     """
     head, height = body
     every = foot_pairs(len(feet))
-    both = feet[every]
+    both, each = feet[every], cost[every]
     alone = every[:, 0] == every[:, 1]
     both[alone, 1, 1] -= FARTHER_UP * height
-    own = cost[every[:, 0]] + np.where(alone, behind, cost[every[:, 1]])
-    total = own + stance_costs(both, head, height)
+    each[alone, 1] = behind
+    total = each.sum(axis=1) + stance_costs(both, head, height)
     best = np.argsort(total)[:PAIRS]
-    return both[best], total[best]
+    return Pairs(both[best], each[best], total[best])
 
 
 def remember_feet(

@@ -27,7 +27,7 @@ from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.tracking.candidates import Candidates, search_frame
 from keyrecon.tracking.evidence import Reader, first_scene, weigh_evidence
 from keyrecon.tracking.feet import foot_pairs, pair_costs
-from keyrecon.tracking.path import fill_gaps, stabilise, taken_places, trust_states
+from keyrecon.tracking.path import fill_gaps, stabilise, taken_states, trust_states
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 from keyrecon.video import Video
@@ -132,12 +132,12 @@ def _connect(
     chosen = cheapest_path(head_cost, stable, Motion(options.head_speed * step))
     if (chosen >= 0).mean() < LEAST_FOUND:
         raise _lost(chosen, numbers)
-    head = fill_gaps(taken_places(stable, chosen), numbers, from_reference)[:, 0]
+    head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
     pairs, costs = _pair(found, head[numbers], height)
     stable = stabilise([c.feet for c in found], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
     taken = cheapest_path(costs, stable, Motion(options.foot_speed * step, gap=12, miss=7.0))
-    feet = fill_gaps(taken_places(stable, taken), numbers, from_reference)
+    feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)
     standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
     halves = [c / 2 for c in costs]

@@ -18,14 +18,13 @@ def stabilise(
     return [warp_points(path, p) for path, p in zip(to_reference, places, strict=True)]
 
 
-def taken_places(
-    places: list[Float[np.ndarray, "_ p 2"]], chosen: Int[np.ndarray, "n"]
-) -> Float[np.ndarray, "n p 2"]:
-    """The states that a path takes; NaN where it takes none."""
-    points = next(p.shape[1] for p in places)
-    taken = np.full((len(chosen), points, 2), np.nan)
+def taken_states(
+    states: list[Float[np.ndarray, "_ *d"]], chosen: Int[np.ndarray, "n"]
+) -> Float[np.ndarray, "n *d"]:
+    """The states that a path takes, or anything known of them; NaN where it takes none."""
+    taken = np.full((len(chosen), *states[0].shape[1:]), np.nan)
     for t in np.flatnonzero(chosen >= 0):
-        taken[t] = places[t][chosen[t]]
+        taken[t] = states[t][chosen[t]]
     return taken
 
 
@@ -39,26 +38,37 @@ def fill_gaps(
     Each of several points stays near its predecessor. Between known frames, and where a place is
     NaN, places are interpolated linearly.
     """
-    seen = np.flatnonzero(np.isfinite(stable).all(axis=(1, 2)))
+    placed = interpolate(stable, numbers, np.arange(len(from_reference)))
+    return warp_points(from_reference[:, None], placed)
+
+
+def interpolate(
+    places: Float[np.ndarray, "n p d"], numbers: Int[np.ndarray, "n"], wanted: Int[np.ndarray, "T"]
+) -> Float[np.ndarray, "T p d"]:
+    """Values at the wanted frames, linear between those that are known, and held beyond them."""
+    seen = np.flatnonzero(np.isfinite(places).reshape(len(places), -1).all(axis=1))
     if not len(seen):
         raise KeyreconError(
             "Neither a head nor two feet below it make a path through the video; pick the colours "
             "of head and shoes again, on another frame too."
         )
-    known = keep_order(stable[seen]).reshape(len(seen), -1)
-    every = np.arange(len(from_reference))
-    between = [np.interp(every, numbers[seen], column) for column in known.T]
-    placed = np.stack(between, axis=1).reshape(len(every), -1, 2)
-    return warp_points(from_reference[:, None], placed)
+    known = keep_order(places[seen])
+    columns = known.reshape(len(seen), -1).T
+    between = [np.interp(wanted, numbers[seen], column) for column in columns]
+    return np.stack(between, axis=1).reshape(len(wanted), *known.shape[1:])
 
 
-def keep_order(places: Float[np.ndarray, "n p 2"]) -> Float[np.ndarray, "n p 2"]:
-    """Swap the members of each pair so that each stays near its predecessor."""
+def keep_order(places: Float[np.ndarray, "n p d"]) -> Float[np.ndarray, "n p d"]:
+    """Swap the members of each pair so that each stays near its predecessor.
+
+    The first two of `d` values are the place; others go along.
+    """
     both = places.copy()
     for t in range(1, len(both)):
-        direct = np.linalg.norm(both[t] - both[t - 1], axis=1).sum()
-        if np.linalg.norm(both[t][::-1] - both[t - 1], axis=1).sum() < direct:
-            both[t] = both[t][::-1]
+        here, before = both[t, :, :2], both[t - 1, :, :2]
+        direct = np.linalg.norm(here - before, axis=1).sum()
+        if np.linalg.norm(here[::-1] - before, axis=1).sum() < direct:
+            both[t] = both[t, ::-1].copy()
     return both
 
 

@@ -65,6 +65,8 @@ class TrackOptions:
     """Usual speed of the head, player heights per second."""
     foot_speed: float = 2.0
     """Usual speed of the feet, player heights per second; a step is faster, a stance slower."""
+    foot_rate: float = 4.0
+    """Feet that move to and fro more often than this are smoothed, times per second."""
     envelope: float = 5.0
     """The standing height may change over this time, seconds."""
 
@@ -150,7 +152,8 @@ def _connect(seen: list[Seen], shot: _Shot, behind: float, options: TrackOptions
     camera, cropping, fps = shot.camera, shot.cropping, shot.fps
     step = float(np.median(cropping.track.height)) / fps
     head, head_trust = connect_head(seen, camera, cropping, options.head_speed * step)
-    gait = Gait(options.foot_speed * step, round(MEMORY * fps), behind)
+    stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
+    gait = Gait(options.foot_speed * step, round(MEMORY * fps), behind, stiffness)
     feet, feet_trust = connect_feet(seen, camera, cropping, head, gait)
     frames = round(options.envelope * fps)
     height = standing_height(head, feet.mean(axis=1), shot.magnification, frames)
