@@ -20,9 +20,10 @@ from keyrecon.tracking.path import fill_gaps, stabilise, taken_states, trust_sta
 from keyrecon.tracking.smooth import smooth_pairs
 from keyrecon.tracking.viterbi import Motion, cheapest_path
 
-EVEN, DOUBT = 0.40, 0.07
-"""Strength that is as likely a part as not, and how fast the odds change with it: responses beside
-the parts stay below a third of the usual one."""
+EVEN, DOUBT = 0.36, 0.07
+"""Strength that is as likely a part as not, and how fast the odds change with it, on rendered
+players: on the floor a third of the usual strength is a foot, higher up half of it may be a
+racket."""
 HIDDEN = 1.5
 """Cost of a foot that is not seen, but was nearby in time."""
 FARTHER_UP = 0.07
