@@ -15,7 +15,7 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 
 from keyrecon.camera import warp_points
 from keyrecon.colors import to_lab
@@ -55,6 +55,9 @@ CANDIDATES = 24
 """Sampled frames whose colours are tried."""
 CHROMA = 1.6
 """Weight of a and b against L: chroma varies less with light."""
+SQUARES = np.arange(256, dtype=np.float32)[:, None, None] * np.float32((1, CHROMA, CHROMA))
+SQUARES *= SQUARES
+"""Weighted square of a difference in L, a and b."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +168,11 @@ class Scene:
         spread[unseen > 0] = UNKNOWN
         return spread
 
+    @cached_property
+    def _doubt(self) -> Float32[np.ndarray, "256"]:
+        """Square of the difference that is as likely the player as not, by `_spread`."""
+        return np.square(np.arange(256, dtype=np.float32) * np.float32(self.sure / 8))
+
     def foreground(
         self,
         lab: UInt8[np.ndarray, "h w 3"],
@@ -179,15 +187,15 @@ class Scene:
         size = (lab.shape[1], lab.shape[0])
         low, high = (_seen_through(plate, to_plate, size) for plate in (self._low, self._high))
         spread = _seen_through(self._spread, to_plate, size)
-        under, over = cv2.subtract(low, lab), cv2.subtract(lab, high)
-        off = cv2.max(under, over).astype(np.float32)
+        under = cv2.subtract(low, lab)
+        squares = cv2.LUT(cv2.max(under, cv2.subtract(lab, high)), SQUARES)
+        light, a, b = cv2.split(squares)
         # A shadow darkens by a share; deeper than any shadow counts fully again.
-        floor = cv2.multiply(low[..., 0], DEEPEST_SHADOW)
-        shadow = (under[..., 0] > 0) & (lab[..., 0] > floor)
-        off[..., 0][shadow] *= SHADOW
-        off *= (1.0, CHROMA, CHROMA)
-        square = np.einsum("ijk,ijk->ij", off, off)
-        likely = square / (square + (spread.astype(np.float32) * (self.sure / 8)) ** 2)
+        floor = cv2.multiply(cv2.extractChannel(low, 0), DEEPEST_SHADOW)
+        shadow = (under[..., 0] > 0) & (cv2.extractChannel(lab, 0) > floor)
+        np.multiply(light, SHADOW**2, out=light, where=shadow)
+        square = light + a + b
+        likely = square / (square + self._doubt[spread])
         likely[spread == UNKNOWN] = 0.5
         return likely
 
