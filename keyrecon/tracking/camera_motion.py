@@ -9,14 +9,14 @@ clearly better, since its extra freedom otherwise drifts where there are no corn
 
 Frames are registered to key pictures, not to their predecessors: a new key picture is taken only
 when the view has left all earlier ones, so errors add up per view, not per frame, and a camera that
-comes back finds its old key picture. Letters and logos laid over the picture stand still while the
-scene moves; edges that persist at one place of the picture in a minority of it are left out.
+comes back finds its old key picture. While the camera rests, only a few frames are registered.
+Letters and logos laid over the picture are left out (`overlay.py`).
 
 If no corner moves noticeably over the whole sequence, the camera is static and the path is
 exactly the identity.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import cv2
@@ -27,9 +27,11 @@ from keyrecon.camera import warp_points
 from keyrecon.pictures import read_grey, shrinking
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
+from keyrecon.tracking.overlay import Overlay
 from keyrecon.video import Video
 
 Grey = UInt8[np.ndarray, "h w"]
+Matrix = Float[np.ndarray, "3 3"]
 
 CORNERS = 240
 """Corners followed from a key picture."""
@@ -39,13 +41,16 @@ LEAST_INLIERS = 12
 """Fewer agreeing corners say nothing about the camera."""
 CLEARLY_BETTER = 0.8
 """A homography must bring the median residual below this share of a similarity's."""
-PERSISTENT = 0.85
-"""An edge that keeps its place and direction to this degree all along is laid over the picture
-(or the camera is static)."""
-
-
 FEW = 0.05
 """Share of the corners that may lie on overlays: so few are outvoted with the player."""
+NOTICEABLE = 3.0
+"""A corner that the model moves by so much shows whether it belongs to the scene, reduced px."""
+REST = 4
+"""Frames looked at together while the camera rests: only the last of them is registered."""
+CALM = 0.25
+"""A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
+TRUSTED = 0.35
+"""Share of agreeing corners below which a key picture has nothing to say."""
 
 
 @dataclass(frozen=True)
@@ -70,29 +75,17 @@ class _Key:
     to_start: Float[np.ndarray, "3 3"]
 
 
-@dataclass(eq=False)
-class _Overlay:
-    """Running evidence of edges that keep their place in the picture."""
+@dataclass(frozen=True, eq=False)
+class _Match:
+    """How a key picture is found again in a frame."""
 
-    gradient: Float[np.ndarray, "2 h w"] | None = None
-    strength: Float[np.ndarray, "h w"] | None = None
-
-    def add(self, grey: Grey) -> None:
-        """Take one more picture into account."""
-        soft = cv2.GaussianBlur(grey, (0, 0), 1.0)
-        slope = np.stack([cv2.Sobel(soft, cv2.CV_32F, 1, 0), cv2.Sobel(soft, cv2.CV_32F, 0, 1)])
-        size = np.hypot(*slope)
-        self.gradient = slope if self.gradient is None else self.gradient + slope
-        self.strength = size if self.strength is None else self.strength + size
-
-    def mask(self) -> Bool[np.ndarray, "h w"]:
-        """Where persistent edges lie, if they are few against those that do not persist."""
-        strong = self.strength > np.percentile(self.strength, 90)
-        persistent = strong & (np.hypot(*self.gradient) > PERSISTENT * self.strength)
-        if persistent.sum() > 0.5 * strong.sum():
-            return np.zeros(strong.shape, bool)
-        size = max(3, strong.shape[1] // 60)
-        return cv2.dilate(persistent.astype(np.uint8), np.ones((size, size))) > 0
+    model: Float[np.ndarray, "3 3"]
+    trust: float
+    """Share of agreeing corners."""
+    moved: Float[np.ndarray, "m 2"]
+    """Corners of the key picture that the model moves noticeably."""
+    follows: Bool[np.ndarray, "m"]
+    """Whether they were found where it puts them."""
 
 
 @dataclass(eq=False)
@@ -100,29 +93,43 @@ class _Follower:
     """Registers one frame after the other."""
 
     options: CameraOptions
-    forbidden: Bool[np.ndarray, "h w"] | None
+    forbidden: Bool[np.ndarray, "h w"] | None = None
+    overlay: Overlay = field(default_factory=Overlay)
     keys: list[_Key] = field(default_factory=list)
     current: int = 0
 
-    def register(
-        self, grey: Grey, guess: Float[np.ndarray, "3 3"]
-    ) -> tuple[Float[np.ndarray, "3 3"], float]:
+    def register(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float]:
         """Homography from this frame to frame 0, and its trust; `guess` is the last frame's."""
         if not self.keys:
             self.keys.append(self._key(grey, np.eye(3)))
             return np.eye(3), 1.0
         self.current = self._nearest(guess, grey.shape)
         key = self.keys[self.current]
-        moved, trust = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
-        if moved is None:
+        match = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
+        if match is None:
             # The view was cut or blurred: start a view of its own where we believe to be.
             self.keys.append(self._key(grey, guess))
             return guess, 0.0
-        to_start = key.to_start @ np.linalg.inv(moved)
-        to_start /= to_start[2, 2]
-        if _displacement(moved, grey.shape) > self.options.leave or trust < 0.35:
+        self.overlay.vote(grey.shape, match.moved, match.follows)
+        to_start = _chain(key, match)
+        if self._leaves(match, grey):
             self.keys.append(self._key(grey, to_start))
-        return to_start, trust
+        return to_start, match.trust
+
+    def glance(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
+        """The same for a frame a little later; None if the camera has moved since."""
+        key = self.keys[self.current]
+        match = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
+        if match is None or self._leaves(match, grey):
+            return None
+        to_start = _chain(key, match)
+        step = _displacement(np.linalg.inv(guess) @ to_start, grey.shape)
+        return None if step * grey.shape[1] > CALM else (to_start, match.trust)
+
+    def _leaves(self, match: _Match, grey: Grey) -> bool:
+        """Whether this frame shares too little with its key picture."""
+        far = _displacement(match.model, grey.shape) > self.options.leave
+        return far or match.trust < TRUSTED
 
     def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> _Key:
         return _Key(grey, _corners(grey, self.forbidden), to_start)
@@ -136,6 +143,12 @@ class _Follower:
         return self.current if keep else best
 
 
+def _chain(key: _Key, match: _Match) -> Float[np.ndarray, "3 3"]:
+    """Homography to frame 0 by way of a key picture."""
+    to_start = key.to_start @ np.linalg.inv(match.model)
+    return to_start / to_start[2, 2]
+
+
 def follow_camera(
     video: Video, options: CameraOptions = CameraOptions(), progress: Progress = silent
 ) -> CameraPath:
@@ -144,17 +157,18 @@ def follow_camera(
     Exactly the identity for a static camera. Trust is low where the view was cut.
     """
     width = min(options.width, video.width)
-    overlay = _Overlay()
-    stride = max(1, len(video) // 64)
-    pictures = progress(read_grey(video, width), "Following the camera", len(video))
-    path, trust, keys = _follow(pictures, options, None, (overlay, stride))
     shape = (round(video.height * width / video.width), width)
+
+    def pictures() -> Iterator[Grey]:
+        return progress(read_grey(video, width), "Following the camera", len(video))
+
+    follower = _Follower(options)
+    path, trust = _follow(pictures(), follower, max(1, len(video) // 64))
     if _is_static(path, shape, options):
         return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
-    forbidden = overlay.mask()
-    if _hold(keys, forbidden) > FEW:
-        pictures = progress(read_grey(video, width), "Following the camera", len(video))
-        path, trust, _ = _follow(pictures, options, forbidden, None)
+    if follower.overlay.share(np.concatenate([k.corners for k in follower.keys])) > FEW:
+        follower = _Follower(options, follower.overlay.mask())
+        path, trust = _follow(pictures(), follower)
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
@@ -163,33 +177,40 @@ def follow_camera(
     return CameraPath(full / full[:, 2:, 2:], trust)
 
 
-def _hold(keys: list[_Key], forbidden: Bool[np.ndarray, "h w"]) -> float:
-    """Share of the corners of all key pictures that lie on something laid over the picture."""
-    x, y = np.concatenate([k.corners for k in keys]).astype(int).T
-    return float(forbidden[y, x].mean()) if len(x) else 0.0
-
-
 def _follow(
-    pictures: Iterable[Grey],
-    options: CameraOptions,
-    forbidden: Bool[np.ndarray, "h w"] | None,
-    watch: tuple[_Overlay, int] | None,
-) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"], list[_Key]]:
-    """Homographies to frame 0 in reduced pixels; `watch` collects evidence of overlays."""
-    follower = _Follower(options, forbidden)
-    guess, path, trust = np.eye(3), [], []
+    pictures: Iterable[Grey], follower: _Follower, watch: int | None = None
+) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"]]:
+    """Homographies to frame 0 in reduced pixels; evidence of overlays from each `watch`-th."""
+    path: list[tuple[Matrix, float]] = []
+    waiting: list[Grey] = []
     for number, grey in enumerate(pictures):
-        if watch and number % watch[1] == 0:
-            watch[0].add(grey)
-        guess, agreed = follower.register(grey, guess)
-        path.append(guess)
-        trust.append(agreed)
-    return np.array(path), np.array(trust), follower.keys
+        if watch and number % watch == 0:
+            follower.overlay.add(grey)
+        waiting.append(grey)
+        if len(waiting) == REST or len(path) < REST:
+            path += _register(follower, waiting, path)
+            waiting = []
+    path += _register(follower, waiting, path)
+    return np.array([pose for pose, _ in path]), np.array([trust for _, trust in path])
 
 
-def _corners(
-    grey: Grey, forbidden: Bool[np.ndarray, "h w"] | None
-) -> Float[np.ndarray, "n 2"]:
+def _register(
+    follower: _Follower, waiting: list[Grey], before: list[tuple[Matrix, float]]
+) -> list[tuple[Matrix, float]]:
+    """Poses of frames in a row; while the camera rests, the last one tells those before it."""
+    found = list(before[-2:])
+    if len(found) == 2 and waiting:
+        last, there = found[0][0], found[1][0]
+        step = _displacement(np.linalg.inv(last) @ there, waiting[0].shape)
+        if step * waiting[0].shape[1] < CALM and (rest := follower.glance(waiting[-1], there)):
+            along = np.linspace(0, 1, len(waiting) + 1)[1:]
+            return [(there + share * (rest[0] - there), rest[1]) for share in along]
+    for grey in waiting:
+        found.append(follower.register(grey, found[-1][0] if found else np.eye(3)))
+    return found[len(before[-2:]) :]
+
+
+def _corners(grey: Grey, forbidden: Bool[np.ndarray, "h w"] | None) -> Float[np.ndarray, "n 2"]:
     """Corners spread over the picture: the best of each cell of a grid, weak ones left out."""
     mask = None if forbidden is None else (~forbidden).astype(np.uint8)
     response = cv2.cornerMinEigenVal(grey, 5)
@@ -206,17 +227,15 @@ def _corners(
     return np.stack([x[good], y[good]], axis=1).astype(np.float32)
 
 
-def _match(
-    key: _Key, grey: Grey, guess: Float[np.ndarray, "3 3"]
-) -> tuple[Float[np.ndarray, "3 3"] | None, float]:
-    """Homography from a key picture to this one, and its share of agreeing corners."""
+def _match(key: _Key, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Match | None:
+    """Homography from a key picture to this one; None where too few corners agree."""
     if len(key.corners) < LEAST_INLIERS:
-        return None, 0.0
+        return None
     start = warp_points(guess, key.corners.astype(float)).astype(np.float32)
     size = np.array(grey.shape[::-1])
     inside = ((start > 4) & (start < size - 5)).all(axis=1)
     if inside.sum() < LEAST_INLIERS:
-        return None, 0.0
+        return None
     source = np.ascontiguousarray(key.corners[inside])
     found, status, _ = cv2.calcOpticalFlowPyrLK(
         key.picture, grey, source, start[inside].copy(), winSize=(15, 15), maxLevel=3,
@@ -224,32 +243,41 @@ def _match(
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )  # fmt: skip
     good = status.ravel() > 0
-    model, inliers = _fit(source[good], found[good])
-    return model, 0.0 if model is None else float(inliers) / int(inside.sum())
+    source, found = source[good], found[good]
+    model = _fit(source, found)
+    if model is None:
+        return None
+    put = warp_points(model, source)
+    agrees = np.linalg.norm(put - found, axis=1) < 1.5 * INLIER
+    if agrees.sum() < LEAST_INLIERS:
+        return None
+    moved = np.linalg.norm(put - source, axis=1) > NOTICEABLE
+    return _Match(model, float(agrees.sum()) / int(inside.sum()), source[moved], agrees[moved])
 
 
 def _fit(
     source: Float[np.ndarray, "n 2"], target: Float[np.ndarray, "n 2"]
-) -> tuple[Float[np.ndarray, "3 3"] | None, int]:
-    """A similarity, or a homography where that is clearly better; and how many points agree."""
+) -> Float[np.ndarray, "3 3"] | None:
+    """A similarity, or a homography where that is clearly better."""
     if len(source) < LEAST_INLIERS:
-        return None, 0
+        return None
     similar, _ = cv2.estimateAffinePartial2D(
         source, target, method=cv2.RANSAC, ransacReprojThreshold=2 * INLIER, maxIters=500
     )
     if similar is None:
-        return None, 0
+        return None
     model = np.vstack([similar, [0, 0, 1]])
-    error = np.linalg.norm(warp_points(model, source) - target, axis=1)
     # Four parameters more need many corners to be known well.
-    if len(source) >= 5 * LEAST_INLIERS:
-        full, _ = cv2.findHomography(source, target, cv2.RANSAC, INLIER, maxIters=500)
-        if full is not None:
-            other = np.linalg.norm(warp_points(full, source) - target, axis=1)
-            if np.median(np.minimum(other, 3)) < CLEARLY_BETTER * np.median(np.minimum(error, 3)):
-                model, error = full, other
-    agree = int((error < 1.5 * INLIER).sum())
-    return (None, 0) if agree < LEAST_INLIERS else (model, agree)
+    if len(source) < 5 * LEAST_INLIERS:
+        return model
+    full, _ = cv2.findHomography(source, target, cv2.RANSAC, INLIER, maxIters=500)
+    if full is None:
+        return model
+    error, other = (
+        np.median(np.minimum(np.linalg.norm(warp_points(m, source) - target, axis=1), 3))
+        for m in (model, full)
+    )
+    return full if other < CLEARLY_BETTER * error else model
 
 
 def _displacement(moved: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> float:
