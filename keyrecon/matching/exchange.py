@@ -127,11 +127,12 @@ def exchange_for_closeness(
         changed = False
         for place, present in enumerate(chosen):
             others = chosen[:place] + chosen[place + 1 :]
-            nearest = distance[others].min(axis=0, initial=np.inf)
-            total = np.minimum(distance, nearest) @ weight
             left_with, _ = goal.replacements(others)
-            total[left_with > goal.uncovered] = np.inf
-            total[others] = np.inf
+            left_with[others] = goal.uncovered + 1
+            allowed = np.flatnonzero(left_with <= goal.uncovered)
+            nearest = distance[others].min(axis=0, initial=np.inf)
+            total = np.full(len(weight), np.inf, distance.dtype)
+            total[allowed] = np.minimum(distance[allowed], nearest) @ weight
             best = int(total.argmin())
             if total[best] < total[present] * (1 - 1e-6):
                 chosen[place], changed = best, True
