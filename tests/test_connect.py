@@ -8,6 +8,7 @@ from keyrecon.tracking.connect import Gait, Seen, connect_feet
 from keyrecon.tracking.crops import Cropping
 from keyrecon.tracking.learn import clear_frames
 from keyrecon.tracking.path import fill_gaps
+from keyrecon.tracking.player import search_crop
 
 COUNT, TALL = 60, 56.0
 HEAD, LEFT, RIGHT = (np.array(spot) for spot in ((200.0, 100.0), (195.0, 150.0), (205.0, 158.0)))
@@ -63,3 +64,14 @@ def test_frames_with_a_racket_or_one_shoe_for_both_feet_teach_nothing():
     told.feet[10:20, 1] = (220, 136)
     told.feet[30:40, 0] = (206, 158)
     assert set(clear_frames(told)) == set(range(COUNT)) - set(range(10, 20)) - set(range(30, 40))
+
+
+def test_a_place_with_the_leg_beneath_it_is_less_a_foot_than_one_with_the_floor():
+    response = np.zeros((2, 88, 96), np.float32)
+    response[1, 60, 40] = response[1, 72, 60] = 1.0
+    player = np.zeros((88, 96), np.float32)
+    player[40:74, 36:45] = player[40:73, 56:65] = 1.0
+    seen = search_crop(response, (255 * player).astype(np.uint8), player, TALL)
+    strength = {round(x): s for (x, _), s in zip(seen.feet, seen.foot_strength, strict=True)}
+    assert strength[60] == pytest.approx(1.0)
+    assert strength[40] == pytest.approx(0.5)

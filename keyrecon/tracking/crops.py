@@ -135,3 +135,7 @@ class Channels:
             np.maximum(map_, 0, out=channel)
         seen *= self.border
         return seen
+
+    def player(self, seen: Float[np.ndarray, "D h w"]) -> Float[np.ndarray, "h w"]:
+        """Any part of the player where the scene is covered, from the channels of a crop."""
+        return seen[1 : 1 + len(self.tables)].max(axis=0) * seen[0]

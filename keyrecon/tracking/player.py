@@ -40,6 +40,11 @@ STILL_SHARE = 0.3
 """Weight of a foot where nothing differs from the scene: a line, or a shoe of its colour."""
 LEAST_OWN = 0.5
 """Less foreground around a foot makes it doubtful."""
+BENEATH = 0.07, 0.2, 0.04
+"""A foot has nothing of the player beneath it from the first to the second of these, and as far
+aside as the third, player heights; a place on the shin has."""
+ON_LEG, LEAST_LEG = 0.5, 0.5
+"""Share of the response that a place loses which has this share of the player's colours beneath."""
 BELOW_HEAD = 0.4
 """Feet are farther below the head than this, player heights."""
 MEMORY = 0.24
@@ -140,8 +145,10 @@ def _look(shot: _Shot, channels: Channels, filters: Filters, progress: Progress)
 
     def look(t: int) -> Seen:
         lab, foreground = crops.lab[t], crops.foreground[t]
-        response = respond(filters, spectrum(channels.see(lab, foreground)))
-        return search_crop(response, foreground, tall)
+        seen = channels.see(lab, foreground)
+        return search_crop(
+            respond(filters, spectrum(seen)), foreground, channels.player(seen), tall
+        )
 
     frames = progress(range(len(crops.lab)), "Looking for head and feet", len(crops.lab))
     return list(side_by_side(look, frames))
@@ -162,7 +169,10 @@ def _connect(seen: list[Seen], shot: _Shot, behind: float, options: TrackOptions
 
 
 def search_crop(
-    response: Float[np.ndarray, "2 h w"], foreground: UInt8[np.ndarray, "h w"], tall: float
+    response: Float[np.ndarray, "2 h w"],
+    foreground: UInt8[np.ndarray, "h w"],
+    player: Float[np.ndarray, "h w"],
+    tall: float,
 ) -> Seen:
     """Candidates in one crop, in its pixels."""
     heads, head_strength = find_peaks(np.maximum(response[0], 0), 2 * OWN * tall, HEADS)
@@ -172,6 +182,17 @@ def search_crop(
     differs = foreground.astype(np.float32) / 255
     own = np.minimum(cv2.blur(differs, (reach, reach)) / LEAST_OWN, 1)
     own = STILL_SHARE + (1 - STILL_SHARE) * own
+    own *= 1 - ON_LEG * np.minimum(_beneath(player, tall) / LEAST_LEG, 1)
     feet, foot_strength = find_peaks(np.maximum(response[1], 0) * own, OWN * tall, FEET, low)
     covered = cv2.resize(differs, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) > 0.5
     return Seen(heads, head_strength, feet, foot_strength, covered)
+
+
+def _beneath(player: Float[np.ndarray, "h w"], tall: float) -> Float[np.ndarray, "h w"]:
+    """Share of the player's colours beneath every place: a shin has them, a foot has not."""
+    top, bottom, aside = (round(share * tall) for share in BENEATH)
+    rows = bottom - top
+    mean = cv2.blur(player, (2 * aside + 1, rows), anchor=(aside, 0))
+    under = np.zeros_like(player)
+    under[:-top] = mean[top:]
+    return under
