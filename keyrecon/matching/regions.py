@@ -76,14 +76,15 @@ def label_crop(
     """
     bins = color_bins(lab)
     unseen = foreground == 0.5
-    anything = palette.any_different[bins] * foreground
-    np.copyto(anything, palette.any_unseen[bins], where=unseen)
+    anything = np.take(palette.any_different, bins) * foreground
+    anything[unseen] = palette.any_unseen[bins[unseen]]
     anything = _soften(anything, player)
     labels = np.zeros(bins.shape, np.uint8)
     window = _window(anything >= 0.5, round((GROWTH + NEARBY) * player) + BORDER)
     if window is None:
         return labels
-    likely = palette.different[bins[window]] * foreground[window][..., None]
+    likely = np.take(palette.different, bins[window], axis=0)
+    likely *= foreground[window][..., None]
     likely[unseen[window]] = palette.unseen[bins[window][unseen[window]]]
     inside = palette.values[_soften(likely, player).argmax(axis=2)]
     inside[anything[window] < 0.5] = 0
