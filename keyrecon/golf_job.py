@@ -13,11 +13,12 @@ from keyrecon.formats.clicks import read_clicks
 from keyrecon.formats.motion_model import BUILT_IN, read_motion_model
 from keyrecon.formats.npz import write_motion
 from keyrecon.golf.clicks import Clicks
-from keyrecon.golf.fit import FitOptions, fit_swing, slide_fit
+from keyrecon.golf.fit import FitOptions, fit_again, fit_swing, slide_fit
 from keyrecon.golf.look import LookOptions, look_at_swing
 from keyrecon.golf.mirror import mirror_clicks, mirror_observations
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
 from keyrecon.golf.result import describe_fit
+from keyrecon.golf.second_look import SecondLookOptions, see_club_again
 from keyrecon.golf.skeleton import size_body
 from keyrecon.golf.start import place_player, start_state
 from keyrecon.progress import Progress, silent
@@ -41,6 +42,10 @@ class GolfOptions:
     """What is followed in the video."""
     fit: FitOptions = field(default_factory=FitOptions)
     """How the model is fitted to it."""
+    again: int = 2
+    """How many times the club is looked for again where the fitted swing expects it."""
+    second_look: SecondLookOptions = field(default_factory=SecondLookOptions)
+    """How it is looked for then."""
     slowmo: float = 1.0
     """How many times slower than real the video plays."""
 
@@ -52,26 +57,51 @@ def fit_video(
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
 ) -> tuple[FittedSwing, Observations]:
-    """Look at a swing and fit the model to it."""
+    """Look at a swing, fit the model to it, and look again with what the fit has shown."""
     observations = look_at_swing(video, clicks, model.keys, options.look, progress)
-    return fit_observations(observations, clicks, model, video, options), observations
+    fitted = fit_observations(observations, clicks, model, video, options)
+    return refine_fit(fitted, observations, clicks, model, video, options)
 
 
-def fit_observations(
+def refine_fit(  # noqa: PLR0913
+    fitted: FittedSwing,
     observations: Observations,
     clicks: Clicks,
     model: MotionModel,
     video: Video,
     options: GolfOptions = GolfOptions(),
+) -> tuple[FittedSwing, Observations]:
+    """The club looked for again where it is expected by now, and the fit with it; in turns."""
+    seen = observations
+    for _ in range(options.again if options.method == "swing" else 0):
+        seen = see_club_again(observations, video, fitted, clicks.height, options.second_look)
+        fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
+    return fitted, seen
+
+
+def fit_observations(  # noqa: PLR0913
+    observations: Observations,
+    clicks: Clicks,
+    model: MotionModel,
+    video: Video,
+    options: GolfOptions = GolfOptions(),
+    before: SwingState | None = None,
 ) -> FittedSwing:
-    """Fit the model to what was seen; left-handers are mirrored on the way in and out."""
+    """Fit the model to what was seen, from scratch or going on from a state found `before`.
+
+    Left-handers are mirrored on the way in and out; states are those of right-handers.
+    """
     seen, clicked = observations, dict(clicks.joints)
     if clicks.left_handed:
         seen, clicked = mirror_observations(seen, video.width), mirror_clicks(clicked, video.width)
     body = size_body(clicks.stature)
     placed = place_player(clicked, float(seen.mu[clicks.frame]), seen.camera, model, body)
-    fit = fit_swing if options.method == "swing" else slide_fit
-    found = fit(seen, model, body, start_state(placed, seen.mu), video.fps, options.fit)
+    start = start_state(placed, seen.mu)
+    if before is not None:
+        found = fit_again(seen, model, body, (start, before), video.fps, options.fit)
+    else:
+        fit = fit_swing if options.method == "swing" else slide_fit
+        found = fit(seen, model, body, start, video.fps, options.fit)
     return describe_fit(*found, observations, video.time, clicks.frame)
 
 

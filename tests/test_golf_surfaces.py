@@ -102,7 +102,7 @@ def test_the_distance_of_a_line_of_sight_is_that_of_the_nearest_point_of_the_sur
     placed, ways = pose(1), sight_lines(samples(), CAMERA)
     starts = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.start)
     ends = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.end)
-    _, found = pass_capsules(ways, starts.repeat(60, 0), ends.repeat(60, 0), CAPSULES.radii)
+    _, found = pass_capsules((ways, np.zeros(60, int)), starts, ends, CAPSULES.radii)
     share = np.linspace(0, 1, 2001)[:, None, None]
     points = (1 - share) * starts[0] + share * ends[0]
     radii = CAPSULES.radii[:, 0] + share[..., 0] * (CAPSULES.radii[:, 1] - CAPSULES.radii[:, 0])

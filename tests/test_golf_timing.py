@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.club import Club
@@ -10,8 +11,11 @@ TRUE = np.array([30, 78, 96, 130])
 
 
 def filmed(keys=TRUE, frames=160):
-    """A club that rests, goes up, comes down twice as fast, and goes up to a finish."""
-    passed = np.interp(np.arange(frames), keys, [0, 1, 2, 3])
+    """A club that rests, goes up, turns round, comes down faster, and goes up to a finish."""
+    pace = np.array([1 / 48, 1 / 30, 1 / 25, 1 / 34])
+    passed = CubicHermiteSpline(keys, [0, 1, 2, 3], pace)(
+        np.clip(np.arange(frames), keys[0], keys[3])
+    )
     up = 0.5 - 0.5 * np.cos(np.pi * passed)
     turn = np.radians(90) + np.radians(np.interp(passed, [0, 1, 2, 3], [0, 190, 0, -220]))
     hands = np.stack([300 - 60 * np.sin(np.pi * passed / 2), 300 - 80 * up], axis=1)
@@ -29,6 +33,14 @@ def test_key_postures_are_found_within_two_frames():
 def test_slow_motion_changes_no_key_posture():
     slowly = find_keys(filmed(), HEIGHT, FPS / 1.5)
     assert np.abs(slowly[:3] - TRUE[:3]).max() <= 3
+
+
+def test_a_rest_with_the_hands_up_is_no_address():
+    club = filmed(np.array([30, 78, 110, 144]), 180)
+    ends = club.ends.copy()
+    ends[60:78] = ends[78]
+    found = find_keys(Club(ends, club.seen, club.tip), HEIGHT, FPS)
+    assert abs(found[0] - 30) <= 4
 
 
 def test_someone_who_stands_still_makes_no_swing():

@@ -29,8 +29,11 @@ STEPS = 9
 """Places along a segment or a gap where the foreground is asked."""
 EDGE = 0.4
 """Probability of foreground at the side of a bar, against its middle."""
-FAINT = 40
+FAINT = 25
 """Probability of foreground, of 255, that a line may consist of."""
+BESIDE, ALONE = 0.02, 0.5
+"""How far beside such a line, in player heights, its foreground must have fallen to this share:
+where the scene is known badly, all of it is faint foreground."""
 VOTES, LINE, LINE_GAP = 0.05, 0.08, 0.02
 """Pixels on such a line, its length and its gaps, player heights."""
 ANGLES = np.arange(-90.0, 90.0, 0.5) * np.pi / 180
@@ -106,8 +109,28 @@ def _thin_lines(foreground: Foreground, frame: int) -> Float[np.ndarray, "n 2 2"
         line_gap=round(LINE_GAP * height), theta=ANGLES, rng=frame,
     )  # fmt: skip
     lines = np.array(found, float).reshape(-1, 2, 2)
+    lines = lines[_stand_alone(foreground.likely[frame], lines, BESIDE * height)]
     longest = np.argsort(-np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))[:MOST_LINES]
     return (lines[longest] - (foreground.shrink - 1) / 2) / foreground.shrink
+
+
+def _stand_alone(
+    likely: UInt8[np.ndarray, "h w"], lines: Float[np.ndarray, "n 2 2"], beside: float
+) -> Bool[np.ndarray, "n"]:
+    """Whether there is far less foreground on either side of lines than along them."""
+    if not len(lines):
+        return np.zeros(0, bool)
+    share = np.linspace(0, 1, STEPS)[:, None]
+    points = lines[:, None, 0] * (1 - share) + lines[:, None, 1] * share
+    way = lines[:, 1] - lines[:, 0]
+    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    across *= beside / np.linalg.norm(across, axis=1, keepdims=True)
+    along, one, other = (
+        cv2.remap(likely, (points + k * across[:, None]).astype(np.float32), None, cv2.INTER_LINEAR)
+        .astype(float).mean(axis=1)
+        for k in (0, -1, 1)
+    )  # fmt: skip
+    return np.maximum(one, other) < ALONE * along
 
 
 def drop_scenery(bars: Sequence[Bars], height: float) -> list[Bars]:

@@ -104,24 +104,73 @@ def fit_swing(
     options: FitOptions = FitOptions(),
 ) -> tuple[MotionModel, Body, SwingState]:
     """The swing that explains what was seen, from a rough start; and what it is made of."""
-    frames = len(start.mu)
+    frames, alphas = len(start.mu), _count_alphas(model, options)
+    knots = _knots(fps, options)
+    stages = [
+        (still_span(0, frames), 10.0),
+        (swing_span(min(alphas, FIRST), frames, knots), 3.0),
+        (swing_span(alphas, frames, knots), 1.0),
+    ]
+    state = replace(start, alpha=np.zeros(alphas))
+    kinds = _weigh_kinds(observations, model, body, start, (fps, options))
+    return model, body, _descend((model, body, kinds), stages, (state, start.mu), (fps, options))
+
+
+def fit_again(
+    observations: Observations,
+    model: MotionModel,
+    body: Body,
+    states: tuple[SwingState, SwingState],
+    fps: float,
+    options: FitOptions = FitOptions(),
+) -> tuple[MotionModel, Body, SwingState]:
+    """The same from the rough start and the swing that was fitted before more was seen."""
+    start, before = states
+    stages = [(swing_span(len(before.alpha), len(start.mu), _knots(fps, options)), 1.0)]
+    kinds = _weigh_kinds(observations, model, body, start, (fps, options))
+    return model, body, _descend((model, body, kinds), stages, (before, start.mu), (fps, options))
+
+
+def _count_alphas(model: MotionModel, options: FitOptions) -> int:
+    return min(options.components, len(model.components))
+
+
+def _knots(fps: float, options: FitOptions) -> tuple[float, float]:
+    """Frames between the knots of normalised time and of the root."""
+    return options.time_knots * fps, options.root_knots * fps
+
+
+def _weigh_kinds(
+    observations: Observations,
+    model: MotionModel,
+    body: Body,
+    start: SwingState,
+    settings: tuple[float, FitOptions],
+) -> list[Kind]:
+    """All kinds of observations, frames counted as far as they are independent looks."""
+    fps, options = settings
     kinds = choose_kinds(observations, model, body, start, options)
     share = min(1.0, LOOKS / fps)
-    kinds = [replace(kind, weight=kind.weight * share) for kind in kinds] + [
-        Kind(partial(mark_residuals, observations, body), options.weights.marks, options.robust)
+    marks = partial(mark_residuals, observations, body)
+    return [replace(kind, weight=kind.weight * share) for kind in kinds] + [
+        Kind(marks, options.weights.marks, options.robust)
     ]
-    alphas = min(options.components, len(model.components))
-    state = replace(start, alpha=np.zeros(alphas))
-    knots = (options.time_knots * fps, options.root_knots * fps)
-    for span, robust in (
-        (still_span(0, frames), 10.0), (swing_span(min(alphas, FIRST), frames, knots), 3.0),
-        (swing_span(alphas, frames, knots), 1.0),
-    ):  # fmt: skip
-        expect = _whole_swing(span, start.mu, options.priors, fps)
+
+
+def _descend(
+    setting: tuple[MotionModel, Body, list[Kind]],
+    stages: list[tuple[Span, float]],
+    states: tuple[SwingState, Float[np.ndarray, "T"]],
+    settings: tuple[float, FitOptions],
+) -> SwingState:
+    """Solve stage by stage from a state; `states` also has the guessed times."""
+    (model, body, kinds), (state, guess), (fps, options) = setting, states, settings
+    for span, robust in stages:
+        expect = _whole_swing(span, guess, options.priors, fps)
         wide = [replace(kind, robust=robust * kind.robust) for kind in kinds]
         state = solve(Problem(model, body, span, wide, expect), state, options.steps)
         state = replace(state, mu=np.clip(np.maximum.accumulate(state.mu), 0, 1))
-    return model, body, state
+    return state
 
 
 def slide_fit(

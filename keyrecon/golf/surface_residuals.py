@@ -14,7 +14,6 @@ frames are carried by the surface that the first one lies on.
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.ndimage import map_coordinates
 
 from keyrecon.golf.point_residuals import pair_rows, project
 from keyrecon.golf.records import Camera, Capsules, Observations, Pose, Residuals
@@ -32,7 +31,7 @@ def foreground_residuals(observations: Observations, capsules: Capsules, pose: P
     pixels = np.concatenate([*observations.foreground, np.zeros((0, 2))])
     starts, ends = _place_capsules(capsules, pose)
     ways = sight_lines(pixels, observations.camera)
-    q, distance = pass_capsules(ways, starts[frame], ends[frame], capsules.radii)
+    q, distance = pass_capsules((ways, frame), starts, ends, capsules.radii)
     nearest = distance.argmin(axis=1)
     rows = np.flatnonzero(distance.min(axis=1) > 0)
     frame, nearest = frame[rows], nearest[rows]
@@ -74,8 +73,8 @@ def match_residuals(observations: Observations, capsules: Capsules, pose: Pose) 
     starts, ends = _place_capsules(capsules, pose)
     ways = sight_lines(matches.start, observations.camera)
     at = matches.frame
-    q, distance = pass_capsules(ways, starts[at], ends[at], capsules.radii)
-    hit, depth = _first_hit(ways, (starts[at], ends[at]), q, distance, capsules.radii)
+    q, distance = pass_capsules((ways, at), starts, ends, capsules.radii)
+    hit, depth = _first_hit((ways, at), (starts, ends), q, distance, capsules.radii)
     rows = np.flatnonzero(np.isfinite(depth))
     at, segment = at[rows], capsules.segment[hit[rows]]
     surface = depth[rows, None] * ways[rows] - pose.origins[at, segment]
@@ -95,41 +94,57 @@ def sight_lines(pixels: Float[np.ndarray, "n 2"], camera: Camera) -> Rows:
 
 
 def pass_capsules(
-    ways: Rows,
-    starts: Float[np.ndarray, "n Q 3"],
-    ends: Float[np.ndarray, "n Q 3"],
+    lines: tuple[Rows, Int[np.ndarray, "n"]],
+    starts: Float[np.ndarray, "T Q 3"],
+    ends: Float[np.ndarray, "T Q 3"],
     radii: Float[np.ndarray, "Q 2"],
 ) -> tuple[Float[np.ndarray, "n Q"], Float[np.ndarray, "n Q"]]:
     """Where along each axis a line of sight is nearest to the surface, and how near it is there.
 
-    With e^2 = h^2 + g u^2, u counted from where the axis is nearest to the line, the slope of
-    e - r vanishes at u = k h / sqrt(g (g - k^2)), k the change of the radius along the axis.
+    `lines` are directions and their frames, in order. With e^2 = h^2 + g u^2, u counted from where the axis
+    is nearest to the line, the slope of e - r vanishes at u = k h / sqrt(g (g - k^2)), k the change
+    of the radius along the axis. All squares follow from how far both vectors go along the line.
     """
-    start = starts - np.einsum("nqi,ni->nq", starts, ways)[..., None] * ways[:, None]
-    along = ends - starts
-    along = along - np.einsum("nqi,ni->nq", along, ways)[..., None] * ways[:, None]
-    g = np.maximum(np.einsum("nqi,nqi->nq", along, along), 1e-12)
-    closest = -np.einsum("nqi,nqi->nq", start, along) / g
-    h = np.linalg.norm(start + closest[..., None] * along, axis=2)
+    frame, axes = lines[1], ends - starts
+    first, along = _along(lines, starts), _along(lines, axes)
+    g = np.maximum(_dot(axes, axes)[frame] - along**2, 1e-12)
+    slope = _dot(starts, axes)[frame] - first * along
+    square = _dot(starts, starts)[frame] - first**2
+    h = np.sqrt(np.maximum(square - slope**2 / g, 0.0))
     k = radii[:, 1] - radii[:, 0]
     slant = k * h / np.sqrt(g * np.maximum(g - k**2, 1e-12))
-    q = np.clip(closest + slant, 0.0, 1.0)
-    reach = np.linalg.norm(start + q[..., None] * along, axis=2)
+    q = np.clip(slant - slope / g, 0.0, 1.0)
+    reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
     return q, reach - (radii[:, 0] + q * k)
 
 
+def _along(
+    lines: tuple[Rows, Int[np.ndarray, "n"]], vectors: Float[np.ndarray, "T Q 3"]
+) -> Float[np.ndarray, "n Q"]:
+    """How far the vectors of each line's frame go along it."""
+    ways, frame = lines
+    bounds = np.searchsorted(frame, np.arange(len(vectors) + 1))
+    parts = [ways[a:b] @ own.T for a, b, own in zip(bounds, bounds[1:], vectors, strict=False)]
+    return np.concatenate(parts)
+
+
+def _dot(
+    one: Float[np.ndarray, "T Q 3"], other: Float[np.ndarray, "T Q 3"]
+) -> Float[np.ndarray, "T Q"]:
+    return np.einsum("tqi,tqi->tq", one, other)
+
+
 def _first_hit(
-    ways: Rows,
-    axes: tuple[Float[np.ndarray, "n Q 3"], Float[np.ndarray, "n Q 3"]],
+    lines: tuple[Rows, Int[np.ndarray, "n"]],
+    axes: tuple[Float[np.ndarray, "T Q 3"], Float[np.ndarray, "T Q 3"]],
     q: Float[np.ndarray, "n Q"],
     distance: Float[np.ndarray, "n Q"],
     radii: Float[np.ndarray, "Q 2"],
 ) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "n"]]:
     """The capsule that a line of sight meets first and how far away; infinite where none."""
-    point = (1 - q[..., None]) * axes[0] + q[..., None] * axes[1]
     radius = radii[:, 0] + q * (radii[:, 1] - radii[:, 0])
     inside = np.sqrt(np.maximum(radius**2 - (distance + radius) ** 2, 0.0))
-    depth = np.einsum("nqi,ni->nq", point, ways) - inside
+    depth = (1 - q) * _along(lines, axes[0]) + q * _along(lines, axes[1]) - inside
     depth = np.where(distance < 0, depth, np.inf)
     first = depth.argmin(axis=1)
     return first, depth[np.arange(len(depth)), first]
@@ -154,15 +169,19 @@ def _reject(vectors: Rows, ways: Rows) -> Rows:
 def _look_up(
     pictures: tuple[Float[np.ndarray, "h w"], ...], pixels: Float[np.ndarray, "T n 2"]
 ) -> tuple[Float[np.ndarray, "m"], Float[np.ndarray, "m 2"]]:
-    """Values of each frame's distance picture at its pixels, and their slopes."""
-    values, slopes = [], []
-    for picture, places in zip(pictures, pixels, strict=True):
-        at = (places[:, ::-1] - (AWAY_SCALE - 1) / 2).T / AWAY_SCALE
-        layers = (picture, *np.gradient(picture)[::-1])
-        value, *slope = (map_coordinates(a, at, order=1, mode="nearest") for a in layers)
-        values.append(value)
-        slopes.append(np.stack(slope, axis=1) / AWAY_SCALE)
-    return np.concatenate(values), np.concatenate(slopes)
+    """Values of each frame's distance picture at its pixels, between its own, and their slopes."""
+    stack = np.stack(pictures)
+    last = np.array(stack.shape[:0:-1]) - 1.0
+    at = np.clip((pixels - (AWAY_SCALE - 1) / 2) / AWAY_SCALE, 0.0, last)
+    low = np.minimum(at, last - 1).astype(int)
+    (x, y), (fx, fy) = np.moveaxis(low, 2, 0), np.moveaxis(at - low, 2, 0)
+    frame = np.arange(len(stack))[:, None]
+    (a, b), (c, d) = [[stack[frame, y + j, x + i] for i in (0, 1)] for j in (0, 1)]
+    value = (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d)
+    slope = np.stack(
+        [(1 - fy) * (b - a) + fy * (d - c), (1 - fx) * (c - a) + fx * (d - b)], axis=2
+    )
+    return value.ravel(), slope.reshape(-1, 2) / AWAY_SCALE
 
 
 def _no_residuals() -> Residuals:

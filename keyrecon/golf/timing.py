@@ -2,11 +2,11 @@
 
 From whatever side a swing is filmed, the hands go up, down to the ball and up again: the hit is the
 lowest place between two high ones that follow one another within a second or so. Around this
-triple lie the four key postures: the top is where the hands turn round, the hit where the club is
-nearest to how it lay at address, the upswing begins where the club last rested before the top, and
-the finish is where it first rests after the hit. The normalised time of every frame follows by
-monotone interpolation (Fritsch and Carlson's PCHIP; a free spline overshoots at the top, where the
-pace changes threefold).
+triple lie the four key postures: the top is amid the time for which the hands are highest, the hit
+where the club is nearest to how it lay at address, the upswing begins where the club leaves the
+place where it rested before, and the finish is where it first rests after the hit. The normalised
+time of every frame follows by monotone interpolation (Fritsch and Carlson's PCHIP; a free spline
+overshoots at the top, where the pace changes threefold).
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,9 @@ from scipy.ndimage import gaussian_filter1d
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.club import Club
 
+NEAR_ADDRESS = 0.15
+"""What is farther from the address, player heights, is no noise."""
+
 
 @dataclass(frozen=True)
 class TimingOptions:
@@ -30,12 +33,16 @@ class TimingOptions:
     """Longest time from the hit to the highest hands of the finish."""
     rise: float = 0.15
     """The hands must rise by this before and after the hit."""
+    valley: float = 0.05
+    """Hands lower than the highest ones by less still are at the top."""
     smooth: float = 0.03
     """Standard deviation of the low-pass."""
-    rest: float = 0.07
-    """Speed of a resting club as a share of its peak."""
-    pause: float = 0.1
-    """Time for which it must rest at the end."""
+    address: float = 0.03
+    """Movement of hands and head together by which a club has left its address."""
+    rest: float = 0.1
+    """Speed at the finish, where the club sways on behind resting hands, as a share of its peak."""
+    pause: float = 0.05
+    """Time for which it must rest there: many let it sink at once."""
 
 
 def find_keys(
@@ -48,10 +55,11 @@ def find_keys(
     ends = gaussian_filter1d(_fill(club.ends), options.smooth * fps, axis=0)
     hands = ends[:, 0] / height
     top, low = _find_lowest(hands[:, 1], fps, options)
+    top = _middle_of_height(hands[:, 1], top, low, round(options.upswing * fps), options.valley)
     speed = np.linalg.norm(np.gradient(ends, 1 / fps, axis=0), axis=2).sum(axis=1) / height
-    resting = speed < options.rest * speed[top:].max()
-    start = _last_rest(resting, speed, top, round(options.pause * fps))
+    start = _last_at_address(ends / height, top, low, options.address)
     hit = _return_to_address(club.ends, ends[start], (top, low), fps)
+    resting = speed < options.rest * speed[top:].max()
     finish = _first_rest(resting, speed, round(hit), round(options.pause * fps))
     return np.array([start, top, hit, finish], float)
 
@@ -90,15 +98,30 @@ def _find_lowest(y: Float[np.ndarray, "T"], fps: float, options: TimingOptions) 
     return found
 
 
-def _last_rest(resting: np.ndarray, speed: np.ndarray, top: int, pause: int) -> int:
-    """Last frame before the upswing of a club that rested for a while; else its slowest."""
-    run = 0
-    upswing = int(speed[: top + 1].argmax()) if top else 0
-    for t in range(upswing, -1, -1):
-        run = run + 1 if resting[t] else 0
-        if run > pause:
-            return t + pause
-    return int(speed[: upswing + 1].argmin())
+def _middle_of_height(
+    y: Float[np.ndarray, "T"], top: int, low: int, before: int, valley: float
+) -> int:
+    """Middle of the time for which the hands are at the top: surer than their highest frame."""
+    first = max(0, low - before)
+    high = first + np.flatnonzero(y[first:low] < y[top] + valley)
+    return round((high[0] + high[-1]) / 2)
+
+
+def _last_at_address(
+    ends: Float[np.ndarray, "T 2 2"], top: int, low: int, address: float
+) -> int:
+    """Last frame before the top in which the club, in heights, still lies as it rested before it.
+
+    It rested where most frames with the hands low agree; by how much they do not is noise.
+    """
+    down = ends[:top, 0, 1] > (ends[top, 0, 1] + ends[low, 0, 1]) / 2
+    if not down.any():
+        return 0
+    frames, poses = np.flatnonzero(down), ends[:top][down]
+    apart = np.linalg.norm(poses[:, None] - poses, axis=3).sum(axis=2)
+    rest = int((apart < address).sum(axis=1).argmax())
+    noise = float(np.median(apart[rest][apart[rest] < NEAR_ADDRESS]))
+    return int(frames[np.flatnonzero(apart[rest] <= address + noise)[-1]])
 
 
 def _first_rest(resting: np.ndarray, speed: np.ndarray, hit: int, pause: int) -> int:

@@ -5,7 +5,7 @@ homography of the turning camera and smeared along its turn; the shadow is that 
 thrown on the floor by the sun.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -26,6 +26,8 @@ class Frame:
     """Index into figure.PARTS at mid-exposure."""
     visible: Bool[np.ndarray, "14"]
     """Joints not hidden by another part of the body, and inside the picture."""
+    club: float
+    """Share of the racket's or club's axis, from the hands on, that a person can see, 0-1."""
 
 
 def draw_frame(stage: Stage, frame: int) -> Frame:
@@ -35,9 +37,13 @@ def draw_frame(stage: Stage, frame: int) -> Frame:
     solids = pose_figure(stage, times)
     _cast_shadow(stage, frame, solids, picture)
     drawn = draw_figure(stage, frame, times, solids)
+    without = picture.copy()
     lay_over(picture, drawn)
+    lay_over(without, [replace(instant, racket=None) for instant in drawn])
+    club = _see_club(stage, frame, np.abs(picture - without).max(axis=2))
     parts = _label_parts(stage, drawn, solids)
-    return Frame(_develop(stage, frame, picture), parts, _find_visible(stage, frame, drawn))
+    visible = _find_visible(stage, frame, drawn)
+    return Frame(_develop(stage, frame, picture), parts, visible, club)
 
 
 def _draw_background(stage: Stage, frame: int) -> UInt8[np.ndarray, "h w 3"]:
@@ -140,6 +146,21 @@ def _find_visible(
     scale = stage.move.focal[frame] / depth.mean()
     before = depth * scale - surface.depth[cell[:, 1], cell[:, 0]]
     return inside & (before < _COVER * stage.pointers.stature * scale)
+
+
+FIST = 0.15
+"""Metres of the racket or club that the hands cover."""
+STANDS_OUT = 8.0
+"""Grey levels by which a line must differ from what is behind it to be seen through the noise."""
+
+
+def _see_club(stage: Stage, frame: int, change: Float[np.ndarray, "h w"]) -> float:
+    """Share of the axis of what is swung along which it changes the picture visibly."""
+    start, way, _ = stage.racket[frame]
+    along = np.linspace(FIST, stage.held.reach, 40)[:, None]
+    pixels = stage.project(start + along * way, frame).astype(np.float32)
+    there = cv2.dilate(change, np.ones((3, 3), np.uint8))
+    return float((cv2.remap(there, pixels[:, None], None, cv2.INTER_LINEAR) > STANDS_OUT).mean())
 
 
 def _develop(stage: Stage, frame: int, picture: Float[np.ndarray, "h w 3"]) -> np.ndarray:

@@ -7,7 +7,7 @@ click, taken from the renderer's own part labels) and `scene.json` (options and 
 import json
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from multiprocessing import get_context
 from os import cpu_count
@@ -138,18 +138,18 @@ def film_stage(
     frames = len(stage.points)
     chosen = {round(share * (frames - 1)) for share in (0.1, 0.5, 0.9)}
     picks: list[Pick] = []
-    visible = np.zeros((frames, len(LSP14.names)), bool)
+    visible, club = np.zeros((frames, len(LSP14.names)), bool), np.zeros(frames)
 
     def pictures() -> Iterator[np.ndarray]:
         drawn = _draw_all(stage, options.workers or cpu_count() or 1, chosen)
         for t, frame in enumerate(progress(drawn, "Drawing", frames)):
-            visible[t] = frame.visible
+            visible[t], club[t] = frame.visible, frame.club
             if t in chosen:
                 picks.extend(click_parts(frame.parts, t))
             yield frame.picture
 
     write_video(out / "video.mp4", pictures(), fps, options.crf)
-    write_truth(out / "truth.npz", stage, fps, visible)
+    write_truth(out / "truth.npz", stage, fps, (visible, club))
     write_picks(out / "picks.json", picks)
     scene = {"options": asdict(options), "look": asdict(stage.look), "fps": fps}
     (out / "scene.json").write_text(json.dumps(scene, indent=2, default=str) + "\n")
@@ -171,7 +171,7 @@ def _draw_chunk(frames: range, labelled: frozenset[int]) -> list[Frame]:
 
 def _without_labels(frame: Frame, keep: bool) -> Frame:
     """Spare the process boundary the part labels that nobody reads."""
-    return frame if keep else Frame(frame.picture, frame.parts[:0], frame.visible)
+    return frame if keep else replace(frame, parts=frame.parts[:0])
 
 
 def _draw_all(stage: Stage, workers: int, labelled: set[int]) -> Iterator[Frame]:
@@ -194,9 +194,12 @@ def _draw_all(stage: Stage, workers: int, labelled: set[int]) -> Iterator[Frame]
 
 
 def write_truth(
-    path: Path, stage: Stage, fps: float, visible: np.ndarray
+    path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    """Joints in each frame's camera axes (metres) and pixels, and the camera they are seen by."""
+    """Joints in each frame's camera axes (metres) and pixels, and the camera they are seen by.
+
+    `seen` tells in every frame which joints are visible, and how much of the racket or club.
+    """
     move = stage.move
     np.savez(
         path,
@@ -204,7 +207,8 @@ def write_truth(
         points2d=move.project(stage.points),
         joint_names=np.array(LSP14.names),
         fps=fps,
-        visible=visible,
+        visible=seen[0],
+        club_visible=seen[1],
         height_m=stage.pointers.stature,
         focal=move.focal,
         rotation=move.rotation,
