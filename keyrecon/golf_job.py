@@ -63,7 +63,7 @@ def fit_video(
     return refine_fit(fitted, observations, clicks, model, video, options)
 
 
-def refine_fit(  # noqa: PLR0913
+def refine_fit(
     fitted: FittedSwing,
     observations: Observations,
     clicks: Clicks,
@@ -79,7 +79,7 @@ def refine_fit(  # noqa: PLR0913
     return fitted, seen
 
 
-def fit_observations(  # noqa: PLR0913
+def fit_observations(
     observations: Observations,
     clicks: Clicks,
     model: MotionModel,

@@ -101,9 +101,10 @@ def pass_capsules(
 ) -> tuple[Float[np.ndarray, "n Q"], Float[np.ndarray, "n Q"]]:
     """Where along each axis a line of sight is nearest to the surface, and how near it is there.
 
-    `lines` are directions and their frames, in order. With e^2 = h^2 + g u^2, u counted from where the axis
-    is nearest to the line, the slope of e - r vanishes at u = k h / sqrt(g (g - k^2)), k the change
-    of the radius along the axis. All squares follow from how far both vectors go along the line.
+    `lines` are directions and their frames, in order. With e^2 = h^2 + g u^2, u counted from where
+    the axis is nearest to the line, the slope of e - r vanishes at u = k h / sqrt(g (g - k^2)), k
+    the change of the radius along the axis. All squares follow from how far both vectors go along
+    the line.
     """
     frame, axes = lines[1], ends - starts
     first, along = _along(lines, starts), _along(lines, axes)

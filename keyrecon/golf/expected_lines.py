@@ -1,0 +1,185 @@
+"""Lines of a picture near the one that is expected.
+
+A line counts by how far its middle is brighter, or darker, than both of its sides, in the picture
+as well as in its difference to the temporal median: a rope in the scene is missing in the second,
+the ghost of a club that rested there in the first, and the edge of an arm has one side only.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+PLACES = 32
+"""Places at which a line is looked at."""
+SHAFT = (0.2, 0.95)
+"""Where on the club they lie, between its ends: beside the hands and the head."""
+ASIDES = 21
+"""Offsets that are tried."""
+NEIGHBOURS = (7, 7)
+"""Turns and offsets among which only the best line is kept."""
+Picture = Float[np.ndarray, "h w"]
+
+
+@dataclass(frozen=True)
+class LineOptions:
+    """Which lines may be the expected one; lengths in player heights."""
+
+    turn: float = 30.0
+    """Degrees by which the club may be turned from where it is expected."""
+    aside: float = 0.05
+    """How far beside the expected hands its line may pass."""
+    usual_turn: float = 10.0
+    """Degrees by which it usually is turned."""
+    usual_aside: float = 0.025
+    """How far beside it usually passes."""
+    far: float = 3.0
+    """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
+    widths: tuple[float, ...] = (0.006, 0.012, 0.024)
+    """From the middle of the shaft to where the scene shows: sharp, and blurred by motion."""
+    contrast: float = 12.0
+    """Grey levels by which a sure shaft stands out."""
+    gain: float = 15.0
+    """What a club that stands out from end to end is worth, in squared standard deviations."""
+    most: int = 6
+    """Lines kept in a frame."""
+    shortest: float = 0.1
+    """A club that seems shorter than this points at the camera: its angle tells nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of a frame that may be the club."""
+
+    ends: Float[np.ndarray, "n 2 2"]
+    """Hands and head, heights."""
+    departure: Float[np.ndarray, "n 2"]
+    """Turn and offset from the expected club, in usual ones."""
+    score: Float[np.ndarray, "n"]
+    """Share of the club that stands out."""
+
+
+def find_lines(
+    pictures: tuple[Picture, Picture],
+    first: Float[np.ndarray, "2 2"],
+    expected: Float[np.ndarray, "2 2"],
+    height: float,
+    options: LineOptions,
+) -> Lines:
+    """The lines near the expected club that stand out most, and the one that was seen at first."""
+    ends = np.zeros((0, 2, 2))
+    if np.linalg.norm(expected[1] - expected[0]) > options.shortest * height:
+        ends = _best_lines(pictures, expected / height, height, options)
+    if np.isfinite(first).all():
+        ends = np.concatenate([ends, first[None] / height])
+    contrast = _contrast(pictures, ends, height, options)
+    return Lines(ends, _depart(expected / height, ends, options), _share(contrast, options))
+
+
+def _best_lines(
+    pictures: tuple[Picture, Picture],
+    expected: Float[np.ndarray, "2 2"],
+    height: float,
+    options: LineOptions,
+) -> Float[np.ndarray, "n 2 2"]:
+    """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
+    turns = np.arange(-options.turn, options.turn + 0.5)
+    asides = np.linspace(-options.aside, options.aside, ASIDES)
+    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
+    ends = _shift(expected, turn, aside)
+    contrast = _contrast(pictures, ends, height, options)
+    worth = weigh_lines(_depart(expected, ends, options), _share(contrast, options), options)
+    worth, sharp = (v.reshape(len(turns), ASIDES) for v in (worth, contrast.mean(axis=1)))
+    peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones(NEIGHBOURS)))
+    best = peaks[np.argsort(-worth.ravel()[peaks])][: options.most]
+    return ends[[_sharpest(sharp, divmod(peak, ASIDES)) for peak in best.tolist()]]
+
+
+def _sharpest(sharp: Float[np.ndarray, "a b"], peak: tuple[int, int]) -> int:
+    """Index of the line of most contrast among the neighbours of one."""
+    (i, j), (di, dj) = peak, (n // 2 for n in NEIGHBOURS)
+    low = max(0, i - di), max(0, j - dj)
+    part = sharp[low[0] : i + di + 1, low[1] : j + dj + 1]
+    k, m = divmod(int(part.argmax()), part.shape[1])
+    return (low[0] + k) * sharp.shape[1] + low[1] + m
+
+
+def _shift(
+    expected: Float[np.ndarray, "2 2"], turn: Float[np.ndarray, "n"], aside: Float[np.ndarray, "n"]
+) -> Float[np.ndarray, "n 2 2"]:
+    """The expected club turned about its hands by degrees and shifted sideways."""
+    way = expected[1] - expected[0]
+    across = np.array([-way[1], way[0]])
+    angle = np.radians(turn)[:, None]
+    hands = expected[0] + aside[:, None] * across / np.linalg.norm(across)
+    return np.stack([hands, hands + np.cos(angle) * way + np.sin(angle) * across], axis=1)
+
+
+def _depart(
+    expected: Float[np.ndarray, "2 2"],
+    ends: Float[np.ndarray, "n 2 2"],
+    options: LineOptions,
+) -> Float[np.ndarray, "n 2"]:
+    """Turn of lines from the expected one and how far aside of its hands they pass."""
+    way, theirs = expected[1] - expected[0], ends[:, 1] - ends[:, 0]
+    turn = np.arctan2(way[0] * theirs[:, 1] - way[1] * theirs[:, 0], theirs @ way)
+    off = ends[:, 0] - expected[0]
+    length = np.maximum(np.linalg.norm(theirs, axis=1), 1e-9)
+    aside = (theirs[:, 0] * off[:, 1] - theirs[:, 1] * off[:, 0]) / length
+    return np.stack([np.degrees(turn) / options.usual_turn, aside / options.usual_aside], axis=1)
+
+
+def _contrast(
+    pictures: tuple[Picture, Picture],
+    ends: Float[np.ndarray, "n 2 2"],
+    height: float,
+    options: LineOptions,
+) -> Float[np.ndarray, "n p"]:
+    """Grey levels by which places along lines stand out in both pictures."""
+    return np.minimum(*(_stand_out(picture, ends, height, options) for picture in pictures))
+
+
+def _share(contrast: Float[np.ndarray, "n p"], options: LineOptions) -> Float[np.ndarray, "n"]:
+    """Share of every line that stands out."""
+    return np.minimum(contrast / options.contrast, 1.0).mean(axis=1)
+
+
+def _stand_out(
+    picture: Picture,
+    ends: Float[np.ndarray, "n 2 2"],
+    height: float,
+    options: LineOptions,
+) -> Float[np.ndarray, "n p"]:
+    """Grey levels by which places along lines differ from both sides, at the best width."""
+    share = np.linspace(*SHAFT, PLACES)[:, None]
+    points = (1 - share) * ends[:, None, 0] + share * ends[:, None, 1]
+    way = ends[:, 1] - ends[:, 0]
+    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    middle = _read(picture, points * height)
+    best = np.zeros_like(middle)
+    for width in options.widths:
+        one, other = (
+            middle - _read(picture, (points + side * width * across[:, None]) * height)
+            for side in (-1, 1)
+        )
+        alike = np.where(one * other > 0, np.minimum(np.abs(one), np.abs(other)), 0.0)
+        best = np.maximum(best, alike)
+    return best
+
+
+def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndarray, "n p"]:
+    if not len(points):
+        return np.zeros(points.shape[:2], np.float32)
+    return cv2.remap(
+        picture, points.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+
+
+def weigh_lines(
+    departure: Float[np.ndarray, "n 2"], score: Float[np.ndarray, "n"], options: LineOptions
+) -> Float[np.ndarray, "n"]:
+    """What a line gains by standing out, less what it pays for departing from expectation."""
+    off = np.minimum((departure**2).sum(axis=1), options.far**2)
+    return options.gain * score - 0.5 * off
