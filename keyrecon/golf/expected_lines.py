@@ -19,6 +19,8 @@ ASIDES = 21
 """Offsets that are tried."""
 NEIGHBOURS = (7, 7)
 """Turns and offsets among which only the best line is kept."""
+SHUTTER = 0.5
+"""Share of the time between frames for which a camera's shutter is open."""
 Picture = Float[np.ndarray, "h w"]
 
 
@@ -26,7 +28,7 @@ Picture = Float[np.ndarray, "h w"]
 class LineOptions:
     """Which lines may be the expected one; lengths in player heights."""
 
-    turn: float = 30.0
+    turn: float = 45.0
     """Degrees by which the club may be turned from where it is expected."""
     aside: float = 0.05
     """How far beside the expected hands its line may pass."""
@@ -37,7 +39,8 @@ class LineOptions:
     far: float = 3.0
     """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
     widths: tuple[float, ...] = (0.006, 0.012, 0.024)
-    """From the middle of the shaft to where the scene shows: sharp, and blurred by motion."""
+    """From the middle of the shaft to where the scene shows; a blurred one is as broad as what it
+    passes over while the shutter is open."""
     contrast: float = 12.0
     """Grey levels by which a sure shaft stands out."""
     gain: float = 15.0
@@ -46,6 +49,18 @@ class LineOptions:
     """Lines kept in a frame."""
     shortest: float = 0.1
     """A club that seems shorter than this points at the camera: its angle tells nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A frame in which lines are looked for."""
+
+    pictures: tuple[Picture, Picture]
+    """The frame, and its difference to the median."""
+    height: float
+    """Of the player, px."""
+    swept: Float[np.ndarray, "2"]
+    """How far hands and head are expected to move from frame to frame, heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,34 +76,30 @@ class Lines:
 
 
 def find_lines(
-    pictures: tuple[Picture, Picture],
+    sight: Sight,
     first: Float[np.ndarray, "2 2"],
     expected: Float[np.ndarray, "2 2"],
-    height: float,
     options: LineOptions,
 ) -> Lines:
     """The lines near the expected club that stand out most, and the one that was seen at first."""
     ends = np.zeros((0, 2, 2))
-    if np.linalg.norm(expected[1] - expected[0]) > options.shortest * height:
-        ends = _best_lines(pictures, expected / height, height, options)
+    if np.linalg.norm(expected[1] - expected[0]) > options.shortest * sight.height:
+        ends = _best_lines(sight, expected / sight.height, options)
     if np.isfinite(first).all():
-        ends = np.concatenate([ends, first[None] / height])
-    contrast = _contrast(pictures, ends, height, options)
-    return Lines(ends, _depart(expected / height, ends, options), _share(contrast, options))
+        ends = np.concatenate([ends, first[None] / sight.height])
+    departure = _depart(expected / sight.height, ends, options)
+    return Lines(ends, departure, _share(_contrast(sight, ends, options), options))
 
 
 def _best_lines(
-    pictures: tuple[Picture, Picture],
-    expected: Float[np.ndarray, "2 2"],
-    height: float,
-    options: LineOptions,
+    sight: Sight, expected: Float[np.ndarray, "2 2"], options: LineOptions
 ) -> Float[np.ndarray, "n 2 2"]:
     """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
     turns = np.arange(-options.turn, options.turn + 0.5)
     asides = np.linspace(-options.aside, options.aside, ASIDES)
     turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
     ends = _shift(expected, turn, aside)
-    contrast = _contrast(pictures, ends, height, options)
+    contrast = _contrast(sight, ends, options)
     worth = weigh_lines(_depart(expected, ends, options), _share(contrast, options), options)
     worth, sharp = (v.reshape(len(turns), ASIDES) for v in (worth, contrast.mean(axis=1)))
     peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones(NEIGHBOURS)))
@@ -131,13 +142,18 @@ def _depart(
 
 
 def _contrast(
-    pictures: tuple[Picture, Picture],
-    ends: Float[np.ndarray, "n 2 2"],
-    height: float,
-    options: LineOptions,
+    sight: Sight, ends: Float[np.ndarray, "n 2 2"], options: LineOptions
 ) -> Float[np.ndarray, "n p"]:
     """Grey levels by which places along lines stand out in both pictures."""
-    return np.minimum(*(_stand_out(picture, ends, height, options) for picture in pictures))
+    share = np.linspace(*SHAFT, PLACES)
+    points = ends[:, None, 0] + share[:, None] * (ends[:, None, 1] - ends[:, None, 0])
+    way = ends[:, 1] - ends[:, 0]
+    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    blur = SHUTTER / 2 * (sight.swept[0] + share * (sight.swept[1] - sight.swept[0]))
+    widths = [np.full(PLACES, w) for w in options.widths] + [options.widths[0] + blur]
+    sides = [sight.height * width[:, None] * across[:, None] for width in widths]
+    return np.minimum(*(_stand_out(p, sight.height * points, sides) for p in sight.pictures))
 
 
 def _share(contrast: Float[np.ndarray, "n p"], options: LineOptions) -> Float[np.ndarray, "n"]:
@@ -146,24 +162,13 @@ def _share(contrast: Float[np.ndarray, "n p"], options: LineOptions) -> Float[np
 
 
 def _stand_out(
-    picture: Picture,
-    ends: Float[np.ndarray, "n 2 2"],
-    height: float,
-    options: LineOptions,
+    picture: Picture, points: Float[np.ndarray, "n p 2"], sides: list[Float[np.ndarray, "n p 2"]]
 ) -> Float[np.ndarray, "n p"]:
-    """Grey levels by which places along lines differ from both sides, at the best width."""
-    share = np.linspace(*SHAFT, PLACES)[:, None]
-    points = (1 - share) * ends[:, None, 0] + share * ends[:, None, 1]
-    way = ends[:, 1] - ends[:, 0]
-    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
-    middle = _read(picture, points * height)
+    """Grey levels by which points differ from what is on both sides, at the best of distances."""
+    middle = _read(picture, points)
     best = np.zeros_like(middle)
-    for width in options.widths:
-        one, other = (
-            middle - _read(picture, (points + side * width * across[:, None]) * height)
-            for side in (-1, 1)
-        )
+    for side in sides:
+        one, other = middle - _read(picture, points - side), middle - _read(picture, points + side)
         alike = np.where(one * other > 0, np.minimum(np.abs(one), np.abs(other)), 0.0)
         best = np.maximum(best, alike)
     return best

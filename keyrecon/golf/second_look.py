@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from keyrecon.golf.expected_lines import LineOptions, Lines, find_lines, weigh_lines
+from keyrecon.golf.expected_lines import LineOptions, Lines, Sight, find_lines, weigh_lines
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.paths import find_cheapest_path
 from keyrecon.pictures import side_by_side
@@ -57,7 +57,7 @@ def see_club_again(
     again = look_again(video, first, fitted.club_seen, height, options)
     frames = np.arange(len(first))
     known = np.isfinite(first).all(axis=(1, 2))
-    kept = (frames > fitted.keys[3]) | ((frames < fitted.keys[0]) & known)
+    kept = known & ((frames < fitted.keys[0]) | (frames > fitted.keys[3]))
     ends = np.where(kept[:, None, None], first, again)
     same = np.abs(ends - first).max(axis=(1, 2)) < SAME_CLUB
     along = np.where(same[:, None], observations.club_along, [ALONG * height, np.inf])
@@ -76,11 +76,12 @@ def look_again(
     `first` is where it was seen at first, NaN where it was not; `height` that of the player in px.
     """
     plate = _median_picture(video)
+    swept = np.linalg.norm(np.gradient(expected / height, axis=0), axis=2)
 
     def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
         frame, grey = numbered
-        pictures = grey.astype(np.float32), grey - plate
-        return find_lines(pictures, first[frame], expected[frame], height, options.lines)
+        sight = Sight((grey.astype(np.float32), grey - plate), height, swept[frame])
+        return find_lines(sight, first[frame], expected[frame], options.lines)
 
     lines = list(side_by_side(look, enumerate(video.grey_frames())))
     chosen = _choose(lines, video.fps, options)
