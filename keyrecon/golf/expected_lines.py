@@ -45,6 +45,8 @@ class LineOptions:
     """Grey levels by which a sure shaft stands out."""
     gain: float = 15.0
     """What a club that stands out from end to end is worth, in squared standard deviations."""
+    known: float = 3.0
+    """What a line is worth besides for having been seen at first, without any expectation."""
     most: int = 6
     """Lines kept in a frame."""
     shortest: float = 0.1
@@ -71,8 +73,8 @@ class Lines:
     """Hands and head, heights."""
     departure: Float[np.ndarray, "n 2"]
     """Turn and offset from the expected club, in usual ones."""
-    score: Float[np.ndarray, "n"]
-    """Share of the club that stands out."""
+    worth: Float[np.ndarray, "n"]
+    """What each gains by standing out, less what it pays for departing from expectation."""
 
 
 def find_lines(
@@ -81,14 +83,21 @@ def find_lines(
     expected: Float[np.ndarray, "2 2"],
     options: LineOptions,
 ) -> Lines:
-    """The lines near the expected club that stand out most, and the one that was seen at first."""
-    ends = np.zeros((0, 2, 2))
-    if np.linalg.norm(expected[1] - expected[0]) > options.shortest * sight.height:
-        ends = _best_lines(sight, expected / sight.height, options)
-    if np.isfinite(first).all():
+    """The lines near the expected club that stand out most, and the one that was seen at first.
+
+    Where nothing can be expected, NaN, the one that was seen at first has to stand out alone.
+    """
+    ends, expected = np.zeros((0, 2, 2)), expected / sight.height
+    if np.linalg.norm(expected[1] - expected[0]) > options.shortest:
+        ends = _best_lines(sight, expected, options)
+    known = int(np.isfinite(first).all())
+    if known:
         ends = np.concatenate([ends, first[None] / sight.height])
-    departure = _depart(expected / sight.height, ends, options)
-    return Lines(ends, departure, _share(_contrast(sight, ends, options), options))
+    departure = measure_departure(expected, ends, options)
+    worth = _weigh(departure, _contrast(sight, ends, options), options)
+    if np.isfinite(expected).all():
+        worth[len(ends) - known :] += options.known
+    return Lines(ends, departure, worth)
 
 
 def _best_lines(
@@ -100,7 +109,7 @@ def _best_lines(
     turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
     ends = _shift(expected, turn, aside)
     contrast = _contrast(sight, ends, options)
-    worth = weigh_lines(_depart(expected, ends, options), _share(contrast, options), options)
+    worth = _weigh(measure_departure(expected, ends, options), contrast, options)
     worth, sharp = (v.reshape(len(turns), ASIDES) for v in (worth, contrast.mean(axis=1)))
     peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones(NEIGHBOURS)))
     best = peaks[np.argsort(-worth.ravel()[peaks])][: options.most]
@@ -127,12 +136,17 @@ def _shift(
     return np.stack([hands, hands + np.cos(angle) * way + np.sin(angle) * across], axis=1)
 
 
-def _depart(
+def measure_departure(
     expected: Float[np.ndarray, "2 2"],
     ends: Float[np.ndarray, "n 2 2"],
     options: LineOptions,
 ) -> Float[np.ndarray, "n 2"]:
-    """Turn of lines from the expected one and how far aside of its hands they pass."""
+    """Turn of lines from the expected one, and how far aside of its hands they pass, in usual ones.
+
+    None where nothing is expected.
+    """
+    if np.isnan(expected).any():
+        return np.zeros((len(ends), 2))
     way, theirs = expected[1] - expected[0], ends[:, 1] - ends[:, 0]
     turn = np.arctan2(way[0] * theirs[:, 1] - way[1] * theirs[:, 0], theirs @ way)
     off = ends[:, 0] - expected[0]
@@ -156,11 +170,6 @@ def _contrast(
     return np.minimum(*(_stand_out(p, sight.height * points, sides) for p in sight.pictures))
 
 
-def _share(contrast: Float[np.ndarray, "n p"], options: LineOptions) -> Float[np.ndarray, "n"]:
-    """Share of every line that stands out."""
-    return np.minimum(contrast / options.contrast, 1.0).mean(axis=1)
-
-
 def _stand_out(
     picture: Picture, points: Float[np.ndarray, "n p 2"], sides: list[Float[np.ndarray, "n p 2"]]
 ) -> Float[np.ndarray, "n p"]:
@@ -182,9 +191,10 @@ def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndar
     )
 
 
-def weigh_lines(
-    departure: Float[np.ndarray, "n 2"], score: Float[np.ndarray, "n"], options: LineOptions
+def _weigh(
+    departure: Float[np.ndarray, "n 2"], contrast: Float[np.ndarray, "n p"], options: LineOptions
 ) -> Float[np.ndarray, "n"]:
-    """What a line gains by standing out, less what it pays for departing from expectation."""
+    """What lines gain by standing out, less what they pay for departing from expectation."""
+    share = np.minimum(contrast / options.contrast, 1.0).mean(axis=1)
     off = np.minimum((departure**2).sum(axis=1), options.far**2)
-    return options.gain * score - 0.5 * off
+    return options.gain * share - 0.5 * off

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from keyrecon.golf.expected_lines import LineOptions, Lines, Sight, find_lines, weigh_lines
+from keyrecon.golf.expected_lines import LineOptions, Lines, Sight, find_lines, measure_departure
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.paths import find_cheapest_path
 from keyrecon.pictures import side_by_side
@@ -21,6 +21,8 @@ from keyrecon.video import Video
 
 PLATE = 15
 """Frames whose median stands for the scene."""
+USUAL = 1.0
+"""Usual departures by which a club at address may be off what is fitted."""
 SAME_CLUB = 1e-3
 """px"""
 ALONG = 0.12
@@ -50,18 +52,28 @@ def see_club_again(
 ) -> Observations:
     """The observations with the club of a second look at the swing; `height` of the player in px.
 
-    A club that rests at address is in the median picture too, and what the player does with it
-    after the finish is no part of the fitted motion: what was seen there at first remains.
+    A club that rests at address is in the median picture too: there, what was seen at first stays.
+    What the player does after the finish is no part of the fitted motion, which tells nothing then.
     """
-    first = observations.club
-    again = look_again(video, first, fitted.club_seen, height, options)
-    frames = np.arange(len(first))
+    first, frames = observations.club, np.arange(len(observations.club))
     known = np.isfinite(first).all(axis=(1, 2))
-    kept = known & ((frames < fitted.keys[0]) | (frames > fitted.keys[3]))
-    ends = np.where(kept[:, None, None], first, again)
+    after = (frames > fitted.keys[3]) & known
+    expected = np.where(after[:, None, None], np.nan, fitted.club_seen)
+    again = look_again(video, first, expected, height, options)
+    turns = _turn_off(first, fitted.club_seen, options.lines)
+    resting = (frames < fitted.keys[0]) & (turns < USUAL)
+    ends = np.where(resting[:, None, None], first, again)
     same = np.abs(ends - first).max(axis=(1, 2)) < SAME_CLUB
     along = np.where(same[:, None], observations.club_along, [ALONG * height, np.inf])
     return replace(observations, club=ends, club_along=along)
+
+
+def _turn_off(
+    first: Float[np.ndarray, "T 2 2"], expected: Float[np.ndarray, "T 2 2"], options: LineOptions
+) -> Float[np.ndarray, "T"]:
+    """Angles by which clubs are turned from the expected ones, in usual ones; NaN where unseen."""
+    pairs = zip(expected, first, strict=True)
+    return np.abs([measure_departure(e, f[None], options)[0, 0] for e, f in pairs])
 
 
 def look_again(
@@ -76,7 +88,7 @@ def look_again(
     `first` is where it was seen at first, NaN where it was not; `height` that of the player in px.
     """
     plate = _median_picture(video)
-    swept = np.linalg.norm(np.gradient(expected / height, axis=0), axis=2)
+    swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
 
     def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
         frame, grey = numbered
@@ -106,5 +118,5 @@ def _choose(lines: Sequence[Lines], fps: float, options: SecondLookOptions) -> I
         square = np.minimum((change**2).sum(axis=2), options.lines.far**2)
         return 0.5 * square * min(1.0, options.pace * fps / (t - before))
 
-    own = [options.miss - weigh_lines(b.departure, b.score, options.lines) for b in lines]
+    own = [options.miss - b.worth for b in lines]
     return find_cheapest_path(own, moving, max(1, round(BRIDGED * fps)), 0.0)
