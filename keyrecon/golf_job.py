@@ -1,7 +1,7 @@
 """`keyrecon golf fit`: from a video and a few clicks to a motion, an overlay and a report."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -21,6 +21,7 @@ from keyrecon.golf.result import describe_fit
 from keyrecon.golf.second_look import SecondLookOptions, see_club_again
 from keyrecon.golf.skeleton import size_body
 from keyrecon.golf.start import place_player, start_state
+from keyrecon.golf.timing import find_rests
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_overlay import write_golf_overlay
 from keyrecon.report.golf_page import write_golf_report
@@ -71,12 +72,17 @@ def refine_fit(
     video: Video,
     options: GolfOptions = GolfOptions(),
 ) -> tuple[FittedSwing, Observations]:
-    """The club looked for again where it is expected by now, and the fit with it; in turns."""
+    """The club looked for again where it is expected by now, and the fit with it, in turns.
+
+    At last the key postures in which the player rests, which the club tells better than the fit.
+    """
     seen = observations
     for _ in range(options.again if options.method == "swing" else 0):
         seen = see_club_again(observations, video, fitted, clicks.height, options.second_look)
         fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
-    return fitted, seen
+    settings = clicks.height, video.fps
+    keys = find_rests(seen.club, fitted.club_seen, fitted.keys, settings, options.look.timing)
+    return replace(fitted, keys=keys), seen
 
 
 def fit_observations(

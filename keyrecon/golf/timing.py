@@ -64,6 +64,26 @@ def find_keys(
     return np.array([start, top, hit, finish], float)
 
 
+def find_rests(
+    seen: Float[np.ndarray, "T 2 2"],
+    fitted: Float[np.ndarray, "T 2 2"],
+    keys: Float[np.ndarray, "4"],
+    settings: tuple[float, float],
+    options: TimingOptions = TimingOptions(),
+) -> Float[np.ndarray, "4"]:
+    """Key postures of a fitted swing, the first and the last one anew; `settings`: height, fps.
+
+    Near its ends the fitted motion hardly moves, so that its time tells little. The upswing begins
+    where the club, as it was seen or else fitted, leaves its address. At the finish what is seen is
+    too fitful: it is where the fitted club rests.
+    """
+    known = np.isfinite(seen).all(axis=(1, 2))
+    clubs = (np.where(known[:, None, None], seen, fitted), fitted)
+    start, finish = (find_keys(Club(c, known, known), *settings, options)[k]
+                     for c, k in zip(clubs, (0, 3), strict=True))  # fmt: skip
+    return np.array([min(start, keys[1] - 1), keys[1], keys[2], max(finish, keys[2] + 1)])
+
+
 def interpolate_times(
     keys: Float[np.ndarray, "4"], key_times: Float[np.ndarray, "4"], frames: int
 ) -> Float[np.ndarray, "T"]:
@@ -107,9 +127,7 @@ def _middle_of_height(
     return round((high[0] + high[-1]) / 2)
 
 
-def _last_at_address(
-    ends: Float[np.ndarray, "T 2 2"], top: int, low: int, address: float
-) -> int:
+def _last_at_address(ends: Float[np.ndarray, "T 2 2"], top: int, low: int, address: float) -> int:
     """Last frame before the top in which the club, in heights, still lies as it rested before it.
 
     It rested where most frames with the hands low agree; by how much they do not is noise.
