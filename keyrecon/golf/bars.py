@@ -29,7 +29,7 @@ STEPS = 9
 """Places along a segment or a gap where the foreground is asked."""
 EDGE = 0.4
 """Probability of foreground at the side of a bar, against its middle."""
-FAINT = 25
+FAINT = 40
 """Probability of foreground, of 255, that a line may consist of."""
 BESIDE, ALONE = 0.02, 0.5
 """How far beside such a line, in player heights, its foreground must have fallen to this share:
