@@ -37,8 +37,9 @@ def read_motion_model(path: Path = BUILT_IN) -> MotionModel:
             arrays = {name: stored[name].astype(np.float64) for name in _ARRAYS}
             provenance = str(stored["provenance"])
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as fault:
+        why = fault.strerror if isinstance(fault, OSError) and fault.strerror else "another format"
         raise KeyreconError(
-            f"{path} is not a swing prior ({fault}); make one with: keyrecon golf train"
+            f"{path} is not a swing prior ({why}); make one with: keyrecon golf train"
         ) from fault
     if version != VERSION:
         raise KeyreconError(
