@@ -69,6 +69,15 @@ def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
     assert track_player(video, track, camera, background, colors, options) is track
 
 
+def test_a_video_too_long_for_its_pictures_to_be_kept_is_read_again(found, monkeypatch):
+    _, video, camera, colors, _ = found
+    kept = find_player(video, colors, camera)
+    monkeypatch.setattr("keyrecon.tracking.find.MOST_KEPT", 0)
+    again = find_player(video, colors, camera)
+    assert (again.head == kept.head).all()
+    assert (again.feet == kept.feet).all()
+
+
 def test_the_standing_height_is_that_of_the_player(found):
     assert found[4].height == pytest.approx(HEIGHT, rel=0.06)
 
