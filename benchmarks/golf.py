@@ -234,16 +234,21 @@ def write_ablation(
 ) -> None:
     """The golfer at the key postures, fitted in several ways: one way per row."""
     frames = np.clip(fits[SHOWN[-1]].keys.round().astype(int), 0, len(video) - 1).tolist()
+    reach = fits[SHOWN[-1]].motion.points2d[frames].reshape(-1, 2)
+    low, high = reach.min(axis=0), reach.max(axis=0)
+    room = ROOM * (high[1] - low[1])
+    (x0, y0), (x1, y1) = np.maximum(low - room, 0).astype(int), (high + room).astype(int)
     rows = []
     for name in SHOWN:
-        drawn = [draw_golfer(video.frame(t), fits[name], seen.camera, t) for t in frames]
+        drawn = [draw_golfer(video.frame(t), fits[name], seen.camera, t)[y0:y1, x0:x1]
+                 for t in frames]  # fmt: skip
         row = np.hstack([reduce_picture(picture, PICTURE) for picture in drawn])
         rows.append(cv2.putText(row, name, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255,) * 3, 2))
     cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
 
 
-PICTURE = 480
-"""Width of one of its pictures, px."""
+PICTURE, ROOM = 480, 0.25
+"""Width of one of its pictures, px, and room around the player, his heights."""
 
 
 def main() -> None:

@@ -56,8 +56,7 @@ def see_club_again(
     What the player does after the finish is no part of the fitted motion, which tells nothing then.
     """
     first, frames = observations.club, np.arange(len(observations.club))
-    known = np.isfinite(first).all(axis=(1, 2))
-    after = (frames > fitted.keys[3]) & known
+    after = frames > fitted.keys[3]
     expected = np.where(after[:, None, None], np.nan, fitted.club_seen)
     again = look_again(video, first, expected, height, options)
     turns = _turn_off(first, fitted.club_seen, options.lines)
