@@ -202,7 +202,7 @@ def test_the_sign_path_is_the_cheapest_of_all_paths():
         jumps = np.diff(z, 2) ** 2 / (2 * (options.jerk**2 + doubt[1:-1, 0] ** 2))
         return cost[np.arange(6), list(path)].sum() + np.minimum(jumps, options.reach).sum()
 
-    found = second_order_path(cost, depth, doubt, options)
+    found = second_order_path(cost, depth[:, 0], doubt, options)
     assert price(found) == pytest.approx(min(price(p) for p in product((0, 1), repeat=6)))
 
 

@@ -27,6 +27,9 @@ from keyrecon.lifting.occlusion import hidden_cost
 from keyrecon.lifting.signs import FlipOptions, Shown, Signs, sign_depths, sign_states
 from keyrecon.lifting.votes import Votes
 
+_CHUNK = 200
+"""Frames whose jumps are weighed at once: 7 MB."""
+
 
 def choose_signs(
     shown: Shown,
@@ -102,43 +105,68 @@ def follow_signs(
         total = options.limits * trunk + sum(cost.min(axis=-1) for cost in limbs)
         total += votes.cost(anatomy.trunk, shown, options)
         total += votes.guided(anatomy.trunk, shown, options)
-        best = second_order_path(total, *sign_depths(anatomy.trunk, shown), options)
+        best = _path(total, anatomy.trunk, shown, options)
         bones = list(anatomy.trunk)
         sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         given = cost[rows, best % cost.shape[1]]
         given += votes.cost(limb.bones, shown, options)
         given += votes.guided(limb.bones, shown, options)
-        path = second_order_path(given, *sign_depths(limb.bones, shown), options)
+        path = _path(given, limb.bones, shown, options)
         bones = list(limb.bones)
         sign[:, bones], probability[:, bones] = _read(path, given, len(bones))
     return Signs(sign, probability)
 
 
+def _path(
+    cost: Float[np.ndarray, "T S"], bones: tuple[int, ...], shown: Shown, options: FlipOptions
+) -> Int[np.ndarray, "T"]:
+    members = list(bones)
+    return second_order_path(cost, shown.depth[:, members], shown.doubt[:, members], options)
+
+
 def second_order_path(
     cost: Float[np.ndarray, "T S"],
-    depth: Float[np.ndarray, "T S g"],
+    depth: Float[np.ndarray, "T g"],
     doubt: Float[np.ndarray, "T g"],
     options: FlipOptions,
 ) -> Int[np.ndarray, "T"]:
-    """Cheapest sequence of states; jumps in the second difference of depth cost (Viterbi)."""
+    """Cheapest sequence of states; jumps in the second difference of depth cost (Viterbi).
+
+    `depth` is |dz| of a group of bones, whose sign vectors are the states.
+    """
     frames, states = cost.shape
     if frames < 3:
         return cost.argmin(axis=1)
     total = cost[0][:, None] + cost[1][None]
     back = np.zeros((frames, states, states), dtype=np.int8 if states < 128 else np.int64)
-    spread = 2 * (options.jerk**2 + doubt**2)
-    for t in range(2, frames):
-        bend = depth[t - 2][:, None, None] - 2 * depth[t - 1][None, :, None] + depth[t][None, None]
-        jump = np.minimum((bend**2 / spread[t - 1]).sum(-1), options.reach)
-        through = total[:, :, None] + jump
-        back[t] = through.argmin(axis=0)
-        total = through.min(axis=0) + cost[t][None]
+    for first in range(2, frames, _CHUNK):
+        last = min(first + _CHUNK, frames)
+        jumps = _jumps(depth[first - 2 : last], doubt[first - 1 : last - 1], options)
+        for t, jump in enumerate(jumps, first):
+            through = total[:, :, None] + jump
+            back[t] = through.argmin(axis=0)
+            total = through.min(axis=0) + cost[t][None]
     path = np.zeros(frames, dtype=np.int64)
     path[-2], path[-1] = np.unravel_index(total.argmin(), total.shape)
     for t in range(frames - 1, 1, -1):
         path[t - 2] = back[t, path[t - 1], path[t]]
     return path
+
+
+def _jumps(
+    depth: Float[np.ndarray, "m g"], doubt: Float[np.ndarray, "n g"], options: FlipOptions
+) -> Float[np.ndarray, "n S S S"]:
+    """Cost of all states of three frames in a row: a sum over bones, of their own signs."""
+    signs = np.array([1.0, -1.0])
+    before, now, after = (depth[k : k + len(doubt), :, None] * signs for k in range(3))
+    bend = before[..., :, None, None] - 2 * now[..., None, :, None] + after[..., None, None, :]
+    each = bend**2 / (2 * (options.jerk**2 + doubt**2))[..., None, None, None]
+    bones, total = doubt.shape[1], np.zeros(1)
+    for bone in range(bones):
+        own = [2 if b == bone else 1 for b in range(bones)]
+        total = total + each[:, bone].reshape(-1, *own, *own, *own)
+    return np.minimum(total, options.reach).reshape(-1, *[2**bones] * 3)
 
 
 def _costs(
