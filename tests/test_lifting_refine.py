@@ -9,7 +9,7 @@ from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
 from keyrecon.lifting.constraints import keep_lengths, low_pass
 from keyrecon.lifting.descend import descend
 from keyrecon.lifting.interpolate import drop_controls, slerp, slerp_between
-from keyrecon.lifting.observe import bridge_gaps, reject_spikes
+from keyrecon.lifting.observe import KNEE, Observed, bridge_gaps, reject_spikes
 from keyrecon.lifting.shown import depth_share, log_density
 from keyrecon.lifting.solver import Smoothness, State, solve, tangents
 from keyrecon.records import HalfKeyframes
@@ -119,13 +119,18 @@ def test_descent_filters_as_one_pass_whose_gain_follows_the_923_rule():
     assert loss == pytest.approx(0.707, abs=0.01)
 
 
+def known(joints, spread, knee=KNEE):
+    """Joints of which all are known equally well."""
+    return Observed(joints, np.full(joints.shape[:2], spread), np.full(joints.shape[:2], knee))
+
+
 @pytest.mark.parametrize("name", ["reprojection", "breadth", "alignment"])
 def test_slopes_agree_with_finite_differences(name):
     state = smooth_state(4)
     rng = np.random.default_rng(3)
     observed = positions(state)[..., :2] + rng.normal(0, 0.01, (4, 14, 2))
     term = {
-        "reprojection": terms.reprojection(observed, np.full((4, 14), 0.02), LENGTHS, LSP14, 1e9),
+        "reprojection": terms.reprojection(known(observed, 0.02, np.inf), LENGTHS, LSP14),
         "alignment": terms.alignment(np.linspace(0, 1, 13), 0.3),
         "breadth": terms.breadth((2, 3), 0.2, 0.01, LENGTHS, LSP14),
     }[name]
@@ -159,7 +164,7 @@ def test_the_solver_returns_to_the_truth_from_a_disturbed_start():
     observed = positions(truth)[..., :2]
     deep = np.sign(truth.directions[..., 2:]) * 0.2
     start = State(truth.root + 0.02, unit(truth.directions + [0.05, -0.05, 0] + deep * [0, 0, 1]))
-    term = terms.reprojection(observed, np.full((80, 14), 0.005), LENGTHS, LSP14)
+    term = terms.reprojection(known(observed, 0.005), LENGTHS, LSP14)
     smoothness = Smoothness(1e2, 1e2 * LENGTHS**2)
     found = solve(start, [term], smoothness, 40, 1e-8)
     error = np.linalg.norm(positions(found) - positions(truth), axis=-1)
@@ -170,10 +175,26 @@ def test_a_solver_step_never_raises_the_cost():
     truth = smooth_state(40)
     rng = np.random.default_rng(5)
     observed = positions(truth)[..., :2] + rng.normal(0, 0.05, (40, 14, 2))
-    term = terms.reprojection(observed, np.full((40, 14), 0.01), LENGTHS, LSP14)
+    term = terms.reprojection(known(observed, 0.01), LENGTHS, LSP14)
     smoothness = Smoothness(1e3, 1e3 * LENGTHS**2)
     costs = [term(solve(truth, [term], smoothness, rounds, 0.0)).cost for rounds in (0, 1, 3, 8)]
     assert costs[-1] < costs[0]
+
+
+def test_what_a_person_saw_holds_against_neighbours_that_slipped():
+    truth, wrist, marked = smooth_state(60), LSP14.index("right_wrist"), 30
+    joints = positions(truth)[..., :2]
+    slipped = joints.copy()
+    slipped[20:41, wrist, 0] += 0.1
+    slipped[marked] = joints[marked]
+    off = {}
+    for knee in (KNEE, np.inf):
+        observed = known(slipped, 0.02)
+        observed.spread[marked], observed.knee[marked] = 0.007, knee
+        term = terms.reprojection(observed, LENGTHS, LSP14)
+        found = solve(truth, [term], Smoothness(1e4, 1e4 * LENGTHS**2), 20, 1e-6)
+        off[knee] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])
+    assert off[np.inf] < 0.5 * off[KNEE]
 
 
 def test_gaps_are_bridged_by_straight_lines():

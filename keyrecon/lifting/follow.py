@@ -68,7 +68,7 @@ def follow_motion(
         part = slice(first, last)
         solved = _follow_window(
             State(guide.root[part], guide.directions[part]),
-            Observed(observed.joints[part], observed.spread[part]),
+            observed.part(part),
             replace(figure, frames=figure.frames - first),
             fps,
             options,

@@ -25,7 +25,7 @@ from keyrecon.lifting.lengths import (
     joint_noise,
     marked_joints,
 )
-from keyrecon.lifting.observe import Observed, bridge_gaps, reject_spikes
+from keyrecon.lifting.observe import KNEE, Observed, bridge_gaps, reject_spikes
 from keyrecon.lifting.refine import RefineOptions, descend_motion
 from keyrecon.lifting.signs import FlipOptions
 from keyrecon.lifting.solver import State
@@ -193,7 +193,9 @@ def _observe(
     spread[annotations.frames] = np.where(
         marked, options.lengths.click_noise, spread[annotations.frames]
     )
-    return Observed(joints, spread)
+    knee = np.full(spread.shape, KNEE)
+    knee[annotations.frames] = np.where(marked & annotations.visible, np.inf, KNEE)
+    return Observed(joints, spread, knee)
 
 
 def _check(tracks: JointTracks, annotations: Annotations) -> None:

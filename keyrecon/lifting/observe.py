@@ -7,6 +7,8 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 MAD_TO_SIGMA = 1.4826
+KNEE = 1.5
+"""Standard deviations from which the pull of a joint that may have slipped grows no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,6 +19,12 @@ class Observed:
     """NaN where missing or rejected."""
     spread: Float[np.ndarray, "T J"]
     """Standard deviation of each joint, body heights."""
+    knee: Float[np.ndarray, "T J"]
+    """Standard deviations beyond which a joint may have slipped; infinite where a person saw it."""
+
+    def part(self, frames: slice) -> "Observed":
+        """Some of the frames."""
+        return Observed(self.joints[frames], self.spread[frames], self.knee[frames])
 
 
 def reject_spikes(

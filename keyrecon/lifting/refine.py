@@ -71,7 +71,7 @@ def refine_motion(  # noqa: PLR0913
 
     `guide` holds the directions of the slerped key poses.
     """
-    recipe = [terms.reprojection(observed.joints, observed.spread, size.lengths, skeleton)]
+    recipe = [terms.reprojection(observed, size.lengths, skeleton)]
     recipe += _trunk_terms(size, skeleton, options)
     recipe += _balance_terms(start, size, skeleton, fps, options)
     recipe.append(terms.key_pose_prior(guide, options.key_spread))

@@ -5,24 +5,24 @@ from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import ancestry, pose_from_directions
+from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.solver import Linear, State, Term
 
 
 def reprojection(
-    observed: Float[np.ndarray, "T J 2"],
-    spread: Float[np.ndarray, "T J"],
+    observed: Observed,
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
-    knee: float = 1.5,
 ) -> Term:
-    """Joints should project onto the observed ones; Huber beyond `knee` times the spread.
+    """Joints should project onto the observed ones; Huber beyond the knee times the spread.
 
-    `observed` and `spread` in units of length (px over scale); NaN or an infinite spread where
-    nothing is known. The squared loss of Eq. 6, made robust.
+    In units of length (px over scale); NaN or an infinite spread where nothing is known. The
+    squared loss of Eq. 6, made robust where a joint may have slipped.
     """
+    spread, knee = observed.spread, observed.knee
     reach = ancestry(skeleton) * lengths
-    inverse = np.where(np.isnan(observed[..., 0]) | np.isinf(spread), 0.0, 1.0 / spread)
-    target = np.nan_to_num(observed)
+    inverse = np.where(np.isnan(observed.joints[..., 0]) | np.isinf(spread), 0.0, 1.0 / spread)
+    target = np.nan_to_num(observed.joints)
     slope = np.zeros((len(skeleton.names), 2, len(lengths), 3))
     for axis in range(2):
         slope[:, axis, :, axis] = reach
@@ -32,9 +32,9 @@ def reprojection(
         points = pose_from_directions(state.directions, lengths, skeleton)[..., :2]
         residual = inverse[..., None] * (points + state.root[:, None] - target)
         size = np.linalg.norm(residual, axis=-1)
-        far = size > knee
-        shrink = np.sqrt(np.where(far, knee / np.maximum(size, 1e-12), 1.0))
-        cost = np.where(far, knee * size - 0.5 * knee**2, 0.5 * size**2).sum()
+        near = np.minimum(size, knee)
+        shrink = np.sqrt(np.where(size > knee, near / np.maximum(size, 1e-12), 1.0))
+        cost = (near * (size - 0.5 * near)).sum()
         weight = inverse * shrink
         by_direction = (weight[:, :, None, None, None] * slope).reshape(frames, -1, len(lengths), 3)
         by_root = (weight[..., None, None] * np.eye(2)).reshape(frames, -1, 2)
