@@ -81,3 +81,8 @@ def test_clicks_on_nothing_say_so(video):
     off = {name: (20.0 + 4 * i, y) for i, (name, (_, y)) in enumerate(clicks().joints.items())}
     with pytest.raises(KeyreconError, match="no player stands out"):
         separate_player(video, clicks(**off))
+
+
+def test_the_same_clicks_cut_out_the_same_player_again(video):
+    once, again = (separate_player(video, clicks()) for _ in range(2))
+    assert all((once.mask(t) == again.mask(t)).all() for t in range(FRAMES))

@@ -48,8 +48,8 @@ ISLAND = 0.06
 """What is farther from the player than half of this does not belong to it, player heights."""
 SAFE = 0.012
 """Width of the rim around the player that belongs to nobody, player heights."""
-SMALLEST, LARGEST = 0.01, 0.7
-"""Area of the player in squared heights: less or more is not a player."""
+SMALLEST, LARGEST = 0.01, 0.4
+"""Area of the player in squared heights: people fill .16 to .2, less or more is no player."""
 SEEN_LEAST = 0.25
 """Share of the sampled frames in which a place must be free to count as known: GrabCut errs in
 some."""
@@ -215,6 +215,7 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], clicks: Clicks) -> _Cutte
     small = reduce_picture(picture, width)
     models = np.zeros((1, 65)), np.zeros((1, 65))
     trimap = _seed(small.shape[:2], clicks)
+    cv2.setRNGSeed(0)  # its clusters begin at random; the same clicks give the same player
     cv2.grabCut(small, trimap, None, *models, 5, cv2.GC_INIT_WITH_MASK)
     cutter = _Cutter(clicks, width, models)
     _check_player(cutter(small), clicks)
