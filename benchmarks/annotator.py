@@ -106,8 +106,7 @@ def correct_suggestion(person: Person, frame: int, answers: Answers, seen: float
         if np.hypot(x - place[0], y - place[1]) > seen:
             person.drag((x, y), place)
     if offered:
-        person.press("Enter")
-        person.await_text("#guide-text", "Which ends|done|Click")
+        person.take_suggestion()
     return finish(person, frame, answers, before)
 
 
@@ -158,9 +157,11 @@ def time_switching(demo: Path) -> dict[str, list[float]]:
     with browser() as chromium, serving(folder) as server:
         person = Person(chromium.new_context(viewport=SCREEN), server.door.address)
         person.add_keyframes(range(10, 600, 20))
+        person.page.reload()  # as one who opens a project whose keyframes are known
+        person.await_text("#done-count", "of")
         person.open(10)
         for frame in range(30, 600, 20):
-            person.page.wait_for_timeout(400)  # a person looks before going on
+            person.page.wait_for_timeout(1000)  # a person looks before going on
             person.press("d")
             person.page.wait_for_selector(f"#picture[data-frame='{frame}']")
         switching = person.durations("keyframe")[1:]

@@ -45,7 +45,7 @@ def show_keyframe(person: Person, answers: Answers, frame: int, out: Path) -> No
     person.open(frame)
     if person.suggestion(frame):
         photograph(person, out, "suggestion")
-        person.press("Enter")
+        person.take_suggestion()
     person.mark_joints(partial(answers.place, frame))
     person.pose()
     limb = list(answers.signs(frame))[-1]

@@ -208,6 +208,11 @@ class Person:
             self.await_text("#guide-text", "suggestion|Which ends|done")
         return offered
 
+    def take_suggestion(self):
+        """Accept what is suggested, and wait for what is asked next."""
+        self.press("Enter")
+        self.await_text("#guide-text", "Which ends|done|Click")
+
     def add_keyframes(self, frames):
         """Give the project keyframes of one's own, without the page's help."""
         edits = [
