@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.chain import pose_from_directions, unit
+from keyrecon.lifting.chain import unit
 from keyrecon.lifting.flips import follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
@@ -99,7 +99,7 @@ def _follow_window(
     guide: State, observed: Observed, figure: Figure, fps: float, options: FollowOptions
 ) -> State:
     skeleton, lengths = figure.skeleton, figure.size.lengths
-    bridge = _flat(guide, figure)
+    bridge = guide.points(lengths, skeleton)[..., :2]
     joints = smooth_joints(observed.joints, bridge, _SMOOTH_SECONDS * fps)
     keys = figure.keys.directions
     noise, flips = _SMOOTHED, at_rate(options.flips, fps)
@@ -112,7 +112,7 @@ def _follow_window(
         state = refine_motion(
             start, observed, guide.directions, figure.size, skeleton, fps, options.refine
         )
-        joints, noise = _flat(state, figure), _FOLLOWED
+        joints, noise = state.points(lengths, skeleton)[..., :2], _FOLLOWED
         keys = _settled_keys(figure, state)
     return state
 
@@ -126,8 +126,3 @@ def _settled_keys(figure: Figure, state: State) -> Float[np.ndarray, "K B 3"]:
     settled[..., 2] = np.where(nearer != 0, -nearer * np.abs(settled[..., 2]), settled[..., 2])
     keys[inside] = settled
     return keys
-
-
-def _flat(state: State, figure: Figure) -> Float[np.ndarray, "T J 2"]:
-    poses = pose_from_directions(state.directions, figure.size.lengths, figure.skeleton)
-    return poses[..., :2] + state.root[:, None]

@@ -16,7 +16,7 @@ from keyrecon.camera import project_orthographic
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
-from keyrecon.lifting.interpolate import interpolate_poses
+from keyrecon.lifting.interpolate import Interpolation, interpolate_poses
 from keyrecon.lifting.keysigns import follow_key_signs
 from keyrecon.lifting.lengths import (
     BodySize,
@@ -103,18 +103,29 @@ def lift_motion(  # noqa: PLR0913
     guide = _place(between, observed, size, skeleton)
     slips = _find_slips(observed, guide, size, annotations, options)
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
+    figure = Figure(skeleton, size, keys, annotations.frames)
     if options.method == "paper":
         upright = _rolled(guide.directions, clean, size, skeleton)
         guide = _place(upright, clean, size, skeleton)
         state = descend_motion(guide, clean, size, skeleton, options.refine)
     else:
         follow = FollowOptions(options.flips, options.refine)
-        figure = Figure(skeleton, size, keys, annotations.frames)
         state = follow_motion(guide, clean, figure, fps, follow, progress)
-    points = pose_from_directions(state.directions, size.lengths, skeleton)
-    points[..., :2] += state.root[:, None]
-    key_poses = pose_from_directions(keys.directions, size.lengths, skeleton)
-    metres = 1.0 if options.height is None else options.height
+    return _in_space(state, figure, slerped, slips, options.height)
+
+
+def _in_space(
+    state: State,
+    figure: Figure,
+    slerped: Interpolation,
+    slips: Bool[np.ndarray, "T J"],
+    height: float | None,
+) -> LiftResult:
+    """The motion in metres where the height is known, else in body heights."""
+    size, keys = figure.size, figure.keys
+    points = state.points(size.lengths, figure.skeleton)
+    key_poses = pose_from_directions(keys.directions, size.lengths, figure.skeleton)
+    metres = 1.0 if height is None else height
     return LiftResult(
         points3d=points * metres,
         points2d=project_orthographic(points, size.scale),
@@ -133,7 +144,7 @@ def _find_slips(
     observed: Observed, guide: State, size: BodySize, annotations: Annotations, options: LiftOptions
 ) -> Bool[np.ndarray, "T J"]:
     """Tracked joints that leap away from where the guide puts them; marks are never slips."""
-    residual = observed.joints - _flat(guide, size, annotations.skeleton)
+    residual = observed.joints - guide.points(size.lengths, annotations.skeleton)[..., :2]
     slips = reject_spikes(residual, _SPIKE_FRAMES, 4.0, 1.4 * options.lengths.track_noise)
     slips[annotations.frames] = False
     return slips
@@ -168,11 +179,6 @@ def _rolled(
     turn = np.exp(1j * np.arctan2(across, along))
     turned = (directions[..., 0] + 1j * directions[..., 1]) * turn
     return np.stack([turned.real, turned.imag, directions[..., 2]], axis=-1)
-
-
-def _flat(state: State, size: BodySize, skeleton: Skeleton) -> Float[np.ndarray, "T J 2"]:
-    poses = pose_from_directions(state.directions, size.lengths, skeleton)
-    return poses[..., :2] + state.root[:, None]
 
 
 def _observe(

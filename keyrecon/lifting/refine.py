@@ -16,7 +16,7 @@ from jaxtyping import Float
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
 from keyrecon.lifting.anatomy import TILT, anatomy_of
-from keyrecon.lifting.chain import ancestry, bone_vectors, breadths, pose_from_directions, unit
+from keyrecon.lifting.chain import ancestry, bone_vectors, breadths, unit
 from keyrecon.lifting.constraints import keep_lengths, low_pass
 from keyrecon.lifting.descend import descend
 from keyrecon.lifting.lengths import BodySize
@@ -89,8 +89,7 @@ def descend_motion(
 ) -> State:
     """Projected gradient descent from the slerped key poses (Fig. 9)."""
     root = skeleton.root
-    points = pose_from_directions(start.directions, size.lengths, skeleton)
-    points[..., :2] += start.root[:, None]
+    points = start.points(size.lengths, skeleton)
     lengths = keep_lengths(size.lengths, skeleton)
     fitted = descend(
         points, observed.joints, (lengths, low_pass(options.sigma)), options.step, options.descents

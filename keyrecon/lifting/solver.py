@@ -14,6 +14,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solveh_banded
 
+from keyrecon.body import Skeleton
+from keyrecon.lifting.chain import pose_from_directions
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -22,6 +25,14 @@ class State:
     root: Float[np.ndarray, "T 2"]
     """Units of length: px over scale."""
     directions: Float[np.ndarray, "T B 3"]
+
+    def points(
+        self, lengths: Float[np.ndarray, "B"], skeleton: Skeleton
+    ) -> Float[np.ndarray, "T J 3"]:
+        """Joints where they are seen in the image; the root has depth 0."""
+        points = pose_from_directions(self.directions, lengths, skeleton)
+        points[..., :2] += self.root[:, None]
+        return points
 
 
 @dataclass(frozen=True, eq=False)

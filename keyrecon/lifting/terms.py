@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.chain import ancestry, pose_from_directions
+from keyrecon.lifting.chain import ancestry
 from keyrecon.lifting.observe import Observed
 from keyrecon.lifting.solver import Linear, State, Term
 
@@ -29,8 +29,7 @@ def reprojection(
 
     def term(state: State) -> Linear:
         frames = len(target)
-        points = pose_from_directions(state.directions, lengths, skeleton)[..., :2]
-        residual = inverse[..., None] * (points + state.root[:, None] - target)
+        residual = inverse[..., None] * (state.points(lengths, skeleton)[..., :2] - target)
         size = np.linalg.norm(residual, axis=-1)
         near = np.minimum(size, knee)
         shrink = np.sqrt(np.where(size > knee, near / np.maximum(size, 1e-12), 1.0))
