@@ -18,7 +18,7 @@ from keyrecon.golf.look import LookOptions, look_at_swing
 from keyrecon.golf.mirror import mirror_clicks, mirror_observations
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
 from keyrecon.golf.result import describe_fit
-from keyrecon.golf.second_look import SecondLookOptions, see_club_again
+from keyrecon.golf.second_look import SecondLookOptions, median_picture, see_club_again
 from keyrecon.golf.skeleton import size_body
 from keyrecon.golf.start import place_player, start_state
 from keyrecon.golf.timing import find_rests
@@ -76,9 +76,12 @@ def refine_fit(
 
     At last the key postures in which the player rests, which the club tells better than the fit.
     """
-    seen = observations
-    for _ in range(options.again if options.method == "swing" else 0):
-        seen = see_club_again(observations, video, fitted, clicks.height, options.second_look)
+    seen, looks = observations, options.again if options.method == "swing" else 0
+    plate = median_picture(video) if looks else None
+    for _ in range(looks):
+        seen = see_club_again(
+            observations, video, plate, fitted, clicks.height, options.second_look
+        )
         fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
     settings = clicks.height, video.fps
     keys = find_rests(seen.club, fitted.club_seen, fitted.keys, settings, options.look.timing)

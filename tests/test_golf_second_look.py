@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.golf.second_look import look_again
+from keyrecon.golf.second_look import look_again, median_picture
 from keyrecon.video import open_video
 from keyrecon.video_writer import write_video
 
@@ -52,7 +52,7 @@ def film(tmp_path_factory):
 
 def test_a_club_is_found_where_it_is_expected_only_roughly(film):
     expected = clubs(ANGLES + 12, HANDS + np.array([3.0, -4.0]))
-    found = look_again(film, NOWHERE, expected, HEIGHT)
+    found = look_again(film, median_picture(film), NOWHERE, expected, HEIGHT)
     known = np.isfinite(found[:, 0, 0])
     assert known[:18].mean() > 0.8 and known[22:].mean() > 0.8
     assert (off(found, clubs(ANGLES))[known] < 3).mean() > 0.9
@@ -60,14 +60,14 @@ def test_a_club_is_found_where_it_is_expected_only_roughly(film):
 
 def test_a_rope_in_the_scene_is_not_taken_for_it(film):
     expected = clubs(np.full(FRAMES, 70.0))
-    found = look_again(film, NOWHERE, expected, HEIGHT)
+    found = look_again(film, median_picture(film), NOWHERE, expected, HEIGHT)
     far = np.abs(ANGLES - 70) > 45
     assert np.isfinite(found[far, 0, 0]).mean() < 0.1
 
 
 def test_what_was_seen_at_first_stays_where_the_expectation_is_all_wrong(film):
     true = clubs(ANGLES)
-    found = look_again(film, true, clubs(ANGLES + 100), HEIGHT)
+    found = look_again(film, median_picture(film), true, clubs(ANGLES + 100), HEIGHT)
     clear = np.abs(np.arange(FRAMES) - 20) > 4
     assert (np.nan_to_num(off(found, true), nan=99.0)[clear] < 1).mean() > 0.8
 
@@ -75,4 +75,4 @@ def test_what_was_seen_at_first_stays_where_the_expectation_is_all_wrong(film):
 def test_nothing_is_found_where_the_club_points_at_the_camera(film):
     expected = clubs(ANGLES)
     expected[:, 1] = expected[:, 0] + 0.1 * (expected[:, 1] - expected[:, 0])
-    assert np.isnan(look_again(film, NOWHERE, expected, HEIGHT)).all()
+    assert np.isnan(look_again(film, median_picture(film), NOWHERE, expected, HEIGHT)).all()

@@ -46,19 +46,21 @@ class SecondLookOptions:
 def see_club_again(
     observations: Observations,
     video: Video,
+    plate: Float[np.ndarray, "h w"],
     fitted: FittedSwing,
     height: float,
     options: SecondLookOptions = SecondLookOptions(),
 ) -> Observations:
     """The observations with the club of a second look at the swing; `height` of the player in px.
 
+    `plate` is the median picture (`median_picture`).
     A club that rests at address is in the median picture too: there, what was seen at first stays.
     What the player does after the finish is no part of the fitted motion, which tells nothing then.
     """
     first, frames = observations.club, np.arange(len(observations.club))
     after = frames > fitted.keys[3]
     expected = np.where(after[:, None, None], np.nan, fitted.club_seen)
-    again = look_again(video, first, expected, height, options)
+    again = look_again(video, plate, first, expected, height, options)
     turns = _turn_off(first, fitted.club_seen, options.lines)
     resting = (frames < fitted.keys[0]) & (turns < USUAL)
     ends = np.where(resting[:, None, None], first, again)
@@ -77,6 +79,7 @@ def _turn_off(
 
 def look_again(
     video: Video,
+    plate: Float[np.ndarray, "h w"],
     first: Float[np.ndarray, "T 2 2"],
     expected: Float[np.ndarray, "T 2 2"],
     height: float,
@@ -86,7 +89,6 @@ def look_again(
 
     `first` is where it was seen at first, NaN where it was not; `height` that of the player in px.
     """
-    plate = _median_picture(video)
     swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
 
     def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
@@ -102,7 +104,7 @@ def look_again(
     return ends
 
 
-def _median_picture(video: Video) -> Float[np.ndarray, "h w"]:
+def median_picture(video: Video) -> Float[np.ndarray, "h w"]:
     """The scene, and what of the player hardly moves."""
     chosen = set(np.linspace(0, len(video) - 1, PLATE).astype(int).tolist())
     pictures = [g for t, g in enumerate(video.grey_frames()) if t in chosen]
