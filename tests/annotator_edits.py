@@ -3,7 +3,9 @@
 import itertools
 import json
 
-from keyrecon.annotate.edits import parse_edits
+import msgspec
+
+from keyrecon.annotate.edits import EditList
 
 _numbers = itertools.count()
 
@@ -19,5 +21,10 @@ def mark(frame, joint, to, was=None):
     return edit("mark", frame=frame, joint=joint, to=to, was=was)
 
 
+def read_edits(text):
+    """Edits from the body of a request, as the server reads it."""
+    return msgspec.json.decode(text, type=EditList).edits
+
+
 def submit(store, *edits):
-    return store.submit(parse_edits(json.dumps({"edits": edits}).encode()))
+    return store.submit(read_edits(json.dumps({"edits": edits})))

@@ -4,11 +4,12 @@ import json
 import random
 from dataclasses import replace
 
+import msgspec
 import pytest
-from annotator_edits import edit, mark, submit
+from annotator_edits import edit, mark, read_edits, submit
 from annotator_files import LIMITS, NECK, on_file
 
-from keyrecon.annotate.edits import Limits, parse_edits
+from keyrecon.annotate.edits import Limits
 from keyrecon.annotate.marks import written_cells
 from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14
@@ -201,15 +202,15 @@ def test_what_cannot_be_is_refused_and_the_rest_of_a_batch_accepted(open_store, 
     ],
 )
 def test_an_edit_of_another_form_is_refused(change):
-    with pytest.raises(KeyreconError, match="no edits"):
-        parse_edits(json.dumps({"edits": [{**mark(3, "neck", [1, 1, 2]), **change}]}).encode())
+    with pytest.raises(msgspec.DecodeError):
+        read_edits(json.dumps({"edits": [{**mark(3, "neck", [1, 1, 2]), **change}]}))
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "1e999"])
 def test_a_place_that_is_no_number_is_refused(number):
     text = json.dumps({"edits": [mark(3, "neck", [7.5, 1, 2])]}).replace("7.5", number)
-    with pytest.raises(KeyreconError, match="no edits"):
-        parse_edits(text.encode())
+    with pytest.raises(msgspec.DecodeError):
+        read_edits(text)
 
 
 def test_what_was_accepted_is_told_to_every_listener(open_store):

@@ -38,7 +38,9 @@ def test_a_dark_or_bright_shaft_is_found_from_the_hands_to_the_head(shade, degre
     bars = find_bars(picture, foreground, 0)
     best = suppose_shafts(bars, foreground, 0, SHOULDERS).ends[0]
     assert abs(direction(best) - degrees) < 1.5
-    assert np.linalg.norm(best[0] - HANDS) < 0.08 * HEIGHT  # a fist
+    turn = np.exp(-1j * np.radians(degrees)) * complex(*best[0] - HANDS)
+    assert 0 <= turn.real < 0.08 * HEIGHT  # the fist hides where it begins
+    assert abs(turn.imag) < 1
     assert np.linalg.norm(best[1] - head) < 8
 
 

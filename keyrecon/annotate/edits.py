@@ -7,7 +7,6 @@ page believed to stand in each cell (`from`), so that two pages cannot overwrite
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-import msgspec
 from msgspec import Meta, Struct, field
 
 from keyrecon.annotate.cells import Change, Key, Value
@@ -193,14 +192,6 @@ def _check_place(place: list[float | int], size: tuple[int, int], margin: float)
             raise KeyreconError(
                 f"({place[0]:g}, {place[1]:g}) is too far off the picture of {size[0]}x{size[1]}."
             )
-
-
-def parse_edits(body: bytes) -> list[AnyEdit]:
-    """Edits from the body of a request; raises KeyreconError that says what is wrong where."""
-    try:
-        return msgspec.json.decode(body, type=EditList).edits
-    except msgspec.DecodeError as fault:
-        raise KeyreconError(f"These are no edits: {fault}.") from fault
 
 
 class EditList(Struct, forbid_unknown_fields=True):
