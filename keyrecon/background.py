@@ -306,9 +306,7 @@ def _look_behind(
     known[where[:, 0], where[:, 1]] = True
 
 
-def _deviation(
-    ranked: UInt8[np.ndarray, "n h w"], middle: np.ndarray
-) -> Float[np.ndarray, "h w"]:
+def _deviation(ranked: UInt8[np.ndarray, "n h w"], middle: np.ndarray) -> Float[np.ndarray, "h w"]:
     """Half the distance between the quartiles, as a standard deviation."""
     low = np.take_along_axis(ranked, (middle // 2)[None], axis=0)[0].astype(np.float32)
     center = np.take_along_axis(ranked, middle[None], axis=0)[0].astype(np.float32)

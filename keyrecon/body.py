@@ -104,9 +104,7 @@ _LSP = (  # name, parent, bone length in statures
 )
 
 
-def _skeleton_from_rows(
-    rows: list[tuple[str, str | None, float]], lower: list[str]
-) -> Skeleton:
+def _skeleton_from_rows(rows: list[tuple[str, str | None, float]], lower: list[str]) -> Skeleton:
     names = tuple(name for name, _, _ in rows)
     return Skeleton(
         names=names,

@@ -32,9 +32,7 @@ app = tyro.extras.SubcommandApp()
 
 
 @app.command
-def demo(
-    name: Positional[Literal["tennis", "golf"]] = "tennis", out: Path = Path("demo")
-) -> None:
+def demo(name: Positional[Literal["tennis", "golf"]] = "tennis", out: Path = Path("demo")) -> None:
     """Run the whole job on the built-in synthetic sequence and print its accuracy.
 
     Tennis renders 36 s whose truth is known, finds the player, chooses keyframes, takes the marks

@@ -47,22 +47,16 @@ def _spread(annotations: Annotations, frames: np.ndarray) -> Annotations:
     return replace(annotations, frames=frames, joints=joints, visible=visible, nearer=nearer)
 
 
-def marks_asked_for(
-    annotations: Annotations, upper: np.ndarray, lower: np.ndarray
-) -> Annotations:
+def marks_asked_for(annotations: Annotations, upper: np.ndarray, lower: np.ndarray) -> Annotations:
     """The marks of each half of the body on the keyframes that need it, and no others."""
     frames, is_lower = annotations.frames, annotations.skeleton.is_lower
-    asked = np.where(
-        is_lower, np.isin(frames, lower)[:, None], np.isin(frames, upper)[:, None]
-    )
+    asked = np.where(is_lower, np.isin(frames, lower)[:, None], np.isin(frames, upper)[:, None])
     rows = asked.any(axis=1)
     joints = np.where(asked[..., None], annotations.joints, np.nan)[rows]
     visible = (asked & annotations.visible)[rows]
     child = annotations.skeleton.bones[:, 1]
     nearer = np.where(asked[:, child], annotations.nearer, 0)[rows]
-    return replace(
-        annotations, frames=frames[rows], joints=joints, visible=visible, nearer=nearer
-    )
+    return replace(annotations, frames=frames[rows], joints=joints, visible=visible, nearer=nearer)
 
 
 def missing_marks(

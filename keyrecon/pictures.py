@@ -73,9 +73,7 @@ def side_by_side(
                 future.cancel()
 
 
-def reduce_picture(
-    picture: UInt8[np.ndarray, "h w *c"], width: int
-) -> UInt8[np.ndarray, "y x *c"]:
+def reduce_picture(picture: UInt8[np.ndarray, "h w *c"], width: int) -> UInt8[np.ndarray, "y x *c"]:
     """A picture reduced to a width; halved by averaging first, so that nothing aliases."""
     height = max(1, round(picture.shape[0] * width / picture.shape[1]))
     while picture.shape[1] >= 2 * width and picture.shape[0] >= 2 * height:

@@ -128,9 +128,7 @@ def prepare(
     figures = make("edges", find_edges, video, track, camera, background, colors)
     comparison = make("compare", compare_frames, figures.edges, track)
     keyframes = make("keyframes", choose_keyframes, comparison, video.fps)
-    return Preparation(
-        video, camera, colors, track, background, figures, comparison, keyframes
-    )
+    return Preparation(video, camera, colors, track, background, figures, comparison, keyframes)
 
 
 def reconstruct(

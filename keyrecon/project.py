@@ -247,9 +247,7 @@ def prepared(workspace: Workspace, options: Options, progress: Progress) -> Prep
     return replace(preparation, keyframes=asked)
 
 
-def annotated(
-    workspace: Workspace, preparation: Preparation, partial: bool = False
-) -> Annotations:
+def annotated(workspace: Workspace, preparation: Preparation, partial: bool = False) -> Annotations:
     """The project's annotations; KeyreconError names the keyframes that lack theirs."""
     file = workspace.annotations_file
     annotations = load_annotations(workspace, preparation.video) if file.is_file() else None

@@ -114,9 +114,7 @@ class Video:
             raise KeyreconError(f"Frame {index} is outside the video of {len(self)} frames.")
         return next(self.frames(index, index + 1, width))
 
-    def _picture(
-        self, frame: av.VideoFrame, width: int | None
-    ) -> UInt8[np.ndarray, "h w 3"]:
+    def _picture(self, frame: av.VideoFrame, width: int | None) -> UInt8[np.ndarray, "h w 3"]:
         if width and width != self.width:
             height = max(1, round(self.height * width / self.width))
             stored = (height, width) if self.turns % 2 else (width, height)
@@ -210,9 +208,7 @@ def _shown_stamps(container: av.container.InputContainer, path: Path) -> list[in
     return stamps
 
 
-def _decode_from(
-    container: av.container.InputContainer, stamp: int
-) -> Iterator[av.VideoFrame]:
+def _decode_from(container: av.container.InputContainer, stamp: int) -> Iterator[av.VideoFrame]:
     """Decode in presentation order from a key frame at or before a presentation time."""
     import av
 

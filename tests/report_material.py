@@ -54,8 +54,13 @@ def half(frames, distances, beta=0.04):
     distance = near[np.arange(len(near)), best]
     well = distance < beta
     return HalfKeyframes(
-        frames=frames, nearest=frames[best], distance=distance, represented=well,
-        coverage=float(well.mean()), beta=beta, printed_count=len(frames),
+        frames=frames,
+        nearest=frames[best],
+        distance=distance,
+        represented=well,
+        coverage=float(well.mean()),
+        beta=beta,
+        printed_count=len(frames),
     )
 
 
@@ -65,8 +70,9 @@ def compare(points2d):
     everything = np.arange(len(flat))
     detour = np.zeros((2, len(flat)))
     step = np.stack([distances[everything[:-1], everything[1:]]] * 2).astype(float)
-    return Comparison(distances, distances, everything, everything, detour, step,
-                      np.ones(len(flat)))
+    return Comparison(
+        distances, distances, everything, everything, detour, step, np.ones(len(flat))
+    )
 
 
 def make_motion(points3d, points2d, keyframes, rng, units="m"):
@@ -75,11 +81,17 @@ def make_motion(points3d, points2d, keyframes, rng, units="m"):
     source = np.where(np.isfinite(found[..., 0]), 1, 2)
     source[keyframes] = 0
     return Motion(
-        skeleton=LSP14, points3d=points3d + rng.normal(0, 0.01, points3d.shape),
-        points2d=points2d + rng.normal(0, 0.5, points2d.shape), points2d_propagated=found,
-        confidence=rng.uniform(0.3, 1, found.shape[:2]), source=source,
-        scale=np.full(len(points3d), SCALE), fps=FPS, time=np.arange(len(points3d)) / FPS,
-        units=units, keyframes=keyframes,
+        skeleton=LSP14,
+        points3d=points3d + rng.normal(0, 0.01, points3d.shape),
+        points2d=points2d + rng.normal(0, 0.5, points2d.shape),
+        points2d_propagated=found,
+        confidence=rng.uniform(0.3, 1, found.shape[:2]),
+        source=source,
+        scale=np.full(len(points3d), SCALE),
+        fps=FPS,
+        time=np.arange(len(points3d)) / FPS,
+        units=units,
+        keyframes=keyframes,
     )
 
 
@@ -103,16 +115,28 @@ def make_material(folder, count=40, with_truth=True, video=None, name="walk.mp4"
     lower = half(np.linspace(6, count - 9, 4).round().astype(int), comparison.lower)
     keyframes = Keyframes(upper, lower, 10, 0.95)
     frames = keyframes.frames
-    asked = np.where(LSP14.is_lower, np.isin(frames, lower.frames)[:, None],
-                     np.isin(frames, upper.frames)[:, None])
+    asked = np.where(
+        LSP14.is_lower,
+        np.isin(frames, lower.frames)[:, None],
+        np.isin(frames, upper.frames)[:, None],
+    )
     marks = np.where(asked[..., None], points2d[frames], np.nan)
     visible = asked & (np.arange(14) % 5 > 0)
     nearer = np.zeros((len(frames), 13), dtype=int)
-    truth = {"points3d": points3d, "points2d": points2d, "fps": np.array(FPS),
-             "joint_names": np.array(LSP14.names)}
+    truth = {
+        "points3d": points3d,
+        "points2d": points2d,
+        "fps": np.array(FPS),
+        "joint_names": np.array(LSP14.names),
+    }
     return ReportMaterial(
-        video, track, comparison, keyframes, Annotations(LSP14, frames, marks, visible, nearer),
-        make_motion(points3d, points2d, frames, rng), {"track": 1.5, "edges": 0.7},
+        video,
+        track,
+        comparison,
+        keyframes,
+        Annotations(LSP14, frames, marks, visible, nearer),
+        make_motion(points3d, points2d, frames, rng),
+        {"track": 1.5, "edges": 0.7},
         truth if with_truth else None,
     )
 

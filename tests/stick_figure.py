@@ -72,10 +72,17 @@ def outline_edges(ends, scale, origin):
         along = np.arange(0, length, STEP)[:, None]
         turn = np.arange(0, np.pi, STEP / radius)[:, None]
         arc = np.cos(turn) * side + np.sin(turn) * axis
-        normal = np.concatenate([np.tile(side, (len(along), 1)), arc,
-                                 np.tile(-side, (len(along), 1)), -arc])
-        base = np.concatenate([ends[row, 0] + along * axis, np.tile(ends[row, 1], (len(arc), 1)),
-                               ends[row, 1] - along * axis, np.tile(ends[row, 0], (len(arc), 1))])
+        normal = np.concatenate(
+            [np.tile(side, (len(along), 1)), arc, np.tile(-side, (len(along), 1)), -arc]
+        )
+        base = np.concatenate(
+            [
+                ends[row, 0] + along * axis,
+                np.tile(ends[row, 1], (len(arc), 1)),
+                ends[row, 1] - along * axis,
+                np.tile(ends[row, 0], (len(arc), 1)),
+            ]
+        )
         points.append(base + radius * normal)
         # y points down: left of the tangent (1, 0) is (0, -1), up on the picture
         tangents.append(np.stack([normal[:, 1], -normal[:, 0]], axis=1))
@@ -90,8 +97,9 @@ def outline_edges(ends, scale, origin):
         kept &= ~(inside & (colors == color) & (owners != row))
     upper = points[:, 1] < 0.03
     lower = points[:, 1] > -0.03
-    return Edges(points[kept] * scale + origin, tangents[kept], colors[kept],
-                 upper[kept], lower[kept])
+    return Edges(
+        points[kept] * scale + origin, tangents[kept], colors[kept], upper[kept], lower[kept]
+    )
 
 
 def moving_figure(count, seed=0, noise=0.0, scale=180.0):
@@ -104,8 +112,9 @@ def moving_figure(count, seed=0, noise=0.0, scale=180.0):
         ends = capsules(angle)
         found = outline_edges(ends, scale, origin)
         jitter = noise * scale * rng.normal(size=found.points.shape)
-        edges.append(Edges(found.points + jitter, found.tangent, found.color,
-                           found.upper, found.lower))
+        edges.append(
+            Edges(found.points + jitter, found.tangent, found.color, found.upper, found.lower)
+        )
         head.append(ends[1].mean(0) * scale + origin)
         feet.append(ends[[7, 9], 1] * scale + origin)
     head, feet = np.array(head), np.array(feet)

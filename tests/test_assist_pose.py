@@ -58,10 +58,7 @@ def test_alternatives_cost_more_and_differ_from_the_pose_and_each_other():
 def test_signs_that_are_called_sure_are_mostly_right():
     readings = [read_pose(sighting(t), SIZE, LSP14) for t in range(0, 240, 12)]
     right = np.concatenate(
-        [
-            (r.nearer == NEARER[t])[DEEP[t]]
-            for r, t in zip(readings, range(0, 240, 12), strict=True)
-        ]
+        [(r.nearer == NEARER[t])[DEEP[t]] for r, t in zip(readings, range(0, 240, 12), strict=True)]
     )
     sure = np.concatenate(
         [r.sure[DEEP[t]] for r, t in zip(readings, range(0, 240, 12), strict=True)]

@@ -51,9 +51,7 @@ def annotated(*frames):
     """The truth on some frames, with signs for the forearms."""
     frames = np.array(frames, dtype=np.int64)
     nearer = np.zeros((len(frames), 13), dtype=np.int64)
-    return Annotations(
-        LSP14, frames, JOINTS[frames], np.ones((len(frames), 14), bool), nearer
-    )
+    return Annotations(LSP14, frames, JOINTS[frames], np.ones((len(frames), 14), bool), nearer)
 
 
 def marked(frame):

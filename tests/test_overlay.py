@@ -22,8 +22,12 @@ GREY = np.full((240, 240, 3), 120, np.uint8)
 def cross():
     """Both shins cross at (120, 120); all other joints are unknown."""
     points = np.full((14, 2), np.nan)
-    for name, place in (("left_knee", (60, 60)), ("left_ankle", (180, 180)),
-                        ("right_knee", (180, 60)), ("right_ankle", (60, 180))):
+    for name, place in (
+        ("left_knee", (60, 60)),
+        ("left_ankle", (180, 180)),
+        ("right_knee", (180, 60)),
+        ("right_ankle", (60, 180)),
+    ):
         points[LSP14.index(name)] = place
     return points
 
@@ -54,8 +58,7 @@ def test_joints_far_outside_the_picture_are_no_trouble():
 
 def test_marks_of_a_person_look_unlike_joints_that_were_filled_in():
     pictures = [
-        draw_pose(GREY, cross(), LSP14, source=np.full(14, kind), height=200.0)
-        for kind in range(3)
+        draw_pose(GREY, cross(), LSP14, source=np.full(14, kind), height=200.0) for kind in range(3)
     ]
     knee = tuple(int(part) for part in cross()[LSP14.index("left_knee")])
     assert tuple(pictures[0][knee]) == tuple(pictures[1][knee]) == LEFT
@@ -82,7 +85,11 @@ def test_limbs_have_sides_and_the_trunk_has_none():
 
 def test_trunk_and_head_are_found_in_the_skeleton():
     assert [LSP14.names[joint] for joint in trunk_outline(LSP14)] == [
-        "left_shoulder", "right_shoulder", "right_hip", "left_hip"]
+        "left_shoulder",
+        "right_shoulder",
+        "right_hip",
+        "left_hip",
+    ]
     assert [LSP14.names[joint] for joint in head_bone(LSP14)] == ["neck", "head_top"]
 
 

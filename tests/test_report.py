@@ -66,8 +66,19 @@ def test_our_scripts_and_styles_know_no_addresses():
 
 def test_the_page_shows_every_section_once(page):
     ids = References(page).ids
-    for name in ("video", "keyframes", "occurrence", "distances", "curves", "figure", "views",
-                 "body", "sources", "angles", "making"):
+    for name in (
+        "video",
+        "keyframes",
+        "occurrence",
+        "distances",
+        "curves",
+        "figure",
+        "views",
+        "body",
+        "sources",
+        "angles",
+        "making",
+    ):
         assert ids.count(name) == 1
     assert len(ids) == len(set(ids))
 
@@ -196,9 +207,11 @@ def test_truth_in_another_order_and_unit_is_brought_to_the_motion(material):
 
 
 def test_joints_that_the_truth_lacks_are_unknown(material):
-    few = {"points3d": material.truth["points3d"][:, :3],
-           "points2d": material.truth["points2d"][:, :3],
-           "joint_names": np.array(LSP14.names[:3])}
+    few = {
+        "points3d": material.truth["points3d"][:, :3],
+        "points2d": material.truth["points2d"][:, :3],
+        "joint_names": np.array(LSP14.names[:3]),
+    }
     assert np.isnan(summary.arrange_truth(few, LSP14).points3d[:, 3:]).all()
 
 
@@ -253,10 +266,22 @@ def test_a_browser_opens_the_page_without_faults(page, tmp_path):
         pytest.skip("no chromium on this machine: the page was not opened in a browser")
     path = tmp_path / "report.html"
     path.write_text(page.replace("<title>", f"{PROBE}<title>", 1))
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic",
-               "--no-first-run", "--disable-background-networking", "--disable-component-update",
-               "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}",
-               "--virtual-time-budget=4000", "--window-size=1366,768", "--dump-dom", path.as_uri()]
+    command = [
+        browser,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--virtual-time-budget=4000",
+        "--window-size=1366,768",
+        "--dump-dom",
+        path.as_uri(),
+    ]
     try:
         found = subprocess.run(command, capture_output=True, text=True, timeout=120)
     except subprocess.TimeoutExpired:

@@ -17,9 +17,10 @@ def noisy_poses(count=120, kinds=3, noise=0.002, seed=0):
 def test_averaging_over_frames_of_the_same_pose_lessens_noise():
     clean, noisy = noisy_poses()
     same = clean == 0.03
-    spread = {"noisy": noisy[same].std(), **{
-        form: smooth_distances(noisy, 0.01, form)[same].std() for form in ("both", "mean")
-    }}
+    spread = {
+        "noisy": noisy[same].std(),
+        **{form: smooth_distances(noisy, 0.01, form)[same].std() for form in ("both", "mean")},
+    }
     assert spread["both"] < spread["mean"] / 2 < spread["noisy"] / 2
 
 

@@ -123,9 +123,7 @@ def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
         )
 
 
-def _left_out(
-    annotations: Annotations, absent: Collection[tuple[int, str]]
-) -> Iterator[Check]:
+def _left_out(annotations: Annotations, absent: Collection[tuple[int, str]]) -> Iterator[Check]:
     """Halves of the body that were begun and lack joints."""
     skeleton = annotations.skeleton
     marked = np.isfinite(annotations.joints[:, :, 0])

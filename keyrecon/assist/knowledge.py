@@ -87,9 +87,7 @@ def learn_body(
     return Knowledge(size, annotations.frames, vectors, trust, skeleton)
 
 
-def _measure(
-    annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: float
-) -> BodySize:
+def _measure(annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: float) -> BodySize:
     """The body's size; that of the table while nothing is marked."""
     skeleton = annotations.skeleton
     ends = annotations.joints[:, skeleton.bones]

@@ -85,9 +85,7 @@ class Found:
     """Share of all pictures of the strip on which head and feet were seen, 0-1."""
 
 
-def find_player(
-    strip: Strip, colors: Colors, camera: CameraPath, frames: tuple[int, ...]
-) -> Found:
+def find_player(strip: Strip, colors: Colors, camera: CameraPath, frames: tuple[int, ...]) -> Found:
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
     track: Track = find.find_player(strip, colors, camera)
     rows = np.searchsorted(strip.numbers, np.unique(frames))

@@ -101,9 +101,7 @@ def suggest_frames(
     return found
 
 
-def _need(
-    comparison: Comparison, motion: Motion, annotations: Annotations, half: str
-) -> _Need:
+def _need(comparison: Comparison, motion: Motion, annotations: Annotations, half: str) -> _Need:
     members = motion.skeleton.is_lower == (half == "lower")
     doubt = 1 - motion.confidence[:, members].mean(axis=1)
     marked = np.isfinite(annotations.joints[:, members, 0]).mean(axis=1) >= LEAST_MARKED

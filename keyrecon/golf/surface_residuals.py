@@ -179,9 +179,7 @@ def _look_up(
     frame = np.arange(len(stack))[:, None]
     (a, b), (c, d) = [[stack[frame, y + j, x + i] for i in (0, 1)] for j in (0, 1)]
     value = (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d)
-    slope = np.stack(
-        [(1 - fy) * (b - a) + fy * (d - c), (1 - fx) * (c - a) + fx * (d - b)], axis=2
-    )
+    slope = np.stack([(1 - fy) * (b - a) + fy * (d - c), (1 - fx) * (c - a) + fx * (d - b)], axis=2)
     return value.ravel(), slope.reshape(-1, 2) / AWAY_SCALE
 
 

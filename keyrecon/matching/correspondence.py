@@ -148,9 +148,7 @@ def spread_choice(count: int, most: int) -> Int[np.ndarray, "N"]:
     return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(int)
 
 
-def list_elements(
-    edges: tuple[Edges, ...], name: str, most: int
-) -> Int[np.ndarray, "T F"]:
+def list_elements(edges: tuple[Edges, ...], name: str, most: int) -> Int[np.ndarray, "T F"]:
     """Rows of the index of each frame's upper or lower elements, at most `most`; -1 pads."""
     rows = np.full((len(edges), most), -1)
     first = 0

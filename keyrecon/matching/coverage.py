@@ -154,9 +154,7 @@ def largest_gain(
     return int(equals[tie[equals].argmax()])
 
 
-def choose_as_printed(
-    hoods: Neighborhoods, reach: int, uncovered: int, most: int
-) -> list[int]:
+def choose_as_printed(hoods: Neighborhoods, reach: int, uncovered: int, most: int) -> list[int]:
     """Eq. 2-4 as printed: the frame that lowers Eq. 2 most, until Eq. 1 holds.
 
     Lazy: a gain measured earlier bounds the present one from above, so only candidates whose

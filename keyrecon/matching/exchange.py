@@ -44,9 +44,7 @@ class Goal:
         """Whether Eq. 1 holds."""
         return self.left_over(self.hoods.union(chosen)) <= self.uncovered
 
-    def replacements(
-        self, others: list[int]
-    ) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
+    def replacements(self, others: list[int]) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
         """Frames left uncovered with each candidate beside `others`, and how many it adds."""
         represented = self.hoods.union(others)
         cost = uncovered_cost(self.hoods.n_frames, self.reach)

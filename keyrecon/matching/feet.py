@@ -64,9 +64,7 @@ def see_feet(
     return observe_joints(target, weight)
 
 
-def miss_feet(
-    feet: Feet, joints: Complex[np.ndarray, "T S J"]
-) -> Float[np.ndarray, "T S J"]:
+def miss_feet(feet: Feet, joints: Complex[np.ndarray, "T S J"]) -> Float[np.ndarray, "T S J"]:
     """How far each leg ends from the nearer tracked foot, 0-1; 0 for other joints."""
     miss = np.zeros(joints.shape)
     apart = np.abs(joints[:, :, feet.ends, None] - feet.points[:, None, None])

@@ -82,9 +82,7 @@ def _half(
     lefts = {left for left, _ in skeleton.mirrored}
     one = tuple(p for p, j in enumerate(joints) if j in lefts and j not in given)
     sides = one, tuple(int(mirror[p]) for p in one)
-    return Half(
-        name, joints, bones, np.isin(joints, given), mirror, np.array(twins), depth, sides
-    )
+    return Half(name, joints, bones, np.isin(joints, given), mirror, np.array(twins), depth, sides)
 
 
 def _depth(skeleton: Skeleton, joint: int) -> int:

@@ -36,9 +36,7 @@ def judge_figures(
     return mean.reshape(len(row), count)
 
 
-def _relative(
-    gap: Complex[np.ndarray, "*n"], found: np.ndarray
-) -> Float[np.ndarray, "*n"]:
+def _relative(gap: Complex[np.ndarray, "*n"], found: np.ndarray) -> Float[np.ndarray, "*n"]:
     """Length of gaps in `JUDGE_REACH`, 1 at most and where no match was found."""
     return np.where(found, np.minimum(np.abs(gap) / JUDGE_REACH, 1), 1)
 

@@ -214,9 +214,7 @@ def _smallest_beta(half: Half, most: int) -> tuple[float, list[int]]:
     return _lower_beta(half, most, high, chosen)
 
 
-def _lower_beta(
-    half: Half, most: int, beta: float, chosen: list[int]
-) -> tuple[float, list[int]]:
+def _lower_beta(half: Half, most: int, beta: float, chosen: list[int]) -> tuple[float, list[int]]:
     """Exchange keyframes to do with a smaller beta still."""
     while beta * BETA_STEP > LEAST_BETA:
         goal = half.goal(beta * BETA_STEP)
@@ -247,9 +245,7 @@ def _center(
     return exchange_for_closeness(goal, chosen, distance, weight)
 
 
-def _record(
-    half: Half, goal: Goal, beta: float, keyframes: Int[np.ndarray, "K"]
-) -> HalfKeyframes:
+def _record(half: Half, goal: Goal, beta: float, keyframes: Int[np.ndarray, "K"]) -> HalfKeyframes:
     comparison, detour = half.comparison, half.detour
     nearest, distance = assign_frames(half.distances(beta), comparison, detour, keyframes)
     represented = represent_frames(goal.hoods, comparison, detour[keyframes] < beta, keyframes)

@@ -210,9 +210,7 @@ def _with_observed_largest(
     return summed + (1 - matched) * mean_matched.max()
 
 
-def _symmetric(
-    directed: Float32[np.ndarray, "T T"], symmetry: str
-) -> Float32[np.ndarray, "T T"]:
+def _symmetric(directed: Float32[np.ndarray, "T T"], symmetry: str) -> Float32[np.ndarray, "T T"]:
     if symmetry == "max":
         both = np.maximum(directed, directed.T)
     else:

@@ -160,9 +160,7 @@ def _best_places(
     return best
 
 
-def _wanted_lengths(
-    sought: Sought, bones: Int[np.ndarray, "B 2"]
-) -> Float[np.ndarray, "B"]:
+def _wanted_lengths(sought: Sought, bones: Int[np.ndarray, "B 2"]) -> Float[np.ndarray, "B"]:
     """The keyframe's limb lengths times the median change of all of them."""
     if not len(bones):
         return np.zeros(0)

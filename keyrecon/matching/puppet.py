@@ -60,9 +60,7 @@ class Puppets:
         return len(self.riders.bone) - 1
 
 
-def make_puppets(
-    edges: tuple[Edges, ...], window: Window, poses: Poses, most: int
-) -> Puppets:
+def make_puppets(edges: tuple[Edges, ...], window: Window, poses: Poses, most: int) -> Puppets:
     """Seat the elements of annotated frames on their bones, at most `most` each."""
     half, seated = poses.half, []
     for frame, pose, known in zip(poses.frames, poses.joints, poses.known, strict=True):

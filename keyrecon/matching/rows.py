@@ -59,9 +59,7 @@ def observe(
     return Normals(matrix, np.concatenate([pull_x, pull_y], axis=1))
 
 
-def observe_joints(
-    target: Complex[np.ndarray, "P J"], weight: Float[np.ndarray, "P J"]
-) -> Normals:
+def observe_joints(target: Complex[np.ndarray, "P J"], weight: Float[np.ndarray, "P J"]) -> Normals:
     """Joints themselves, weighted alike in all directions."""
     count = target.shape[1]
     matrix = np.zeros((len(target), 2 * count, 2 * count))

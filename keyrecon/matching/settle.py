@@ -77,9 +77,7 @@ def _see_all(puppets: Puppets, index: ElementIndex, figures: Figures, reach: flo
     return Normals(*in_blocks(see, len(figures.frames)))
 
 
-def _hold(
-    puppets: Puppets, proposal: Proposal, joints: Complex[np.ndarray, "T J"]
-) -> Normals:
+def _hold(puppets: Puppets, proposal: Proposal, joints: Complex[np.ndarray, "T J"]) -> Normals:
     """Follow the proposal, and hold what is known."""
     poses = puppets.poses
     away = (np.abs(joints - proposal.joints) / FOLLOW) ** 2

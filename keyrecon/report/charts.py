@@ -59,15 +59,31 @@ def _add_occurrence(
     hover = "frame %{x}: keyframe at frame %{customdata}<extra></extra>"
     well = half.represented
     figure.add_scatter(
-        x=frames, y=height, customdata=half.nearest, hovertemplate=hover, row=row, col=1,
-        mode="lines", line={"shape": "hv", "width": 1, "color": "var(--propagated)"},
+        x=frames,
+        y=height,
+        customdata=half.nearest,
+        hovertemplate=hover,
+        row=row,
+        col=1,
+        mode="lines",
+        line={"shape": "hv", "width": 1, "color": "var(--propagated)"},
     )
     figure.add_scatter(
-        x=frames[~well], y=height[~well], mode="markers", hoverinfo="skip", row=row, col=1,
+        x=frames[~well],
+        y=height[~well],
+        mode="markers",
+        hoverinfo="skip",
+        row=row,
+        col=1,
         marker={"size": 4, "symbol": "circle-open", "color": "var(--right)"},
     )
     figure.add_scatter(
-        x=half.frames, y=rank, mode="markers", row=row, col=1, customdata=half.frames,
+        x=half.frames,
+        y=rank,
+        mode="markers",
+        row=row,
+        col=1,
+        customdata=half.frames,
         hovertemplate="keyframe at frame %{x}<extra></extra>",
         marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"},
     )
@@ -79,18 +95,27 @@ def joint_chart(frames: int, has_truth: bool) -> go.Figure:
     for row in (1, 2):
         shown = row == 1
         traces: list[dict[str, Any]] = [
-            {"name": "before refinement", "mode": "markers",
-             "marker": {"size": 3.5, "color": "var(--muted)"}},
+            {
+                "name": "before refinement",
+                "mode": "markers",
+                "marker": {"size": 3.5, "color": "var(--muted)"},
+            },
             {"name": "refined", "mode": "lines", "line": {"width": 2, "color": "var(--accent)"}},
         ]
         if has_truth:
             truth_line = {"width": 1.2, "dash": "dot", "color": "var(--truth)"}
             traces.append({"name": "truth", "mode": "lines", "line": truth_line})
-        traces.append({"name": "annotated", "mode": "markers",
-                       "marker": {"size": 9, "symbol": "diamond", "color": "var(--annotated)"}})
+        traces.append(
+            {
+                "name": "annotated",
+                "mode": "markers",
+                "marker": {"size": 9, "symbol": "diamond", "color": "var(--annotated)"},
+            }
+        )
         for trace in traces:
-            figure.add_scatter(x=[], y=[], showlegend=shown, legendgroup=trace["name"],
-                               row=row, col=1, **trace)
+            figure.add_scatter(
+                x=[], y=[], showlegend=shown, legendgroup=trace["name"], row=row, col=1, **trace
+            )
         figure.update_yaxes(autorange="reversed", row=row, col=1)
     return style_chart(figure, 460)
 
@@ -105,9 +130,14 @@ def angle_chart(motion: Motion) -> go.Figure:
     for column, joint in enumerate(joints):
         row = titles.index(_pair_name(skeleton, joint)) + 1
         figure.add_scatter(
-            x=np.arange(len(degrees)), y=degrees[:, column].round(1), row=row, col=1,
-            name=("left", "right", "middle")[sides[joint]], showlegend=row == 1,
-            legendgroup=str(sides[joint]), mode="lines",
+            x=np.arange(len(degrees)),
+            y=degrees[:, column].round(1),
+            row=row,
+            col=1,
+            name=("left", "right", "middle")[sides[joint]],
+            showlegend=row == 1,
+            legendgroup=str(sides[joint]),
+            mode="lines",
             line={"width": 1.6, "color": SIDE_COLORS[sides[joint]]},
         )
     figure.update_yaxes(range=[0, 185], dtick=45, ticksuffix="°")
@@ -123,18 +153,32 @@ def source_chart(motion: Motion) -> go.Figure:
     names = [plain_name(name) for name in motion.skeleton.names]
     shares = source_shares(motion)
     figure = make_subplots(
-        cols=2, shared_yaxes=True, column_widths=[0.68, 0.32], horizontal_spacing=0.04,
+        cols=2,
+        shared_yaxes=True,
+        column_widths=[0.68, 0.32],
+        horizontal_spacing=0.04,
         subplot_titles=("Where each joint comes from", "Not found in the picture"),
     )
     for kind, name in enumerate(SOURCES):
         figure.add_bar(
-            y=names, x=shares[:, kind].round(4), name=name, orientation="h", row=1, col=1,
+            y=names,
+            x=shares[:, kind].round(4),
+            name=name,
+            orientation="h",
+            row=1,
+            col=1,
             marker={"color": SOURCE_COLORS[kind]},
             hovertemplate=f"%{{y}}: {name} in %{{x:.1%}} of frames<extra></extra>",
         )
     figure.add_bar(
-        y=names, x=missing_shares(motion).round(4), name="not found", orientation="h",
-        row=1, col=2, marker={"color": "var(--muted)"}, showlegend=False,
+        y=names,
+        x=missing_shares(motion).round(4),
+        name="not found",
+        orientation="h",
+        row=1,
+        col=2,
+        marker={"color": "var(--muted)"},
+        showlegend=False,
         hovertemplate="%{y}: not found in %{x:.1%} of frames<extra></extra>",
     )
     figure.update_xaxes(tickformat=".0%", rangemode="tozero")
@@ -142,7 +186,10 @@ def source_chart(motion: Motion) -> go.Figure:
     for title, axis in zip(figure.layout.annotations, ("xaxis", "xaxis2"), strict=True):
         title.update(x=figure.layout[axis].domain[0], xanchor="left")
     return style_chart(figure, 440).update_layout(
-        barmode="stack", bargap=0.25, hovermode="closest", margin={"l": 110, "b": 70},
+        barmode="stack",
+        bargap=0.25,
+        hovermode="closest",
+        margin={"l": 110, "b": 70},
         legend={"y": -0.1, "x": 0, "xanchor": "left", "yanchor": "top", "traceorder": "normal"},
     )
 
@@ -152,10 +199,20 @@ def trust_chart(
 ) -> go.Figure:
     """One number of every frame that tells how good it is, with the annotated frames marked."""
     figure = stack_charts((title,), len(values))
-    figure.add_scatter(x=np.arange(len(values)), y=values.astype(np.float32).round(4), mode="lines",
-                       line={"width": 1.4, "color": "var(--accent)"}, name="every frame")
-    figure.add_scatter(x=keyframes, y=values[keyframes].round(4), mode="markers", name="annotated",
-                       marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"})
+    figure.add_scatter(
+        x=np.arange(len(values)),
+        y=values.astype(np.float32).round(4),
+        mode="lines",
+        line={"width": 1.4, "color": "var(--accent)"},
+        name="every frame",
+    )
+    figure.add_scatter(
+        x=keyframes,
+        y=values[keyframes].round(4),
+        mode="markers",
+        name="annotated",
+        marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"},
+    )
     figure.update_yaxes(rangemode="tozero")
     return style_chart(figure, 250)
 
@@ -164,7 +221,9 @@ def stack_charts(titles: tuple[str, ...], frames: int) -> go.Figure:
     """Charts over the same frames, one above the other."""
     count = max(1, len(titles))
     figure = make_subplots(
-        rows=count, shared_xaxes=True, subplot_titles=titles,
+        rows=count,
+        shared_xaxes=True,
+        subplot_titles=titles,
         vertical_spacing=0.22 / max(2, count),
     )
     figure.update_annotations(x=0, xanchor="left")
@@ -178,11 +237,18 @@ def style_chart(figure: go.Figure, height: int, legend: bool = True) -> go.Figur
     figure.update_xaxes(**line).update_yaxes(**line)
     figure.update_annotations(font_size=13)
     return figure.update_layout(
-        template="none", height=height, showlegend=legend, hovermode="x unified",
-        paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
+        template="none",
+        height=height,
+        showlegend=legend,
+        hovermode="x unified",
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
         font={"family": "system-ui, sans-serif", "size": 12, "color": "var(--ink)"},
         margin={"l": 56, "r": 12, "t": 34, "b": 40},
         legend={"orientation": "h", "y": 1.0, "x": 1.0, "xanchor": "right", "yanchor": "bottom"},
-        hoverlabel={"bgcolor": "var(--card)", "font": {"color": "var(--ink)"},
-                    "bordercolor": "var(--rule)"},
+        hoverlabel={
+            "bgcolor": "var(--card)",
+            "font": {"color": "var(--ink)"},
+            "bordercolor": "var(--rule)",
+        },
     )

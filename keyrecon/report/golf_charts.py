@@ -16,13 +16,29 @@ def time_chart(fitted: FittedSwing, observations: Observations, model: MotionMod
     """Normalised time against the frame (Fig. 9): first guess from the club, and fitted."""
     frames = np.arange(len(fitted.state.mu))
     figure = stack_charts(("Normalised time",), len(frames))
-    figure.add_scatter(x=frames, y=observations.mu.round(4), name="guess from the club",
-                       mode="lines", line={"width": 1.2, "dash": "dot", "color": "var(--muted)"})
-    figure.add_scatter(x=frames, y=fitted.state.mu.round(4), name="fitted", mode="lines",
-                       line={"width": 2, "color": "var(--accent)"})
-    figure.add_scatter(x=fitted.keys.round(2), y=model.keys.round(4), name="key postures",
-                       mode="markers+text", text=KEY_NAMES, textposition="top left",
-                       marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"})
+    figure.add_scatter(
+        x=frames,
+        y=observations.mu.round(4),
+        name="guess from the club",
+        mode="lines",
+        line={"width": 1.2, "dash": "dot", "color": "var(--muted)"},
+    )
+    figure.add_scatter(
+        x=frames,
+        y=fitted.state.mu.round(4),
+        name="fitted",
+        mode="lines",
+        line={"width": 2, "color": "var(--accent)"},
+    )
+    figure.add_scatter(
+        x=fitted.keys.round(2),
+        y=model.keys.round(4),
+        name="key postures",
+        mode="markers+text",
+        text=KEY_NAMES,
+        textposition="top left",
+        marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"},
+    )
     figure.update_yaxes(range=[-0.05, 1.15])
     return style_chart(figure, 320)
 
@@ -36,8 +52,13 @@ def turn_chart(measures: SwingMeasures, keys: np.ndarray) -> go.Figure:
         ("X-factor", measures.x_factor, "var(--trunk)"),
     )  # fmt: skip
     for name, values, color in rows:
-        figure.add_scatter(x=frames, y=values.round(1), name=name, mode="lines",
-                           line={"width": 1.8, "color": color})
+        figure.add_scatter(
+            x=frames,
+            y=values.round(1),
+            name=name,
+            mode="lines",
+            line={"width": 1.8, "color": color},
+        )
     for frame in keys[1:3]:
         figure.add_vline(x=float(frame), line={"width": 1, "color": "var(--annotated)"})
     figure.update_yaxes(ticksuffix="°", dtick=45)

@@ -20,9 +20,12 @@ def headline(material: ReportMaterial) -> str:
         ("Frames", f"{count:,}", f"{motion.time[-1]:.1f} s at {motion.fps:.4g} per second"),
         ("Keyframes", f"{len(keyframes.frames)}", halves),
         ("Annotation cost", f"{cost:.2%}", "of the frames, half-body marks counted half"),
-        ("Coverage", f"{min(keyframes.upper.coverage, keyframes.lower.coverage):.1%}",
-         f"upper {keyframes.upper.coverage:.1%}, lower {keyframes.lower.coverage:.1%}, "
-         f"asked for {keyframes.alpha:.0%}"),
+        (
+            "Coverage",
+            f"{min(keyframes.upper.coverage, keyframes.lower.coverage):.1%}",
+            f"upper {keyframes.upper.coverage:.1%}, lower {keyframes.lower.coverage:.1%}, "
+            f"asked for {keyframes.alpha:.0%}",
+        ),
         *(_trust_cards(motion) if scores is None else _score_cards(scores)),
     ]
     tiles = "".join(
@@ -55,8 +58,11 @@ def accuracy(scores: Scores) -> str:
         ("acceleration error", f"{scores.acceleration:.1f} mm/frame²", "jitter and lost motion"),
         ("PCK@0.2", f"{scores.pck:.1%}", "joints within 0.2 torso lengths in the picture"),
         ("median in the picture", f"{scores.median_px:.1f} px", "half of the joints are closer"),
-        ("bone lengths vary", f"{scores.limb_variation:.2%}",
-         f"mean of all bones; the worst {scores.limb_variation_max:.2%}"),
+        (
+            "bone lengths vary",
+            f"{scores.limb_variation:.2%}",
+            f"mean of all bones; the worst {scores.limb_variation_max:.2%}",
+        ),
     ]
     return "<h3>Accuracy against the known truth</h3>" + table(
         ("measure", "value", "meaning"), rows, "Accuracy", "texts"
@@ -67,8 +73,11 @@ def _trust_cards(motion: Motion) -> list[tuple[str, str, str]]:
     sure = float((motion.confidence >= 0.5).mean())
     missing = float(missing_shares(motion).mean())
     return [
-        ("Confidence", f"{float(np.nanmean(motion.confidence)):.2f}",
-         f"mean over joints and frames; {sure:.0%} at 0.5 or more"),
+        (
+            "Confidence",
+            f"{float(np.nanmean(motion.confidence)):.2f}",
+            f"mean over joints and frames; {sure:.0%} at 0.5 or more",
+        ),
         ("Found in the picture", f"{1 - missing:.1%}", "of joints; the rest is filled in"),
     ]
 

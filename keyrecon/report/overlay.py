@@ -14,9 +14,7 @@ from keyrecon.video import Video
 from keyrecon.video_writer import write_video
 
 
-def write_overlay(
-    path: Path, video: Video, motion: Motion, progress: Progress = silent
-) -> None:
+def write_overlay(path: Path, video: Video, motion: Motion, progress: Progress = silent) -> None:
     """Write the video with the refined pose and the frame number on every frame.
 
     The pose is the projection of the 3D joints; near limbs cross over far ones. Frames after

@@ -61,22 +61,29 @@ def build_page(material: ReportMaterial, pictures: Pictures) -> str:
 def _body(material: ReportMaterial, pictures: Pictures) -> str:
     strip = list(pictures.strip)
     chosen = strip[:: max(1, round(len(strip) / VIEW_COUNT))]
-    return "".join((
-        headline(material),
-        _trust_over_time(material),
-        sections.story(pictures, material.motion.time),
-        sections.keyframe_pictures(material, pictures),
-        _occurrence(material),
-        sections.matrices(material),
-        _joint_curves(material),
-        _figure_player(pictures, material.truth is not None),
-        sections.reference_views(material, chosen),
-        tables.body_tables(material),
-        _sources(material),
-        _angles(material),
-        section("making", "How it was made", tables.stage_times(material.seconds),
-                tables.option_table(material.options), note(f"keyrecon {text(__version__)}")),
-    ))
+    return "".join(
+        (
+            headline(material),
+            _trust_over_time(material),
+            sections.story(pictures, material.motion.time),
+            sections.keyframe_pictures(material, pictures),
+            _occurrence(material),
+            sections.matrices(material),
+            _joint_curves(material),
+            _figure_player(pictures, material.truth is not None),
+            sections.reference_views(material, chosen),
+            tables.body_tables(material),
+            _sources(material),
+            _angles(material),
+            section(
+                "making",
+                "How it was made",
+                tables.stage_times(material.seconds),
+                tables.option_table(material.options),
+                note(f"keyrecon {text(__version__)}"),
+            ),
+        )
+    )
 
 
 def _chart(name: str, figure: go.Figure) -> str:
@@ -98,10 +105,13 @@ def _trust_over_time(material: ReportMaterial) -> str:
 
 def _occurrence(material: ReportMaterial) -> str:
     return section(
-        "occurrence", "Which keyframe stands for which frame",
-        note("Keyframes are ordered so that similar poses lie side by side: opposite strokes show "
-             "as peaks and troughs. Diamonds are the keyframes themselves, rings are frames "
-             "farther than β from every keyframe. Press a chart to go to a frame."),
+        "occurrence",
+        "Which keyframe stands for which frame",
+        note(
+            "Keyframes are ordered so that similar poses lie side by side: opposite strokes show "
+            "as peaks and troughs. Diamonds are the keyframes themselves, rings are frames "
+            "farther than β from every keyframe. Press a chart to go to a frame."
+        ),
         _chart("occurrence", charts.keyframe_chart(material.keyframes, material.comparison)),
     )
 
@@ -113,7 +123,8 @@ def _joint_curves(material: ReportMaterial) -> str:
         for joint, name in enumerate(names)
     )
     return section(
-        "curves", "Joints before and after refinement",
+        "curves",
+        "Joints before and after refinement",
         f'<label class="chooser">Joint <select id="joint">{options}</select></label>',
         _chart("joint", charts.joint_chart(len(material.motion.time), material.truth is not None)),
     )
@@ -122,17 +133,26 @@ def _joint_curves(material: ReportMaterial) -> str:
 def _figure_player(pictures: Pictures, has_truth: bool) -> str:
     views = "".join(
         f'<button type="button" data-yaw="{yaw}" data-pitch="{pitch}">{name}</button>'
-        for name, yaw, pitch in (("Camera", 0, 0), ("Right", 90, 0), ("Left", -90, 0),
-                                 ("Above", 0, 90), ("Free", 35, 18))
+        for name, yaw, pitch in (
+            ("Camera", 0, 0),
+            ("Right", 90, 0),
+            ("Left", -90, 0),
+            ("Above", 0, 90),
+            ("Free", 35, 18),
+        )
     )
     ghost = (
         '<label><input type="checkbox" id="ghost" checked> truth in grey</label>'
-        if has_truth else ""
+        if has_truth
+        else ""
     )
     return section(
-        "figure", "The motion in 3D",
-        note("Drag to turn, arrow keys while it has the focus, Ctrl and wheel to zoom. The body is "
-             "held at its root; the grid lies at the lower foot."),
+        "figure",
+        "The motion in 3D",
+        note(
+            "Drag to turn, arrow keys while it has the focus, Ctrl and wheel to zoom. The body is "
+            "held at its root; the grid lies at the lower foot."
+        ),
         f'<div class="player"><div class="plate"><canvas id="figure-canvas" tabindex="0" '
         'aria-label="Turnable 3D figure"></canvas></div>'
         f'<video id="clip" src="{pictures.clip}" muted playsinline preload="auto" '
@@ -143,29 +163,44 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
 
 def _sources(material: ReportMaterial) -> str:
     return section(
-        "sources", "Where the joints come from",
-        note("Every number can be traced to a mark that a person made or to a stated rule. "
-             "<em>Annotated</em>: marked on this frame. <em>Propagated</em>: carried over from a "
-             "keyframe. <em>Interpolated</em>: not found, filled in. <em>Refined</em>: found, and "
-             "replaced because it disagreed with the rest."),
+        "sources",
+        "Where the joints come from",
+        note(
+            "Every number can be traced to a mark that a person made or to a stated rule. "
+            "<em>Annotated</em>: marked on this frame. <em>Propagated</em>: carried over from a "
+            "keyframe. <em>Interpolated</em>: not found, filled in. <em>Refined</em>: found, and "
+            "replaced because it disagreed with the rest."
+        ),
         _chart("sources", charts.source_chart(material.motion)),
     )
 
 
 def _angles(material: ReportMaterial) -> str:
     return section(
-        "angles", "Joint angles",
-        note("Angle between the two bones that meet at the joint, in space: 180° is straight, "
-             "smaller is more bent. It does not depend on the camera or on the units."),
+        "angles",
+        "Joint angles",
+        note(
+            "Angle between the two bones that meet at the joint, in space: 180° is straight, "
+            "smaller is more bent. It does not depend on the camera or on the units."
+        ),
         _chart("angles", charts.angle_chart(material.motion)),
     )
 
 
 def _navigation() -> str:
-    links = (("video", "Video"), ("keyframes", "Keyframes"), ("occurrence", "Occurrence"),
-             ("distances", "Distances"), ("curves", "Curves"), ("figure", "3D"),
-             ("views", "Views"), ("body", "Body"), ("sources", "Sources"), ("angles", "Angles"),
-             ("making", "Making"))
+    links = (
+        ("video", "Video"),
+        ("keyframes", "Keyframes"),
+        ("occurrence", "Occurrence"),
+        ("distances", "Distances"),
+        ("curves", "Curves"),
+        ("figure", "3D"),
+        ("views", "Views"),
+        ("body", "Body"),
+        ("sources", "Sources"),
+        ("angles", "Angles"),
+        ("making", "Making"),
+    )
     items = "".join(f'<a href="#{name}">{label}</a>' for name, label in links)
     return f'<nav aria-label="Sections"><div>{items}</div></nav>'
 
@@ -179,7 +214,7 @@ def _transport() -> str:
         '<footer class="transport"><button type="button" id="play" aria-label="Play">▶</button>'
         '<input type="range" id="frame" min="0" value="0" step="1" aria-label="Frame">'
         f'<output id="now"></output><label>speed <select id="speed">{speeds}</select></label>'
-        "</footer><dialog id=\"large\"><button type=\"button\" autofocus>Close</button>"
+        '</footer><dialog id="large"><button type="button" autofocus>Close</button>'
         '<img alt=""><p></p></dialog>'
     )
 
@@ -203,4 +238,3 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
         "truth2d": None if truth is None else pack(truth.points2d),
         "marked": {"frames": marks.frames.tolist(), "points": pack(marks.joints)},
     }
-

@@ -44,7 +44,8 @@ def keyframe_pictures(material: ReportMaterial, pictures: Pictures) -> str:
         )
         uri = pictures.keyframes.get(frame)
         shown = (
-            f'<img src="{uri}" alt="Keyframe {frame} with its marks">' if uri
+            f'<img src="{uri}" alt="Keyframe {frame} with its marks">'
+            if uri
             else '<span class="empty">not annotated</span>'
         )
         cards.append(
@@ -67,8 +68,10 @@ def stands_for(half: HalfKeyframes, frame: int) -> int | None:
 def matrices(material: ReportMaterial) -> str:
     """Pose distance of every two frames, as pictures with a readout."""
     keyframes, comparison = material.keyframes, material.comparison
-    halves = (("Upper body", keyframes.upper, comparison.upper),
-              ("Lower body", keyframes.lower, comparison.lower))
+    halves = (
+        ("Upper body", keyframes.upper, comparison.upper),
+        ("Lower body", keyframes.lower, comparison.lower),
+    )
     figures = "".join(
         _matrix(title, half, distances, comparison.row) for title, half, distances in halves
     )
@@ -77,8 +80,9 @@ def matrices(material: ReportMaterial) -> str:
         "Distances are in player heights; the line on the scale is β, under which a keyframe "
         "stands for a frame. Point at a pair to read it, press to go to the frame."
     )
-    return section("distances", "Which frames look alike", about,
-                   f'<div class="pair">{figures}</div>')
+    return section(
+        "distances", "Which frames look alike", about, f'<div class="pair">{figures}</div>'
+    )
 
 
 def _matrix(
@@ -88,8 +92,13 @@ def _matrix(
     row: Int[np.ndarray, "T"],
 ) -> str:
     grey, top = reduce_matrix(distances, row)
-    setting = {"title": title, "top": top, "beta": half.beta, "frames": len(row),
-               "keyframes": half.frames.tolist()}
+    setting = {
+        "title": title,
+        "top": top,
+        "beta": half.beta,
+        "frames": len(row),
+        "keyframes": half.frames.tolist(),
+    }
     return (
         f'<figure class="matrix" data-matrix="{text(to_json(setting))}"><figcaption>{text(title)}'
         f', β = {half.beta:.3f}</figcaption><div class="plate"><img src="{png_uri(grey)}" '
@@ -107,8 +116,9 @@ def reduce_matrix(
         at = row[np.linspace(0, len(row) - 1, side).round().astype(int)]
         small = distances[np.ix_(at, at)]
     else:
-        small = cv2.resize(np.asarray(distances, np.float32), (side, side),
-                           interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            np.asarray(distances, np.float32), (side, side), interpolation=cv2.INTER_AREA
+        )
     known = np.isfinite(small)
     top = float(np.quantile(small[known], 0.995)) if known.any() else 1.0
     scaled = np.where(known, small, top) / max(top, 1e-9)
@@ -130,24 +140,33 @@ def reference_views(material: ReportMaterial, frames: list[int]) -> str:
             rows.append(("truth", truth_row))
     body = "".join(
         f'<tr{" class=true" if name == "truth" else ""}><th scope="row">{name}</th>'
-        + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        + "".join(f"<td>{cell}</td>" for cell in cells)
+        + "</tr>"
         for name, cells in rows
     )
     head = "".join(f'<th scope="col">{frame}</th>' for frame in frames)
     about = note(
         "Views from cameras that were not used, drawn in parallel projection; each pose is centred."
-        + (" The truth has one scale for the whole sequence and is not turned." if true is not None
-           else "")
+        + (
+            " The truth has one scale for the whole sequence and is not turned."
+            if true is not None
+            else ""
+        )
     )
     return section(
-        "views", "Seen from elsewhere", about,
+        "views",
+        "Seen from elsewhere",
+        about,
         '<div class="scroll" tabindex="0" role="region" aria-label="Views"><table class="views">'
         f"<thead><tr><th>frame</th>{head}</tr></thead><tbody>{body}</tbody></table></div>",
     )
 
 
 def _drawings(
-    points: Float[np.ndarray, "T J 3"], frames: list[int], skeleton: Skeleton, view: str,
+    points: Float[np.ndarray, "T J 3"],
+    frames: list[int],
+    skeleton: Skeleton,
+    view: str,
     height: float,
 ) -> list[str]:
     return [pose_drawing(points[frame], skeleton, view, height) for frame in frames]

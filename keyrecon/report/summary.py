@@ -66,9 +66,9 @@ def error_per_frame(motion: Motion, truth: Truth) -> Float[np.ndarray, "T"]:
     return np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan)
 
 
-def bone_lengths(points3d: Float[np.ndarray, "T J 3"], skeleton: Skeleton) -> Float[
-    np.ndarray, "T B"
-]:
+def bone_lengths(
+    points3d: Float[np.ndarray, "T J 3"], skeleton: Skeleton
+) -> Float[np.ndarray, "T B"]:
     """Length of every bone in every frame, in the order of `skeleton.bones`."""
     parent, child = skeleton.bones.T
     return np.linalg.norm(points3d[:, child] - points3d[:, parent], axis=-1)

@@ -24,16 +24,22 @@ def body_tables(material: ReportMaterial) -> str:
     """Bones that should not change, joints that should not jitter, feet that should not slide."""
     motion = material.motion
     slow = foot_speed(motion, material.track)
-    feet = note(
-        f"Slower foot: {np.median(slow):.2f} player heights per second across the picture "
-        f"(median), {np.quantile(slow, 0.9):.2f} at the 90th percentile. A player on the ground "
-        "has one foot at rest most of the time, so with a camera at rest this should be near 0."
-    ) if len(slow) else ""
+    feet = (
+        note(
+            f"Slower foot: {np.median(slow):.2f} player heights per second across the picture "
+            f"(median), {np.quantile(slow, 0.9):.2f} at the 90th percentile. A player on the ground "
+            "has one foot at rest most of the time, so with a camera at rest this should be near 0."
+        )
+        if len(slow)
+        else ""
+    )
     return section(
-        "body", "Bones, joints and feet",
+        "body",
+        "Bones, joints and feet",
         f'<div class="pair tables"><div><h3>Bone lengths</h3>{_bone_table(motion)}</div>',
         f"<div><h3>Joints in the picture</h3>{_joint_table(material)}</div></div>",
-        _joint_note(), feet,
+        _joint_note(),
+        feet,
     )
 
 
@@ -56,11 +62,15 @@ def _bone_table(motion: Motion) -> str:
     for bone, (parent, child) in enumerate(skeleton.bones):
         other = int(skeleton.bone_mirror[bone])
         mirrored = mean[bone] / mean[other] - 1 if other != bone else np.nan
-        rows.append((
-            f"{plain_name(skeleton.names[parent])} to {plain_name(skeleton.names[child])}",
-            f"{mean[bone]:.3f}", f"{spread[bone] / mean[bone]:.2%}",
-            number(mirrored, "+z.1%"), f"{mean[bone] / expected[bone] - 1:+z.1%}",
-        ))
+        rows.append(
+            (
+                f"{plain_name(skeleton.names[parent])} to {plain_name(skeleton.names[child])}",
+                f"{mean[bone]:.3f}",
+                f"{spread[bone] / mean[bone]:.2%}",
+                number(mirrored, "+z.1%"),
+                f"{mean[bone] / expected[bone] - 1:+z.1%}",
+            )
+        )
     head = ("bone", f"length, {unit}", "varies", "other side", "average")
     return table(head, rows, "Bone lengths")
 
@@ -70,8 +80,11 @@ def _joint_table(material: ReportMaterial) -> str:
     columns = [
         ("not found", missing_shares(motion), ".1%"),
         ("moved", correction(motion, track), ".1%"),
-        ("acceleration before", joint_acceleration(motion.points2d_propagated, track, motion.fps),
-         ".1f"),
+        (
+            "acceleration before",
+            joint_acceleration(motion.points2d_propagated, track, motion.fps),
+            ".1f",
+        ),
         ("acceleration after", joint_acceleration(motion.points2d, track, motion.fps), ".1f"),
     ]
     if material.true_joints is not None:

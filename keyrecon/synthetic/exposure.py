@@ -79,9 +79,7 @@ def _take_instant(stage: Stage, frame: int, solids: FigureSolids, instant: int) 
     )  # fmt: skip
 
 
-def _draw_racket(
-    stage: Stage, frame: int, span: tuple[float, float], scale: float
-) -> Layer | None:
+def _draw_racket(stage: Stage, frame: int, span: tuple[float, float], scale: float) -> Layer | None:
     """The racket, smeared over a span of time (middle, length; in frames)."""
     time, length = span
     focal = float(stage.move.focal[frame])

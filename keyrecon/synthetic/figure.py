@@ -92,9 +92,7 @@ def between(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
     return a + share * (b - a)
 
 
-def _add_trunk(
-    body: _Assembly, points: np.ndarray, pointers: Pointers, build: Build
-) -> None:
+def _add_trunk(body: _Assembly, points: np.ndarray, pointers: Pointers, build: Build) -> None:
     neck = joint(points, "neck")
     hips = [joint(points, f"{s}_hip") for s in ("right", "left")]
     shoulders = [joint(points, f"{s}_shoulder") for s in ("right", "left")]

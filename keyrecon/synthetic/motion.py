@@ -79,9 +79,7 @@ def _place_joints(
     return points
 
 
-def _poses(
-    plan: Plan, times: Float[np.ndarray, "T"], rate: float
-) -> Float[np.ndarray, "T C"]:
+def _poses(plan: Plan, times: Float[np.ndarray, "T"], rate: float) -> Float[np.ndarray, "T C"]:
     """Key poses, interpolated without overshoot and rounded off in time."""
     kept: list[tuple[float, np.ndarray]] = []
     for time, numbers in sorted(plan.poses, key=lambda p: p[0]):

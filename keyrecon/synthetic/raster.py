@@ -70,9 +70,7 @@ def _draw_one(
     depth, owner, along = buffers
     height, width = depth.shape
     x0, y0 = np.maximum(np.floor(forms.boxes[index, :2]).astype(int) - origin, 0)
-    x1, y1 = np.minimum(
-        np.ceil(forms.boxes[index, 2:]).astype(int) + 1 - origin, [width, height]
-    )
+    x1, y1 = np.minimum(np.ceil(forms.boxes[index, 2:]).astype(int) + 1 - origin, [width, height])
     if x1 <= x0 or y1 <= y0:
         return
     start = forms.start[index]

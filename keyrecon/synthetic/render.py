@@ -130,9 +130,7 @@ _COVER = np.array(
 """Depth of flesh and cloth in front of a joint, in statures."""
 
 
-def _find_visible(
-    stage: Stage, frame: int, drawn: list[Instant]
-) -> Bool[np.ndarray, "14"]:
+def _find_visible(stage: Stage, frame: int, drawn: list[Instant]) -> Bool[np.ndarray, "14"]:
     """Joints in the picture whose surface is nearer than any other limb's."""
     if not drawn:
         return np.zeros(len(LSP14.names), bool)

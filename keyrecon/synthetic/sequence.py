@@ -193,9 +193,7 @@ def _draw_all(stage: Stage, workers: int, labelled: set[int]) -> Iterator[Frame]
                 waiting.append(pool.submit(draw, chunks[following]))
 
 
-def write_truth(
-    path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np.ndarray]
-) -> None:
+def write_truth(path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np.ndarray]) -> None:
     """Joints in each frame's camera axes (metres) and pixels, and the camera they are seen by.
 
     `seen` tells in every frame which joints are visible, and how much of the racket or club.

@@ -53,4 +53,3 @@ def player_boxes(
     low, high = spots.min(axis=1), spots.max(axis=1)
     room = height[:, None]
     return np.concatenate([low - room * (0.5, 0.35), high + room * (0.5, 0.08)], axis=1)
-
