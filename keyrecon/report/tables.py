@@ -27,8 +27,9 @@ def body_tables(material: ReportMaterial) -> str:
     feet = (
         note(
             f"Slower foot: {np.median(slow):.2f} player heights per second across the picture "
-            f"(median), {np.quantile(slow, 0.9):.2f} at the 90th percentile. A player on the ground "
-            "has one foot at rest most of the time, so with a camera at rest this should be near 0."
+            f"(median), {np.quantile(slow, 0.9):.2f} at the 90th percentile. A player on the "
+            "ground has one foot at rest most of the time, so with a camera at rest this should "
+            "be near 0."
         )
         if len(slow)
         else ""
