@@ -7,9 +7,10 @@ import pytest
 from annotator_edits import edit, mark, submit
 from annotator_files import NECK, add_mark, on_file, one_mark
 
+from keyrecon.annotate import files
 from keyrecon.annotate.journal import NotSaved
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.coco import write_coco
+from keyrecon.formats.coco import coco_lines, coco_text, write_coco
 from keyrecon.formats.picks import read_picks
 from keyrecon.records import Pick
 from keyrecon.workspace import Workspace
@@ -26,6 +27,25 @@ def test_marks_that_another_program_adds_come_in_and_ours_stay(open_store, bare)
         ("mark", 5, "head_top"): [30, 40, 2],
     }
     assert store.state.cells == wanted == on_file(bare)
+
+
+def test_an_edit_puts_the_lines_of_its_own_frame_together_and_no_others(
+    open_store, bare, monkeypatch
+):
+    store, written = open_store(), []
+    submit(store, *(mark(frame, "neck", [frame, 20, 2]) for frame in range(50)))
+
+    def spied(marks, size):
+        written.extend(marks.frames.tolist())
+        return coco_lines(marks, size)
+
+    monkeypatch.setattr(files, "coco_lines", spied)
+    submit(store, mark(7, "neck", [9, 9, 1], was=[7, 20, 2]))
+    submit(store, mark(8, "neck", None, was=[8, 20, 2]))
+    store.undo("u")
+    assert written == [7, 8]
+    text = (bare / "annotations.json").read_text()
+    assert text == coco_text(store.annotations(), (128, 64))
 
 
 def test_marks_added_while_nobody_served_come_in_at_the_next_start(open_store, bare):

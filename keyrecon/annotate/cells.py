@@ -74,6 +74,12 @@ def difference(before: Mapping[Key, Value], after: Mapping[Key, Value]) -> tuple
     return tuple(change for change in found if change.before != change.after)
 
 
+def changed_keys(before: Mapping[Key, Value], after: Mapping[Key, Value]) -> set[Key]:
+    """Cells that hold another object; values that no edit touched are the same object still."""
+    set_anew = {key for key, value in after.items() if before.get(key) is not value}
+    return set_anew | (before.keys() - after.keys())
+
+
 def of_kind(cells: Mapping[Key, Value], *kinds: str) -> Cells:
     """The cells of some kinds."""
     return {key: value for key, value in cells.items() if key[0] in kinds}

@@ -8,7 +8,7 @@ parent first): 1 the child end is nearer the camera, -1 farther, 0 unknown.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,9 @@ from keyrecon.formats.marks import (
 from keyrecon.records import Annotations
 
 Json = dict[str, Any]
+Lines = tuple[str, str]
+"""A frame's line in images and its line in annotations."""
+INFO = {"description": "2D joints for keyrecon; frame = 0-based frame of the video"}
 
 
 def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
@@ -137,38 +140,46 @@ def _nearer(annotation: Json, category: Json, frame: int, sheet: Sheet) -> np.nd
 
 def annotations_to_coco(annotations: Annotations, size: tuple[int, int]) -> Json:
     """Marks as a COCO keypoints structure; `size` is the picture's width and height, px."""
-    skeleton = annotations.skeleton
+    rows = [*_frame_rows(annotations, size).values()]
+    return {
+        "info": INFO,
+        "images": [image for image, _ in rows],
+        "annotations": [annotation for _, annotation in rows],
+        "categories": [_category(annotations.skeleton)],
+    }
+
+
+def _category(skeleton: Skeleton) -> Json:
+    return {
+        "id": 1,
+        "name": "person",
+        "keypoints": list(skeleton.names),
+        "skeleton": (skeleton.bones + 1).tolist(),
+    }
+
+
+def _frame_rows(annotations: Annotations, size: tuple[int, int]) -> dict[int, tuple[Json, Json]]:
+    """What images and annotations hold of each frame."""
     joints = np.nan_to_num(annotations.joints)
     v = np.where(np.isfinite(annotations.joints).all(axis=2), 1 + annotations.visible, 0)
     return {
-        "info": {"description": "2D joints for keyrecon; frame = 0-based frame of the video"},
-        "images": [
-            {
-                "id": frame,
-                "file_name": f"frame_{frame:06d}.png",
-                "width": size[0],
-                "height": size[1],
-                "frame": frame,
-            }
-            for frame in annotations.frames.tolist()
-        ],
-        "annotations": [
-            _annotation(frame, joints[k], v[k], annotations.nearer[k].tolist())
-            for k, frame in enumerate(annotations.frames.tolist())
-        ],
-        "categories": [
-            {
-                "id": 1,
-                "name": "person",
-                "keypoints": list(skeleton.names),
-                "skeleton": (skeleton.bones + 1).tolist(),
-            }
-        ],
+        frame: (_image(frame, size), _annotation(frame, joints[k], v[k], annotations.nearer[k]))
+        for k, frame in enumerate(annotations.frames.tolist())
+    }
+
+
+def _image(frame: int, size: tuple[int, int]) -> Json:
+    return {
+        "id": frame,
+        "file_name": f"frame_{frame:06d}.png",
+        "width": size[0],
+        "height": size[1],
+        "frame": frame,
     }
 
 
 def _annotation(
-    frame: int, joints: Float[np.ndarray, "J 2"], v: np.ndarray, nearer: list[int]
+    frame: int, joints: Float[np.ndarray, "J 2"], v: np.ndarray, nearer: np.ndarray
 ) -> Json:
     marked = joints[v > 0] if (v > 0).any() else np.zeros((1, 2))
     x, y = marked.min(axis=0).tolist()
@@ -185,20 +196,35 @@ def _annotation(
         "bbox": [x, y, width, height],
         "area": width * height,
         "iscrowd": 0,
-        "attributes": {"nearer": nearer},
+        "attributes": {"nearer": nearer.tolist()},
     }
 
 
+def coco_lines(annotations: Annotations, size: tuple[int, int]) -> dict[int, Lines]:
+    """The lines of each frame, to be put together by `text_of_lines`."""
+    rows = _frame_rows(annotations, size)
+    return {frame: (_line(image), _line(body)) for frame, (image, body) in rows.items()}
+
+
+def text_of_lines(lines: Mapping[int, Lines], skeleton: Skeleton) -> str:
+    """The text of a COCO file, one annotation to a line."""
+    told = [lines[frame] for frame in sorted(lines)]
+    parts = {
+        "images": [image for image, _ in told],
+        "annotations": [annotation for _, annotation in told],
+        "categories": [_line(_category(skeleton))],
+    }
+    lists = [f' "{key}": [\n  ' + ",\n  ".join(rows) + "\n ]" for key, rows in parts.items()]
+    return "{\n" + ",\n".join([f' "info": {_line(INFO)}', *lists]) + "\n}\n"
+
+
+def _line(row: Json) -> str:
+    return json.dumps(row, allow_nan=False)
+
+
 def coco_text(annotations: Annotations, size: tuple[int, int]) -> str:
-    """Marks as the text of a COCO file, one annotation to a line."""
-    parts = []
-    for key, value in annotations_to_coco(annotations, size).items():
-        rows = value if isinstance(value, list) else [value]
-        body = ",\n  ".join(json.dumps(row, allow_nan=False) for row in rows)
-        parts.append(
-            f' "{key}": [\n  {body}\n ]' if isinstance(value, list) else f' "{key}": {body}'
-        )
-    return "{\n" + ",\n".join(parts) + "\n}\n"
+    """Marks as the text of a COCO file."""
+    return text_of_lines(coco_lines(annotations, size), annotations.skeleton)
 
 
 def write_coco(path: Path, annotations: Annotations, size: tuple[int, int]) -> None:
