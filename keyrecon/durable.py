@@ -2,7 +2,8 @@
 
 The bytes go to a file of a name of its own in the same folder, which reaches the disk (fsync)
 before it takes the place of the old one; then the folder itself is synchronised, because a
-rename without that is atomic but not durable.
+rename without that is atomic but not durable. What can be made again needs no such wait for the
+disk: it too appears whole to whoever reads it, but a loss of power may tear it.
 """
 
 import os
@@ -20,9 +21,20 @@ def write_durably(path: Path, content: bytes | str) -> None:
     On any failure the old file stays as it was and nothing is left beside it. Raises
     KeyreconError where the folder does not take the file (missing, full, read-only).
     """
-    data = content.encode() if isinstance(content, str) else content
+    _write(path, content.encode() if isinstance(content, str) else content, durably=True)
+
+
+def write_quickly(path: Path, content: bytes) -> None:
+    """Replace `path` by what can be made again; its reader must be able to tell a torn file.
+
+    Raises KeyreconError where the folder does not take the file.
+    """
+    _write(path, content, durably=False)
+
+
+def _write(path: Path, data: bytes, durably: bool) -> None:
     try:
-        _replace(path, data)
+        _replace(path, data, durably)
     except OSError as fault:
         raise KeyreconError(
             f"{path} could not be written ({fault.strerror or fault}); the former content is "
@@ -30,7 +42,7 @@ def write_durably(path: Path, content: bytes | str) -> None:
         ) from fault
 
 
-def _replace(path: Path, data: bytes) -> None:
+def _replace(path: Path, data: bytes, durably: bool) -> None:
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
     with NamedTemporaryFile(
         dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
@@ -39,12 +51,14 @@ def _replace(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             os.fchmod(file.fileno(), mode)
-            os.fsync(file.fileno())
+            if durably:
+                os.fsync(file.fileno())
             os.replace(file.name, path)
         except BaseException:
             Path(file.name).unlink(missing_ok=True)
             raise
-    _synchronise_folder(path.parent)
+    if durably:
+        _synchronise_folder(path.parent)
 
 
 def hold_lock(path: Path, seconds: float = -1.0) -> FileLock:

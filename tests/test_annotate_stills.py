@@ -54,6 +54,25 @@ def test_stills_asked_for_all_at_once_are_all_answered(opened):
         assert read_number(cv2.imdecode(data, cv2.IMREAD_COLOR)) == frame
 
 
+@pytest.mark.parametrize(
+    "tear",
+    [
+        lambda data: b"",
+        lambda data: data[: len(data) // 2],
+        lambda data: bytes(len(data)),
+        lambda data: data[:300] + bytes(100) + data[400:],
+    ],
+    ids=["empty", "half", "zeros", "a hole"],
+)
+def test_a_still_that_a_loss_of_power_tore_is_made_anew(opened, tear):
+    stills = opened().stills
+    whole = stills.still(7).result(timeout=20)
+    for file in stills.folder.iterdir():
+        file.write_bytes(tear(file.read_bytes()))
+    assert stills.still(7).result(timeout=20) == whole
+    assert stills.still(7).done()
+
+
 def test_a_still_that_nobody_waits_for_any_more_delays_no_other(opened):
     stills = opened().stills
     waiting = [stills.still(frame) for frame in range(50)]

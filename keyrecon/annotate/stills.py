@@ -4,9 +4,13 @@ A frame deep inside a group of pictures costs the decoding of all before it, so 
 requests would be slow. One thread therefore decodes a run of neighbours for each frame that is
 asked for, the frame itself first; what was asked last is answered first. When nobody asks, it
 makes the pictures of the keyframes, so that going from one to the next only reads a file.
+
+The folder is a cache: nothing waits until a picture has reached the disk. Each file ends in the
+CRC-32 of its picture, so one that a loss of power tore counts as not made.
 """
 
 import hashlib
+import zlib
 from collections.abc import Iterable
 from concurrent.futures import Future
 from pathlib import Path
@@ -16,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from keyrecon.durable import write_durably
+from keyrecon.durable import write_quickly
 from keyrecon.errors import KeyreconError
 from keyrecon.pictures import reduce_picture
 from keyrecon.video import Video
@@ -61,8 +65,8 @@ class Stills:
             )
         waiting: Future[bytes] = Future()
         kept = self._kept_width(width)
-        if self._path(frame, kept).is_file():
-            waiting.set_result(self._path(frame, kept).read_bytes())
+        if data := _read(self._path(frame, kept)):
+            waiting.set_result(data)
         else:
             with self._changed:
                 self._asked.append((frame, kept, waiting))
@@ -94,12 +98,11 @@ class Stills:
     def _work(self) -> None:
         while order := self._next():
             frame, width, waiting = order
-            path = self._path(frame, width)
             try:
-                if not path.is_file():
-                    self._make(frame, width, alone=waiting is None)
+                data = _read(self._path(frame, width))
+                data = data or self._make(frame, width, alone=waiting is None)
                 if waiting and waiting.set_running_or_notify_cancel():
-                    waiting.set_result(path.read_bytes())
+                    waiting.set_result(data)
             except Exception as fault:  # noqa: BLE001 - raised again where the still was asked for
                 if waiting and (waiting.running() or waiting.set_running_or_notify_cancel()):
                     waiting.set_exception(fault)
@@ -113,23 +116,24 @@ class Stills:
                 return None
             return self._asked.pop() if self._asked else self._coming.pop()
 
-    def _make(self, frame: int, width: int, alone: bool) -> None:
+    def _make(self, frame: int, width: int, alone: bool) -> bytes:
         """Decode a run of frames; keep the one asked for first, then what else is asked of it."""
         first = frame if alone else frame - frame % RUN
         span = range(first, frame + 1 if alone else min(first + RUN, len(self.video)))
-        run = {}
+        run, still = {}, b""
         for number, picture in enumerate(self.video.frames(first, span.stop), first):
             run[number] = reduce_picture(picture, width)
             if number == frame:
-                self._keep(frame, run[frame])
+                still = self._keep(frame, run[frame])
                 self._answer_waiting()
         asked, _ = self._waited_for(span, width)
         for number in sorted(run, key=lambda n: (n not in asked, abs(n - frame))):
             if number not in asked and self._waited_for(span, width)[1]:
-                return
-            if not self._path(number, width).is_file():
+                break
+            if _read(self._path(number, width)) is None:
                 self._keep(number, run[number])
                 self._answer_waiting()
+        return still
 
     def _waited_for(self, span: range, width: int) -> tuple[set[int], bool]:
         """Frames of a run that someone waits for, and whether someone waits for any other."""
@@ -138,17 +142,19 @@ class Stills:
             other = any(f not in span or kept != width for f, kept, _ in self._asked)
         return here, other
 
-    def _keep(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
-        write_durably(self._path(frame, picture.shape[1]), encode_jpeg(picture))
+    def _keep(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
+        data = encode_jpeg(picture)
+        write_quickly(self._path(frame, picture.shape[1]), data + _checksum(data))
+        return data
 
     def _answer_waiting(self) -> None:
         """Answer all whose still has been made meanwhile."""
         with self._changed:
-            ready = [o for o in self._asked if self._path(o[0], o[1]).is_file()]
-            self._asked = [order for order in self._asked if order not in ready]
-        for frame, width, waiting in ready:
-            if waiting and waiting.set_running_or_notify_cancel():  # False: nobody waits any more
-                waiting.set_result(self._path(frame, width).read_bytes())
+            found = [(order, _read(self._path(order[0], order[1]))) for order in self._asked]
+            self._asked = [order for order, data in found if data is None]
+        for (_, _, waiting), data in found:
+            if data and waiting and waiting.set_running_or_notify_cancel():  # else nobody waits
+                waiting.set_result(data)
 
 
 def encode_jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
@@ -160,6 +166,19 @@ def encode_jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
 def encode_png(picture: UInt8[np.ndarray, "h w 4"]) -> bytes:
     """An RGBA picture as PNG."""
     return cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+
+
+def _checksum(data: bytes) -> bytes:
+    return zlib.crc32(data).to_bytes(4, "big")
+
+
+def _read(path: Path) -> bytes | None:
+    """A still that was kept; None if there is none, or if it is not whole."""
+    try:
+        kept = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    return kept[:-4] if len(kept) > 4 and kept[-4:] == _checksum(kept[:-4]) else None
 
 
 def _forget_oldest(folder: Path) -> None:
