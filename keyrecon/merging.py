@@ -19,7 +19,15 @@ def find_conflicts(old: Annotations, new: Annotations) -> list[str]:
         after = new.joints[np.searchsorted(new.frames, frame)]
         differ = (np.abs(before - after) > SAME_PX).any(axis=1)  # NaN compares false
         conflicts += [f"frame {frame} {old.skeleton.names[j]}" for j in np.flatnonzero(differ)]
-    return conflicts
+    contradicted = {*old.absent} & _placed(new) | {*new.absent} & _placed(old)
+    return conflicts + [f"frame {frame} {name}" for frame, name in sorted(contradicted)]
+
+
+def _placed(annotations: Annotations) -> set[tuple[int, str]]:
+    """Frames and names of marked joints."""
+    marked = np.argwhere(np.isfinite(annotations.joints).all(axis=2)).tolist()
+    frames, names = annotations.frames.tolist(), annotations.skeleton.names
+    return {(frames[row], names[joint]) for row, joint in marked}
 
 
 def merge_annotations(old: Annotations, new: Annotations) -> Annotations:
@@ -33,7 +41,11 @@ def merge_annotations(old: Annotations, new: Annotations) -> Annotations:
     merged.joints[rows] = np.where(marked[..., None], new.joints, merged.joints[rows])
     merged.visible[rows] = np.where(marked, new.visible, merged.visible[rows])
     merged.nearer[rows] = np.where(new.nearer != 0, new.nearer, merged.nearer[rows])
-    return merged
+    for frame, name in {*new.absent} & _placed(old):
+        row, joint = np.searchsorted(frames, frame), old.skeleton.index(name)
+        merged.joints[row, joint], merged.visible[row, joint] = np.nan, False
+    absent = {*old.absent} - _placed(new) | {*new.absent}
+    return replace(merged, absent=tuple(sorted(absent)))
 
 
 def _spread(annotations: Annotations, frames: np.ndarray) -> Annotations:
@@ -62,7 +74,10 @@ def marks_asked_for(annotations: Annotations, upper: np.ndarray, lower: np.ndarr
 def missing_marks(
     annotations: Annotations | None, upper: np.ndarray, lower: np.ndarray
 ) -> dict[int, list[str]]:
-    """Halves of the body without any mark on keyframes that need them, by frame."""
+    """Halves of the body without any mark on keyframes that need them, by frame.
+
+    A half of which the person said that no joint is to be seen lacks nothing.
+    """
     missing: dict[int, list[str]] = {}
     for frames, lower_half in ((upper, False), (lower, True)):
         for frame in frames.tolist():
@@ -73,11 +88,12 @@ def missing_marks(
 
 
 def _unmarked(annotations: Annotations | None, frame: int, lower_half: bool) -> list[str]:
-    if annotations is None or frame not in annotations.frames:
-        return ["lower body" if lower_half else "upper body"]
-    row = annotations.joints[np.searchsorted(annotations.frames, frame)]
-    skeleton = annotations.skeleton
-    half = skeleton.is_lower == lower_half
-    if not np.isfinite(row[half]).any():
-        return ["lower body" if lower_half else "upper body"]
-    return []
+    half = ["lower body" if lower_half else "upper body"]
+    if annotations is None:
+        return half
+    is_asked = annotations.skeleton.is_lower == lower_half
+    names = [annotations.skeleton.names[joint] for joint in np.flatnonzero(is_asked)]
+    if {(frame, name) for name in names} <= {*annotations.absent}:
+        return []
+    row = annotations.joints[annotations.frames == frame][:, is_asked]
+    return [] if np.isfinite(row).any() else half

@@ -199,6 +199,9 @@ class Annotations:
     """False where the joint was placed though hidden, or not marked."""
     nearer: Int[np.ndarray, "K B"]
     """1 where the child end of a bone is nearer the camera, -1 farther, 0 unknown."""
+    absent: tuple[tuple[int, str], ...] = ()
+    """Sorted frames and names of joints of which the person said that they cannot be seen or
+    placed: nothing is missing there. Such a frame needs no row."""
 
 
 @dataclass(frozen=True, eq=False)

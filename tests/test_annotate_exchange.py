@@ -17,6 +17,20 @@ def test_marks_go_out_and_come_back_in_every_format(opened):
     assert ask(desk, "GET", "/api/export/doc").status == 400
 
 
+def test_an_absent_joint_goes_out_and_is_neither_new_nor_contradicted_when_it_comes_back(opened):
+    desk = opened()
+    submit(desk.store, mark(3, "neck", [10, 20, 0]), mark(3, "head_top", [0, 0, 0]))
+    text = ask(desk, "GET", "/api/export/coco").content.decode()
+    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert (told["frames"], told["new"], told["conflicts"]) == ([3], 0, [])
+    desk.store.undo("u")
+    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert (told["new"], told["conflicts"]) == (1, [])
+    submit(desk.store, mark(3, "head_top", [5, 6, 2]))
+    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert [conflict["joint"] for conflict in told["conflicts"]] == ["head_top"]
+
+
 def coco_with(desk, *edits):
     """The text of a COCO file with these marks alone."""
     before = desk.store.state.revision

@@ -1,14 +1,16 @@
 """annotations.json and picks.json show the state, and what other programs change comes in."""
 
 import json
+from dataclasses import replace
 from threading import Thread
 
 import pytest
 from annotator_edits import edit, mark, submit
-from annotator_files import NECK, add_mark, on_file, one_mark
+from annotator_files import LIMITS, NECK, add_mark, on_file, one_mark, read_marks
 
 from keyrecon.annotate import files
 from keyrecon.annotate.journal import NotSaved
+from keyrecon.annotate.store import Store
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.coco import coco_lines, coco_text, write_coco
 from keyrecon.formats.picks import read_picks
@@ -56,6 +58,28 @@ def test_marks_added_while_nobody_served_come_in_at_the_next_start(open_store, b
         ("mark", 6, "neck"): [1, 2, 0],
         ("mark", 5, "head_top"): [30, 40, 2],
     }
+
+
+def test_joints_said_to_be_absent_travel_with_the_file(open_store, bare, tmp_path):
+    submit(open_store(), mark(3, "neck", [10, 20, 2]), mark(6, "neck", [1, 2, 0]))
+    there = tmp_path / "there"
+    there.mkdir()
+    for name in ("project.toml", "annotations.json"):
+        (there / name).write_bytes((bare / name).read_bytes())
+    travelled = Store(Workspace(there), LIMITS)
+    assert travelled.state.cells == {NECK: [10, 20, 2], ("mark", 6, "neck"): [0, 0, 0]}
+    travelled.close()
+
+
+def test_a_program_that_knows_no_absent_joints_takes_none_away(open_store, bare):
+    submit(open_store(), mark(3, "neck", [10, 20, 2]), mark(6, "neck", [1, 2, 0]))
+    file = bare / "annotations.json"
+    write_coco(file, replace(read_marks(bare), absent=()), (128, 64))
+    assert open_store().state.cells == {NECK: [10, 20, 2], ("mark", 6, "neck"): [1, 2, 0]}
+    assert read_marks(bare).absent == ((6, "neck"),)
+    add_mark(bare, 6, "neck", 30, 40)
+    assert open_store().state.cells == {NECK: [10, 20, 2], ("mark", 6, "neck"): [30, 40, 2]}
+    assert read_marks(bare).absent == ()
 
 
 def test_what_another_program_did_can_be_undone(open_store, bare):

@@ -51,6 +51,24 @@ def test_marks_come_back_from_coco_unchanged(tmp_path, marked):
     assert np.array_equal(back.nearer, marked.nearer)
 
 
+def test_joints_that_a_person_looked_for_in_vain_come_back_from_coco(tmp_path, marked):
+    said = ((3, "right_ankle"), (3, "right_knee"), (77, "neck"))
+    write_coco(tmp_path / "a.json", replace(marked, absent=said), SIZE)
+    back = read(tmp_path / "a.json")
+    assert back.absent == said
+    assert_same(back, marked)
+    assert np.array_equal(back.nearer, marked.nearer)
+    write_coco(tmp_path / "b.json", marked, SIZE)
+    assert "absent" not in (tmp_path / "b.json").read_text()
+
+
+def test_a_joint_that_is_placed_is_not_absent(tmp_path, marked):
+    write_coco(tmp_path / "a.json", replace(marked, absent=((121, "neck"),)), SIZE)
+    back = read(tmp_path / "a.json")
+    assert back.absent == ()
+    assert_same(back, marked)
+
+
 def test_coco_holds_what_other_readers_expect(marked):
     data = annotations_to_coco(marked, SIZE)
     row = data["annotations"][0]
@@ -95,6 +113,9 @@ FAULTS = {
     "frame 50: right_ankle has visibility 3": set_in("annotations", 1, "keypoints", 2, value=3),
     "frame 50: right_ankle is at .*far outside": set_in(
         "annotations", 1, "keypoints", 0, value=9e4
+    ),
+    "frame 3: the joint 'tail' is not in": set_in(
+        "annotations", 0, "attributes", "absent", value=["tail"]
     ),
     "NaN is not a number": set_in("annotations", 1, "keypoints", 0, value=float("nan")),
     "Infinity is not a number": set_in("annotations", 1, "keypoints", 0, value=float("inf")),

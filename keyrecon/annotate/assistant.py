@@ -28,8 +28,8 @@ class Assistant:
     """Where the joints of a frame probably are, from the frames annotated so far."""
     pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None
     """A frame's body in space from its marks and signs, and the most plausible alternatives."""
-    checks: Callable[[Annotations, set[tuple[int, str]]], list[Json]] | None = None
-    """Marks to look at again, most suspicious first; the set holds joints said to be absent."""
+    checks: Callable[[Annotations], list[Json]] | None = None
+    """Marks to look at again, most suspicious first."""
     suggest: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
     """Frames where one more annotation would help most, none of those taken already."""
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None

@@ -14,7 +14,7 @@ from starlette.responses import Response
 
 from keyrecon.annotate.cells import Cells, Change, of_kind
 from keyrecon.annotate.desk import Desk
-from keyrecon.annotate.marks import cells_from_annotations
+from keyrecon.annotate.marks import cells_from_annotations, is_absent
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.annotations import read_annotations
 from keyrecon.formats.coco import coco_text
@@ -70,8 +70,10 @@ def _same(change: Change) -> bool:
     """Whether two values are one, rounded by some format that may not know hidden joints."""
     if change.key[0] == "nearer":
         return change.before == change.after
+    if is_absent(change.before) or is_absent(change.after):
+        return is_absent(change.before) and is_absent(change.after)
     pairs = zip(change.before[:2], change.after[:2], strict=True)
-    return bool(change.before[2]) and all(abs(a - b) <= SAME_PX for a, b in pairs)
+    return all(abs(a - b) <= SAME_PX for a, b in pairs)
 
 
 def _conflict(change: Change) -> dict[str, Any]:

@@ -4,7 +4,12 @@ from pathlib import Path
 
 from keyrecon.annotate.cells import FILE_CELLS, Cells, changed_keys, of_kind, picks_of
 from keyrecon.annotate.edits import Limits
-from keyrecon.annotate.marks import annotations_from_cells, cells_from_annotations, written_cells
+from keyrecon.annotate.marks import (
+    annotations_from_cells,
+    cells_from_annotations,
+    is_absent,
+    written_cells,
+)
 from keyrecon.annotate.mirror import FileForm
 from keyrecon.formats.coco import Lines, coco_lines, read_coco, text_of_lines
 from keyrecon.formats.picks import picks_text, read_picks
@@ -19,7 +24,7 @@ def annotations_form(workspace: Workspace, limits: Limits) -> FileForm:
     def read(_: Cells) -> Cells:
         return cells_from_annotations(read_coco(path, skeleton, limits.n_frames, limits.size))
 
-    return FileForm(path, FILE_CELLS, written_cells, MarksWriter(limits), True, read)
+    return FileForm(path, FILE_CELLS, written_cells, MarksWriter(limits), True, read, is_absent)
 
 
 class MarksWriter:
@@ -59,6 +64,7 @@ def picks_form(workspace: Workspace) -> FileForm:
         lambda cells: picks_text(picks_from_cells(cells)),
         False,
         lambda cells: _read_picks(path, cells),
+        lambda _: False,
     )
 
 

@@ -5,14 +5,19 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.annotate.cells import FILE_CELLS, Cells, of_kind
+from keyrecon.annotate.cells import FILE_CELLS, Cells, Value, of_kind
 from keyrecon.body import Skeleton
 from keyrecon.records import Annotations
 
+ABSENT = (0, 0, 0)
+"""The mark of a joint that is absent, as a file tells it."""
+
 
 def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
-    """Marks and signs of all frames that have any; joints said to be absent count as unmarked."""
-    told = written_cells(cells)
+    """Marks and signs of all frames that have any, and the joints said to be absent."""
+    told = {
+        key: value for key, value in of_kind(cells, *FILE_CELLS).items() if not is_absent(value)
+    }
     frames = sorted({key[1] for key in told})
     row = {frame: k for k, frame in enumerate(frames)}
     limbs = [skeleton.names[child] for _, child in skeleton.bones.tolist()]
@@ -24,6 +29,7 @@ def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
         marks[..., :2],
         marks[..., 2] == 2,
         signs[..., 0].astype(np.int64),
+        tuple(sorted(key[1:] for key, value in of_kind(cells, "mark").items() if is_absent(value))),
     )
 
 
@@ -41,7 +47,8 @@ def _table(
 
 def cells_from_annotations(annotations: Annotations) -> Cells:
     """The cells that hold these marks and signs."""
-    skeleton, cells = annotations.skeleton, {}
+    skeleton = annotations.skeleton
+    cells: Cells = {("mark", *where): [*ABSENT] for where in annotations.absent}
     marked = np.isfinite(annotations.joints).all(axis=2)
     for k, joint in np.argwhere(marked).tolist():
         x, y = annotations.joints[k, joint].tolist()
@@ -54,6 +61,11 @@ def cells_from_annotations(annotations: Annotations) -> Cells:
 
 
 def written_cells(cells: Cells) -> Cells:
-    """The cells that annotations.json can hold: all but joints said to be absent."""
+    """The cells as annotations.json holds them: without the place where an absent joint was."""
     found = of_kind(cells, *FILE_CELLS)
-    return {k: value for k, value in found.items() if k[0] == "nearer" or value[2]}
+    return {key: [*ABSENT] if is_absent(value) else value for key, value in found.items()}
+
+
+def is_absent(value: Value) -> bool:
+    """Whether a cell of annotations.json says that a joint is absent."""
+    return isinstance(value, list) and not value[2]

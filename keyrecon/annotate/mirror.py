@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from keyrecon.annotate.cells import Cells, Change, difference
+from keyrecon.annotate.cells import Cells, Change, Value, difference
 from keyrecon.annotate.journal import NotSaved
 from keyrecon.durable import write_durably
 from keyrecon.errors import KeyreconError
@@ -40,6 +40,8 @@ class FileForm:
     """Whether other programs may keep things there that the sheet does not know."""
     read: Callable[[Cells], Cells]
     """What the file holds; of equal values the keys of the cells given are used."""
+    lasts: Callable[[Value], bool]
+    """Whether a value stays though another program left it out, because few programs know it."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ class Mirror:
         known = {version[0] for version in (self.wanted, self.shown) if version != UNKNOWN} or {0}
         bases = [self.form.pick_out(at(revision)) for revision in known]
         self.shown, self._outside = UNKNOWN, (digest, found)
-        return min((difference(base, found) for base in bases), key=len)
+        changes = min((difference(base, found) for base in bases), key=len)
+        return tuple(c for c in changes if c.after is not None or not self.form.lasts(c.before))
 
     def accept(self, cells: Cells) -> None:
         """Leave the file as another program wrote it if it says the same as the sheet."""

@@ -128,9 +128,8 @@ def pose(desk: Desk, asked: Asked) -> Json:
 
 def checks(desk: Desk, asked: Asked) -> list[Json]:
     """Marks to look at again."""
-    ask, cells = desk.assistant.checks, desk.store.state.cells
-    absent = {(int(k[1]), str(k[2])) for k, v in of_kind(cells, "mark").items() if not v[2]}
-    return ask(desk.store.annotations(), absent) if ask else []
+    ask = desk.assistant.checks
+    return ask(desk.store.annotations()) if ask else []
 
 
 def suggestions(desk: Desk, asked: Asked) -> list[Json]:

@@ -173,14 +173,12 @@ def _rounded(values: Iterable[float], digits: int) -> list[float]:
     return [round(float(value), digits) for value in values]
 
 
-def describe_checks(
-    study: Study, annotations: Annotations, absent: set[tuple[int, str]]
-) -> list[Json]:
+def describe_checks(study: Study, annotations: Annotations) -> list[Json]:
     """Marks to look at again, the most suspicious first."""
     preparation, knowledge = study.preparation(), study.knowledge(annotations, wait=True)
     if preparation is None or knowledge is None:
         return []
-    looks = study.lookalikes(_decided(annotations, absent))
+    looks = study.lookalikes(_decided(annotations))
     return [
         {
             "frame": check.frame,
@@ -189,17 +187,17 @@ def describe_checks(
             "suspicion": round(float(check.suspicion), 3),
             "text": check.text,
         }
-        for check in find_checks(annotations, knowledge.size, looks, absent)
+        for check in find_checks(annotations, knowledge.size, looks)
     ]
 
 
-def _decided(annotations: Annotations, absent: set[tuple[int, str]]) -> Annotations:
+def _decided(annotations: Annotations) -> Annotations:
     """Halves of the body of which every joint is marked or said to be absent.
 
     A frame in the middle of being marked is not compared with others yet.
     """
     skeleton, joints = annotations.skeleton, annotations.joints.copy()
-    open_ = np.isnan(joints[:, :, 0])
+    open_, absent = np.isnan(joints[:, :, 0]), {*annotations.absent}
     for row, joint in np.argwhere(open_):
         open_[row, joint] = (annotations.frames[row], skeleton.names[joint]) not in absent
     for half in (skeleton.is_lower, ~skeleton.is_lower):

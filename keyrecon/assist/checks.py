@@ -11,7 +11,7 @@ taken to be swapped, and again, until none is left worth it. Evidence on the sam
 together as if independent, 1 - (1 - a)(1 - b), and told once.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -59,13 +59,10 @@ class Check:
 
 
 def find_checks(
-    annotations: Annotations,
-    size: BodySize,
-    looks: tuple[Lookalikes, ...],
-    absent: Collection[tuple[int, str]] = (),
+    annotations: Annotations, size: BodySize, looks: tuple[Lookalikes, ...]
 ) -> list[Check]:
-    """All that is worth telling; `absent` joints (frame, name) were said not to be visible."""
-    found = [*_too_long(annotations, size), *_left_out(annotations, absent)]
+    """All that is worth telling."""
+    found = [*_too_long(annotations, size), *_left_out(annotations)]
     for look in looks:
         found += [*_swapped(look, annotations.skeleton), *_elsewhere(look, annotations.skeleton)]
     told: list[Check] = []
@@ -123,9 +120,9 @@ def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
         )
 
 
-def _left_out(annotations: Annotations, absent: Collection[tuple[int, str]]) -> Iterator[Check]:
+def _left_out(annotations: Annotations) -> Iterator[Check]:
     """Halves of the body that were begun and lack joints."""
-    skeleton = annotations.skeleton
+    skeleton, absent = annotations.skeleton, {*annotations.absent}
     marked = np.isfinite(annotations.joints[:, :, 0])
     for half in (~skeleton.is_lower, skeleton.is_lower):
         for row in np.flatnonzero(marked[:, half].any(axis=1)):

@@ -4,7 +4,10 @@
 program left it out, the number at the end of the file name). `annotations[]` carry `keypoints`,
 x, y, v for every joint of the category (v = 0 not labelled, 1 placed though hidden, 2 visible),
 and `attributes.nearer`, one number per limb of the category's skeleton (1-based pairs of joints,
-parent first): 1 the child end is nearer the camera, -1 farther, 0 unknown.
+parent first): 1 the child end is nearer the camera, -1 farther, 0 unknown. `attributes.absent`,
+where there is any, lists by name the joints that a person looked for and that are not to be
+seen; to readers that do not know it these are joints not labelled. A joint that is placed is not
+absent, whatever the list says.
 """
 
 import json
@@ -13,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.durable import write_durably
@@ -45,7 +48,7 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
         data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         images = {image["id"]: image for image in data["images"]}
         categories = {c["id"]: c for c in data["categories"] if c.get("keypoints")}
-        marks, nearer = [], {}
+        marks, nearer, absent = [], {}, set()
         for annotation in data["annotations"]:
             if annotation.get("category_id") in categories and "keypoints" in annotation:
                 category = categories[annotation["category_id"]]
@@ -53,12 +56,13 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
                 marks += _marks(annotation, category, frame, sheet)
                 signs = _nearer(annotation, category, frame, sheet)
                 nearer[frame] = np.where(signs, signs, nearer.get(frame, 0))
+                absent |= _absent(annotation, frame, sheet)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
         raise KeyreconError(
             f"{path} is not a COCO keypoints file ({_explain(fault)}); it needs images, "
             "annotations with keypoints, and categories with the joints' names."
         ) from fault
-    return annotations_from_marks(marks, sheet, nearer)
+    return annotations_from_marks(marks, sheet, nearer, absent)
 
 
 def _refuse_constant(word: str) -> float:
@@ -103,6 +107,12 @@ def _marks(annotation: Json, category: Json, frame: int, sheet: Sheet) -> Iterat
             )
         if v:
             yield Mark(frame, name, float(x), float(y), v == 2)
+
+
+def _absent(annotation: Json, frame: int, sheet: Sheet) -> set[tuple[int, str]]:
+    """Joints that a person said are not to be seen."""
+    names = (annotation.get("attributes") or {}).get("absent") or []
+    return {(frame, sheet.skeleton.names[sheet.joint(name, frame)]) for name in names}
 
 
 def _nearer(annotation: Json, category: Json, frame: int, sheet: Sheet) -> np.ndarray:
@@ -160,11 +170,21 @@ def _category(skeleton: Skeleton) -> Json:
 
 def _frame_rows(annotations: Annotations, size: tuple[int, int]) -> dict[int, tuple[Json, Json]]:
     """What images and annotations hold of each frame."""
-    joints = np.nan_to_num(annotations.joints)
+    skeleton, joints = annotations.skeleton, np.nan_to_num(annotations.joints)
     v = np.where(np.isfinite(annotations.joints).all(axis=2), 1 + annotations.visible, 0)
+    places = np.concatenate([joints, v[..., None]], axis=2)
+    nothing = np.zeros((len(skeleton.names), 3)), np.zeros(len(skeleton.bones), dtype=np.int64)
+    pairs = zip(places, annotations.nearer, strict=True)
+    told = dict(zip(annotations.frames.tolist(), pairs, strict=True))
+    absent: dict[int, list[str]] = {}
+    for frame, name in annotations.absent:
+        absent.setdefault(frame, []).append(name)
     return {
-        frame: (_image(frame, size), _annotation(frame, joints[k], v[k], annotations.nearer[k]))
-        for k, frame in enumerate(annotations.frames.tolist())
+        frame: (
+            _image(frame, size),
+            _annotation(frame, *told.get(frame, nothing), absent.get(frame, [])),
+        )
+        for frame in sorted({*told, *absent})
     }
 
 
@@ -179,24 +199,22 @@ def _image(frame: int, size: tuple[int, int]) -> Json:
 
 
 def _annotation(
-    frame: int, joints: Float[np.ndarray, "J 2"], v: np.ndarray, nearer: np.ndarray
+    frame: int, places: Float[np.ndarray, "J 3"], nearer: Int[np.ndarray, "B"], absent: list[str]
 ) -> Json:
-    marked = joints[v > 0] if (v > 0).any() else np.zeros((1, 2))
-    x, y = marked.min(axis=0).tolist()
+    is_marked = places[:, 2] > 0
+    marked = places[is_marked, :2] if is_marked.any() else np.zeros((1, 2))
+    left, top = marked.min(axis=0).tolist()
     width, height = np.ptp(marked, axis=0).tolist()
-    keypoints = [
-        n for (a, b), c in zip(joints.tolist(), v.tolist(), strict=True) for n in (a, b, c)
-    ]
     return {
         "id": frame,
         "image_id": frame,
         "category_id": 1,
-        "keypoints": keypoints,
-        "num_keypoints": int((v > 0).sum()),
-        "bbox": [x, y, width, height],
+        "keypoints": [n for x, y, v in places.tolist() for n in (x, y, int(v))],
+        "num_keypoints": int(is_marked.sum()),
+        "bbox": [left, top, width, height],
         "area": width * height,
         "iscrowd": 0,
-        "attributes": {"nearer": nearer.tolist()},
+        "attributes": {"nearer": nearer.tolist()} | ({"absent": absent} if absent else {}),
     }
 
 

@@ -5,7 +5,7 @@ said here once, and every complaint names the file, the frame and the joint.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,9 +94,11 @@ def annotations_from_marks(
     marks: Iterable[Mark],
     sheet: Sheet,
     nearer: Mapping[int, Int[np.ndarray, "B"]] | None = None,
+    absent: Collection[tuple[int, str]] = (),
 ) -> Annotations:
     """Marks in frame order; `nearer` holds the signs of the frames that have them.
 
+    Joints said to be `absent` on a frame (in the skeleton's spelling) are so where not marked.
     Raises KeyreconError for frames outside the video, joints that the skeleton does not have,
     coordinates that are not numbers or a whole picture off, and two different marks of one joint.
     """
@@ -111,7 +113,7 @@ def annotations_from_marks(
                 f"{sheet.path}, frame {mark.frame}: {mark.joint} is marked twice, at "
                 f"({other.x:g}, {other.y:g}) and ({mark.x:g}, {mark.y:g}); keep one athlete."
             )
-    signs = dict(nearer or {})
+    signs = {frame: row for frame, row in (nearer or {}).items() if row.any()}
     frames = np.array(sorted({frame for frame, _ in placed} | signs.keys()), dtype=np.int64)
     joints = np.full((len(frames), len(sheet.skeleton.names), 2), np.nan)
     visible = np.zeros(joints.shape[:2], dtype=bool)
@@ -122,7 +124,8 @@ def annotations_from_marks(
     unknown = np.zeros(len(sheet.skeleton.bones), dtype=np.int64)
     rows = [signs.get(frame, unknown) for frame in frames.tolist()]
     stacked = np.array(rows, dtype=np.int64).reshape(len(frames), len(unknown))
-    return Annotations(sheet.skeleton, frames, joints, visible, stacked)
+    open_ = {*absent} - {(frame, sheet.skeleton.names[joint]) for frame, joint in placed}
+    return Annotations(sheet.skeleton, frames, joints, visible, stacked, tuple(sorted(open_)))
 
 
 def _check_place(mark: Mark, sheet: Sheet) -> None:
