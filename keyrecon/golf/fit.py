@@ -36,6 +36,7 @@ from keyrecon.golf.surface_residuals import (
     foreground_residuals,
     match_residuals,
 )
+from keyrecon.golf.timing import keep_order
 from keyrecon.golf.unknowns import Span, still_span, swing_span
 from keyrecon.golf.windows import (
     WindowOptions,
@@ -169,7 +170,7 @@ def _descend(
         expect = _whole_swing(span, guess, options.priors, fps)
         wide = [replace(kind, robust=robust * kind.robust) for kind in kinds]
         state = solve(Problem(model, body, span, wide, expect), state, options.steps)
-        state = replace(state, mu=np.clip(np.maximum.accumulate(state.mu), 0, 1))
+        state = replace(state, mu=keep_order(state.mu))
     return state
 
 

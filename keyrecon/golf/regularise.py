@@ -27,6 +27,8 @@ class PriorOptions:
     """Seconds by which the first guess of the normalised time is early or late."""
     rest: float = 0.005
     """Of the normalised time where the player stands still by that guess."""
+    relax: float = 0.05
+    """Of the normalised time after the finish: many let the arms sink the way they came."""
     pace: float = 1.5
     """Of the change of pace, normalised time per second squared, from what was guessed."""
     turn: float = 0.07
@@ -63,7 +65,8 @@ def expect_times(
     """
     frames = len(guess)
     pace = gaussian_filter1d(np.gradient(guess) * fps, options.timing * fps)
-    near = np.diag(1 / ((options.rest + options.timing * pace) * np.sqrt(fps)))
+    rest = np.where(np.arange(frames) > guess.argmax(), options.relax, options.rest)
+    near = np.diag(1 / ((rest + options.timing * pace) * np.sqrt(fps)))
     bend = np.diff(np.eye(frames), n=2, axis=0) * fps**2 / (options.pace * np.sqrt(fps))
     rows = np.concatenate([near, bend])
     return Rows(rows @ (state.mu - guess), _on_mu(span, rows))

@@ -64,32 +64,19 @@ def find_keys(
     return np.array([start, top, hit, finish], float)
 
 
-def find_rests(
-    seen: Float[np.ndarray, "T 2 2"],
-    fitted: Float[np.ndarray, "T 2 2"],
-    keys: Float[np.ndarray, "4"],
-    settings: tuple[float, float],
-    options: TimingOptions = TimingOptions(),
-) -> Float[np.ndarray, "4"]:
-    """Key postures of a fitted swing, the first and the last one anew; `settings`: height, fps.
-
-    Near its ends the fitted motion hardly moves, so that its time tells little. The upswing begins
-    where the club, as it was seen or else fitted, leaves its address. At the finish what is seen is
-    too fitful: it is where the fitted club rests.
-    """
-    known = np.isfinite(seen).all(axis=(1, 2))
-    clubs = (np.where(known[:, None, None], seen, fitted), fitted)
-    start, finish = (find_keys(Club(c, known, known), *settings, options)[k]
-                     for c, k in zip(clubs, (0, 3), strict=True))  # fmt: skip
-    return np.array([min(start, keys[1] - 1), keys[1], keys[2], max(finish, keys[2] + 1)])
-
-
 def interpolate_times(
     keys: Float[np.ndarray, "4"], key_times: Float[np.ndarray, "4"], frames: int
 ) -> Float[np.ndarray, "T"]:
     """Normalised time of every frame; constant before the first and after the last key."""
     inside = np.clip(np.arange(frames), keys[0], keys[-1])
     return PchipInterpolator(keys, key_times)(inside)
+
+
+def keep_order(mu: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
+    """Normalised times that rise up to the finish, and after it may only fall."""
+    last = int(mu.argmax())
+    rising, falling = np.maximum.accumulate(mu[:last]), np.minimum.accumulate(mu[last:])
+    return np.clip(np.concatenate([rising, falling]), 0, 1)
 
 
 def _fill(ends: Float[np.ndarray, "T 2 2"]) -> Float[np.ndarray, "T 2 2"]:
