@@ -21,6 +21,8 @@ NEIGHBOURS = (7, 7)
 """Turns and offsets among which only the best line is kept."""
 SHUTTER = 0.5
 """Share of the time between frames for which a camera's shutter is open."""
+BLURS = (0.5, 1.0)
+"""A blur seems narrower where it is pale, and where the club is slower than expected."""
 Picture = Float[np.ndarray, "h w"]
 
 
@@ -38,9 +40,9 @@ class LineOptions:
     """How far beside it usually passes."""
     far: float = 3.0
     """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
-    widths: tuple[float, ...] = (0.006, 0.012, 0.024)
-    """From the middle of the shaft to where the scene shows; a blurred one is as broad as what it
-    passes over while the shutter is open."""
+    widths: tuple[float, ...] = (0.006, 0.012)
+    """From the middle of the shaft to where the scene shows: less than half an arm's breadth. A
+    blurred one is as broad as what it passes over while the shutter is open."""
     contrast: float = 12.0
     """Grey levels by which a sure shaft stands out."""
     gain: float = 15.0
@@ -92,7 +94,8 @@ def find_lines(
         ends = _best_lines(sight, expected, options)
     known = int(np.isfinite(first).all())
     if known:
-        ends = np.concatenate([ends, first[None] / sight.height])
+        line = _sharpen(sight, lay_on(first / sight.height, expected), options)
+        ends = np.concatenate([ends, line[None]])
     departure = measure_departure(expected, ends, options)
     worth = _weigh(departure, _contrast(sight, ends, options), options)
     if np.isfinite(expected).all():
@@ -123,6 +126,28 @@ def _sharpest(sharp: Float[np.ndarray, "a b"], peak: tuple[int, int]) -> int:
     part = sharp[low[0] : i + di + 1, low[1] : j + dj + 1]
     k, m = divmod(int(part.argmax()), part.shape[1])
     return (low[0] + k) * sharp.shape[1] + low[1] + m
+
+
+def lay_on(
+    line: Float[np.ndarray, "2 2"], club: Float[np.ndarray, "2 2"]
+) -> Float[np.ndarray, "2 2"]:
+    """A club moved on to a line, hands first; the line where there is no club."""
+    if np.isnan(club).any():
+        return line
+    unit = (line[1] - line[0]) / max(float(np.linalg.norm(line[1] - line[0])), 1e-9)
+    hands = line[0] + ((club[0] - line[0]) @ unit) * unit
+    return np.stack([hands, hands + np.linalg.norm(club[1] - club[0]) * unit])
+
+
+def _sharpen(
+    sight: Sight, line: Float[np.ndarray, "2 2"], options: LineOptions
+) -> Float[np.ndarray, "2 2"]:
+    """The line of most contrast among the neighbours of one: a shaft seen in part is askew."""
+    turns = np.arange(-(NEIGHBOURS[0] // 2), NEIGHBOURS[0] // 2 + 1.0)
+    asides = turns * 2 * options.aside / (ASIDES - 1)
+    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
+    ends = _shift(line, turn, aside)
+    return ends[int(_contrast(sight, ends, options).mean(axis=1).argmax())]
 
 
 def _shift(
@@ -165,7 +190,8 @@ def _contrast(
     across = np.stack([-way[:, 1], way[:, 0]], axis=1)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     blur = SHUTTER / 2 * (sight.swept[0] + share * (sight.swept[1] - sight.swept[0]))
-    widths = [np.full(PLACES, w) for w in options.widths] + [options.widths[0] + blur]
+    widths = [np.full(PLACES, w) for w in options.widths]
+    widths += [options.widths[0] + share * blur for share in BLURS]
     sides = [sight.height * width[:, None] * across[:, None] for width in widths]
     return np.minimum(*(_stand_out(p, sight.height * points, sides) for p in sight.pictures))
 

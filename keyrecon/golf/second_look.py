@@ -11,9 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
-from keyrecon.golf.expected_lines import LineOptions, Lines, Sight, find_lines, measure_departure
+from keyrecon.golf.expected_lines import (
+    LineOptions,
+    Lines,
+    Sight,
+    find_lines,
+    lay_on,
+    measure_departure,
+)
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.paths import find_cheapest_path
 from keyrecon.pictures import side_by_side
@@ -22,9 +29,7 @@ from keyrecon.video import Video
 PLATE = 15
 """Frames whose median stands for the scene."""
 USUAL = 1.0
-"""Usual departures by which a club at address may be off what is fitted."""
-SAME_CLUB = 1e-3
-"""px"""
+"""Usual departures within which a line seen at first is the same club."""
 ALONG = 0.12
 """Standard deviation along the shaft of hands that were only expected there, player heights."""
 BRIDGED = 0.5
@@ -54,46 +59,50 @@ def see_club_again(
     """The observations with the club of a second look at the swing; `height` of the player in px.
 
     `plate` is the median picture (`median_picture`).
-    A club that rests at address is in the median picture too: there, what was seen at first stays.
-    What the player does after the finish is no part of the fitted motion, which tells nothing then.
+    How far a shaft reaches was seen at first, where that was the same one.
     """
-    first, frames = observations.club, np.arange(len(observations.club))
-    after = frames > fitted.keys[3]
-    expected = np.where(after[:, None, None], np.nan, fitted.club_seen)
-    again = look_again(video, plate, first, expected, height, options)
-    turns = _turn_off(first, fitted.club_seen, options.lines)
-    resting = (frames < fitted.keys[0]) & (turns < USUAL)
-    ends = np.where(resting[:, None, None], first, again)
-    same = np.abs(ends - first).max(axis=(1, 2)) < SAME_CLUB
-    along = np.where(same[:, None], observations.club_along, [ALONG * height, np.inf])
+    first, resting = observations.club, np.arange(len(observations.club)) < fitted.keys[0]
+    ends = look_again((video, plate), (first, fitted.club_seen), height, resting, options)
+    along = np.tile([ALONG * height, np.inf], (len(ends), 1))
+    for t in _find_same(ends, first, height, options.lines):
+        ends[t], along[t] = lay_on(ends[t], first[t]), observations.club_along[t]
     return replace(observations, club=ends, club_along=along)
 
 
-def _turn_off(
-    first: Float[np.ndarray, "T 2 2"], expected: Float[np.ndarray, "T 2 2"], options: LineOptions
-) -> Float[np.ndarray, "T"]:
-    """Angles by which clubs are turned from the expected ones, in usual ones; NaN where unseen."""
-    pairs = zip(expected, first, strict=True)
-    return np.abs([measure_departure(e, f[None], options)[0, 0] for e, f in pairs])
+def _find_same(
+    ends: Float[np.ndarray, "T 2 2"],
+    first: Float[np.ndarray, "T 2 2"],
+    height: float,
+    options: LineOptions,
+) -> Int[np.ndarray, "n"]:
+    """Frames in which the club is what was seen at first."""
+    pairs = zip(ends / height, first / height, strict=True)
+    apart = [measure_departure(e, f[None], options)[0] for e, f in pairs]
+    seen = np.isfinite(ends + first).all(axis=(1, 2))
+    return np.flatnonzero(seen & (np.abs(apart).max(axis=1) < USUAL))
 
 
 def look_again(
-    video: Video,
-    plate: Float[np.ndarray, "h w"],
-    first: Float[np.ndarray, "T 2 2"],
-    expected: Float[np.ndarray, "T 2 2"],
+    scene: tuple[Video, Float[np.ndarray, "h w"]],
+    clubs: tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T 2 2"]],
     height: float,
+    resting: Bool[np.ndarray, "T"],
     options: SecondLookOptions = SecondLookOptions(),
 ) -> Float[np.ndarray, "T 2 2"]:
     """Hand end and head of the club, px, NaN where it is not seen.
 
-    `first` is where it was seen at first, NaN where it was not; `height` that of the player in px.
+    `scene` is the video with its median picture, in which a `resting` club is too; `clubs` are
+    where it was seen at first, NaN where it was not, and where it is expected; `height` is that of
+    the player in px.
     """
+    (video, plate), (first, expected) = scene, clubs
     swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
 
     def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
         frame, grey = numbered
-        sight = Sight((grey.astype(np.float32), grey - plate), height, swept[frame])
+        picture = grey.astype(np.float32)
+        moved = picture if resting[frame] else picture - plate
+        sight = Sight((picture, moved), height, swept[frame])
         return find_lines(sight, first[frame], expected[frame], options.lines)
 
     lines = list(side_by_side(look, enumerate(video.grey_frames())))
