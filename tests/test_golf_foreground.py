@@ -7,6 +7,7 @@ import pytest
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import Clicks
 from keyrecon.golf.foreground import separate_player
+from keyrecon.golf.look import find_whole
 from keyrecon.video import open_video
 from keyrecon.video_writer import write_video
 
@@ -86,3 +87,11 @@ def test_clicks_on_nothing_say_so(video):
 def test_the_same_clicks_cut_out_the_same_player_again(video):
     once, again = (separate_player(video, clicks()) for _ in range(2))
     assert all((once.mask(t) == again.mask(t)).all() for t in range(FRAMES))
+
+
+def test_a_mask_that_lost_half_of_the_player_counts_for_nothing():
+    player = np.zeros((60, 30), bool)
+    player[5:55, 10:20] = True
+    legs = player.copy()
+    legs[:30] = False
+    assert find_whole([player, player, legs, player]).tolist() == [True, True, False, True]

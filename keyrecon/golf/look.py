@@ -36,6 +36,8 @@ TIP, NO_TIP, HEAD = 0.02, 0.12, 0.1
 the player, and of the head end, which contrast often cuts short."""
 INTO_HANDS = 0.025
 """From where the shaft leaves the hands to between them, player heights."""
+WHOLE = 2 / 3
+"""Share of the usual area of the mask; a player who turns shows no less."""
 SAMPLE = 0.03
 """Distance between samples of the mask, player heights."""
 
@@ -81,6 +83,7 @@ def look_at_swing(
         pictures, foreground, clicks, video.fps, options.appearance, progress
     )
     bodies = [foreground.player(t) for t in range(len(video))]
+    whole = find_whole(bodies)
     ends, along = _describe_club(club, foreground.height, (video.width, video.height))
     return Observations(
         camera=rough_camera(clicks),
@@ -89,8 +92,13 @@ def look_at_swing(
         club=ends,
         club_spread=np.full(len(video), ACROSS * foreground.height),
         club_along=along,
-        foreground=tuple(_sample_mask(b, foreground) for b in bodies),
-        away=tuple(_away(foreground, t, body) for t, body in enumerate(bodies)),
+        foreground=tuple(
+            _sample_mask(body & kept, foreground) for body, kept in zip(bodies, whole, strict=True)
+        ),
+        away=tuple(
+            _away(foreground, t, body) * kept
+            for t, (body, kept) in enumerate(zip(bodies, whole, strict=True))
+        ),
         matches=_match_all([p[..., 0] for p in pictures], bodies, foreground, options.matches),
         keys=keys,
         mu=interpolate_times(keys, key_times, len(video)),
@@ -141,6 +149,15 @@ def _describe_club(
     inside = ((ends[:, 1] > border) & (ends[:, 1] < np.array(size) - border)).all(axis=1)
     hands = np.where(club.tip, TIP, NO_TIP) * height
     return ends, np.stack([hands, np.where(inside, HEAD * height, np.inf)], axis=1)
+
+
+def find_whole(bodies: list[Bool[np.ndarray, "h w"]]) -> Bool[np.ndarray, "T"]:
+    """Frames whose mask has all of the player: one with clothes of the scene's colour loses parts.
+
+    What such a mask leaves out is no reason to move the player elsewhere.
+    """
+    areas = np.array([body.sum() for body in bodies])
+    return areas > WHOLE * np.median(areas)
 
 
 def _sample_mask(body: Bool[np.ndarray, "h w"], foreground: Foreground) -> Float[np.ndarray, "n 2"]:
