@@ -14,14 +14,16 @@ from keyrecon.formats.motion_model import BUILT_IN, read_motion_model
 from keyrecon.formats.npz import write_motion
 from keyrecon.golf.clicks import Clicks
 from keyrecon.golf.fit import FitOptions, fit_again, fit_swing, slide_fit
+from keyrecon.golf.hand_rests import RestOptions, time_rests
 from keyrecon.golf.look import LookOptions, look_at_swing
 from keyrecon.golf.mirror import mirror_clicks, mirror_observations
+from keyrecon.golf.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
 from keyrecon.golf.result import describe_fit
 from keyrecon.golf.second_look import SecondLookOptions, median_picture, see_club_again
 from keyrecon.golf.skeleton import size_body
 from keyrecon.golf.start import place_player, start_state
-from keyrecon.golf.timing import find_rests
+from keyrecon.golf.timing import interpolate_times
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_overlay import write_golf_overlay
 from keyrecon.report.golf_page import write_golf_report
@@ -47,6 +49,10 @@ class GolfOptions:
     """How many times the club is looked for again where the fitted swing expects it."""
     second_look: SecondLookOptions = field(default_factory=SecondLookOptions)
     """How it is looked for then."""
+    rests: RestOptions = field(default_factory=RestOptions)
+    """When hands rest."""
+    proportions: ProportionOptions = field(default_factory=ProportionOptions)
+    """How annotated keyframes tell the player's proportions."""
     slowmo: float = 1.0
     """How many times slower than real the video plays."""
 
@@ -74,7 +80,7 @@ def refine_fit(
 ) -> tuple[FittedSwing, Observations]:
     """The club looked for again where it is expected by now, and the fit with it, in turns.
 
-    At last the key postures in which the player rests, which the club tells better than the fit.
+    In turns, too, the hands tell when the swing begins and ends, better than club or fit do.
     """
     seen, looks = observations, options.again if options.method == "swing" else 0
     plate = median_picture(video) if looks else None
@@ -82,9 +88,10 @@ def refine_fit(
         seen = see_club_again(
             observations, video, plate, fitted, clicks.height, options.second_look
         )
+        keys = time_rests(video, seen.foreground, fitted, clicks.height, options.rests)
+        seen = replace(seen, keys=keys, mu=interpolate_times(keys, model.keys, len(video)))
         fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
-    settings = clicks.height, video.fps
-    keys = find_rests(seen.club, fitted.club_seen, fitted.keys, settings, options.look.timing)
+    keys = time_rests(video, seen.foreground, fitted, clicks.height, options.rests)
     return replace(fitted, keys=keys), seen
 
 
@@ -111,6 +118,9 @@ def fit_observations(
     else:
         fit = fit_swing if options.method == "swing" else slide_fit
         found = fit(seen, model, body, start, video.fps, options.fit)
+    if seen.marks is not None and options.method == "swing":
+        settings = options.fit, options.proportions
+        found = refit_proportions(found, seen, start, video.fps, settings)
     return describe_fit(*found, observations, video.time, clicks.frame)
 
 

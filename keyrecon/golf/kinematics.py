@@ -11,15 +11,23 @@ from keyrecon.golf.skeleton import CLUB, PARENTS, REST, SEGMENTS
 def place_body(body: Body, posture: Posture, state: SwingState) -> Pose:
     """Forward kinematics: every segment in camera axes."""
     frames = len(posture.turns)
-    origins = np.empty((frames, len(SEGMENTS), 3))
     rotations = np.empty((frames, len(SEGMENTS), 3, 3))
     rotations[:, 0] = state.rotation @ posture.turns[:, 0]
     shift = body.stature * np.einsum("tij,tj->ti", state.rotation, posture.place)
-    origins[:, 0] = state.position + shift
     for p, parent in enumerate(PARENTS[1:], start=1):
         rotations[:, p] = rotations[:, parent] @ posture.turns[:, p]
+    return Pose(hang_segments(body, state.position + shift, rotations), rotations)
+
+
+def hang_segments(
+    body: Body, pelvis: Float[np.ndarray, "T 3"], rotations: Float[np.ndarray, "T P 3 3"]
+) -> Float[np.ndarray, "T P 3"]:
+    """Origins of all segments from the pelvis's, in camera axes."""
+    origins = np.empty((len(pelvis), len(SEGMENTS), 3))
+    origins[:, 0] = pelvis
+    for p, parent in enumerate(PARENTS[1:], start=1):
         origins[:, p] = origins[:, parent] + rotations[:, parent] @ body.offsets[p]
-    return Pose(origins, rotations)
+    return origins
 
 
 def pose_rates(
