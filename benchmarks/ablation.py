@@ -20,10 +20,12 @@ from unittest.mock import patch
 import numpy as np
 from accuracy import HEIGHT_ERROR, Case, mark, prepare_case
 from sequences import DATA, TENNIS, render
+from unseen import unseen_model
 
 from keyrecon.console import show
 from keyrecon.lifting import follow, lift
 from keyrecon.lifting.chain import bone_vectors, breadths
+from keyrecon.lifting.depths import DepthModel
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.lifting.signs import Signs
@@ -50,9 +52,11 @@ class Trial:
     truth: dict[str, np.ndarray]
     height: float
     """Stature as typed, metres."""
+    model: DepthModel
+    """Learnt without these players."""
 
 
-def carry(case: Case) -> Trial:
+def carry(case: Case, model: DepthModel) -> Trial:
     """Joints of a sequence carried from its keyframes, as the pipeline does."""
     prepared, truth = case.preparation, case.truth
     marks = mark(case)
@@ -68,13 +72,13 @@ def carry(case: Case) -> Trial:
     error = np.random.default_rng(case.sequence.seed).uniform(-HEIGHT_ERROR, HEIGHT_ERROR)
     height = float(truth["height_m"]) * (1 + error)
     seen, fps = prepared.track.height, prepared.video.fps
-    return Trial(tracks, marks, prepared.keyframes, seen, fps, truth, height)
+    return Trial(tracks, marks, prepared.keyframes, seen, fps, truth, height, model)
 
 
 def lift_trial(trial: Trial) -> LiftResult:
     """The lift as it is."""
     given = trial.tracks, trial.marks, trial.keyframes, trial.height_px, trial.fps
-    return lift_motion(*given, options=LiftOptions(height=trial.height))
+    return lift_motion(*given, model=trial.model, options=LiftOptions(height=trial.height))
 
 
 def true_signs(trial: Trial) -> np.ndarray:
@@ -168,14 +172,14 @@ def judge(trial: Trial, found: LiftResult) -> list[float]:
     return [*scores, acceleration_error(points, truth, root), right[marked & limb].mean()]
 
 
-def measure(folder: Path, case: Case) -> dict[str, list[float]]:
+def measure(folder: Path, case: Case, model: DepthModel) -> dict[str, list[float]]:
     """Scores of one sequence under every condition."""
-    trial = carry(case)
+    trial = carry(case, model)
     rows = {name: judge(trial, run(trial)) for name, run in CONDITIONS.items()}
     blind = replace(trial, marks=replace(trial.marks, nearer=0 * trial.marks.nearer))
     rows["no signs from the person"] = judge(blind, lift_trial(blind))
     half = replace(Options(), keyframes=KeyframeOptions(budget=KeyframeOptions().budget / 2))
-    fewer = carry(prepare_case(case.sequence, folder, half))
+    fewer = carry(prepare_case(case.sequence, folder, half), model)
     rows["half the keyframes"] = judge(fewer, lift_trial(fewer))
     return rows
 
@@ -192,7 +196,9 @@ def main() -> None:
     for sequence in TENNIS:
         if not words.only or sequence.name in words.only:
             folder = render(sequence, words.work, words.mocap)
-            for name, row in measure(folder, prepare_case(sequence, folder, Options())).items():
+            _, model = unseen_model(sequence, words.work, words.mocap)
+            case = prepare_case(sequence, folder, Options())
+            for name, row in measure(folder, case, model).items():
                 every.setdefault(name, []).append(row)
                 print_row(sequence.name, name, row)
     for name, rows in every.items():

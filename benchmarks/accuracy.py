@@ -4,7 +4,8 @@
         [--mediapipe PYTHON]
 
 Renders what is missing in the work folder, annotates the chosen keyframes from the truth with
-click noise, reconstructs and prints a table. Nothing is asserted. With an interpreter that has
+click noise, reconstructs and prints a table. The depth model is learnt without the players of the
+sequence. Nothing is asserted. With an interpreter that has
 mediapipe 0.10.21 installed, MediaPipe Pose is measured on the same videos.
 """
 
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from peer import score_mediapipe
 from sequences import DATA, OTHER, TENNIS, Sequence, render
+from unseen import unseen_model
 
 from keyrecon.console import show
 from keyrecon.formats.picks import read_picks
@@ -114,10 +116,12 @@ COLUMNS = (
 )
 
 
-def report(sequence: Sequence, folder: Path, forms: list[str]) -> None:
-    """Print the rows of one sequence."""
+def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> None:
+    """Print the rows of one sequence; `depths` is a depth model."""
     for form in forms:
         options, signs = FORMS[form]
+        if options.depths != "none":
+            options = replace(options, depths=str(depths))
         if sequence.seconds <= SHORT:
             budget = 2 * options.keyframes.budget
             options = replace(options, keyframes=replace(options.keyframes, budget=budget))
@@ -161,7 +165,8 @@ def main() -> None:
     for sequence in OTHER if words.other else TENNIS:
         if not words.only or sequence.name in words.only:
             folder = render(sequence, words.work, words.mocap)
-            report(sequence, folder, words.form)
+            depths, _ = unseen_model(sequence, words.work, words.mocap)
+            report(sequence, folder, depths, words.form)
             if words.mediapipe:
                 report_mediapipe(sequence, folder, words.mediapipe)
     print(f"Peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB.")

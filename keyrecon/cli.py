@@ -13,11 +13,13 @@ import tyro
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from keyrecon import demo as demonstration
+from keyrecon import depth_job
 from keyrecon import project as work
 from keyrecon.console import show
 from keyrecon.errors import KeyreconError
 from keyrecon.golf_commands import golf
 from keyrecon.golf_demo import run_golf_demo
+from keyrecon.lifting.learn_depths import LearnDepthsOptions
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.records import Pick
 from keyrecon.serving import serve_annotator
@@ -240,6 +242,24 @@ def relink(project: Positional[Path], video: Positional[Path]) -> None:
     """
     Workspace(project).relink(video)
     print(f"{project} now uses {video}.")
+
+
+@app.command
+def depths(
+    captures: Positional[tuple[Path, ...]],
+    out: Path = Path("depths.npz"),
+    options: OmitArgPrefixes[Annotated[LearnDepthsOptions, arg(name="")]] = LearnDepthsOptions(),
+) -> None:
+    """Learn from motion capture what depth bones usually have that look alike in a picture.
+
+    It helps `keyrecon run` with the depth signs that nobody gave; a model comes with the program.
+    To use another: keyrecon run PROJECT --depths FILE.
+
+    Args:
+        captures: .bvh, .amc (with its .asf) or .c3d files, or folders of them.
+        out: File to write.
+    """
+    print(depth_job.learn(captures, out, options, show))
 
 
 app.command(golf, name="golf", help="A model of whole golf swings: train it, fit it to a video.")

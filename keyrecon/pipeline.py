@@ -8,6 +8,7 @@ runs them; the command line passes one that returns stored results where nothing
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,8 +16,10 @@ import numpy as np
 from keyrecon.background import BackgroundOptions, build_background
 from keyrecon.colors import ColorOptions, learn_colors
 from keyrecon.errors import KeyreconError
+from keyrecon.formats.depth_model import BUILT_IN, read_depth_model
 from keyrecon.formats.motion_model import read_motion_model
 from keyrecon.golf.follow import SwingPriorOptions, follow_swing
+from keyrecon.lifting.depths import DepthModel
 from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
 from keyrecon.matching.edges import EdgeOptions, find_edges
 from keyrecon.matching.keyframes import (
@@ -64,6 +67,9 @@ class Options:
     compare: CompareOptions = field(default_factory=CompareOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     propagate: PropagateOptions = field(default_factory=PropagateOptions)
+    depths: str = "built-in"
+    """What helps with depth signs that nobody gave: 'built-in', 'none', or a file that
+    `keyrecon depths` wrote."""
     prior: Literal["none", "golf"] = "none"
     """'golf' lets the swing prior tell depth signs and what nobody saw between keyframes."""
     swing: SwingPriorOptions = field(default_factory=SwingPriorOptions)
@@ -143,6 +149,7 @@ def reconstruct(
     Lengths are in metres where `options.lift.height` is given, else in body heights. Raises
     KeyreconError when keyframes are not annotated.
     """
+    model = _depth_model(options)  # a wrong file is told of before minutes are spent
     preparation = _with_annotated(preparation, annotations, options, progress)
     video, keyframes = preparation.video, preparation.keyframes
     tracks = keep(
@@ -159,9 +166,16 @@ def reconstruct(
         pictures = height, (video.width, video.height)
         known = (tracks, annotations, read_motion_model(), pictures, video.time)
         expected = keep("swing", follow_swing, *known, options=options.swing, progress=progress)
-    inputs = (tracks, annotations, keyframes, height, video.fps, expected)
+    inputs = (tracks, annotations, keyframes, height, video.fps, expected, model)
     lifted = keep("lift", lift_motion, *inputs, options=options.lift, progress=progress)
     return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
+
+
+def _depth_model(options: Options) -> DepthModel | None:
+    """The depth model that was asked for."""
+    if options.depths == "none":
+        return None
+    return read_depth_model(BUILT_IN if options.depths == "built-in" else Path(options.depths))
 
 
 def _with_annotated(
@@ -223,6 +237,7 @@ def as_printed(options: Options = Options()) -> Options:
         track=replace(options.track, method="paper"),
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
+        depths="none",
         lift=replace(options.lift, method="paper"),
     )
 

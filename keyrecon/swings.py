@@ -4,15 +4,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.mocap import read_capture
+from keyrecon.formats.mocap import find_captures, read_capture
 from keyrecon.formats.motion_model import write_motion_model
 from keyrecon.golf.leave_out import LeftOut, leave_one_out
 from keyrecon.golf.records import MotionModel, Swing
 from keyrecon.golf.swings import make_swing
 from keyrecon.golf.train import TrainOptions, collect_swings, learn_motion
 from keyrecon.progress import Progress, silent
-
-SUFFIXES = (".bvh", ".amc", ".c3d")
 
 
 def read_swing(path: Path) -> Swing:
@@ -26,16 +24,7 @@ def read_swing(path: Path) -> Swing:
 
 def read_swings(paths: Iterable[Path]) -> tuple[Swing, ...]:
     """All swings of files and folders, in order of their names."""
-    files = [file for path in paths for file in _files(path)]
-    if not files:
-        raise KeyreconError("There are no swings; name .bvh, .amc or .c3d files or their folder.")
-    return tuple(read_swing(file) for file in files)
-
-
-def _files(path: Path) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    return sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+    return tuple(read_swing(file) for file in find_captures(paths))
 
 
 def train(

@@ -1,5 +1,6 @@
 """Facts about lifting: from joints in the picture to a motion in space."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -168,12 +169,17 @@ def test_half_the_frame_rate_gives_a_frame_twice_the_say_and_four_times_the_jump
     assert slow.limits == 2 * once.limits and slow.jerk == 4 * once.jerk
 
 
+def bare(flat, depth):
+    """Bones of which nothing is known but what the picture shows."""
+    return Shown(flat, depth, np.full(depth.shape, 0.01), np.full(depth.shape, np.nan))
+
+
 def test_signs_are_the_cheapest_of_all_sign_vectors():
     rng = np.random.default_rng(3)
     directions = unit(standing_directions() + 0.4 * rng.normal(size=(3, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
     depth = np.abs(LSP14.lengths * directions[..., 2])
-    shown = Shown(flat, depth, np.full(depth.shape, 0.01))
+    shown = bare(flat, depth)
     nearer = np.zeros((3, 13), dtype=np.int64)
     chosen = choose_signs(shown, nearer, BREADTHS, LSP14).sign
     every = np.array(list(product((1, -1), repeat=13)))
@@ -214,16 +220,36 @@ def test_knees_bend_backwards_whichever_way_the_figure_faces():
     for yaw in (0.4, -0.5, 2.6):
         directions = turned(lifted, yaw)[None]
         flat = LSP14.lengths[:, None] * directions[..., :2]
-        shown = Shown(flat, np.abs(LSP14.lengths * directions[..., 2]), np.full((1, 13), 0.01))
+        shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
         chosen = choose_signs(shown, np.zeros((1, 13), np.int64), BREADTHS, LSP14)
         np.testing.assert_array_equal(chosen.sign[0, shanks], np.sign(directions[0, shanks, 2]))
+
+
+def test_what_is_usual_tells_apart_what_looks_the_same():
+    names = [LSP14.names[c] for _, c in LSP14.bones]
+    arms = [
+        names.index(f"{side}_{end}") for side in ("right", "left") for end in ("elbow", "wrist")
+    ]
+    nobody = np.zeros((1, 13), np.int64)
+    blind, told = [], []
+    for side in (1, -1):
+        directions = standing_directions()[None]
+        directions[:, arms] = unit(np.array([0.1, 0.6, 0.8 * side]))
+        flat, dz = LSP14.lengths[:, None] * directions[..., :2], LSP14.lengths * directions[..., 2]
+        shown = bare(flat, np.abs(dz))
+        blind.append(choose_signs(shown, nobody, BREADTHS, LSP14).sign[0, arms])
+        known = choose_signs(replace(shown, usual=dz), nobody, BREADTHS, LSP14)
+        told.append(known.sign[0, arms])
+    np.testing.assert_array_equal(blind[0], blind[1])
+    np.testing.assert_array_equal(told[0], 1)
+    np.testing.assert_array_equal(told[1], -1)
 
 
 def test_confirmed_signs_are_kept():
     rng = np.random.default_rng(7)
     directions = unit(standing_directions() + 0.3 * rng.normal(size=(5, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
-    shown = Shown(flat, np.abs(LSP14.lengths * directions[..., 2]), np.full((5, 13), 0.01))
+    shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
     nearer = rng.choice([-1, 1], (5, 13))
     chosen = choose_signs(shown, nearer, BREADTHS, LSP14, FlipOptions(confirmed=1e3))
     np.testing.assert_array_equal(chosen.sign, -nearer)

@@ -4,7 +4,7 @@ Whatever the file, the result is the same: LSP14's joints in metres in a right-h
 Y up, checked to be a person: upright, 1.2-2.3 m tall, right side on the right.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,9 @@ from keyrecon.formats.bvh import read_bvh
 from keyrecon.formats.c3d_markers import read_markers
 from keyrecon.formats.rigs import find_joints, metres_per_unit, upright
 
+SUFFIXES = (".bvh", ".amc", ".c3d")
+"""Of files that hold a motion."""
+
 
 @dataclass(frozen=True, eq=False)
 class Capture:
@@ -30,6 +33,18 @@ class Capture:
     """Right and left toe, metres; None where the file has none."""
     club: Float[np.ndarray, "T 2 3"] | None = None
     """Hand end and head of a golf club, metres; None where the file has none."""
+
+
+def find_captures(paths: Iterable[Path]) -> list[Path]:
+    """The files named, and those in the folders named, in order of their names."""
+    files = [file for path in paths for file in (_inside(path) if path.is_dir() else [path])]
+    if not files:
+        raise KeyreconError("There is no capture; name .bvh, .amc or .c3d files or their folder.")
+    return files
+
+
+def _inside(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
 
 
 def read_mocap(paths: Sequence[Path], trim: int = 0) -> tuple[Capture, ...]:

@@ -27,6 +27,9 @@ from keyrecon.lifting.occlusion import hidden_cost
 from keyrecon.lifting.signs import FlipOptions, Shown, Signs, sign_depths, sign_states
 from keyrecon.lifting.votes import Votes
 
+_USUAL_SPREAD = 0.4
+"""How far depths are from the usual, in lengths of the bone: root mean square over players whose
+captures a model had not learnt from."""
 _CHUNK = 200
 """Frames whose jumps are weighed at once: 7 MB."""
 
@@ -71,7 +74,7 @@ def sign_costs(
     States as `sign_states` lists them, limbs in the order of `anatomy_of`.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = _costs(shown, breadths, anatomy)
+    trunk, limbs = _costs(shown, breadths, anatomy, (1.0, 1.0))
     trunk = trunk + _contradiction(anatomy.trunk, nearer, options.confirmed)
     limbs = [
         cost + _contradiction(limb.bones, nearer, options.confirmed)[:, None]
@@ -93,8 +96,7 @@ def follow_signs(
     `hidden` tells of joints that were marked though they could not be seen.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = _costs(shown, breadths, anatomy)
-    limbs = [options.limits * cost for cost in limbs]
+    trunk, limbs = _costs(shown, breadths, anatomy, (options.limits, options.usual))
     if hidden is not None:
         limbs = _with_hidden(limbs, shown, hidden, skeleton)
     sign = np.ones(shown.depth.shape, dtype=np.int64)
@@ -102,7 +104,7 @@ def follow_signs(
     rows = np.arange(len(sign))
     best = np.zeros(len(sign), dtype=np.int64)
     if anatomy.trunk:
-        total = options.limits * trunk + sum(cost.min(axis=-1) for cost in limbs)
+        total = trunk + sum(cost.min(axis=-1) for cost in limbs)
         total += votes.cost(anatomy.trunk, shown, options)
         total += votes.guided(anatomy.trunk, shown, options)
         best = _path(total, anatomy.trunk, shown, options)
@@ -170,6 +172,33 @@ def _jumps(
 
 
 def _costs(
+    shown: Shown,
+    breadths: Float[np.ndarray, "P"],
+    anatomy: Anatomy,
+    weights: tuple[float, float],
+) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
+    """Cost of every trunk state, and of every limb state given it.
+
+    `weights` of joint limits and of what is usual.
+    """
+    limits, usual = weights
+    trunk, limbs = _limit_costs(shown, breadths, anatomy)
+    return limits * trunk + usual * _unusual(anatomy.trunk, shown), [
+        limits * cost + usual * _unusual(limb.bones, shown)[:, None]
+        for limb, cost in zip(anatomy.limbs, limbs, strict=True)
+    ]
+
+
+def _unusual(bones: tuple[int, ...], shown: Shown) -> Float[np.ndarray, "T S"]:
+    """How far the depth of a group of bones is from the usual, for every sign vector, nats."""
+    depth, doubt = sign_depths(bones, shown)
+    usual = shown.usual[:, None, list(bones)]
+    length = np.sqrt((shown.flat**2).sum(axis=-1) + shown.depth**2)[:, None, list(bones)]
+    spread = (_USUAL_SPREAD * length) ** 2 + doubt[:, None] ** 2
+    return np.nan_to_num((depth - usual) ** 2 / (2 * spread)).sum(axis=-1)
+
+
+def _limit_costs(
     shown: Shown, breadths: Float[np.ndarray, "P"], anatomy: Anatomy
 ) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of joint limits for every trunk state, and of every limb state given it."""
@@ -200,7 +229,7 @@ def _with_hidden(
     frames = np.flatnonzero(hidden.any(axis=1))
     if not anatomy.trunk or not len(frames):
         return limbs
-    seen = Shown(shown.flat[frames], shown.depth[frames], shown.doubt[frames])
+    seen = shown.part(frames)
     corners = _candidates(anatomy.trunk, seen)
     result = []
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):

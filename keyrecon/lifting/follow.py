@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import unit
+from keyrecon.lifting.depths import DepthModel
 from keyrecon.lifting.flips import follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
@@ -49,6 +50,8 @@ class Figure:
     keys: KeyPoses
     frames: Int[np.ndarray, "K"]
     """Frames of the key poses."""
+    model: DepthModel | None = None
+    """What depth bones usually have."""
 
 
 def follow_motion(
@@ -105,7 +108,8 @@ def _follow_window(
     noise, flips = _SMOOTHED, at_rate(options.flips, fps)
     guided = lengths * guide.directions[..., 2]
     for _ in range(2):
-        shown = show_bones(joints, np.full(joints.shape[:2], noise), lengths, skeleton)
+        blur = np.full(joints.shape[:2], noise)
+        shown = show_bones(joints, blur, lengths, skeleton, figure.model)
         votes = Votes(lengths[:, None] * keys, figure.frames, figure.keys.trust, guided, skeleton)
         signs = follow_signs(shown, votes, figure.size.breadths, skeleton, flips)
         start = State(joints[:, skeleton.root], lift_shown(shown, signs.sign))

@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.lifting.depths import DepthModel
 from keyrecon.lifting.flips import follow_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed, smooth_joints
-from keyrecon.lifting.signs import FlipOptions, Shown, Signs, at_rate
+from keyrecon.lifting.signs import FlipOptions, Signs, at_rate
 from keyrecon.lifting.taylor import show_bones
 from keyrecon.lifting.votes import Votes
 from keyrecon.records import Annotations
@@ -34,10 +35,12 @@ def follow_key_signs(
     size: BodySize,
     fps: float,
     options: FlipOptions = FlipOptions(),
+    model: DepthModel | None = None,
 ) -> Signs:
     """Signs of every bone in every keyframe; those that the person confirmed stay."""
     frames, nearer = annotations.frames, annotations.nearer
-    shown = _show_all(observed, annotations, size, fps)
+    joints, noise = _joints(observed, annotations, fps)
+    shown = show_bones(joints, noise, size.lengths, annotations.skeleton, model)
     vectors = np.concatenate([shown.flat, shown.depth[..., None]], axis=-1)[frames]
     vectors[..., 2] *= -nearer
     hidden = np.zeros(observed.joints.shape[:2], dtype=bool)
@@ -51,7 +54,7 @@ def follow_key_signs(
             continue
         start = max(first - _ASIDE, 0)
         piece = slice(start, first + _PIECE + _ASIDE)
-        seen = Shown(shown.flat[piece], shown.depth[piece], shown.doubt[piece])
+        seen = shown.part(piece)
         votes = Votes(
             vectors,
             frames - start,
@@ -66,8 +69,10 @@ def follow_key_signs(
     return Signs(np.where(confirmed, -nearer, sign), np.where(confirmed, 1.0, probability))
 
 
-def _show_all(observed: Observed, annotations: Annotations, size: BodySize, fps: float) -> Shown:
-    """All frames, smoothed; keyframes as they were marked."""
+def _joints(
+    observed: Observed, annotations: Annotations, fps: float
+) -> tuple[Float[np.ndarray, "T J 2"], Float[np.ndarray, "T J"]]:
+    """Joints of all frames, smoothed, and their noise; keyframes as they were marked."""
     frames = annotations.frames
     still = np.zeros_like(observed.joints)
     joints = smooth_joints(observed.joints, still, _SMOOTH_SECONDS * fps)
@@ -75,4 +80,4 @@ def _show_all(observed: Observed, annotations: Annotations, size: BodySize, fps:
     marked = np.isfinite(annotations.joints[..., 0])
     joints[frames] = np.where(marked[..., None], observed.joints[frames], joints[frames])
     noise[frames] = np.where(marked, observed.spread[frames], _SMOOTHED)
-    return show_bones(joints, noise, size.lengths, annotations.skeleton)
+    return joints, noise

@@ -15,6 +15,7 @@ from keyrecon.body import Skeleton
 from keyrecon.camera import project_orthographic
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import bone_vectors, pose_from_directions, unit
+from keyrecon.lifting.depths import DepthModel
 from keyrecon.lifting.follow import Figure, FollowOptions, follow_motion
 from keyrecon.lifting.interpolate import Interpolation, interpolate_poses
 from keyrecon.lifting.keysigns import follow_key_signs
@@ -82,19 +83,21 @@ def lift_motion(  # noqa: PLR0913
     height_px: Float[np.ndarray, "T"],
     fps: float,
     expected: Float[np.ndarray, "T J 3"] | None = None,
+    model: DepthModel | None = None,
     options: LiftOptions = LiftOptions(),
     progress: Progress = silent,
 ) -> LiftResult:
     """Lift tracked joints to 3D with the help of annotated keyframes.
 
     `height_px` is the tracked standing height. `expected`, poses of a motion prior in camera axes,
-    take the place of the slerped key poses. Raises KeyreconError without annotations.
+    take the place of the slerped key poses; `model` helps with the depth signs that nobody gave.
+    Raises KeyreconError without annotations.
     """
     _check(tracks, annotations)
     skeleton = annotations.skeleton
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths)
     observed = _observe(tracks, annotations, size, fps, options)
-    signs = follow_key_signs(observed, annotations, size, fps, options.flips)
+    signs = follow_key_signs(observed, annotations, size, fps, options.flips, model)
     keys = lift_keyframes(observed, annotations, size, options.flips, signs)
     slerped = interpolate_poses(
         keys.directions, annotations.frames, keyframes, observed.joints, size.lengths, skeleton
@@ -103,7 +106,7 @@ def lift_motion(  # noqa: PLR0913
     guide = _place(between, observed, size, skeleton)
     slips = _find_slips(observed, guide, size, annotations, options)
     clean = replace(observed, joints=np.where(slips[..., None], np.nan, observed.joints))
-    figure = Figure(skeleton, size, keys, annotations.frames)
+    figure = Figure(skeleton, size, keys, annotations.frames, model)
     if options.method == "paper":
         upright = _rolled(guide.directions, clean, size, skeleton)
         guide = _place(upright, clean, size, skeleton)

@@ -13,12 +13,14 @@ class FlipOptions:
 
     confirmed: float = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
-    limits: float = 0.15
+    limits: float = 0.075
     """Weight of joint limits per frame; errors stay alike over several frames."""
     votes: float = 0.3
     """Weight of the key poses per frame."""
     guide: float = 1.0
     """Weight of the slerped key poses per frame."""
+    usual: float = 0.6
+    """Weight, per frame, of the depth that bones usually have where they look like this."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
     jerk: float = 0.1
@@ -35,6 +37,7 @@ def at_rate(options: FlipOptions, fps: float) -> FlipOptions:
         limits=options.limits * step,
         votes=options.votes * step,
         guide=options.guide * step,
+        usual=options.usual * step,
         jerk=options.jerk * step**2,
     )
 
@@ -49,6 +52,13 @@ class Shown:
     """|dz|, statures."""
     doubt: Float[np.ndarray, "T B"]
     """Standard deviation of |dz|, statures."""
+    usual: Float[np.ndarray, "T B"]
+    """Depth, with its sign, that bones usually have that look like this, statures; NaN where
+    nothing is known of that."""
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> "Shown":
+        """Some of the frames."""
+        return Shown(self.flat[frames], self.depth[frames], self.doubt[frames], self.usual[frames])
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.chain import bone_vectors, unit
+from keyrecon.lifting.depths import DepthModel, usual_depths
 from keyrecon.lifting.flips import choose_signs
 from keyrecon.lifting.lengths import BodySize
 from keyrecon.lifting.observe import Observed
@@ -64,11 +65,12 @@ def show_bones(
     noise: Float[np.ndarray, "T J"],
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
+    model: DepthModel | None = None,
 ) -> Shown:
     """Everything about bones but the sign of their depth; joints and noise in units of length.
 
     A bone with a missing end is taken to lie anywhere: it shows nothing and may be as deep as
-    it is long on average.
+    it is long on average. `model` tells what depth such bones usually have.
     """
     vectors = bone_vectors(joints, skeleton)
     missing = np.isnan(vectors[..., 0])
@@ -78,7 +80,9 @@ def show_bones(
     blur = np.where(missing, 0.8, blur)
     share = depth_share(shown, blur)
     flat = np.sqrt(1 - share**2)[..., None] * unit(np.nan_to_num(vectors))
-    return Shown(lengths[:, None] * flat, lengths * share, lengths * depth_doubt(shown, blur))
+    doubt = lengths * depth_doubt(shown, blur)
+    usual = usual_depths(model, vectors, lengths, skeleton)
+    return Shown(lengths[:, None] * flat, lengths * share, doubt, usual)
 
 
 def lift_shown(shown: Shown, sign: Int[np.ndarray, "T B"]) -> Float[np.ndarray, "T B 3"]:

@@ -1,0 +1,33 @@
+"""Depth models that have not seen the players of a sequence.
+
+The model that comes with keyrecon is learnt from all captures at hand, those of the rendered
+sequences among them. Measured with it, a sequence would be one that it knows. So every sequence is
+lifted with a model learnt from all captures but those of its own players.
+"""
+
+from pathlib import Path
+
+from sequences import Sequence, mocap_files
+
+from keyrecon.console import show
+from keyrecon.depth_job import learn_from_files
+from keyrecon.formats.depth_model import read_depth_model, write_depth_model
+from keyrecon.formats.mocap import find_captures
+from keyrecon.lifting.depths import DepthModel
+
+
+def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:
+    """A model learnt without the players of a sequence, and its file in the work folder."""
+    players = {player(file) for file in mocap_files(sequence, mocap)}
+    path = work / f"depths-without-{'-'.join(sorted(players))}.npz"
+    if not path.is_file():
+        folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
+        others = [f for f in find_captures(folders) if player(f) not in players]
+        write_depth_model(path, learn_from_files(others, progress=show))
+    return path, read_depth_model(path)
+
+
+def player(file: Path) -> str:
+    """Who was captured: cmu_05_12_daz is subject 05 of CMU, jarua_Reves is jarua."""
+    words = file.stem.split("_")
+    return "_".join(words[:2]) if words[0] == "cmu" else words[0]

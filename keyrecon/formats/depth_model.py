@@ -1,0 +1,44 @@
+"""Depth models on disk: one compressed npz, no pickle; layers in half precision."""
+
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from keyrecon.errors import KeyreconError
+from keyrecon.lifting.depths import VERSION, DepthModel
+
+BUILT_IN = Path(__file__).parent.parent / "lifting" / "depths.npz"
+"""The model that ships with the package; `depths.md` beside it says how it was made."""
+
+
+def write_depth_model(path: Path, model: DepthModel) -> None:
+    """Write a model; the folder is made if need be."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    layers = {f"weight{n}": weight for n, weight in enumerate(model.weights)}
+    layers |= {f"bias{n}": bias for n, bias in enumerate(model.biases)}
+    halves = {name: values.astype(np.float16) for name, values in layers.items()}
+    provenance = np.array(model.provenance)
+    with path.open("wb") as file:
+        np.savez_compressed(file, version=model.version, provenance=provenance, **halves)
+
+
+def read_depth_model(path: Path = BUILT_IN) -> DepthModel:
+    """Read a model; raises KeyreconError for another kind of file, or one of another version."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            version, provenance = int(stored["version"]), str(stored["provenance"])
+            count = sum(name.startswith("weight") for name in stored.files)
+            weights = tuple(stored[f"weight{n}"].astype(np.float32) for n in range(count))
+            biases = tuple(stored[f"bias{n}"].astype(np.float32) for n in range(count))
+    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as fault:
+        why = fault.strerror if isinstance(fault, OSError) and fault.strerror else "another format"
+        raise KeyreconError(
+            f"{path} is not a depth model ({why}); make one with: keyrecon depths"
+        ) from fault
+    if version != VERSION:
+        raise KeyreconError(
+            f"{path} is a depth model of version {version} and this program needs {VERSION}; "
+            "make it again with: keyrecon depths"
+        )
+    return DepthModel(weights, biases, provenance, version)
