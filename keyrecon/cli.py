@@ -17,6 +17,7 @@ from keyrecon import depth_job
 from keyrecon import project as work
 from keyrecon.console import show
 from keyrecon.errors import KeyreconError
+from keyrecon.exporting import export as export_files
 from keyrecon.golf_commands import golf
 from keyrecon.golf_demo import run_golf_demo
 from keyrecon.lifting.learn_depths import LearnDepthsOptions
@@ -201,7 +202,7 @@ def export(project: Positional[Path], files: Positional[tuple[Path, ...]]) -> No
         project: Project folder.
         files: Files to write.
     """
-    for line in work.export(Workspace(project), files, show):
+    for line in export_files(Workspace(project), files, show):
         print(line)
 
 

@@ -7,8 +7,11 @@ disk: it too appears whole to whoever reads it, but a loss of power may tear it.
 """
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import IO
 
 from filelock import FileLock, Timeout
 
@@ -21,7 +24,8 @@ def write_durably(path: Path, content: bytes | str) -> None:
     On any failure the old file stays as it was and nothing is left beside it. Raises
     KeyreconError where the folder does not take the file (missing, full, read-only).
     """
-    _write(path, content.encode() if isinstance(content, str) else content, durably=True)
+    with replacing(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
 
 
 def write_quickly(path: Path, content: bytes) -> None:
@@ -29,12 +33,26 @@ def write_quickly(path: Path, content: bytes) -> None:
 
     Raises KeyreconError where the folder does not take the file.
     """
-    _write(path, content, durably=False)
+    with replacing(path, durably=False) as file:
+        file.write(content)
 
 
-def _write(path: Path, data: bytes, durably: bool) -> None:
+@contextmanager
+def replacing(path: Path, durably: bool = True) -> Iterator[IO[bytes]]:
+    """A file to be written, which takes the place of `path` when the block ends well.
+
+    On any failure the old file stays as it was and nothing is left beside it; what the system
+    refuses becomes a KeyreconError.
+    """
     try:
-        _replace(path, data, durably)
+        with _beside(path) as file:
+            yield file
+            file.flush()
+            if durably:
+                os.fsync(file.fileno())
+            os.replace(file.name, path)
+        if durably:
+            _synchronise_folder(path.parent)
     except OSError as fault:
         raise KeyreconError(
             f"{path} could not be written ({fault.strerror or fault}); the former content is "
@@ -42,23 +60,29 @@ def _write(path: Path, data: bytes, durably: bool) -> None:
         ) from fault
 
 
-def _replace(path: Path, data: bytes, durably: bool) -> None:
+@contextmanager
+def _beside(path: Path) -> Iterator[IO[bytes]]:
+    """A file in the same folder and with the same permissions, gone if the block fails."""
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
     with NamedTemporaryFile(
         dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
     ) as file:
         try:
-            file.write(data)
-            file.flush()
             os.fchmod(file.fileno(), mode)
-            if durably:
-                os.fsync(file.fileno())
-            os.replace(file.name, path)
+            yield file
         except BaseException:
             Path(file.name).unlink(missing_ok=True)
             raise
-    if durably:
-        _synchronise_folder(path.parent)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it; KeyreconError where the system refuses."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise KeyreconError(
+            f"The folder {path} cannot be made ({fault.strerror}); choose another place."
+        ) from fault
 
 
 def hold_lock(path: Path, seconds: float = -1.0) -> FileLock:

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.body import read_skeleton
-from keyrecon.durable import write_durably
+from keyrecon.durable import make_folder, write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.annotations import read_annotations
 from keyrecon.formats.coco import read_coco, write_coco
-from keyrecon.formats.export import export_motion
 from keyrecon.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.formats.npz import read_motion, write_motion
 from keyrecon.formats.review import implausible_bones, joints_outside
@@ -22,7 +21,6 @@ from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_h
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Motion, Pick
 from keyrecon.report.material import ReportMaterial
-from keyrecon.report.overlay import write_overlay
 from keyrecon.report.page import write_report
 from keyrecon.report.summary import annotation_cost
 from keyrecon.video import Video, open_video
@@ -136,7 +134,7 @@ def write_keyframe_pictures(
     workspace: Workspace, preparation: Preparation, progress: Progress
 ) -> None:
     """One PNG per keyframe, named by frame number as labelling tools keep it."""
-    workspace.pictures.mkdir(exist_ok=True)
+    make_folder(workspace.pictures)
     frames = preparation.keyframes.frames.tolist()
     for frame in progress(frames, "Writing keyframe pictures", len(frames)):
         path = workspace.pictures / f"frame_{frame:06d}.png"
@@ -270,20 +268,6 @@ def load_motion(path: Path) -> Motion:
     if not file.is_file():
         raise KeyreconError(f"There is no motion at {file}; make it with: keyrecon run {path}")
     return read_motion(file)
-
-
-def export(workspace: Workspace, files: Sequence[Path], progress: Progress) -> list[str]:
-    """Write the motion in other formats; returns a line for each file."""
-    motion = load_motion(workspace.folder)
-    lines = []
-    for file in files:
-        if file.suffix == ".mp4":
-            write_overlay(file, workspace.video(), motion, progress)
-        else:
-            video = workspace.video() if file.suffix == ".json" else None
-            export_motion(file, motion, (video.width, video.height) if video else None)
-        lines.append(f"Wrote {file}.")
-    return lines
 
 
 def evaluate(path: Path, truth: Path) -> str:

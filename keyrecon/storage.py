@@ -6,16 +6,15 @@ lengths, so that a long video costs a handful of arrays, not thousands.
 """
 
 import json
-import os
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 
+from keyrecon.durable import make_folder, replacing
 from keyrecon.errors import KeyreconError
 
 Tree = dict[str, Any]
@@ -27,14 +26,9 @@ def save_record(path: Path, value: object) -> None:
     arrays: Arrays = {}
     tree = _take_apart(value, arrays)
     text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-        try:
-            np.savez(file, tree=text, **arrays)
-        except BaseException:
-            Path(file.name).unlink()
-            raise
-    os.replace(file.name, path)
+    make_folder(path.parent)
+    with replacing(path, durably=False) as file:
+        np.savez(file, tree=text, **arrays)
 
 
 def load_record(path: Path) -> Any:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from keyrecon.durable import replacing, write_durably
 from keyrecon.errors import KeyreconError
 
 
@@ -18,13 +19,14 @@ def write_video(
     """Encode RGB pictures of one size as they come (8 bit 4:2:0); returns how many there were.
 
     `crf` is x264's constant quality, 18 very good to 28 coarse. An odd last row or column is left
-    out, because 4:2:0 needs even sizes. Raises KeyreconError when there are no frames.
+    out, because 4:2:0 needs even sizes. The file appears when it is whole. Raises KeyreconError
+    when there are no frames, or where the file cannot be written.
     """
     import av
 
     count = 0
     stream = None
-    with av.open(str(path), "w") as container:
+    with replacing(path) as file, av.open(file, "w", format="mp4") as container:
         for count, picture in enumerate(frames, start=1):  # noqa: B007
             height, width = (n - n % 2 for n in picture.shape[:2])
             if stream is None:
@@ -36,10 +38,9 @@ def write_video(
                 np.ascontiguousarray(picture[:height, :width]), format="rgb24"
             )
             container.mux(stream.encode(frame))
-        if stream is not None:
-            container.mux(stream.encode())
-    if not count:
-        raise KeyreconError(f"No frames came to be written to {path}; give at least one.")
+        if stream is None:
+            raise KeyreconError(f"No frames came to be written to {path}; give at least one.")
+        container.mux(stream.encode())
     return count
 
 
@@ -47,4 +48,5 @@ def write_picture(path: Path, picture: UInt8[np.ndarray, "h w 3"]) -> None:
     """Write one RGB picture as PNG."""
     import cv2
 
-    path.write_bytes(cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1].tobytes())
+    turned = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    write_durably(path, cv2.imencode(".png", turned)[1].tobytes())

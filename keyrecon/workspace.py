@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
-from keyrecon.durable import hold_lock, write_durably
+from keyrecon.durable import hold_lock, make_folder, write_durably
 from keyrecon.errors import KeyreconError
 from keyrecon.formats.picks import read_picks, write_picks
 from keyrecon.records import Pick
@@ -99,7 +99,7 @@ class Workspace:
         file = folder / "project.toml"
         if file.exists():
             raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         lines = ["# A keyrecon project.", "version = 1", "", "[video]"]
         lines += [f"path = {json.dumps(_relative(video_file, folder))}"]
         lines += [f'fingerprint = "{video.fingerprint}"']
@@ -125,6 +125,10 @@ class Workspace:
             wanted.get("slow_motion", 1.0),
         )
 
+    def _places_of_video(self) -> tuple[Path, Path]:
+        """Where a video is looked for that has moved."""
+        return self.folder, self.folder.resolve().parent
+
     def relink(self, video_file: Path) -> None:
         """Point the project at the place its video has moved to."""
         if not video_file.is_file():
@@ -140,7 +144,7 @@ class Workspace:
         self.project = tomllib.loads(self.project_file.read_text())
 
     def _find_video(self, name: str, fingerprint: str) -> Path:
-        for place in (self.folder, self.folder.resolve().parent):
+        for place in self._places_of_video():
             candidate = place / name
             if candidate.is_file() and fingerprint_file(candidate) == fingerprint:
                 return candidate
@@ -182,6 +186,14 @@ class Workspace:
             yield
         finally:
             lock.release()
+
+    def kept_files(self) -> list[Path]:
+        """Files there are that hold a person's work, or from which the rest is made."""
+        names = ("*.toml", "*.json", "*.sqlite*", self.motion_file.name, self.report_file.name)
+        own = [file for name in names for file in self.folder.glob(name)]
+        video = Path(self.project["video"]["path"])
+        places = [self.folder / video, *(place / video.name for place in self._places_of_video())]
+        return own + [file for file in places if file.is_file()]
 
     def put_aside(self, file: Path) -> None:
         """Keep a copy of a file that a person made, before it changes."""

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from keyrecon.durable import write_quickly
+from keyrecon.durable import make_folder, write_quickly
 from keyrecon.errors import KeyreconError
 from keyrecon.pictures import reduce_picture
 from keyrecon.video import Video
@@ -48,7 +48,7 @@ class Stills:
         self.identity = hashlib.sha256(told).hexdigest()[:16]
         """Tells this video and trim from others."""
         self.folder = folder / self.identity
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         _forget_oldest(folder)
         self._changed = Condition()
         self._asked: list[Order] = []
