@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 
 
 @dataclass(frozen=True)
@@ -144,8 +144,8 @@ def read_skeleton(path: Path) -> Skeleton:
         skeleton = _skeleton_from_rows(rows, data["lower"])
     except (OSError, ValueError, KeyError, TypeError) as fault:
         raise KeyreconError(
-            f"{path} is not a skeleton file ({fault!r}); it needs 'joints' with name, parent "
-            "and length, and 'lower' with joint names."
+            f"{path} is not a skeleton file ({explain(fault)}); it needs 'joints' with name, "
+            "parent and length, and 'lower' with joint names."
         ) from fault
     roots = skeleton.parents.count(-1)
     if roots != 1 or len(skeleton.bones) != len(skeleton.names) - 1:

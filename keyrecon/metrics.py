@@ -24,7 +24,7 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.records import Motion
 
 Points = Float[np.ndarray, "T J 3"]
@@ -186,7 +186,7 @@ def read_truth(path: Path) -> dict[str, np.ndarray]:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             truth = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, TypeError, EOFError, BadZipFile) as fault:
-        raise KeyreconError(f"{path} is not a truth.npz ({fault}).") from fault
+        raise KeyreconError(f"{path} is not a truth.npz ({explain(fault)}).") from fault
     if missing := {"points3d", "points2d", "joint_names", "fps"} - truth.keys():
         raise KeyreconError(
             f"{path} has no {', '.join(sorted(missing))}; a truth.npz holds points3d, points2d, "

@@ -9,7 +9,7 @@ import numpy as np
 
 from keyrecon.body import read_skeleton
 from keyrecon.durable import make_folder, write_durably
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, quoted
 from keyrecon.formats.annotations import read_annotations
 from keyrecon.formats.coco import read_coco, write_coco
 from keyrecon.formats.keyframes import keyframes_from_json, keyframes_to_json
@@ -19,7 +19,7 @@ from keyrecon.merging import find_conflicts, merge_annotations, missing_marks
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_height
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Motion, Pick
+from keyrecon.records import Annotations, Keyframes, Motion, Pick
 from keyrecon.report.material import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.report.summary import annotation_cost
@@ -51,7 +51,10 @@ def start(
     )
     if opened.variable_rate:
         text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
-    return f"{text}\nNext: keyrecon pick {folder} --frame N --head X,Y --foot X,Y ..."
+    return (
+        f"{text}\nNext: keyrecon annotate {quoted(folder)} to click the colours on a page, or "
+        f"keyrecon pick {quoted(folder)} --frame N --head X,Y --foot X,Y ..."
+    )
 
 
 def point(text: str, flag: str) -> tuple[float, float]:
@@ -91,7 +94,7 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
     together = workspace.add_picks(picks)
     counts = {part: sum(p.part == part for p in together) for part in {p.part for p in together}}
     listed = ", ".join(f"{n} {part}" for part, n in sorted(counts.items()))
-    return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {workspace.folder}"
+    return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {quoted(workspace.folder)}"
 
 
 def find_keyframes(
@@ -112,6 +115,7 @@ def find_keyframes(
 def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     """What was found, and what to do next."""
     found, frames = preparation.keyframes, len(preparation.video)
+    folder = quoted(workspace.folder)
     seen = float((preparation.track.trust > 0).mean())
     halves = [
         f"{name} body: {len(half.frames)} keyframes stand for {half.coverage:.1%} of the frames "
@@ -124,8 +128,8 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
             *halves,
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
-            f"Next: keyrecon annotate {workspace.folder}, or mark the joints in another tool (COCO "
-            f"keypoints, DeepLabCut or CVAT) and keyrecon import {workspace.folder} FILE",
+            f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
+            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
         ]
     )
 
@@ -156,7 +160,7 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
         [
             f"{workspace.annotations_file}: marks on {len(merged.frames)} frames.",
             *(f"Warning: {text}" for text in warnings),
-            f"Next: keyrecon run {workspace.folder}",
+            f"Next: keyrecon run {quoted(workspace.folder)}",
         ]
     )
 
@@ -204,8 +208,8 @@ def run(
     `partial` goes on with what is annotated, `truth` is for the report.
     """
     started = time.perf_counter()
+    annotations = annotated(workspace, partial)
     preparation = prepared(workspace, options, progress)
-    annotations = annotated(workspace, preparation, partial)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     write_motion(workspace.motion_file, motion)
     material = ReportMaterial(
@@ -229,35 +233,42 @@ def run(
 
 def prepared(workspace: Workspace, options: Options, progress: Progress) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
-    if not workspace.keyframes_file.is_file():
-        workspace.picks()
-        raise KeyreconError(
-            f"No keyframes have been chosen yet; run: keyrecon keyframes {workspace.folder}"
-        )
+    video, asked = workspace.video(), asked_for(workspace)
     keep = workspace.stages.keep
-    preparation = prepare(workspace.video(), workspace.picks(), options, keep, progress)
-    asked = keyframes_from_json(workspace.keyframes_file.read_text())
-    if len(asked.upper.nearest) != len(preparation.video):
-        raise KeyreconError(
-            f"{workspace.keyframes_file} was made for {len(asked.upper.nearest)} frames and the "
-            f"video has {len(preparation.video)}; run: keyrecon keyframes {workspace.folder}"
-        )
+    preparation = prepare(video, workspace.picks(), options, keep, progress)
     return replace(preparation, keyframes=asked)
 
 
-def annotated(workspace: Workspace, preparation: Preparation, partial: bool = False) -> Annotations:
+def asked_for(workspace: Workspace) -> Keyframes:
+    """The keyframes that the person was asked to annotate."""
+    if not workspace.keyframes_file.is_file():
+        workspace.picks()
+        raise KeyreconError(
+            f"No keyframes have been chosen yet; run: keyrecon keyframes {quoted(workspace.folder)}"
+        )
+    asked = keyframes_from_json(workspace.keyframes_file.read_text())
+    n_frames = len(workspace.video())
+    if len(asked.upper.nearest) != n_frames:
+        raise KeyreconError(
+            f"{workspace.keyframes_file} was made for {len(asked.upper.nearest)} frames and the "
+            f"video has {n_frames}; run: keyrecon keyframes {quoted(workspace.folder)}"
+        )
+    return asked
+
+
+def annotated(workspace: Workspace, partial: bool = False) -> Annotations:
     """The project's annotations; KeyreconError names the keyframes that lack theirs."""
-    file = workspace.annotations_file
-    annotations = load_annotations(workspace, preparation.video) if file.is_file() else None
-    found = preparation.keyframes
+    file, found = workspace.annotations_file, asked_for(workspace)
+    annotations = load_annotations(workspace, workspace.video()) if file.is_file() else None
     missing = missing_marks(annotations, found.upper.frames, found.lower.frames)
     if annotations is None or (missing and not partial):
+        folder = quoted(workspace.folder)
         named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
         listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
         raise KeyreconError(
             f"{len(missing)} of {len(found.frames)} keyframes are not annotated: frame {listed}. "
-            f"Mark them and add the file with: keyrecon import {workspace.folder} FILE, or go on "
-            "with what is annotated: keyrecon run --partial"
+            f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
+            f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
         )
     return annotations
 
@@ -266,7 +277,9 @@ def load_motion(path: Path) -> Motion:
     """The motion of a project folder or file."""
     file = path / "motion.npz" if path.is_dir() else path
     if not file.is_file():
-        raise KeyreconError(f"There is no motion at {file}; make it with: keyrecon run {path}")
+        raise KeyreconError(
+            f"There is no motion at {file}; make it with: keyrecon run {quoted(path)}"
+        )
     return read_motion(file)
 
 

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from keyrecon.durable import make_folder, replacing
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 
 Tree = dict[str, Any]
 Arrays = dict[str, np.ndarray]
@@ -39,7 +39,7 @@ def load_record(path: Path) -> Any:
             return _put_together(tree, stored)
     except (OSError, ValueError, KeyError, TypeError, ImportError, BadZipFile) as fault:
         raise KeyreconError(
-            f"{path} is not a stored result ({fault}); delete it and run again."
+            f"{path} is not a stored result ({explain(fault)}); delete it and run again."
         ) from fault
 
 

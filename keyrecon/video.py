@@ -164,7 +164,8 @@ def open_video(
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
     if not 0 <= start < (end or len(stamps)) <= len(stamps):
         raise KeyreconError(
-            f"{path} has {len(stamps)} frames; start {start} and end {end} do not fit them."
+            f"{path} has {len(stamps)} frames, counted from 0; it cannot be used from frame "
+            f"{start} {'on' if end is None else f'up to before frame {end}'}."
         )
     stamps = stamps[start:end]
     time = (stamps - stamps[0]) * seconds_per_tick / slow_motion

@@ -22,12 +22,20 @@ from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.durable import hold_lock, make_folder, write_durably
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain, quoted
 from keyrecon.formats.picks import read_picks, write_picks
 from keyrecon.records import Pick
 from keyrecon.stages import StageStore
 from keyrecon.video import Video, fingerprint_file, open_video
 
+VIDEO_FIELDS = {
+    "path": (str,),
+    "fingerprint": (str,),
+    "start": (int,),
+    "end": (int,),
+    "slow_motion": (int, float),
+}
+"""What project.toml tells of the video; the first two must be there."""
 OPTIONS_TABLE = "\n# Options that differ from the defaults.\n[options]\n"
 
 
@@ -41,15 +49,15 @@ class Workspace:
         if not self.project_file.is_file():
             raise KeyreconError(
                 f"{folder} is not a keyrecon project (no project.toml); "
-                f"make one with: keyrecon new VIDEO --project {folder}"
+                f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
             )
         try:
             self.project = tomllib.loads(self.project_file.read_text())
-            self.project["video"]["path"], self.project["video"]["fingerprint"]
-        except (tomllib.TOMLDecodeError, KeyError, UnicodeDecodeError) as fault:
+            _check_video(self.project["video"])
+        except (OSError, ValueError, KeyError, TypeError) as fault:
             raise KeyreconError(
-                f"{self.project_file} cannot be read ({fault}); mend it or make the project "
-                "anew in another folder."
+                f"{self.project_file} cannot be read ({explain(fault)}); mend it or make the "
+                "project anew in another folder."
             ) from fault
 
     @property
@@ -150,7 +158,7 @@ class Workspace:
                 return candidate
         raise KeyreconError(
             f"The video {self.project['video']['path']} is not where the project expects it; "
-            f"tell where it is now with: keyrecon relink {self.folder} VIDEO"
+            f"tell where it is now with: keyrecon relink {quoted(self.folder)} VIDEO"
         )
 
     def picks(self) -> tuple[Pick, ...]:
@@ -160,8 +168,9 @@ class Workspace:
         """
         if not self.picks_file.is_file():
             raise KeyreconError(
-                f"{self.folder} has no picks yet; click the player's head, feet and clothes with: "
-                f"keyrecon pick {self.folder} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
+                f"{self.folder} has no picks yet; click the player's head, feet and clothes on the "
+                f"page of keyrecon annotate {quoted(self.folder)}, or with: keyrecon pick "
+                f"{quoted(self.folder)} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
             )
         picks = read_picks(self.picks_file)
         return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))
@@ -216,6 +225,16 @@ class Workspace:
             self.project = tomllib.loads(text)
 
 
+def _check_video(told: Any) -> None:
+    """Raise KeyError or TypeError where project.toml does not tell the video as we write it."""
+    if not isinstance(told, dict):
+        raise TypeError("video must be a table")
+    for name, kinds in VIDEO_FIELDS.items():
+        value = told[name] if name in ("path", "fingerprint") else told.get(name)
+        if value is not None and type(value) not in kinds:
+            raise TypeError(f"video.{name} cannot be {value!r}")
+
+
 def _relative(path: Path, folder: Path) -> str:
     """`path` as seen from `folder`, with forward slashes."""
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
@@ -255,10 +274,11 @@ def _apply(options: Any, changes: dict, where: str) -> Any:
                 f"{where} has {', '.join(sorted(known))}."
             )
         old = getattr(options, name)
+        same = isinstance(value, str) == isinstance(old, str)
+        if not same or isinstance(value, dict) != is_dataclass(old):
+            raise KeyreconError(f"project.toml: {where}.{name} cannot be {value!r}.")
         if is_dataclass(old):
             new[name] = _apply(old, value, f"{where}.{name}")
-        elif isinstance(value, dict) or isinstance(value, str) != isinstance(old, str):
-            raise KeyreconError(f"project.toml: {where}.{name} cannot be {value!r}.")
         else:
             new[name] = tuple(value) if isinstance(value, list) else value
     return replace(options, **new)

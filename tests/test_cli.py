@@ -1,6 +1,7 @@
 """What the command line says to wrong input: one line, exit code 1, nothing written over."""
 
 import json
+import shlex
 import subprocess
 import sys
 
@@ -67,6 +68,77 @@ def test_a_video_that_is_not_one(keyrecon, tmp_path):
     code, _, err = keyrecon("new", tmp_path / "a.mp4", "--project", tmp_path / "p")
     assert one_line(code, err, "cannot be read as a video")
     assert not (tmp_path / "p").exists()
+
+
+def test_a_project_cannot_be_where_a_file_is_or_below_one(keyrecon, tmp_path, write_numbered):
+    video = write_numbered("v.mp4", list(range(0, 240, 12)))
+    (tmp_path / "notes").write_text("mine")
+    for folder in (tmp_path / "notes", tmp_path / "notes" / "p"):
+        code, _, err = keyrecon("new", video, "--project", folder)
+        assert one_line(code, err, "cannot be made", "choose another place")
+    assert (tmp_path / "notes").read_text() == "mine"
+
+
+def test_frames_that_the_video_does_not_have_are_told(keyrecon, tmp_path, write_numbered):
+    video = write_numbered("v.mp4", list(range(0, 240, 12)))
+    for trim, words in (
+        (("--start", "50"), ("has 20 frames", "from frame 50 on")),
+        (("--end", "21"), ("has 20 frames", "from frame 0 up to before frame 21")),
+    ):
+        code, _, err = keyrecon("new", video, "--project", tmp_path / "p", *trim)
+        assert one_line(code, err, *words)
+
+
+def test_a_proposed_command_can_be_pasted_whatever_the_folder_is_called(
+    keyrecon, tmp_path, write_numbered
+):
+    video = write_numbered("v.mp4", list(range(0, 240, 12)))
+    folder = tmp_path / "Käfer & Söhne (2)"
+    _, out, _ = keyrecon("new", video, "--project", folder)
+    assert f"keyrecon annotate {shlex.quote(str(folder))} " in out
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("start = 'x'", ("video.start cannot be 'x'",)),
+        ("end = true", ("video.end cannot be True",)),
+        ("video = 3", ("project.toml cannot be read",)),
+        ("[options]\nlift = 3", ("options.lift cannot be 3",)),
+        ("[options.lift]\nheigth = 2.0", ("options.lift.heigth", "does not exist")),
+        ("[", ("project.toml cannot be read",)),
+    ],
+)
+def test_a_project_file_with_a_slip_is_told(keyrecon, project, line, words):
+    file = project / "project.toml"
+    text = file.read_text()
+    file.write_text(f"{line}\n" if line.startswith("video") else f"{text}\n{line}\n")
+    code, _, err = keyrecon("keyframes", project)
+    assert one_line(code, err, *words)
+
+
+@pytest.mark.parametrize("text", ["{", '{"picks": 3}', '{"picks": [{}]}', ""])
+def test_a_file_in_the_project_that_is_not_what_it_was_is_told_in_plain_words(
+    keyrecon, project, text
+):
+    for name in ("picks.json", "keyframes.json"):
+        (project / name).write_text(text)
+        code, _, err = keyrecon("run", project)
+        assert one_line(code, err, name)
+        assert "Error(" not in err
+        (project / name).unlink()
+
+
+def test_a_file_that_is_no_motion_is_told_without_advice_to_load_it_unsafely(
+    keyrecon, project, tmp_path
+):
+    (project / "motion.npz").write_text("text")
+    for words in (
+        ("export", project, tmp_path / "m.bvh"),
+        ("evaluate", project, "--truth", tmp_path / "truth.npz"),
+    ):
+        code, _, err = keyrecon(*words)
+        assert one_line(code, err, "motion.npz is not a motion (another format)")
 
 
 def test_no_picks_yet(keyrecon, project):

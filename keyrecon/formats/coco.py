@@ -20,7 +20,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.durable import write_durably
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.formats.marks import (
     Mark,
     Sheet,
@@ -59,7 +59,7 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
                 absent |= _absent(annotation, frame, sheet)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
         raise KeyreconError(
-            f"{path} is not a COCO keypoints file ({_explain(fault)}); it needs images, "
+            f"{path} is not a COCO keypoints file ({explain(fault)}); it needs images, "
             "annotations with keypoints, and categories with the joints' names."
         ) from fault
     return annotations_from_marks(marks, sheet, nearer, absent)
@@ -67,10 +67,6 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
 
 def _refuse_constant(word: str) -> float:
     raise ValueError(f"{word} is not a number")
-
-
-def _explain(fault: Exception) -> str:
-    return f"no {fault}" if isinstance(fault, KeyError) else str(fault)
 
 
 def _frame(annotation: Json, images: dict[Any, Json], sheet: Sheet) -> int:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.records import HalfKeyframes, Keyframes
 
 HALVES = ("upper", "lower")
@@ -62,7 +62,8 @@ def keyframes_from_json(text: str) -> Keyframes:
         )
     except (ValueError, KeyError, TypeError, AttributeError) as fault:
         raise KeyreconError(
-            f"keyframes.json cannot be read ({fault!r}); make it again with keyrecon keyframes."
+            f"keyframes.json cannot be read ({explain(fault)}); make it again with keyrecon "
+            "keyframes."
         ) from fault
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from keyrecon import __version__
 from keyrecon.body import Skeleton
 from keyrecon.durable import write_durably
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.records import SOURCES, Motion
 
 ARRAYS = {
@@ -58,9 +58,8 @@ def read_motion(path: Path) -> Motion:
             units=str(data["units"]),
         )
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
-        reason = f"no {fault}" if isinstance(fault, KeyError) else fault
         raise KeyreconError(
-            f"{path} is not a motion ({reason}); make it with keyrecon run."
+            f"{path} is not a motion ({explain(fault)}); make it with keyrecon run."
         ) from fault
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from keyrecon.durable import write_durably
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.records import Pick
 
 
@@ -18,7 +18,8 @@ def read_picks(path: Path) -> tuple[Pick, ...]:
         )
     except (OSError, ValueError, KeyError, TypeError) as fault:
         raise KeyreconError(
-            f"{path} is not a file of picks ({fault!r}); mend it or move it away and pick again."
+            f"{path} is not a file of picks ({explain(fault)}); mend it or move it away and pick "
+            "again."
         ) from fault
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
+from keyrecon.durable import make_folder
 from keyrecon.formats.mocap import read_mocap
 from keyrecon.formats.picks import write_picks
 from keyrecon.progress import Progress, silent
@@ -134,7 +135,7 @@ def film_stage(
     stage: Stage, fps: float, options: SceneOptions, out: Path, progress: Progress = silent
 ) -> None:
     """Draw all frames of a stage and write video, truth, picks and scene into a folder."""
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     frames = len(stage.points)
     chosen = {round(share * (frames - 1)) for share in (0.1, 0.5, 0.9)}
     picks: list[Pick] = []
