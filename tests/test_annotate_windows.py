@@ -1,0 +1,67 @@
+"""The annotator's page in windows of every size: nothing lies over anything or out of reach."""
+
+import pytest
+from page_driver import CHROMIUM, Person, browser, serving
+from page_project import make_project, write_numbered_video
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+)
+WINDOWS = ((1920, 1080), (1366, 768), (1100, 500), (1024, 768), (768, 1024), (600, 900), (390, 800))
+PARTS = (
+    "header button, main button:not(.joints *, .picks *), main input, main canvas[role], "
+    ".guide p, .list, .joints, output"
+)
+OVERLAPS = """
+(selector) => {
+  const parts = [...document.querySelectorAll(selector)]
+    .filter((part) => part.checkVisibility() && !(part.matches("p, output") && !part.innerText))
+    .map((part) => ({ part, box: part.getBoundingClientRect() }));
+  const own = (part) => part.closest(".viewer, .space, .strip") ?? part;
+  const name = ({ part }) => part.id || part.innerText || part.ariaLabel || part.className;
+  const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1
+    || a.bottom <= b.top + 1 || b.bottom <= a.top + 1;
+  const clash = (a, b) => !a.part.contains(b.part) && !b.part.contains(a.part)
+    && own(a.part) !== own(b.part) && !apart(a.box, b.box);
+  const found = [];
+  for (const [n, one] of parts.entries()) {
+    if (one.box.left < -1 || one.box.right > innerWidth + 1) found.push(`${name(one)} is cut`);
+    const guide = one.part.closest(".guide")?.getBoundingClientRect();
+    if (guide && one.box.bottom > guide.bottom + 1) found.push(`${name(one)} is cut below`);
+    for (const other of parts.slice(n + 1))
+      if (clash(one, other)) found.push(`${name(one)} lies over ${name(other)}`);
+  }
+  return found;
+}
+"""
+"""Parts of the page that can be seen and lie on each other, or beyond the window's edge."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("windows")
+    video = write_numbered_video(folder / "numbered.mp4")
+    with serving(make_project(folder / "rally", video)) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("size", WINDOWS, ids=lambda size: "x".join(map(str, size)))
+def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, size):
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+    person = Person(context, server.door.address)
+    found = {}
+    for key, page in (("Alt+1", "pick"), ("Alt+2", "keyframes"), ("Alt+3", "motion")):
+        person.press(key)
+        person.page.wait_for_selector(f"#{page}:not([hidden])")
+        person.await_drawn()
+        found[page] = person.page.evaluate(OVERLAPS, PARTS)
+        wide = person.page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= size[0], page
+    context.close()
+    assert found == {"pick": [], "keyframes": [], "motion": []}
