@@ -42,6 +42,15 @@ def write_numbered(tmp_path_factory):
     return write
 
 
+@pytest.fixture(scope="session")
+def chromium():
+    """A browser for all tests that need one."""
+    from page_driver import browser
+
+    with browser() as opened:
+        yield opened
+
+
 @pytest.fixture
 def folder(tmp_path, write_numbered):
     """A project for a video of 50 numbered pictures, without picks or keyframes."""

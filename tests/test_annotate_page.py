@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from page_driver import CHROMIUM, SCREEN, Person, browser, far, serving
+from page_driver import CHROMIUM, SCREEN, Person, far, serving
 from page_project import (
     FPS,
     FRAMES,
@@ -30,12 +30,6 @@ pytestmark = pytest.mark.skipif(
     not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
 )
 POINTS3D, POINTS2D = truth()
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    with browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="session")
@@ -375,6 +369,10 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
         person.await_text("#motion-text", "Make the motion")
         context.close()
     assert person.complaints == []
+
+
+def test_a_page_that_can_tell_nothing_of_the_body_says_why(person):
+    person.await_text("#space-empty", "stored results are missing.* Make the motion")
 
 
 def test_edits_made_without_the_server_can_be_taken_back(person, folder):

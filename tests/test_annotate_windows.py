@@ -1,7 +1,7 @@
 """The annotator's page in windows of every size: nothing lies over anything or out of reach."""
 
 import pytest
-from page_driver import CHROMIUM, Person, browser, serving
+from page_driver import CHROMIUM, Person, serving
 from page_project import make_project, write_numbered_video
 
 pytestmark = pytest.mark.skipif(
@@ -43,12 +43,6 @@ def server(tmp_path_factory):
     video = write_numbered_video(folder / "numbered.mp4")
     with serving(make_project(folder / "rally", video)) as served:
         yield served
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as opened:
-        yield opened
 
 
 @pytest.mark.parametrize("size", WINDOWS, ids=lambda size: "x".join(map(str, size)))

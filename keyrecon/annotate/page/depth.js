@@ -2,6 +2,7 @@
 // dragged, and for the suggestion of a keyframe when it is opened.
 import * as api from "./api.js";
 import { byId, make, setText, toggle } from "./dom.js";
+import { whyNoHelp } from "./guide.js";
 import { createSpace } from "./space.js";
 
 const EMPTY = "The body in space appears here as joints are placed.";
@@ -109,7 +110,7 @@ export function createDepth(model, placed) {
       other = pose?.alternatives?.[hovered]?.points3d;
     showInSpace(other ?? pose?.points3d, other ? pose?.points3d : null);
     byId("space-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
-    setText(byId("space-empty"), pose?.trouble ?? EMPTY);
+    setText(byId("space-empty"), pose?.trouble ?? whyNoHelp(model.project) ?? EMPTY);
     drawReadings();
   }
 

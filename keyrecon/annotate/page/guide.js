@@ -88,3 +88,9 @@ export function sidesOf(project) {
   for (const [left, right] of project.mirror) [sides[left], sides[right]] = ["left", "right"];
   return sides;
 }
+
+// Where the server can say nothing of the body: why, and what helps; else null.
+export function whyNoHelp({ has }) {
+  if (!has.keyframes || has.help) return null;
+  return "The stored results are missing or of another version. Make the motion, and this works again.";
+}

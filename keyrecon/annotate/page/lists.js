@@ -1,7 +1,7 @@
 // The lists beside the picture: keyframes, checks by suspicion, and what would help next.
 import * as api from "./api.js";
 import { byId, make, setText, toggle } from "./dom.js";
-import { asked, spoken } from "./guide.js";
+import { asked, spoken, whyNoHelp } from "./guide.js";
 import { createList } from "./list.js";
 
 const HALF = { upper: "upper body", lower: "lower body", both: "whole body" };
@@ -55,7 +55,7 @@ function checkRow(element, check) {
     make("span", { className: "suspicion" }, meter(check.suspicion)),
     make(
       "span",
-      { className: "text" },
+      { className: "text", title: check.text },
       make("b", {}, `Frame ${check.frame}${name ? `, ${spoken(name)}` : ""}`),
       make("small", {}, check.text),
     ),
@@ -67,7 +67,7 @@ function suggestionRow(element, suggestion) {
     bodySign(suggestion.half),
     make(
       "span",
-      { className: "text" },
+      { className: "text", title: suggestion.why },
       make("b", {}, `Frame ${suggestion.frame}`),
       make("small", {}, suggestion.why),
     ),
@@ -127,12 +127,11 @@ export function createLists(model, actions) {
 
   function explain() {
     const keyframe = model.keyframe(),
-      { has } = model.project;
-    if (tab !== "frames" && has.keyframes && !has.help)
-      return "The stored results are missing or of another version. Make the motion, and this works again.";
+      silent = whyNoHelp(model.project);
+    if (tab !== "frames" && silent) return silent;
     if (tab === "checks")
       return checks.length
-        ? "Most suspicious first. G goes from one to the next."
+        ? checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
         : "Nothing looks wrong.";
     if (tab === "next") {
       if (suggestions.length)
