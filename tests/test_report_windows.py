@@ -1,0 +1,38 @@
+"""report.html in windows of several widths."""
+
+import pytest
+from page_driver import CHROMIUM
+from report_material import make_material
+
+from keyrecon.report.page import write_report
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM.exists(), reason=f"THE REPORT IS NOT OPENED: there is no Chromium at {CHROMIUM}"
+)
+TOPS = """
+[...document.querySelectorAll(".still")].map((still) => [
+  Math.round(still.getBoundingClientRect().top),
+  Math.round(still.firstElementChild.getBoundingClientRect().top),
+])
+"""
+"""Where each card of the pictures begins, and where its picture does."""
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    write_report(folder / "report.html", make_material(folder))
+    return folder / "report.html"
+
+
+@pytest.mark.parametrize("width", [1366, 800, 390])
+def test_a_report_fits_its_window_and_its_pictures_stand_in_rows(chromium, report, width):
+    page = chromium.new_page(viewport={"width": width, "height": 800})
+    page.goto(report.as_uri())
+    page.wait_for_selector(".js-plotly-plot .main-svg")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.evaluate("document.querySelector('.strip .still').append('lower body as well '.repeat(9))")
+    tops = page.evaluate(TOPS)
+    page.close()
+    assert len(tops) > 20
+    assert all(picture - card <= 1 for card, picture in tops)
