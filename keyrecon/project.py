@@ -46,7 +46,7 @@ def start(
     if skeleton is not None:
         write_durably(folder / "skeleton.json", skeleton.read_bytes())
     text = (
-        f"{folder}: {len(opened)} frames of {opened.width}x{opened.height} at "
+        f"{folder}: {_counted(len(opened), 'frame')} of {opened.width}x{opened.height} at "
         f"{opened.fps:.4g} frames per second."
     )
     if opened.variable_rate:
@@ -118,8 +118,9 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     folder = quoted(workspace.folder)
     seen = float((preparation.track.trust > 0).mean())
     halves = [
-        f"{name} body: {len(half.frames)} keyframes stand for {half.coverage:.1%} of the frames "
-        f"(beta {half.beta:.4f}; as printed in the paper it would take {half.printed_count})."
+        f"{name} body: {_counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
+        f"frames (beta {half.beta:.4f}; as printed in the paper it would take "
+        f"{half.printed_count})."
         for name, half in (("Upper", found.upper), ("Lower", found.lower))
     ]
     return "\n".join(
@@ -132,6 +133,10 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
             f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
         ]
     )
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def write_keyframe_pictures(

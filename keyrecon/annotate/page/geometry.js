@@ -33,6 +33,18 @@ export function held(view, [width, height], picture, strip = 80) {
   };
 }
 
+// A box enlarged by places that lie outside it; null without a box.
+export function around(box, places) {
+  if (!box) return null;
+  const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
+  return [
+    Math.min(box[0], ...xs),
+    Math.min(box[1], ...ys),
+    Math.max(box[2], ...xs),
+    Math.max(box[3], ...ys),
+  ];
+}
+
 // A box widened about its middle, cut at the picture's edge.
 export function widened([x0, y0, x1, y1], share, [width, height]) {
   const dx = (x1 - x0) * share,

@@ -5,6 +5,7 @@ import { byId, color } from "./dom.js";
 import { createDepth } from "./depth.js";
 import { createFiles } from "./files.js";
 import { createFrame } from "./frame.js";
+import { around } from "./geometry.js";
 import { createJobs } from "./jobs.js";
 import { createJoints } from "./joints.js";
 import { belongsTo, meaning } from "./keys.js";
@@ -15,6 +16,7 @@ import { createPick } from "./pick.js";
 import { createPrompt } from "./prompt.js";
 import { createScrub } from "./scrub.js";
 import { createStage, SMALL } from "./stage.js";
+import { marksOf } from "./state.js";
 import { createStills } from "./stills.js";
 import { createViewer } from "./viewer.js";
 
@@ -22,7 +24,7 @@ const VIEWS = ["pick", "keyframes", "motion"];
 
 const model = await createModel();
 const { doing } = model;
-const stills = createStills(model.project, model.changed);
+const stills = createStills(model.project, model.changed, model.tell);
 const viewer = createViewer({
   root: byId("picture"),
   project: model.project,
@@ -53,7 +55,8 @@ model.middle = viewer.middle;
 let opening = null;
 model.opened = (number) => {
   opening = { frame: number, at: performance.now() };
-  viewer.frameBox(model.keyframe()?.box);
+  const places = Object.values(marksOf(model.state, number)).filter(([, , seen]) => seen);
+  viewer.frameBox(around(model.keyframe()?.box, places));
   history.replaceState(null, "", `#frame=${number}`);
   depth.askGhost(number);
   lookAhead();
@@ -65,10 +68,10 @@ function lookAhead() {
     at = frames.indexOf(doing.frame);
   const near = [1, -1, 2].map((by) => frames[at + by]).filter((number) => number !== undefined);
   const reach = Math.round(model.project.fps),
-    around = [];
+    beside = [];
   for (let by = 1; by <= reach; by++)
-    around.push([doing.frame + by, SMALL], [doing.frame - by, SMALL]);
-  stills.wish([...near.map((number) => [number]), ...around]);
+    beside.push([doing.frame + by, SMALL], [doing.frame - by, SMALL]);
+  stills.wish([...near.map((number) => [number]), ...beside]);
 }
 
 // The keyframe that the address names, so that a place can be returned to.

@@ -40,5 +40,6 @@ export const usualBudget = (count) => Math.max(0.015, Math.min(0.05, 25 / count)
 
 // Frames spread over the video, to see how well the picks do elsewhere.
 export function spread(count, n) {
-  return Array.from({ length: n }, (_, k) => Math.round(((k + 0.5) * count) / n));
+  const even = Array.from({ length: n }, (_, k) => Math.floor(((k + 0.5) * count) / n));
+  return [...new Set(even)]; // a short video has fewer frames than places
 }

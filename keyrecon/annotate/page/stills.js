@@ -7,9 +7,11 @@ const AHEAD = 2;
 const URGENT = 3;
 const REMEMBERED = 16; // pictures that were to be drawn and are not here yet
 
-export function createStills(project, ready) {
+// `ready` hears of each picture, `failed` why a frame has none: once, it would fail again.
+export function createStills(project, ready, failed) {
   const kept = new Map(); // key -> picture, oldest use first
-  const coming = new Set();
+  const coming = new Set(),
+    broken = new Set();
   let wanted = [],
     urgent = [],
     room = 0;
@@ -25,8 +27,12 @@ export function createStills(project, ready) {
 
   async function fetchOne(frame, width) {
     const response = await fetch(address(frame, width), { credentials: "same-origin" });
-    if (!response.ok) throw new Error(`still ${frame}: ${response.status}`);
-    return createImageBitmap(await response.blob());
+    if (response.ok) return createImageBitmap(await response.blob());
+    if (response.status === 400) {
+      broken.add(key(frame, width));
+      failed((await response.json()).error);
+    }
+    throw new Error(`still ${frame}: ${response.status}`);
   }
 
   function keep(name, picture) {
@@ -42,7 +48,7 @@ export function createStills(project, ready) {
 
   function load(frame, width) {
     const name = key(frame, width);
-    if (kept.has(name) || coming.has(name)) return;
+    if (kept.has(name) || coming.has(name) || broken.has(name)) return;
     coming.add(name);
     fetchOne(frame, width)
       .then((picture) => {

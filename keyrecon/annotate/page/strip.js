@@ -1,6 +1,7 @@
 // Small pictures of frames spread over the video, with the head and the feet that the picks find there.
 import * as api from "./api.js";
 import { byId, make, penOf, setText } from "./dom.js";
+import { fit, toScreen } from "./geometry.js";
 import { spread } from "./parts.js";
 
 const FRAMES = 7;
@@ -32,9 +33,9 @@ export function createStrip(model, stills, choose) {
     () => found.clear(),
   ); // too few picks so far
 
-  function mark(pen, [x, y], scale, style, size) {
+  function mark(pen, [x, y], style, size) {
     pen.beginPath();
-    pen.arc(x * scale, y * scale, size, 0, 2 * Math.PI);
+    pen.arc(x, y, size, 0, 2 * Math.PI);
     pen.lineWidth = 4;
     pen.strokeStyle = "rgba(0, 0, 0, .7)";
     pen.stroke();
@@ -47,12 +48,13 @@ export function createStrip(model, stills, choose) {
     for (const { frame, cell, canvas } of cells) {
       const [pen, width, height] = penOf(canvas),
         row = found.get(frame),
-        scale = width / project.width;
-      const picture = stills.get(frame, WIDTH);
-      if (picture) pen.drawImage(picture, 0, 0, width, height);
+        view = fit([0, 0, project.width, project.height], [width, height]);
+      const picture = stills.get(frame, WIDTH),
+        extent = [project.width * view.scale, project.height * view.scale];
+      if (picture) pen.drawImage(picture, view.x, view.y, ...extent);
       cell.setAttribute("aria-current", frame === current);
-      if (row?.head) mark(pen, row.head, scale, "#56b4e9", 5);
-      for (const foot of row?.feet ?? []) mark(pen, foot, scale, "#e69f00", 3.5);
+      if (row?.head) mark(pen, toScreen(view, row.head), "#56b4e9", 5);
+      for (const foot of row?.feet ?? []) mark(pen, toScreen(view, foot), "#e69f00", 3.5);
     }
     const seen =
       typeof trust === "number"
