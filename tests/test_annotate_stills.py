@@ -92,6 +92,22 @@ def test_stills_may_be_kept_by_the_browser_only_under_the_name_of_this_video(ope
         assert ("no-store" in control) != kept
 
 
+def test_a_still_waits_for_no_neighbour_and_fails_with_none(opened, monkeypatch):
+    desk = opened()
+    frames = type(desk.stills.video).frames
+
+    def damaged_from_9_on(video, first, stop):
+        yield from frames(video, first, min(stop, 9))
+        assert desk.stills.still(7).done()
+        raise KeyreconError("frame 9 cannot be decoded")
+
+    monkeypatch.setattr(type(desk.stills.video), "frames", damaged_from_9_on)
+    assert desk.stills.still(7).result(timeout=20)
+    with pytest.raises(KeyreconError, match="frame 9 cannot be decoded"):
+        desk.stills.still(12).result(timeout=20)
+    assert desk.stills.still(8).result(timeout=20)
+
+
 def test_a_still_that_cannot_be_made_says_why(opened, monkeypatch):
     desk = opened()
 

@@ -99,41 +99,39 @@ class Stills:
         while order := self._next():
             frame, width, waiting = order
             try:
-                data = _read(self._path(frame, width))
-                data = data or self._make(frame, width, alone=waiting is None)
-                if waiting and waiting.set_running_or_notify_cancel():
-                    waiting.set_result(data)
+                if _read(self._path(frame, width)) is None:
+                    self._make(frame, width, alone=waiting is None)
+                self._answer_waiting()
+                self._give_up(order, KeyreconError(f"Frame {frame} cannot be kept."))
             except Exception as fault:  # noqa: BLE001 - raised again where the still was asked for
-                if waiting and (waiting.running() or waiting.set_running_or_notify_cancel()):
-                    waiting.set_exception(fault)
+                self._give_up(order, fault)
 
     def _next(self) -> Order | None:
-        """What to do next; waits for it, None at the end."""
+        """What to do next; waits for it, None at the end. Who asked stays listed till answered."""
         with self._changed:
             while not (self._asked or self._coming or self._closed):
                 self._changed.wait()
             if self._closed:
                 return None
-            return self._asked.pop() if self._asked else self._coming.pop()
+            return self._asked[-1] if self._asked else self._coming.pop()
 
-    def _make(self, frame: int, width: int, alone: bool) -> bytes:
+    def _make(self, frame: int, width: int, alone: bool) -> None:
         """Decode a run of frames; keep the one asked for first, then what else is asked of it."""
         first = frame if alone else frame - frame % RUN
         span = range(first, frame + 1 if alone else min(first + RUN, len(self.video)))
-        run, still = {}, b""
+        run = {}
         for number, picture in enumerate(self.video.frames(first, span.stop), first):
             run[number] = reduce_picture(picture, width)
             if number == frame:
-                still = self._keep(frame, run[frame])
+                self._keep(frame, run[frame])
                 self._answer_waiting()
         asked, _ = self._waited_for(span, width)
         for number in sorted(run, key=lambda n: (n not in asked, abs(n - frame))):
             if number not in asked and self._waited_for(span, width)[1]:
-                break
+                return
             if _read(self._path(number, width)) is None:
                 self._keep(number, run[number])
                 self._answer_waiting()
-        return still
 
     def _waited_for(self, span: range, width: int) -> tuple[set[int], bool]:
         """Frames of a run that someone waits for, and whether someone waits for any other."""
@@ -142,10 +140,9 @@ class Stills:
             other = any(f not in span or kept != width for f, kept, _ in self._asked)
         return here, other
 
-    def _keep(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
+    def _keep(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
         data = encode_jpeg(picture)
         write_quickly(self._path(frame, picture.shape[1]), data + _checksum(data))
-        return data
 
     def _answer_waiting(self) -> None:
         """Answer all whose still has been made meanwhile."""
@@ -155,6 +152,15 @@ class Stills:
         for (_, _, waiting), data in found:
             if data and waiting and waiting.set_running_or_notify_cancel():  # else nobody waits
                 waiting.set_result(data)
+
+    def _give_up(self, order: Order, fault: Exception) -> None:
+        """Tell whoever still waits for an order that nothing came of it."""
+        with self._changed:
+            left = [other for other in self._asked if other is order]
+            self._asked = [other for other in self._asked if other is not order]
+        for _, _, waiting in left:
+            if waiting and waiting.set_running_or_notify_cancel():
+                waiting.set_exception(fault)
 
 
 def encode_jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
