@@ -89,6 +89,7 @@ def refine_fit(
             observations, video, plate, fitted, clicks.height, options.second_look
         )
         keys = time_rests(video, seen.foreground, fitted, clicks.height, options.rests)
+        keys[1:3] = observations.keys[1:3]  # told by the club alone: a fit must not guide itself
         seen = replace(seen, keys=keys, mu=interpolate_times(keys, model.keys, len(video)))
         fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
     keys = time_rests(video, seen.foreground, fitted, clicks.height, options.rests)
