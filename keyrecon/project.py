@@ -15,6 +15,7 @@ from keyrecon.formats.coco import read_coco, write_coco
 from keyrecon.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.formats.npz import read_motion, write_motion
 from keyrecon.formats.review import implausible_bones, joints_outside
+from keyrecon.matching.absence import absent_frames, list_stretches
 from keyrecon.merging import find_conflicts, merge_annotations, missing_marks
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_height
@@ -126,6 +127,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     return "\n".join(
         [
             f"Player found in {seen:.1%} of {frames} frames.",
+            *_describe_absence(preparation),
             *halves,
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
@@ -133,6 +135,17 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
             f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
         ]
     )
+
+
+def _describe_absence(preparation: Preparation) -> list[str]:
+    """Stretches in which no keyframes are asked for."""
+    clarity, reach = preparation.comparison.clarity, preparation.keyframes.reach
+    stretches = list_stretches(absent_frames(clarity, reach))
+    if not stretches:
+        return []
+    listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
+    more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
+    return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
 
 
 def _counted(number: int, what: str) -> str:

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.errors import KeyreconError
+from keyrecon.matching.absence import absent_frames, put_back, take_compared
 from keyrecon.matching.assignment import assign_frames, find_neighborhoods, represent_frames
 from keyrecon.matching.coverage import choose_as_printed, choose_greedily
 from keyrecon.matching.exchange import (
@@ -130,10 +131,14 @@ def choose_keyframes(
 ) -> Keyframes:
     """Keyframes of both halves of the body within the budget.
 
-    Raises KeyreconError where the options ask for what cannot be (`count_labels`).
+    None in stretches without the player. Raises KeyreconError where the options ask for what
+    cannot be (`count_labels`).
     """
-    labels = count_labels(options, len(comparison.row))
+    frames = len(comparison.row)
+    labels = count_labels(options, frames)
     reach = max(1, round(options.reach * fps / 50))
+    kept = np.flatnonzero(~absent_frames(comparison.clarity, reach))
+    comparison = take_compared(comparison, kept)
     halves = []
     wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
@@ -141,6 +146,7 @@ def choose_keyframes(
         half = _half(comparison, getattr(comparison, name), index, reach, options)
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
         halves.append(_choose_half(half, most, beta, also))
+    halves = [put_back(half, kept, frames) for half in halves]
     return Keyframes(*halves, reach=reach, alpha=options.coverage)
 
 
@@ -270,13 +276,19 @@ def adopt_keyframes(
 ) -> Keyframes:
     """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
 
-    Frames that nobody asked for count like the others. Beta stays, so that coverage tells what the
-    missing ones cost or more ones bring.
+    Frames that nobody asked for count like the others, also where the player seemed to be absent.
+    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
     """
+    away = absent_frames(comparison.clarity, asked.reach)
+    away[np.concatenate(annotated)] = False
+    kept, everyone = np.flatnonzero(~away), len(comparison.row)
+    comparison = take_compared(comparison, kept)
     halves = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
     for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
         beta = getattr(asked, name).beta
-        halves.append(_record(half, half.goal(beta), beta, np.unique(frames)))
+        chosen = np.searchsorted(kept, np.unique(frames))
+        found = _record(half, half.goal(beta), beta, chosen)
+        halves.append(put_back(found, kept, everyone))
     return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)

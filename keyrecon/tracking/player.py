@@ -11,7 +11,7 @@ from the second time needs no more than some frames of every second.
 `method="paper"` keeps the path through colour and radial symmetry as it was found.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal, TypeVar
 
 import cv2
@@ -26,6 +26,7 @@ from keyrecon.tracking.connect import Gait, Seen, connect_feet, connect_head
 from keyrecon.tracking.correlation import Filters, respond, spectrum
 from keyrecon.tracking.crops import ABOVE, Channels, Cropping, Crops, cut_crops
 from keyrecon.tracking.learn import clear_frames, learn_parts, sound_frames
+from keyrecon.tracking.presence import present
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.symmetry import find_peaks
 from keyrecon.video import Video
@@ -165,7 +166,8 @@ def _connect(seen: list[Seen], shot: _Shot, behind: float, options: TrackOptions
     frames = round(options.envelope * fps)
     height = standing_height(head, feet.mean(axis=1), shot.magnification, frames)
     trust = np.sqrt(head_trust * feet_trust)
-    return Track(head, feet, height, player_boxes(head, feet, height), trust)
+    track = Track(head, feet, height, player_boxes(head, feet, height), trust)
+    return replace(track, trust=trust * present(shot.crops, cropping, track))
 
 
 def search_crop(
