@@ -179,11 +179,12 @@ def _costs(
 ) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of every trunk state, and of every limb state given it.
 
-    `weights` of joint limits and of what is usual.
+    `weights` of joint limits and of what is usual. The latter is not asked about the trunk: its
+    lean cannot be told from a camera that looks down, so what is usual there tells of cameras.
     """
     limits, usual = weights
     trunk, limbs = _limit_costs(shown, breadths, anatomy)
-    return limits * trunk + usual * _unusual(anatomy.trunk, shown), [
+    return limits * trunk, [
         limits * cost + usual * _unusual(limb.bones, shown)[:, None]
         for limb, cost in zip(anatomy.limbs, limbs, strict=True)
     ]

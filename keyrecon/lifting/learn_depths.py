@@ -1,7 +1,7 @@
 """Learning what depth bones usually have: captured poses, varied and seen from all around.
 
 Every pose that is learnt from is drawn anew: mirrored or not, each limb turned a little as other
-people would hold it, seen by a camera from any side and from the ground or a stand, with bones
+people would hold it, seen by a camera from any side and from a tripod or a stand, with bones
 as long and joints as exact as lengths and tracks really are. Left and right share what is learnt,
 and so do all ways that a player may face. The network is fitted by least squares (Adam; Kingma and
 Ba, ICLR 2015), so its answer is the mean of all depths that the picture allows.
@@ -48,8 +48,8 @@ class LearnDepthsOptions:
     limb_turn: float = 0.25
     """Standard deviation by which limbs are turned, radians per axis; half of it within limbs
     and for the body above the hips."""
-    camera_up: tuple[float, float] = (-5.0, 30.0)
-    """Range of the angle by which the camera looks down, degrees: from the ground to a stand."""
+    camera_up: tuple[float, float] = (-3.0, 20.0)
+    """Range of the angle by which the camera looks down, degrees: from a tripod to a stand."""
     camera_roll: float = 1.5
     """Standard deviation of the camera's roll, degrees."""
     length_error: float = 0.06

@@ -13,14 +13,14 @@ class FlipOptions:
 
     confirmed: float = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
-    limits: float = 0.075
+    limits: float = 0.15
     """Weight of joint limits per frame; errors stay alike over several frames."""
     votes: float = 0.3
     """Weight of the key poses per frame."""
     guide: float = 1.0
     """Weight of the slerped key poses per frame."""
     usual: float = 1.0
-    """Weight, per frame, of the depth that bones usually have where they look like this."""
+    """Weight, per frame, of the depth that limbs usually have where they look like this."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
     jerk: float = 0.1
