@@ -15,7 +15,7 @@ from keyrecon.lifting.depths import DepthModel, usual_depths
 from keyrecon.lifting.learn_depths import LearnDepthsOptions, learn_depths
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
-QUICK = LearnDepthsOptions(rounds=3, poses=20_000, units=64)
+QUICK = LearnDepthsOptions(poses=20_000)
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +57,8 @@ def test_the_built_in_model_knows_the_built_in_tennis():
 
 def test_the_same_captures_give_the_same_model():
     captures = [play_tennis(MotionOptions(2.0, seed=3))]
-    few = replace(QUICK, rounds=1, poses=3000)
-    one, other = (learn_depths(captures, "", few) for _ in range(2))
-    for a, b in zip(one.weights, other.weights, strict=True):
-        np.testing.assert_array_equal(a, b)
+    one, other = (learn_depths(captures, "", QUICK) for _ in range(2))
+    np.testing.assert_array_equal(one.coefficients, other.coefficients)
 
 
 def test_joints_besides_change_nothing_and_have_no_usual_depth(model):
@@ -97,7 +95,7 @@ def test_models_come_back_from_files(model, tmp_path):
     again = read_depth_model(tmp_path / "new" / "depths.npz")
     assert again.provenance == "one player"
     seen = np.random.default_rng(0).uniform(-0.7, 0.7, (50, 13, 2))
-    np.testing.assert_allclose(again.depth_shares(seen), model.depth_shares(seen), atol=0.01)
+    np.testing.assert_allclose(again.depth_shares(seen), model.depth_shares(seen), atol=1e-3)
 
 
 def test_files_that_are_no_depth_models_are_refused(model, tmp_path):
@@ -115,18 +113,17 @@ def test_files_that_are_no_depth_models_are_refused(model, tmp_path):
         read_depth_model(file)
 
 
-def test_layers_that_do_not_fit_together_are_refused():
-    weights = np.zeros((26, 8)), np.zeros((9, 13))
-    with pytest.raises(KeyreconError, match="do not fit"):
-        DepthModel(weights, (np.zeros(8), np.zeros(13)), "")
+def test_a_model_with_other_terms_is_refused():
+    with pytest.raises(KeyreconError, match="820 x 13 coefficients, this one 5 x 13"):
+        DepthModel(np.zeros((5, 13)), "")
 
 
 def test_the_command_learns_from_files_what_run_can_use(tmp_path, monkeypatch, capsys):
     from test_mocap import bvh_text
 
     out = tmp_path / "mine.npz"
-    call = ["keyrecon", "depths", str(tmp_path), "--out", str(out), "--rounds", "1"]
-    monkeypatch.setattr(sys, "argv", [*call, "--poses", "2000", "--units", "16"])
+    call = ["keyrecon", "depths", str(tmp_path), "--out", str(out)]
+    monkeypatch.setattr(sys, "argv", [*call, "--poses", "2000"])
     (tmp_path / "walk.bvh").write_text(bvh_text(frames=12)[0])
     with pytest.raises(SystemExit):
         cli.main()

@@ -1,4 +1,4 @@
-"""Depth models on disk: one compressed npz, no pickle; layers in half precision."""
+"""Depth models on disk: one compressed npz, no pickle, in single precision."""
 
 from pathlib import Path
 from zipfile import BadZipFile
@@ -15,12 +15,11 @@ BUILT_IN = Path(__file__).parent.parent / "lifting" / "depths.npz"
 def write_depth_model(path: Path, model: DepthModel) -> None:
     """Write a model; the folder is made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    layers = {f"weight{n}": weight for n, weight in enumerate(model.weights)}
-    layers |= {f"bias{n}": bias for n, bias in enumerate(model.biases)}
-    halves = {name: values.astype(np.float16) for name, values in layers.items()}
-    provenance = np.array(model.provenance)
+    coefficients, provenance = model.coefficients.astype(np.float32), np.array(model.provenance)
     with path.open("wb") as file:
-        np.savez_compressed(file, version=model.version, provenance=provenance, **halves)
+        np.savez_compressed(
+            file, version=model.version, provenance=provenance, coefficients=coefficients
+        )
 
 
 def read_depth_model(path: Path = BUILT_IN) -> DepthModel:
@@ -28,9 +27,7 @@ def read_depth_model(path: Path = BUILT_IN) -> DepthModel:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             version, provenance = int(stored["version"]), str(stored["provenance"])
-            count = sum(name.startswith("weight") for name in stored.files)
-            weights = tuple(stored[f"weight{n}"].astype(np.float32) for n in range(count))
-            biases = tuple(stored[f"bias{n}"].astype(np.float32) for n in range(count))
+            coefficients = stored["coefficients"].astype(np.float64)
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as fault:
         why = fault.strerror if isinstance(fault, OSError) and fault.strerror else "another format"
         raise KeyreconError(
@@ -41,4 +38,4 @@ def read_depth_model(path: Path = BUILT_IN) -> DepthModel:
             f"{path} is a depth model of version {version} and this program needs {VERSION}; "
             "make it again with: keyrecon depths"
         )
-    return DepthModel(weights, biases, provenance, version)
+    return DepthModel(coefficients, provenance, version)

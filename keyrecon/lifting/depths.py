@@ -1,15 +1,15 @@
-"""What depth bones usually have in a picture like this: a regression learnt from captured motion.
+"""What depth limbs usually have in a picture like this: a regression learnt from captured motion.
 
 A flat picture of a whole body says more about depth than joint limits can put into words: which
-way an arm reaches goes with how hips, shoulders and the other limbs look. A small network takes the
-13 bones as the picture shows them (in shares of their lengths) and gives the depth share that
-such bones had on average in motion capture seen from all around (as Martinez et al., ICCV 2017,
-lift joints). Only its sign is of interest here, since lengths tell the rest better. An
-average near zero says that the picture fits both signs, and then it does not count.
+way an arm reaches goes with how hips, shoulders and the other limbs look. The rule is a polynomial
+of second degree in what the picture shows of the 13 bones, in shares of their lengths: both
+in-plane parts, and how much is left for depth (Taylor's sqrt(1 - q^2)). Its coefficients give the
+depths of captured people, seen from all around, with the least squared error. Only the sign of what
+it gives is of interest here, since lengths tell the rest better; a value near zero says that the
+picture fits both signs, and then it does not count.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -18,35 +18,47 @@ from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
 
 VERSION = 1
-"""Of the bones and features that a model is learnt for."""
+"""Of the bones and terms that a model has coefficients for."""
 _BONES = len(LSP14.bones)
+_SHOWN = 3 * _BONES
+TERMS = 1 + _SHOWN + _SHOWN * (_SHOWN + 1) // 2
+"""Of the polynomial: a constant, 39 linear ones, 780 products."""
 
 
 @dataclass(frozen=True, eq=False)
 class DepthModel:
-    """A learnt guess of depth shares: two hidden layers of rectified units."""
+    """A rule for the depth shares of LSP14's bones."""
 
-    weights: tuple[Float[np.ndarray, "_ _"], ...]
-    """Matrix of each layer: 26 in-plane shares come in, 13 depth shares go out."""
-    biases: tuple[Float[np.ndarray, "_"], ...]
+    coefficients: Float[np.ndarray, "terms 13"]
+    """Of each term, for each bone."""
     provenance: str
     """What it was learnt from."""
     version: int = VERSION
 
     def __post_init__(self) -> None:
-        """Raise KeyreconError where layers do not fit together."""
-        sizes = [2 * _BONES, *(len(bias) for bias in self.biases)]
-        shapes = list(pairwise(sizes))
-        if sizes[-1] != _BONES or [w.shape for w in self.weights] != shapes:
-            raise KeyreconError("The layers of this depth model do not fit together.")
+        """Raise KeyreconError for another number of coefficients."""
+        if self.coefficients.shape != (TERMS, _BONES):
+            raise KeyreconError(
+                f"A depth model has {TERMS} x {_BONES} coefficients, this one "
+                f"{' x '.join(map(str, self.coefficients.shape))}."
+            )
 
     def depth_shares(self, flat: Float[np.ndarray, "T 13 2"]) -> Float[np.ndarray, "T 13"]:
         """Expected dz / length of LSP14's bones from their in-plane vectors / length."""
-        layer = flat.reshape(len(flat), 2 * _BONES)
-        *hidden, last = zip(self.weights, self.biases, strict=True)
-        for weight, bias in hidden:
-            layer = np.maximum(layer @ weight + bias, 0)
-        return layer @ last[0] + last[1]
+        return polynomial(flat) @ self.coefficients
+
+
+def polynomial(flat: Float[np.ndarray, "n 13 2"]) -> Float[np.ndarray, "n terms"]:
+    """All terms of a picture: in-plane vectors over lengths, depth left, products of any two.
+
+    A bone cannot look longer than it is.
+    """
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1)
+    left = np.sqrt(np.clip(1 - (flat**2).sum(axis=-1), 0, 1))
+    shown = np.concatenate([flat.reshape(len(flat), -1), left], axis=1)
+    one, other = np.triu_indices(_SHOWN)
+    constant = np.ones((len(flat), 1), shown.dtype)
+    return np.concatenate([constant, shown, shown[:, one] * shown[:, other]], axis=1)
 
 
 def usual_depths(
@@ -65,7 +77,6 @@ def usual_depths(
     if model is None or places is None:
         return usual
     flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1.0)
     usual[:, places] = model.depth_shares(flat) * lengths[places]
     return usual
 

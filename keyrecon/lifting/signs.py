@@ -19,7 +19,7 @@ class FlipOptions:
     """Weight of the key poses per frame."""
     guide: float = 1.0
     """Weight of the slerped key poses per frame."""
-    usual: float = 1.0
+    usual: float = 0.7
     """Weight, per frame, of the depth that limbs usually have where they look like this."""
     alike: float = 0.08
     """Difference of shown bone vectors at which two poses look alike, statures."""
