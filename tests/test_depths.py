@@ -61,6 +61,12 @@ def test_the_same_captures_give_the_same_model():
     np.testing.assert_array_equal(one.coefficients, other.coefficients)
 
 
+@pytest.mark.parametrize("wrong", [{"poses": 0}, {"ridge": 0.0}])
+def test_options_with_which_nothing_is_learnt_are_refused(wrong):
+    with pytest.raises(KeyreconError, match="must be above 0"):
+        learn_depths([play_tennis(MotionOptions(2.0))], "", replace(QUICK, **wrong))
+
+
 def test_joints_besides_change_nothing_and_have_no_usual_depth(model):
     vectors = bone_vectors(filmed(seed=4, yaw=30.0)[:3, :, :2], LSP14)
     toed = Skeleton(

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
 from keyrecon.lifting.chain import bone_vectors, unit
 from keyrecon.lifting.depths import TERMS, DepthModel, polynomial
 from keyrecon.progress import Progress, silent
@@ -52,6 +53,7 @@ class LearnDepthsOptions:
     joint_error: float = 0.04
     """Standard deviation of a bone's vector in the picture, in lengths of the bone."""
     seed: int = 0
+    """Of the poses drawn."""
 
 
 def learn_depths(
@@ -63,7 +65,13 @@ def learn_depths(
     """Learn a depth model from joints of captured people: LSP14's, metres, Y up.
 
     A capture counts by the root of its length, so that a long one does not drown the others.
+    Raises KeyreconError for options with which nothing can be learnt.
     """
+    if options.poses < 1 or options.ridge <= 0:
+        raise KeyreconError(
+            f"Nothing can be learnt from {options.poses} poses with a ridge of {options.ridge:g}; "
+            "both must be above 0."
+        )
     rng = np.random.default_rng(options.seed)
     poses = [unit(bone_vectors(joints, LSP14)).astype(np.float32) for joints in captures]
     batches = -(-options.poses // _BATCH)
