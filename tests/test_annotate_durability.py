@@ -32,8 +32,11 @@ from keyrecon.annotate.store import Store
 from keyrecon.body import LSP14
 from keyrecon.workspace import Workspace
 
+def say(word):  # in one piece: whoever is killed has said a word or has not
+    os.write(1, f"{word}\\n".encode())
+
 def edit_forever(folder, first):
-    print(os.getpid(), flush=True)
+    say(os.getpid())
     store = Store(Workspace(folder), Limits(LSP14, 100, (128, 64)))
     for number in itertools.count(first):
         if number % 7 == 5:
@@ -44,14 +47,14 @@ def edit_forever(folder, first):
             before = store.state.cells.get(("mark", number % 100, "neck"))
             late = mark(number % 100, "neck", [number % 120, 7.5, 2], was=before)
             assert submit(store, {**late, "id": f"edit {number}"})[0]["ok"]
-        print(number, flush=True)
+        say(number)
 
 for first in sys.stdin:
     child = os.fork()
     if not child:
         edit_forever(Path(sys.argv[1]), int(first))
     os.waitpid(child, 0)
-    print("dead", flush=True)
+    say("dead")
 """
 """Begins to edit at the number it is told, in a process that can be killed, again and again."""
 
