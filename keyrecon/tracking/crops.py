@@ -128,7 +128,7 @@ class Channels:
         seen[1 : 1 + parts] *= STILL_WEIGHT + (1 - STILL_WEIGHT) * seen[0]
         light = np.ascontiguousarray(lab[..., 0])
         gx, gy = (cv2.Sobel(light, cv2.CV_32F, *d, scale=0.25) for d in ((1, 0), (0, 1)))
-        size = cv2.magnitude(gx, gy)
+        size = np.hypot(gx, gy)
         share = 1 / ((size + FAINT) * (size + 1e-6))
         along, across = (gx * gx - gy * gy) * share, 2 * gx * gy * share
         for channel, map_ in zip(seen[-DIRECTIONS:], (along, -along, across, -across), strict=True):

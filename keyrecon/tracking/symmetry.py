@@ -47,7 +47,7 @@ def find_slope(smooth: Float[np.ndarray, "h w"], least: float = 0.1) -> Slope:
     """Gradients steeper than `least` times the steepest, at most MOST_VOTERS of them."""
     gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
     gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(gx, gy)
+    size = np.hypot(gx, gy)
     spots = np.flatnonzero(size > least * max(float(size.max()), 1e-9))
     if len(spots) > MOST_VOTERS:
         steepness = size.ravel()[spots]
