@@ -22,17 +22,18 @@ from accuracy import HEIGHT_ERROR, Case, mark, prepare_case
 from sequences import DATA, TENNIS, render
 from unseen import unseen_model
 
-from keyrecon.console import show
-from keyrecon.lifting import follow, lift
-from keyrecon.lifting.chain import bone_vectors, breadths
-from keyrecon.lifting.depths import DepthModel
-from keyrecon.lifting.lengths import BodySize
-from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
-from keyrecon.lifting.signs import Signs
-from keyrecon.matching.keyframes import KeyframeOptions
-from keyrecon.matching.propagate import PropagateOptions, propagate_joints
+from keyrecon.app.console import show
+from keyrecon.keyframes.selection import KeyframeOptions
+from keyrecon.lifting import initial_motion as follow
+from keyrecon.lifting import lifting as lift
+from keyrecon.lifting.bone_directions import bone_vectors, breadths
+from keyrecon.lifting.depth_evidence import DepthSigns
+from keyrecon.lifting.lifting import LiftOptions, LiftResult, lift_motion
+from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
 from keyrecon.pipeline import Options
+from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import Annotations, JointTracks, Keyframes
 
 OUTLIERS = 0.03
@@ -119,7 +120,7 @@ def perfect_size(trial: Trial, lengths: bool = True, scale: bool = True) -> Iter
 def perfect_signs(trial: Trial) -> Iterator[None]:
     """Depth signs of every frame from the truth."""
     signs = true_signs(trial)
-    known = Signs(signs, np.ones(signs.shape))
+    known = DepthSigns(signs, np.ones(signs.shape))
     with patch.object(follow, "follow_signs", lambda *given: known):
         yield
 

@@ -19,15 +19,15 @@ from peer import score_mediapipe
 from sequences import DATA, OTHER, TENNIS, Sequence, render
 from unseen import unseen_model
 
-from keyrecon.console import show
-from keyrecon.formats.picks import read_picks
+from keyrecon.app.console import show
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.stages import StageStore
+from keyrecon.io.video import open_video
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, Preparation, as_printed, prepare, reconstruct, with_height
 from keyrecon.records import Annotations, Motion
 from keyrecon.report.summary import annotation_cost
-from keyrecon.stages import StageStore
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
-from keyrecon.video import open_video
 
 CLICK_NOISE = 3.0 / 400
 """Standard deviation of a click, player heights."""

@@ -18,22 +18,22 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon import project
-from keyrecon.assist.assistant import make_assistant
+from keyrecon.annotate.assist.answers import make_assistant
+from keyrecon.app import project
+from keyrecon.app.console import show
+from keyrecon.app.demo import CLICK_NOISE, run_demo
 from keyrecon.body import LSP14
-from keyrecon.console import show
-from keyrecon.demo import CLICK_NOISE, run_demo
-from keyrecon.formats.coco import read_coco, write_coco
-from keyrecon.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.coco import read_coco, write_coco
+from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.records import Annotations
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
-from keyrecon.video import open_video
-from keyrecon.video_writer import write_video
-from keyrecon.workspace import Workspace
 
-sys.path.append(str(Path(__file__).parent.parent / "tests"))
+sys.path.append(str(Path(__file__).parent.parent / "tests" / "support"))
 from page_driver import SCREEN, Person, browser, serving
 
 SEEN = 0.02

@@ -26,26 +26,26 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from keyrecon.app.golf import GolfOptions, fit_observations, refine_fit
+from keyrecon.app.golf_training import read_swings
 from keyrecon.body import LSP14
-from keyrecon.formats.motion_model import read_motion_model, write_motion_model
-from keyrecon.golf.clicks import Clicks
-from keyrecon.golf.fit import FitOptions, WeightOptions
-from keyrecon.golf.look import LookOptions, look_at_swing
-from keyrecon.golf.records import FittedSwing, Marks, MotionModel, Observations, Swing
-from keyrecon.golf.retarget import change_swing
-from keyrecon.golf.skeleton import size_body, turns_from_swing
-from keyrecon.golf.train import TrainOptions, collect_swings, learn_motion
-from keyrecon.golf.variation import tilt_arms
-from keyrecon.golf_job import GolfOptions, fit_observations, refine_fit
+from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
+from keyrecon.golf.observe.observation import ObservationOptions, observe_swing
+from keyrecon.golf.prior.captured_swing import change_swing
+from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
+from keyrecon.golf.prior.training import TrainOptions, collect_swings, learn_motion
+from keyrecon.golf.prior.variation import tilt_arms
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations, Swing, SwingMarks
+from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
+from keyrecon.io.frame_reader import reduce_picture
+from keyrecon.io.storage import load_record, save_record
+from keyrecon.io.video import Video, open_video
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pictures import reduce_picture
-from keyrecon.report.golf_figure import draw_golfer
-from keyrecon.storage import load_record, save_record
-from keyrecon.swings import read_swings
-from keyrecon.synthetic.cameras import CameraOptions, View
+from keyrecon.report.golf_pictures import draw_golfer
+from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 from keyrecon.synthetic.sequence import SceneOptions
-from keyrecon.video import Video, open_video
 
 MOCAP = Path(__file__).parent.parent.parent / "shared" / "data" / "mocap" / "golf"
 CLICKED = ("head_top", "right_knee", "left_knee", "right_ankle", "left_ankle")
@@ -89,7 +89,7 @@ def film(scene: Scene, swings: tuple[Swing, ...], out: Path) -> Path:
         swing = change_swing(swing, size_body(swing.stature), turns, place)
     options = SceneOptions(
         seed=SCENES.index(scene),
-        camera=CameraOptions(scene.view, player_px=370.0),
+        camera=CameraPlanOptions(scene.view, player_px=370.0),
         shutter=0.006 if scene.fps > 50 else 0.010,
         left_handed=scene.left_handed,
         workers=1,
@@ -98,7 +98,9 @@ def film(scene: Scene, swings: tuple[Swing, ...], out: Path) -> Path:
     return folder
 
 
-def click(truth: dict[str, np.ndarray], scene: Scene, size: tuple[int, int], seed: int) -> Clicks:
+def click(
+    truth: dict[str, np.ndarray], scene: Scene, size: tuple[int, int], seed: int
+) -> GolfClicks:
     """What a person clicks in the first frame."""
     rng = np.random.default_rng([seed, 77])
     first = truth["points2d"][0]
@@ -107,15 +109,17 @@ def click(truth: dict[str, np.ndarray], scene: Scene, size: tuple[int, int], see
     clicked = {
         name: tuple((p + rng.normal(0, CLICK_NOISE, 2)).tolist()) for name, p in places.items()
     }
-    return Clicks(0, size, clicked, left_handed=scene.left_handed, stature=float(truth["height_m"]))
+    return GolfClicks(
+        0, size, clicked, left_handed=scene.left_handed, stature=float(truth["height_m"])
+    )
 
 
-def annotate(truth: dict[str, np.ndarray], seed: int) -> Marks:
+def annotate(truth: dict[str, np.ndarray], seed: int) -> SwingMarks:
     """All joints of four frames: address, top, hit and finish, marked with 2 px of noise."""
     frames = np.unique(np.round(truth["keys"]).astype(int))
     rng = np.random.default_rng([seed, 78])
     joints = truth["points2d"][frames]
-    return Marks(frames, joints + rng.normal(0, 2.0, joints.shape))
+    return SwingMarks(frames, joints + rng.normal(0, 2.0, joints.shape))
 
 
 def learn_without(player: int, swings: tuple[Swing, ...], out: Path) -> MotionModel:
@@ -128,12 +132,12 @@ def learn_without(player: int, swings: tuple[Swing, ...], out: Path) -> MotionMo
     return read_motion_model(file)
 
 
-def look(video: Video, clicks: Clicks, model: MotionModel, folder: Path) -> Observations:
+def look(video: Video, clicks: GolfClicks, model: MotionModel, folder: Path) -> Observations:
     """What is seen in a video, kept beside it."""
     file = folder / "seen.npz"
     if not file.is_file():
         began = time.perf_counter()
-        save_record(file, look_at_swing(video, clicks, model.keys, LookOptions()))
+        save_record(file, observe_swing(video, clicks, model.keys, ObservationOptions()))
         (folder / "seconds.txt").write_text(f"{time.perf_counter() - began:.1f}")
     return load_record(file)
 

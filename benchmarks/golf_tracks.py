@@ -18,12 +18,12 @@ import cv2
 import numpy as np
 
 from keyrecon.body import LSP14
-from keyrecon.colors import to_lab
-from keyrecon.golf.appearance import track_patch
-from keyrecon.golf.clicks import Clicks
-from keyrecon.golf.foreground import Foreground, separate_player
-from keyrecon.pictures import read_small
-from keyrecon.video import open_video
+from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.observe.appearance_tracker import track_patch
+from keyrecon.golf.observe.foreground import Foreground, separate_player
+from keyrecon.io.frame_reader import read_small
+from keyrecon.io.video import open_video
+from keyrecon.segmentation.color_model import to_lab
 
 JOINTS = ("right_knee", "left_knee", "right_ankle", "left_ankle", "head_top")
 PATCH = 0.1
@@ -46,7 +46,7 @@ def measure(folder: Path) -> dict[str, np.ndarray]:
     places, visible = truth["points2d"], truth["visible"]
     clicked = {name: tuple(places[0, LSP14.index(name)].tolist()) for name in JOINTS}
     clicked["root"] = tuple(places[0, [2, 3]].mean(axis=0).tolist())
-    clicks = Clicks(0, (video.width, video.height), clicked)
+    clicks = GolfClicks(0, (video.width, video.height), clicked)
     foreground = separate_player(video, clicks)
     pictures = list(read_small(video, foreground.likely.shape[2]))
     found: dict[str, list[np.ndarray]] = {name: [] for name in TRACKERS}

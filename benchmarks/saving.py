@@ -14,11 +14,11 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from keyrecon.annotate.cells import Change
-from keyrecon.annotate.edits import Limits, MarkEdit
-from keyrecon.annotate.store import Store
+from keyrecon.annotate.store.cells import Change
+from keyrecon.annotate.store.edits import Limits, MarkEdit
+from keyrecon.annotate.store.store import Store
 from keyrecon.body import LSP14
-from keyrecon.workspace import Workspace
+from keyrecon.io.workspace import Workspace
 
 KEYFRAMES = (1, 30, 200, 1000)
 EDITS = 60

@@ -13,13 +13,13 @@ from pathlib import Path
 from annotator import Answers, begin, known_answers
 from page_driver import SCREEN, Person, browser, serving
 
-from keyrecon.assist.assistant import make_assistant
+from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.body import LSP14
-from keyrecon.formats.coco import write_coco
-from keyrecon.formats.npz import read_motion, write_motion
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.video import open_video
+from keyrecon.io.workspace import Workspace
 from keyrecon.records import Annotations
-from keyrecon.video import open_video
-from keyrecon.workspace import Workspace
 
 QUALITY = 82
 """Of the JPEGs."""

@@ -7,8 +7,8 @@ and resolutions that differ in everything a user's video may differ in.
 from dataclasses import dataclass
 from pathlib import Path
 
-from keyrecon.console import show
-from keyrecon.synthetic.cameras import CameraOptions, View
+from keyrecon.app.console import show
+from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
 
@@ -66,7 +66,9 @@ def render(sequence: Sequence, work: Path, mocap: Path) -> Path:
     folder = work / sequence.name
     if not (folder / "truth.npz").is_file():
         size = sequence.width, round(sequence.width * 9 / 16)
-        camera = CameraOptions(View(sequence.camera), sequence.pan, *size, float(sequence.player))
+        camera = CameraPlanOptions(
+            View(sequence.camera), sequence.pan, *size, float(sequence.player)
+        )
         options = SynthOptions(
             SceneOptions(sequence.seed, camera), JoinOptions(seconds=sequence.seconds)
         )

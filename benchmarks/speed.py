@@ -15,11 +15,11 @@ from pathlib import Path
 from accuracy import Case, solve
 from sequences import DATA, TENNIS, render
 
-from keyrecon.formats.picks import read_picks
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.stages import StageStore
+from keyrecon.io.video import open_video
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options, prepare
-from keyrecon.stages import StageStore
-from keyrecon.video import open_video
 
 
 def main() -> None:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from sequences import Sequence, mocap_files
 
-from keyrecon.console import show
-from keyrecon.depth_job import learn_from_files
-from keyrecon.formats.depth_model import read_depth_model, write_depth_model
-from keyrecon.formats.mocap import find_captures
-from keyrecon.lifting.depths import DepthModel
+from keyrecon.app.console import show
+from keyrecon.app.depth_training import learn_from_files
+from keyrecon.io.formats.mocap import find_captures
+from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
+from keyrecon.lifting.priors.depth_model import DepthModel
 
 
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:

@@ -24,7 +24,7 @@ except PackageNotFoundError:
 
 _PUBLIC = {
     "KeyreconError": "keyrecon.errors",
-    "open_video": "keyrecon.video",
+    "open_video": "keyrecon.io.video",
     "prepare": "keyrecon.pipeline",
     "reconstruct": "keyrecon.pipeline",
     "Options": "keyrecon.pipeline",

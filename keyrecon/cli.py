@@ -12,20 +12,20 @@ from typing import Annotated, Literal
 import tyro
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from keyrecon import demo as demonstration
-from keyrecon import depth_job
-from keyrecon import project as work
-from keyrecon.console import show
+from keyrecon.app import demo as demonstration
+from keyrecon.app import depth_training as depth_job
+from keyrecon.app import project as work
+from keyrecon.app.annotator import serve_annotator
+from keyrecon.app.console import show
+from keyrecon.app.exporting import export as export_files
+from keyrecon.app.golf_commands import golf
+from keyrecon.app.golf_demo import run_golf_demo
 from keyrecon.errors import KeyreconError
-from keyrecon.exporting import export as export_files
-from keyrecon.golf_commands import golf
-from keyrecon.golf_demo import run_golf_demo
-from keyrecon.lifting.learn_depths import LearnDepthsOptions
+from keyrecon.io.workspace import Workspace
+from keyrecon.lifting.priors.depth_model import DepthTrainingOptions
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.records import Pick
-from keyrecon.serving import serve_annotator
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
-from keyrecon.workspace import Workspace
 
 Advanced = Annotated[Options, arg(name="")]
 Points = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="X,Y")]
@@ -249,7 +249,9 @@ def relink(project: Positional[Path], video: Positional[Path]) -> None:
 def depths(
     captures: Positional[tuple[Path, ...]],
     out: Path = Path("depths.npz"),
-    options: OmitArgPrefixes[Annotated[LearnDepthsOptions, arg(name="")]] = LearnDepthsOptions(),
+    options: OmitArgPrefixes[
+        Annotated[DepthTrainingOptions, arg(name="")]
+    ] = DepthTrainingOptions(),
 ) -> None:
     """Learn from motion capture what depth bones usually have that look alike in a picture.
 

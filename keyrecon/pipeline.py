@@ -13,43 +13,42 @@ from typing import Any, Literal
 
 import numpy as np
 
-from keyrecon.background import BackgroundOptions, build_background
-from keyrecon.colors import ColorOptions, learn_colors
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.depth_model import BUILT_IN, read_depth_model
-from keyrecon.formats.motion_model import read_motion_model
-from keyrecon.golf.follow import SwingPriorOptions, follow_swing
-from keyrecon.lifting.depths import DepthModel
-from keyrecon.lifting.lift import LiftOptions, LiftResult, lift_motion
-from keyrecon.matching.edges import EdgeOptions, find_edges
-from keyrecon.matching.keyframes import (
+from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
+from keyrecon.io.formats.model_file import BUILT_IN_DEPTH_MODEL, read_depth_model, read_motion_model
+from keyrecon.io.video import Video
+from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
+from keyrecon.keyframes.selection import (
     KeyframeOptions,
     adopt_keyframes,
     choose_keyframes,
     count_labels,
 )
-from keyrecon.matching.matrix import CompareOptions, compare_frames
-from keyrecon.matching.propagate import LEAST_MARKED, PropagateOptions, propagate_joints
+from keyrecon.lifting.lifting import LiftOptions, LiftResult, lift_motion
+from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
+from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, propagate_joints
 from keyrecon.records import (
     SOURCES,
     Annotations,
     Background,
     CameraPath,
     Colors,
-    Comparison,
-    Figures,
     JointTracks,
     Keyframes,
     Motion,
     Pick,
+    PlayerContours,
+    PoseDistances,
     Survey,
     Track,
 )
-from keyrecon.tracking.camera_motion import CameraOptions, follow_camera
-from keyrecon.tracking.find import EVERY_FRAME, FindOptions, find_player
-from keyrecon.tracking.player import TrackOptions, track_player
-from keyrecon.video import Video
+from keyrecon.segmentation.background_model import BackgroundOptions, build_background
+from keyrecon.segmentation.color_model import ColorOptions, learn_colors
+from keyrecon.segmentation.contours import EdgeOptions, find_edges
+from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
+from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
+from keyrecon.tracking.tracker import TrackOptions, track_player
 
 Keep = Callable[..., Any]
 
@@ -58,7 +57,7 @@ Keep = Callable[..., Any]
 class Options:
     """What every stage can be told."""
 
-    camera: CameraOptions = field(default_factory=CameraOptions)
+    camera: CameraMotionOptions = field(default_factory=CameraMotionOptions)
     colors: ColorOptions = field(default_factory=ColorOptions)
     find: FindOptions = field(default_factory=FindOptions)
     track: TrackOptions = field(default_factory=TrackOptions)
@@ -86,8 +85,8 @@ class Preparation:
     colors: Colors
     track: Track
     background: Background
-    figures: Figures
-    comparison: Comparison
+    figures: PlayerContours
+    comparison: PoseDistances
     keyframes: Keyframes
 
     @property
@@ -126,7 +125,7 @@ def prepare(
         stage_options = getattr(options, name)
         return keep(name, stage, *inputs, options=stage_options, progress=progress)
 
-    camera = make("camera", follow_camera, video)
+    camera = make("camera", estimate_camera_motion, video)
     colors = make("colors", learn_colors, video, picks)
     rough = make("find", find_player, video, colors, camera)
     background = make("background", build_background, video, camera, rough)
@@ -165,7 +164,7 @@ def reconstruct(
     if options.prior == "golf":
         pictures = height, (video.width, video.height)
         known = (tracks, annotations, read_motion_model(), pictures, video.time)
-        expected = keep("swing", follow_swing, *known, options=options.swing, progress=progress)
+        expected = keep("swing", fit_swing_prior, *known, options=options.swing, progress=progress)
     inputs = (tracks, annotations, keyframes, height, video.fps, expected, model)
     lifted = keep("lift", lift_motion, *inputs, options=options.lift, progress=progress)
     return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
@@ -175,7 +174,9 @@ def _depth_model(options: Options) -> DepthModel | None:
     """The depth model that was asked for."""
     if options.depths == "none":
         return None
-    return read_depth_model(BUILT_IN if options.depths == "built-in" else Path(options.depths))
+    return read_depth_model(
+        BUILT_IN_DEPTH_MODEL if options.depths == "built-in" else Path(options.depths)
+    )
 
 
 def _with_annotated(

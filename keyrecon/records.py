@@ -79,7 +79,7 @@ class Colors:
     names: tuple[str, ...]
     """The parts picked: 'head', 'foot' and the regions. Labels and edges count in this order."""
     seen: Float[np.ndarray, "C bins"]
-    """Share of each part's pixels in each colour bin (see `keyrecon.colors`)."""
+    """Share of each part's pixels in each colour bin (see `keyrecon.segmentation.color_model`)."""
     surroundings: Float[np.ndarray, "bins"]
     """Share of the pixels around the player in each colour bin."""
     height: float
@@ -101,7 +101,7 @@ class Background:
 
 
 @dataclass(frozen=True, eq=False)
-class Figures:
+class PlayerContours:
     """The player's coloured regions in every frame, and their directed edges."""
 
     edges: tuple[Edges, ...]
@@ -116,7 +116,7 @@ class Figures:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class PoseDistances:
     """Pose distances between every two frames, each half of the body apart (Section 4.2).
 
     M frames are compared: all T of a short video, exemplars that stand for their neighbours in
@@ -179,10 +179,10 @@ class Keyframes:
 class Survey:
     """What was seen of the player before anything was annotated."""
 
-    figures: Figures
+    figures: PlayerContours
     track: Track
     camera: CameraPath
-    comparison: Comparison
+    comparison: PoseDistances
     keyframes: Keyframes
 
 

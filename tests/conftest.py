@@ -3,23 +3,8 @@
 from fractions import Fraction
 
 import av
-import numpy as np
 import pytest
-
-
-def numbered_picture(number, width=128, height=64):
-    """A grey picture whose blocks encode `number` in binary."""
-    picture = np.full((height, width, 3), 60, dtype=np.uint8)
-    for bit in range(10):
-        value = 220 if number >> bit & 1 else 20
-        picture[16:48, 4 + bit * 12 : 14 + bit * 12] = value
-    return picture
-
-
-def read_number(picture):
-    """The number that `numbered_picture` drew."""
-    blocks = [picture[28:36, 7 + bit * 12 : 11 + bit * 12].mean() for bit in range(10)]
-    return sum((value > 120) << bit for bit, value in enumerate(blocks))
+from numbered_pictures import numbered_picture
 
 
 @pytest.fixture(scope="session")
@@ -89,8 +74,8 @@ def open_store(bare):
     """Open its store; the one opened before is closed."""
     from annotator_files import LIMITS
 
-    from keyrecon.annotate.store import Store
-    from keyrecon.workspace import Workspace
+    from keyrecon.annotate.store.store import Store
+    from keyrecon.io.workspace import Workspace
 
     stores = []
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
-from keyrecon.formats.picks import read_picks
-from keyrecon.lifting.lift import LiftOptions, lift_motion
-from keyrecon.matching.keyframes import KeyframeOptions
-from keyrecon.matching.propagate import propagate_joints
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.video import open_video
+from keyrecon.keyframes.selection import KeyframeOptions
+from keyrecon.lifting.lifting import LiftOptions, lift_motion
 from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe, pck, read_truth
 from keyrecon.pipeline import Options, prepare
-from keyrecon.synthetic.cameras import CameraOptions, View
+from keyrecon.propagation.propagation import propagate_joints
+from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
-from keyrecon.video import open_video
 
 FRAMES, FPS = 100, 30.0
 HIPS = (LSP14.index("right_hip"), LSP14.index("left_hip"))
@@ -26,7 +26,7 @@ HIPS = (LSP14.index("right_hip"), LSP14.index("left_hip"))
 def carried(tmp_path_factory):
     """A left-handed player filmed from behind by a panning camera, with joints carried over."""
     folder = tmp_path_factory.mktemp("sequence")
-    camera = CameraOptions(View.BACK, pan=True, width=480, height=270, player_px=140.0)
+    camera = CameraPlanOptions(View.BACK, pan=True, width=480, height=270, player_px=140.0)
     scene = SceneOptions(seed=9, camera=camera, left_handed=True, workers=1)
     synthesize(folder, (), SynthOptions(scene, JoinOptions(seconds=FRAMES / FPS, fps=FPS)))
     truth = read_truth(folder / "truth.npz")

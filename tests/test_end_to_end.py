@@ -7,23 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from keyrecon import cli, project
+from keyrecon import cli
+from keyrecon.app import project
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.coco import write_coco
-from keyrecon.formats.keyframes import keyframes_from_json
-from keyrecon.formats.npz import read_motion
-from keyrecon.formats.picks import read_picks
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
-from keyrecon.synthetic.cameras import CameraOptions
+from keyrecon.synthetic.cameras import CameraPlanOptions
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
-from keyrecon.video import open_video
-from keyrecon.video_writer import write_video
-from keyrecon.workspace import Workspace
 
 SIZE = (480, 270)
 FRAMES = 120
@@ -45,7 +46,7 @@ def keyrecon(*words):
 def clip(tmp_path_factory):
     """A rendered clip, its project with keyframes, and marks from the truth."""
     folder = tmp_path_factory.mktemp("clip")
-    camera = CameraOptions(width=SIZE[0], height=SIZE[1], player_px=150.0)
+    camera = CameraPlanOptions(width=SIZE[0], height=SIZE[1], player_px=150.0)
     scene = SceneOptions(seed=2, camera=camera, workers=1)
     synthesize(folder, (), SynthOptions(scene, JoinOptions(seconds=FRAMES / 30, fps=30.0)))
     made = folder / "project"

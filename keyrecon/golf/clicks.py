@@ -26,7 +26,7 @@ SHORTEST_PLAYER = 60.0
 
 
 @dataclass(frozen=True)
-class Clicks:
+class GolfClicks:
     """What a person clicked in one frame, and roughly knows about player and camera."""
 
     frame: int
@@ -74,7 +74,7 @@ class Clicks:
         return float(np.linalg.norm(self.place("head_top") - self.feet))
 
 
-def check_clicks(clicks: Clicks, n_frames: int, size: tuple[int, int]) -> None:
+def check_clicks(clicks: GolfClicks, n_frames: int, size: tuple[int, int]) -> None:
     """Raises KeyreconError where clicks do not belong to a video of this length and size."""
     if clicks.size != size:
         raise KeyreconError(
@@ -87,7 +87,7 @@ def check_clicks(clicks: Clicks, n_frames: int, size: tuple[int, int]) -> None:
         )
 
 
-def check_joints(clicks: Clicks, origin: str) -> None:
+def check_joints(clicks: GolfClicks, origin: str) -> None:
     """The joints that a start needs, inside the picture, the right way up.
 
     Raises KeyreconError that names `origin`, the file they come from.
@@ -111,7 +111,7 @@ def check_joints(clicks: Clicks, origin: str) -> None:
     _check_posture(clicks, origin)
 
 
-def _check_posture(clicks: Clicks, origin: str) -> None:
+def _check_posture(clicks: GolfClicks, origin: str) -> None:
     if clicks.height < SHORTEST_PLAYER:
         raise KeyreconError(
             f"{origin}: head and ankles are only {clicks.height:.0f} px apart; the player must be "

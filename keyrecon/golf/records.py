@@ -119,7 +119,7 @@ class SwingState:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class RootPose:
     """All segments in camera axes."""
 
     origins: Float[np.ndarray, "T P 3"]
@@ -139,7 +139,7 @@ class Matches:
 
 
 @dataclass(frozen=True, eq=False)
-class Marks:
+class SwingMarks:
     """Joints that a person marked in some frames."""
 
     frames: Int[np.ndarray, "K"]
@@ -173,7 +173,7 @@ class Observations:
     mu: Float[np.ndarray, "T"]
     """First guess of the normalised time."""
     left_handed: bool
-    marks: Marks | None = None
+    marks: SwingMarks | None = None
     """Annotated keyframes, where a person made some."""
 
 
@@ -201,7 +201,7 @@ class FittedSwing:
     motion: Motion
     state: SwingState
     body: Body
-    pose: Pose
+    pose: RootPose
     """In the real camera, of the real player."""
     capsules: Capsules
     """On the segments of `pose`."""

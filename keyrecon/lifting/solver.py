@@ -15,11 +15,11 @@ from jaxtyping import Float
 from scipy.linalg import solveh_banded
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.chain import pose_from_directions
+from keyrecon.lifting.bone_directions import pose_from_directions
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class MotionState:
     """A motion: root in the image and bone directions in space."""
 
     root: Float[np.ndarray, "T 2"]
@@ -46,7 +46,7 @@ class Linear:
     """Value of the term where it is not half the sum of squared residuals (robust terms)."""
 
 
-Term = Callable[[State], Linear]
+Term = Callable[[MotionState], Linear]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class Smoothness:
 
 
 def solve(
-    start: State, terms: Sequence[Term], smoothness: Smoothness, rounds: int, tolerance: float
-) -> State:
+    start: MotionState, terms: Sequence[Term], smoothness: Smoothness, rounds: int, tolerance: float
+) -> MotionState:
     """Lower the sum of all terms until a step gains less than the share `tolerance`."""
     state, damping = start, 1e-3
     lines = [term(state) for term in terms]
@@ -89,13 +89,15 @@ def tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3
     return np.stack([first, np.cross(directions, first)], axis=-1)
 
 
-def _move(state: State, step: Float[np.ndarray, "T D"]) -> State:
+def _move(state: MotionState, step: Float[np.ndarray, "T D"]) -> MotionState:
     turn = step[:, 2:].reshape(len(step), -1, 2)
     moved = state.directions + np.einsum("tbik,tbk->tbi", tangents(state.directions), turn)
-    return State(state.root + step[:, :2], moved / np.linalg.norm(moved, axis=-1, keepdims=True))
+    return MotionState(
+        state.root + step[:, :2], moved / np.linalg.norm(moved, axis=-1, keepdims=True)
+    )
 
 
-def _cost(state: State, lines: Sequence[Linear], smoothness: Smoothness) -> float:
+def _cost(state: MotionState, lines: Sequence[Linear], smoothness: Smoothness) -> float:
     total = sum(
         0.5 * float((line.residual**2).sum()) if line.cost is None else line.cost for line in lines
     )
@@ -104,7 +106,7 @@ def _cost(state: State, lines: Sequence[Linear], smoothness: Smoothness) -> floa
 
 
 def _step(
-    state: State, lines: Sequence[Linear], smoothness: Smoothness, damping: float
+    state: MotionState, lines: Sequence[Linear], smoothness: Smoothness, damping: float
 ) -> Float[np.ndarray, "T D"]:
     basis = tangents(state.directions)
     hessian, gradient = _gather(lines, basis)

@@ -11,13 +11,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.chain import bone_vectors, unit
-from keyrecon.lifting.depths import DepthModel, usual_depths
-from keyrecon.lifting.flips import choose_signs
-from keyrecon.lifting.lengths import BodySize
-from keyrecon.lifting.observe import Observed
-from keyrecon.lifting.shown import depth_doubt, depth_share
-from keyrecon.lifting.signs import FlipOptions, Shown, Signs
+from keyrecon.lifting.bone_directions import bone_vectors, unit
+from keyrecon.lifting.depth_evidence import DepthSignOptions, DepthSigns, ForeshortenedBones
+from keyrecon.lifting.depth_signs import choose_depth_signs
+from keyrecon.lifting.foreshortening import depth_doubt, depth_share
+from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.lifting.preprocessing import PreparedTracks
+from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.records import Annotations
 
 _GUESS = 0.3
@@ -39,11 +39,11 @@ class KeyPoses:
 
 
 def lift_keyframes(
-    observed: Observed,
+    observed: PreparedTracks,
     annotations: Annotations,
     size: BodySize,
-    options: FlipOptions = FlipOptions(),
-    signs: Signs | None = None,
+    options: DepthSignOptions = DepthSignOptions(),
+    signs: DepthSigns | None = None,
 ) -> KeyPoses:
     """Poses of the annotated frames, with confirmed depth signs where there are any.
 
@@ -51,22 +51,26 @@ def lift_keyframes(
     picture is judged by itself.
     """
     frames, skeleton = annotations.frames, annotations.skeleton
-    shown = show_bones(observed.joints[frames], observed.spread[frames], size.lengths, skeleton)
+    shown = foreshorten_bones(
+        observed.joints[frames], observed.spread[frames], size.lengths, skeleton
+    )
     if signs is None:
-        signs = choose_signs(shown, annotations.nearer, size.breadths, skeleton, options)
+        signs = choose_depth_signs(shown, annotations.nearer, size.breadths, skeleton, options)
     marked = np.isfinite(annotations.joints[:, skeleton.bones, 0]).all(axis=-1)
     sure = marked | (annotations.nearer != 0)
     trust = np.where(sure, 1.0, _GUESS * (2 * signs.probability - 1))
-    return KeyPoses(lift_shown(shown, signs.sign), signs.probability, trust, annotations.nearer)
+    return KeyPoses(
+        lift_foreshortened(shown, signs.sign), signs.probability, trust, annotations.nearer
+    )
 
 
-def show_bones(
+def foreshorten_bones(
     joints: Float[np.ndarray, "T J 2"],
     noise: Float[np.ndarray, "T J"],
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
     model: DepthModel | None = None,
-) -> Shown:
+) -> ForeshortenedBones:
     """Everything about bones but the sign of their depth; joints and noise in units of length.
 
     A bone with a missing end is taken to lie anywhere: it shows nothing and may be as deep as
@@ -81,10 +85,12 @@ def show_bones(
     share = depth_share(shown, blur)
     flat = np.sqrt(1 - share**2)[..., None] * unit(np.nan_to_num(vectors))
     doubt = lengths * depth_doubt(shown, blur)
-    usual = usual_depths(model, vectors, lengths, skeleton)
-    return Shown(lengths[:, None] * flat, lengths * share, doubt, usual)
+    usual = expected_depth(model, vectors, lengths, skeleton)
+    return ForeshortenedBones(lengths[:, None] * flat, lengths * share, doubt, usual)
 
 
-def lift_shown(shown: Shown, sign: Int[np.ndarray, "T B"]) -> Float[np.ndarray, "T B 3"]:
+def lift_foreshortened(
+    shown: ForeshortenedBones, sign: Int[np.ndarray, "T B"]
+) -> Float[np.ndarray, "T B 3"]:
     """Unit bone directions of the given depth signs."""
     return unit(np.concatenate([shown.flat, (sign * shown.depth)[..., None]], axis=-1))

@@ -4,13 +4,13 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.chain import ancestry
-from keyrecon.lifting.observe import Observed
-from keyrecon.lifting.solver import Linear, State, Term
+from keyrecon.lifting.bone_directions import ancestry
+from keyrecon.lifting.preprocessing import PreparedTracks
+from keyrecon.lifting.solver import Linear, MotionState, Term
 
 
 def reprojection(
-    observed: Observed,
+    observed: PreparedTracks,
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
 ) -> Term:
@@ -27,7 +27,7 @@ def reprojection(
     for axis in range(2):
         slope[:, axis, :, axis] = reach
 
-    def term(state: State) -> Linear:
+    def term(state: MotionState) -> Linear:
         frames = len(target)
         residual = inverse[..., None] * (state.points(lengths, skeleton)[..., :2] - target)
         size = np.linalg.norm(residual, axis=-1)
@@ -55,7 +55,7 @@ def breadth(
     ways = ancestry(skeleton) * lengths
     difference = ways[pair[0]] - ways[pair[1]]
 
-    def term(state: State) -> Linear:
+    def term(state: MotionState) -> Linear:
         across = np.einsum("b,tbi->ti", difference, state.directions)
         size = np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
         toward = across / size / spread
@@ -69,7 +69,7 @@ def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
     slope = np.zeros((3, len(share), 3))
     slope[np.arange(3), :, np.arange(3)] = share / spread
 
-    def term(state: State) -> Linear:
+    def term(state: MotionState) -> Linear:
         residual = np.einsum("b,tbi->ti", share, state.directions) / spread
         return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
 
@@ -82,7 +82,7 @@ def balance(share: Float[np.ndarray, "B"], tilt: float, spread: float) -> Term:
     slope[0, :, 2] = share / spread
     slope[0, :, 1] = -tilt * share / spread
 
-    def term(state: State) -> Linear:
+    def term(state: MotionState) -> Linear:
         residual = np.einsum("mbi,tbi->tm", slope, state.directions)
         return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
 
@@ -99,7 +99,7 @@ def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], spread: float) -> Term:
     for bone in range(bones):
         identity[bone, :, bone] = np.eye(3) / spread
 
-    def term(state: State) -> Linear:
+    def term(state: MotionState) -> Linear:
         frames = len(wanted)
         off = (state.directions - wanted) / spread
         size = np.sqrt(1 + (off**2).sum(axis=-1, keepdims=True))

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from plotly.subplots import make_subplots
 
 from keyrecon.body import Skeleton
-from keyrecon.records import SOURCES, Comparison, HalfKeyframes, Keyframes, Motion
+from keyrecon.records import SOURCES, HalfKeyframes, Keyframes, Motion, PoseDistances
 from keyrecon.report.drawing import joint_sides
 from keyrecon.report.summary import (
     hinge_angles,
@@ -31,7 +31,7 @@ def plain_name(name: str) -> str:
     return name.replace("_", " ")
 
 
-def keyframe_chart(keyframes: Keyframes, comparison: Comparison) -> go.Figure:
+def keyframe_chart(keyframes: Keyframes, comparison: PoseDistances) -> go.Figure:
     """Which keyframe stands for which frame (Fig. 6), both halves of the body."""
     figure = stack_charts(("Upper body", "Lower body"), len(comparison.row))
     halves = ((keyframes.upper, comparison.upper), (keyframes.lower, comparison.lower))
@@ -42,7 +42,7 @@ def keyframe_chart(keyframes: Keyframes, comparison: Comparison) -> go.Figure:
 
 
 def _between_keyframes(
-    half: HalfKeyframes, comparison: Comparison, distances: Float[np.ndarray, "M M"]
+    half: HalfKeyframes, comparison: PoseDistances, distances: Float[np.ndarray, "M M"]
 ) -> Float[np.ndarray, "K K"]:
     rows = comparison.row[half.frames]
     return distances[np.ix_(rows, rows)].astype(np.float64)

@@ -1,15 +1,110 @@
-"""Pictures of a swing: key postures with the golfer on them, and the paths of club and hands."""
+"""The golfer's volumetric primitives on a picture, and as seen from above (CVPR 2005, Fig. 1).
 
-from collections.abc import Sequence
+A tapered capsule looks like the hull of two discs; far ones are drawn before near ones.
+
+Pictures of a swing: key postures with the golfer on them, and the paths of club and hands.
+
+The video with the fitted golfer and club on it, and the view from above in a corner.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from keyrecon.golf.records import FittedSwing, Observations
-from keyrecon.report.golf_figure import CLUB, draw_from_above, draw_golfer
+from keyrecon.golf.prior.skeleton import NAMES
+from keyrecon.golf.records import Camera, Capsules, FittedSwing, Observations, RootPose
+from keyrecon.io.video import Video
+from keyrecon.io.video_writer import write_video
+from keyrecon.progress import Progress, silent
+from keyrecon.report.drawing import LEFT, RIGHT, SEAM, SUBPIXEL, TRUNK, draw_pose
 from keyrecon.report.pictures import jpeg_uri
-from keyrecon.video import Video
+
+CLUB = (213, 94, 0)
+"""Vermillion of Okabe and Ito."""
+BODY = (196, 190, 180)
+FLOOR = (46, 52, 50)
+REACH = 1.5
+"""Metres from the player to the edge of the view from above."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Both ends of every capsule as seen."""
+
+    centres: Float[np.ndarray, "Q 2 2"]
+    """px"""
+    radii: Float[np.ndarray, "Q 2"]
+    """px"""
+    order: list[int]
+    """Far to near."""
+
+
+def draw_golfer(
+    picture: UInt8[np.ndarray, "h w 3"], fitted: FittedSwing, camera: Camera, frame: int
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A copy of the picture with translucent primitives and the club on it."""
+    ends, radii = _place(fitted.capsules, fitted.pose, frame)
+    scale = camera.focal / np.maximum(ends[..., 2:], 0.1)
+    discs = Discs(
+        ends[..., :2] * scale + camera.principal,
+        radii * scale[..., 0],
+        np.argsort(-ends[..., 2].mean(axis=1)).tolist(),
+    )
+    layer = picture.copy()
+    _draw_discs(layer, discs, fitted.capsules)
+    drawn = cv2.addWeighted(layer, 0.6, picture, 0.4, 0)
+    _draw_club(drawn, fitted.club_seen[frame])
+    return drawn
+
+
+def draw_from_above(fitted: FittedSwing, frame: int, size: int) -> UInt8[np.ndarray, "size size 3"]:
+    """The primitives from above: the camera is below the picture and looks up in it."""
+    middle = fitted.pose.origins[0, 0]
+    scale = size / (2 * REACH)
+
+    def look(points: np.ndarray) -> np.ndarray:
+        flat = (points - middle)[..., [0, 2]] * [1.0, -1.0]
+        return flat * scale + size / 2
+
+    ends, radii = _place(fitted.capsules, fitted.pose, frame)
+    discs = Discs(look(ends), radii * scale, np.argsort(-ends[..., 1].mean(axis=1)).tolist())
+    picture = np.full((size, size, 3), FLOOR, np.uint8)
+    _draw_discs(picture, discs, fitted.capsules)
+    _draw_club(picture, look(fitted.club[frame]))
+    return picture
+
+
+def _place(
+    capsules: Capsules, pose: RootPose, frame: int
+) -> tuple[Float[np.ndarray, "Q 2 3"], Float[np.ndarray, "Q 2"]]:
+    """Both ends in camera axes, and radii."""
+    local = np.stack([capsules.start, capsules.end], axis=1)
+    turned = local @ np.swapaxes(pose.rotations[frame, capsules.segment], 1, 2)
+    return pose.origins[frame, capsules.segment][:, None] + turned, capsules.radii
+
+
+def _draw_discs(picture: UInt8[np.ndarray, "h w 3"], discs: Discs, capsules: Capsules) -> None:
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = np.stack([np.cos(around), np.sin(around)], axis=1)
+    for q in discs.order:
+        rims = discs.centres[q][:, None] + discs.radii[q][:, None, None] * ring
+        hull = cv2.convexHull((rims.reshape(-1, 2) * 2**SUBPIXEL).astype(np.int32))
+        name = NAMES[capsules.segment[q]]
+        side = LEFT if name.startswith("left") else RIGHT if name.startswith("right") else BODY
+        cv2.fillConvexPoly(picture, hull, side, cv2.LINE_AA, SUBPIXEL)
+        cv2.polylines(picture, [hull], True, SEAM, 1, cv2.LINE_AA, SUBPIXEL)
+
+
+def _draw_club(picture: UInt8[np.ndarray, "h w 3"], ends: Float[np.ndarray, "2 2"]) -> None:
+    grip, head = (tuple(p) for p in (np.clip(ends, -9e3, 9e3) * 2**SUBPIXEL).astype(int).tolist())
+    cv2.line(picture, grip, head, SEAM, 4, cv2.LINE_AA, SUBPIXEL)
+    cv2.line(picture, grip, head, CLUB, 2, cv2.LINE_AA, SUBPIXEL)
+    cv2.circle(picture, head, 4 * 2**SUBPIXEL, TRUNK, 1, cv2.LINE_AA, SUBPIXEL)
+
 
 HANDS = (0, 114, 178)
 """Blue of Okabe and Ito."""
@@ -93,3 +188,43 @@ def _chosen(video: Video, frames: list[int]) -> list[tuple[int, np.ndarray]]:
 def _small(picture: UInt8[np.ndarray, "h w 3"], width: int = WIDTH) -> str:
     share = min(1.0, width / picture.shape[1])
     return jpeg_uri(cv2.resize(picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA))
+
+
+INSET = 0.3
+"""Side of the view from above as a share of the picture's height."""
+
+
+def write_golf_overlay(
+    path: Path, video: Video, fitted: FittedSwing, camera: Camera, progress: Progress = silent
+) -> None:
+    """Write the overlay as a video."""
+    write_video(path, _overlay_frames(video, fitted, camera, progress), video.fps)
+
+
+def _overlay_frames(
+    video: Video, fitted: FittedSwing, camera: Camera, progress: Progress
+) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    for frame, picture in enumerate(progress(video.frames(), "Drawing the overlay", len(video))):
+        yield draw_overlay(picture, fitted, camera, frame)
+
+
+def draw_overlay(
+    picture: UInt8[np.ndarray, "h w 3"], fitted: FittedSwing, camera: Camera, frame: int
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Primitives, skeleton and club on one picture, the view from above in its upper corner."""
+    motion = fitted.motion
+    drawn = draw_golfer(picture, fitted, camera, frame)
+    drawn = draw_pose(
+        drawn, motion.points2d[frame], motion.skeleton, motion.points3d[frame, :, 2],
+        motion.source[frame],
+    )  # fmt: skip
+    size = round(INSET * picture.shape[0])
+    left = _emptier_side(fitted, picture.shape[1])
+    columns = slice(0, size) if left else slice(picture.shape[1] - size, None)
+    drawn[:size, columns] = draw_from_above(fitted, frame, size)
+    return drawn
+
+
+def _emptier_side(fitted: FittedSwing, width: int) -> bool:
+    """Whether the player stands in the right half, so that the left has room."""
+    return float(np.median(fitted.motion.points2d[..., 0])) > width / 2

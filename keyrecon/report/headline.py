@@ -4,8 +4,7 @@ import numpy as np
 
 from keyrecon.metrics import Scores, evaluate_motion
 from keyrecon.records import Motion
-from keyrecon.report.markup import note, table, text
-from keyrecon.report.material import ReportMaterial
+from keyrecon.report.markup import ReportMaterial, note, table, text
 from keyrecon.report.summary import annotation_cost, missing_shares
 
 

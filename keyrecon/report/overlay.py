@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from keyrecon.io.video import Video
+from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
 from keyrecon.report.drawing import TRUNK, draw_pose
-from keyrecon.video import Video
-from keyrecon.video_writer import write_video
 
 
 def write_overlay(path: Path, video: Video, motion: Motion, progress: Progress = silent) -> None:

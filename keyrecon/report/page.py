@@ -13,13 +13,12 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
-from keyrecon.durable import write_durably
+from keyrecon.io.durable import write_durably
 from keyrecon.progress import Progress, silent
 from keyrecon.report import charts, sections, tables
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
 from keyrecon.report.headline import headline
-from keyrecon.report.markup import data_block, note, pack, section, text, to_json
-from keyrecon.report.material import ReportMaterial
+from keyrecon.report.markup import ReportMaterial, data_block, note, pack, section, text, to_json
 from keyrecon.report.pictures import Pictures, cut_pictures
 from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth, stature
 

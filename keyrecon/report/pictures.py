@@ -16,12 +16,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d
 
-from keyrecon.pictures import reduce_picture
+from keyrecon.io.frame_reader import reduce_picture
+from keyrecon.io.video import Video
+from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Track
 from keyrecon.report.drawing import draw_pose
-from keyrecon.video import Video
-from keyrecon.video_writer import write_video
 
 STILL, CLIP = 420, 336
 """Side of the square stills and of the small video, px."""

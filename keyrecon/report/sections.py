@@ -6,8 +6,7 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.body import Skeleton
 from keyrecon.records import HalfKeyframes
-from keyrecon.report.markup import note, section, text, to_json
-from keyrecon.report.material import ReportMaterial
+from keyrecon.report.markup import ReportMaterial, note, section, text, to_json
 from keyrecon.report.pictures import Pictures, png_uri
 from keyrecon.report.summary import center_on_root, scale_truth, stature
 from keyrecon.report.views import VIEWS, pose_drawing

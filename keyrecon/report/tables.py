@@ -7,8 +7,7 @@ import numpy as np
 
 from keyrecon.records import Motion
 from keyrecon.report.charts import plain_name
-from keyrecon.report.markup import note, number, section, table
-from keyrecon.report.material import ReportMaterial
+from keyrecon.report.markup import ReportMaterial, note, number, section, table
 from keyrecon.report.summary import (
     bone_lengths,
     correction,

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter, lfilter_zi
 
-from keyrecon.camera import look_at, project_perspective
+from keyrecon.numerics.geometry import look_at, project_perspective
 
 
 class View(StrEnum):
@@ -84,7 +84,7 @@ class CameraMove:
 
 
 @dataclass(frozen=True)
-class CameraOptions:
+class CameraPlanOptions:
     """How the player is filmed."""
 
     view: View = View.OBLIQUE
@@ -104,7 +104,7 @@ def plan_camera(
     points: Float[np.ndarray, "T 14 3"],
     fps: float,
     stature: float,
-    options: CameraOptions,
+    options: CameraPlanOptions,
     rng: np.random.Generator,
 ) -> CameraMove:
     """Place a camera by its view and let it stand still or follow the player."""

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.formats.mocap import Capture
-from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, estimate_stature, joint
+from keyrecon.io.formats.mocap import Capture
+from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, estimate_stature, joint
 
 SHORTEST = 18
 """Frames that a clip has at least."""

@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt8
 
 from keyrecon.synthetic.cameras import CameraMove
 from keyrecon.synthetic.looks import Court, Look
-from keyrecon.synthetic.props import View, add_props
+from keyrecon.synthetic.props import PropView, add_props
 from keyrecon.synthetic.shading import make_noise
 
 NET_Z = -11.885
@@ -28,7 +28,7 @@ MOST_PIXELS = 8e6
 
 
 @dataclass(frozen=True, eq=False)
-class Background:
+class CourtPicture:
     """A picture on the plane of a reference view."""
 
     picture: UInt8[np.ndarray, "h w 3"]
@@ -61,17 +61,17 @@ class Rays:
         return np.float32(self.origin[axis]) + np.where(np.isfinite(t), t, 0) * self.direction[axis]
 
 
-def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> Background:
+def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> CourtPicture:
     """Surroundings as seen in all frames of a camera move; things stand `beyond` metres away."""
     rays, rotation, focal, lo = cast_rays(move)
     painted, surface_t = _paint(rays, look, np.random.default_rng([seed, 23]))
     picture = np.clip(painted, 0, 255).astype(np.uint8)
-    view = View(move.center, rotation, focal, -lo, beyond)
+    view = PropView(move.center, rotation, focal, -lo, beyond)
     behind = move.center[2] < NET_Z  # the camera looks through the net from the far side
     add_props(picture, view, (look, seed), lambda z: (z > NET_Z) == behind)
     _add_net(picture, rays, surface_t, look.court)
     add_props(picture, view, (look, seed), lambda z: (z > NET_Z) != behind)
-    return Background(picture, rotation, focal, lo)
+    return CourtPicture(picture, rotation, focal, lo)
 
 
 def cast_rays(move: CameraMove) -> tuple[Rays, np.ndarray, float, Float[np.ndarray, "2"]]:

@@ -11,12 +11,11 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.synthetic.cones import Solids
 from keyrecon.synthetic.figure import FigureSolids
 from keyrecon.synthetic.racket import MOST as RACKET_MOST
 from keyrecon.synthetic.racket import STEP as RACKET_STEP
 from keyrecon.synthetic.racket import Layer, draw_implement
-from keyrecon.synthetic.raster import Surface, draw_solids
+from keyrecon.synthetic.raster import Solids, Surface, draw_solids
 from keyrecon.synthetic.shading import paint_surface
 from keyrecon.synthetic.stage import Stage
 

@@ -16,9 +16,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from keyrecon.body import LSP14
-from keyrecon.synthetic.pointers import ANKLE_HEIGHT, STATURE, unit
-from keyrecon.synthetic.rally import Plan, ease, plan_points
-from keyrecon.synthetic.strokes import CHANNELS
+from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, unit
+from keyrecon.synthetic.rally import CHANNELS, PointPlan, ease, plan_points
 
 _LENGTH = {LSP14.names[c]: LSP14.proportions[c] for _, c in LSP14.bones}
 
@@ -47,7 +46,7 @@ def play_tennis(options: MotionOptions = MotionOptions()) -> Float[np.ndarray, "
 
 
 def _place_joints(
-    plan: Plan, times: Float[np.ndarray, "T"], options: MotionOptions
+    plan: PointPlan, times: Float[np.ndarray, "T"], options: MotionOptions
 ) -> Float[np.ndarray, "T 14 3"]:
     """Turn the plan into joints, limb by limb."""
     s = options.stature / STATURE
@@ -79,7 +78,7 @@ def _place_joints(
     return points
 
 
-def _poses(plan: Plan, times: Float[np.ndarray, "T"], rate: float) -> Float[np.ndarray, "T C"]:
+def _poses(plan: PointPlan, times: Float[np.ndarray, "T"], rate: float) -> Float[np.ndarray, "T C"]:
     """Key poses, interpolated without overshoot and rounded off in time."""
     kept: list[tuple[float, np.ndarray]] = []
     for time, numbers in sorted(plan.poses, key=lambda p: p[0]):
@@ -122,7 +121,7 @@ def _square(vectors: np.ndarray, to: np.ndarray) -> np.ndarray:
 
 
 def _feet(
-    plan: Plan, times: Float[np.ndarray, "T"], scale: float
+    plan: PointPlan, times: Float[np.ndarray, "T"], scale: float
 ) -> tuple[Float[np.ndarray, "T 2 3"], Float[np.ndarray, "T 2"]]:
     """Ankles in the world and headings of the feet, right and left."""
     ankles = np.empty((len(times), 2, 3))

@@ -12,16 +12,14 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.body import LSP14
-from keyrecon.synthetic.cones import Solids
-from keyrecon.synthetic.figure import build_solids
+from keyrecon.synthetic.figure import build_solids, point_figure
 from keyrecon.synthetic.looks import Look, Rgb, choose_look
-from keyrecon.synthetic.pointers import point_figure
-from keyrecon.synthetic.raster import draw_solids
+from keyrecon.synthetic.raster import Solids, draw_solids
 from keyrecon.synthetic.shading import Light, Tiles, make_tiles, paint_surface
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PropView:
     """Camera and picture that props are drawn into."""
 
     center: Float[np.ndarray, "3"]
@@ -66,7 +64,7 @@ class Person:
 
 def add_props(
     picture: UInt8[np.ndarray, "h w 3"],
-    view: View,
+    view: PropView,
     scene: tuple[Look, int],
     wanted: Callable[[float], bool],
 ) -> None:
@@ -112,7 +110,7 @@ def _choose_boxes(rng: np.random.Generator, look: Look) -> list[Box]:
     return boxes
 
 
-def _draw_box(picture: np.ndarray, view: View, box: Box, look: Look) -> None:
+def _draw_box(picture: np.ndarray, view: PropView, box: Box, look: Look) -> None:
     """The faces that look at the camera, lit by their direction, and a shadow."""
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (0, 1) for z in (-1, 1)], float)
     world = np.array(box.place) + corners * np.array(box.size) * [0.5, 1, 0.5]
@@ -190,7 +188,7 @@ def _stand(person: Person) -> Float[np.ndarray, "14 3"]:
 
 
 def _draw_person(
-    picture: np.ndarray, view: View, person: Person, scene: tuple[Look, Tiles]
+    picture: np.ndarray, view: PropView, person: Person, scene: tuple[Look, Tiles]
 ) -> None:
     """A clothed bystander; one in three wears the player's shirt."""
     look, tiles = scene
@@ -229,7 +227,7 @@ _BALL = ((0.7, 1.0, (40, 50, 40)), (0.0, 1.0, (196, 208, 66)), (-0.3, 0.6, (222,
 
 
 def _draw_balls(
-    picture: np.ndarray, view: View, rng: np.random.Generator, wanted: Callable[[float], bool]
+    picture: np.ndarray, view: PropView, rng: np.random.Generator, wanted: Callable[[float], bool]
 ) -> None:
     """Tennis balls on the floor."""
     for _ in range(int(rng.integers(2, 9))):

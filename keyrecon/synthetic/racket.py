@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.synthetic.pointers import Pointers, joint, unit
+from keyrecon.synthetic.figure import Pointers, joint, unit
 
 GRIP = 0.08
 """Metres from the wrist to the middle of the fist."""

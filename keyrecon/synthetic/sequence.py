@@ -18,23 +18,22 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
-from keyrecon.durable import make_folder
-from keyrecon.formats.mocap import read_mocap
-from keyrecon.formats.picks import write_picks
+from keyrecon.io.durable import make_folder
+from keyrecon.io.formats.mocap import read_mocap
+from keyrecon.io.formats.picks import write_picks
+from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Pick
-from keyrecon.synthetic.cameras import CameraMove, CameraOptions, plan_camera
+from keyrecon.synthetic.cameras import CameraMove, CameraPlanOptions, plan_camera
 from keyrecon.synthetic.clips import JoinOptions, join_clips
-from keyrecon.synthetic.court import Background, draw_background
-from keyrecon.synthetic.figure import PARTS
+from keyrecon.synthetic.court import CourtPicture, draw_background
+from keyrecon.synthetic.figure import PARTS, point_figure
 from keyrecon.synthetic.looks import Look, choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
-from keyrecon.synthetic.pointers import point_figure
 from keyrecon.synthetic.racket import RACKET, racket_frames
 from keyrecon.synthetic.render import Frame, draw_frame
 from keyrecon.synthetic.shading import make_tiles
 from keyrecon.synthetic.stage import Stage
-from keyrecon.video_writer import write_video
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class SceneOptions:
 
     seed: int = 0
     """Decides looks, light, camera placement and noise."""
-    camera: CameraOptions = field(default_factory=CameraOptions)
+    camera: CameraPlanOptions = field(default_factory=CameraPlanOptions)
     shutter: float = 0.012
     """Seconds that the shutter is open."""
     noise: float = 2.2
@@ -90,7 +89,7 @@ def synthesize(
 
 def draw_court(
     points: Float[np.ndarray, "T 14 3"], move: CameraMove, look: Look, seed: int
-) -> Background:
+) -> CourtPicture:
     """A tennis court with nothing standing between camera and player."""
     return draw_background(move, look, seed, float(move.to_camera(points)[..., 2].max()) + 0.8)
 
@@ -99,7 +98,7 @@ def set_stage(
     points: Float[np.ndarray, "T 14 3"],
     fps: float,
     options: SceneOptions = SceneOptions(),
-    surroundings: Callable[..., Background] = draw_court,
+    surroundings: Callable[..., CourtPicture] = draw_court,
 ) -> Stage:
     """Everything that frames are drawn from; `points` in the world, metres, y up, floor at 0.
 

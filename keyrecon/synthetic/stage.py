@@ -6,10 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.synthetic.cameras import CameraMove
-from keyrecon.synthetic.court import Background
-from keyrecon.synthetic.figure import FigureSolids, build_solids
+from keyrecon.synthetic.court import CourtPicture
+from keyrecon.synthetic.figure import FigureSolids, Pointers, build_solids, unit
 from keyrecon.synthetic.looks import Look
-from keyrecon.synthetic.pointers import Pointers, unit
 from keyrecon.synthetic.racket import Implement
 from keyrecon.synthetic.shading import Light, Tiles
 
@@ -26,7 +25,7 @@ class Stage:
     held: Implement
     """What the player swings."""
     move: CameraMove
-    background: Background
+    background: CourtPicture
     look: Look
     tiles: Tiles
     noise: Int[np.ndarray, "h w 3"]

@@ -23,12 +23,12 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from keyrecon.camera import warp_points
-from keyrecon.pictures import read_grey, shrinking
+from keyrecon.io.frame_reader import read_grey, shrinking
+from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
-from keyrecon.tracking.overlay import Overlay
-from keyrecon.video import Video
+from keyrecon.segmentation.static_overlay import Overlay
 
 Grey = UInt8[np.ndarray, "h w"]
 Matrix = Float[np.ndarray, "3 3"]
@@ -45,16 +45,16 @@ FEW = 0.05
 """Share of the corners that may lie on overlays: so few are outvoted with the player."""
 NOTICEABLE = 3.0
 """A corner that the model moves by so much shows whether it belongs to the scene, reduced px."""
-REST = 4
+REST_MOTION = 4
 """Frames looked at together while the camera rests: only the last of them is registered."""
-CALM = 0.25
+STATIC_MOTION = 0.25
 """A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
 TRUSTED = 0.35
 """Share of agreeing corners below which a key picture has nothing to say."""
 
 
 @dataclass(frozen=True)
-class CameraOptions:
+class CameraMotionOptions:
     """How the background is followed."""
 
     width: int = 480
@@ -89,10 +89,10 @@ class _Match:
 
 
 @dataclass(eq=False)
-class _Follower:
+class _FeatureTracker:
     """Registers one frame after the other."""
 
-    options: CameraOptions
+    options: CameraMotionOptions
     forbidden: Bool[np.ndarray, "h w"] | None = None
     overlay: Overlay = field(default_factory=Overlay)
     keys: list[_Key] = field(default_factory=list)
@@ -124,7 +124,7 @@ class _Follower:
             return None
         to_start = _chain(key, match)
         step = _displacement(np.linalg.inv(guess) @ to_start, grey.shape)
-        return None if step * grey.shape[1] > CALM else (to_start, match.trust)
+        return None if step * grey.shape[1] > STATIC_MOTION else (to_start, match.trust)
 
     def _leaves(self, match: _Match, grey: Grey) -> bool:
         """Whether this frame shares too little with its key picture."""
@@ -149,8 +149,8 @@ def _chain(key: _Key, match: _Match) -> Float[np.ndarray, "3 3"]:
     return to_start / to_start[2, 2]
 
 
-def follow_camera(
-    video: Video, options: CameraOptions = CameraOptions(), progress: Progress = silent
+def estimate_camera_motion(
+    video: Video, options: CameraMotionOptions = CameraMotionOptions(), progress: Progress = silent
 ) -> CameraPath:
     """Homographies from every frame to the middle one, and how much to trust them.
 
@@ -162,12 +162,12 @@ def follow_camera(
     def pictures() -> Iterator[Grey]:
         return progress(read_grey(video, width), "Following the camera", len(video))
 
-    follower = _Follower(options)
+    follower = _FeatureTracker(options)
     path, trust = _follow(pictures(), follower, max(1, len(video) // 64))
     if _is_static(path, shape, options):
         return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
     if follower.overlay.share(np.concatenate([k.corners for k in follower.keys])) > FEW:
-        follower = _Follower(options, follower.overlay.mask())
+        follower = _FeatureTracker(options, follower.overlay.mask())
         path, trust = _follow(pictures(), follower)
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
@@ -178,7 +178,7 @@ def follow_camera(
 
 
 def _follow(
-    pictures: Iterable[Grey], follower: _Follower, watch: int | None = None
+    pictures: Iterable[Grey], follower: _FeatureTracker, watch: int | None = None
 ) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"]]:
     """Homographies to frame 0 in reduced pixels; evidence of overlays from each `watch`-th."""
     path: list[tuple[Matrix, float]] = []
@@ -187,7 +187,7 @@ def _follow(
         if watch and number % watch == 0:
             follower.overlay.add(grey)
         waiting.append(grey)
-        if len(waiting) == REST or len(path) < REST:
+        if len(waiting) == REST_MOTION or len(path) < REST_MOTION:
             path += _register(follower, waiting, path)
             waiting = []
     path += _register(follower, waiting, path)
@@ -195,14 +195,16 @@ def _follow(
 
 
 def _register(
-    follower: _Follower, waiting: list[Grey], before: list[tuple[Matrix, float]]
+    follower: _FeatureTracker, waiting: list[Grey], before: list[tuple[Matrix, float]]
 ) -> list[tuple[Matrix, float]]:
     """Poses of frames in a row; while the camera rests, the last one tells those before it."""
     found = list(before[-2:])
     if len(found) == 2 and waiting:
         last, there = found[0][0], found[1][0]
         step = _displacement(np.linalg.inv(last) @ there, waiting[0].shape)
-        if step * waiting[0].shape[1] < CALM and (rest := follower.glance(waiting[-1], there)):
+        if step * waiting[0].shape[1] < STATIC_MOTION and (
+            rest := follower.glance(waiting[-1], there)
+        ):
             along = np.linspace(0, 1, len(waiting) + 1)[1:]
             return [(there + share * (rest[0] - there), rest[1]) for share in along]
     for grey in waiting:
@@ -288,7 +290,7 @@ def _displacement(moved: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> fl
 
 
 def _is_static(
-    path: Float[np.ndarray, "T 3 3"], shape: tuple[int, int], options: CameraOptions
+    path: Float[np.ndarray, "T 3 3"], shape: tuple[int, int], options: CameraMotionOptions
 ) -> bool:
     """Whether nothing in the picture is moved noticeably in nearly all frames."""
     height, width = shape

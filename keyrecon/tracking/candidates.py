@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.ndimage import maximum_filter1d
 
-from keyrecon.tracking.evidence import HEAD_RADIUS, Evidence, mean_inside
-from keyrecon.tracking.feet import SHOE_RADIUS
-from keyrecon.tracking.symmetry import ellipse, find_peaks, find_slope, radial_symmetry
+from keyrecon.segmentation.part_evidence import HEAD_RADIUS, Evidence, mean_inside
+from keyrecon.tracking.foot_pairs import SHOE_RADIUS
+from keyrecon.tracking.radial_symmetry import ellipse, find_peaks, gradient_field, radial_symmetry
 
 RADII = (0.8, 1.0, 1.25)
 """Shares of a part's radius that are searched."""
@@ -35,7 +35,7 @@ LEAST_BODY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class PartCandidates:
     """What one frame offers."""
 
     heads: Float[np.ndarray, "m 2"]
@@ -45,10 +45,10 @@ class Candidates:
     """NaN where only the end of a leg was seen, and no shoe."""
 
 
-def search_frame(evidence: Evidence, tall: float) -> Candidates:
+def search_frame(evidence: Evidence, tall: float) -> PartCandidates:
     """Round head-coloured and elliptical shoe-coloured places, scored with their neighbourhood."""
     radii = [max(1.0, r * HEAD_RADIUS * tall) for r in RADII]
-    score = radial_symmetry(find_slope(evidence.head), radii)
+    score = radial_symmetry(gradient_field(evidence.head), radii)
     heads, strength = find_peaks(score, HEAD_RADIUS * tall, 3 * HEADS)
     body = mean_inside(evidence, heads, (-0.15, 0.12, 0.15, 0.65), tall)
     strength = strength * (0.02 + body)
@@ -56,7 +56,7 @@ def search_frame(evidence: Evidence, tall: float) -> Candidates:
     order = order[body[order] > LEAST_BODY]
     heads, strength = heads[order], strength[order]
     feet, foot_strength = _search_feet(evidence, heads[:4], tall)
-    return Candidates(heads, strength, feet, foot_strength)
+    return PartCandidates(heads, strength, feet, foot_strength)
 
 
 def _search_feet(
@@ -73,7 +73,7 @@ def _search_feet(
     rows, columns = np.flatnonzero(below.any(axis=1)), np.flatnonzero(below.any(axis=0))
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     corner = np.array([columns[0], rows[0]])
-    slope = find_slope(np.where(below, evidence.foot, 0)[window])
+    slope = gradient_field(np.where(below, evidence.foot, 0)[window])
     radii = [max(1.0, r * SHOE_RADIUS * tall) for r in RADII]
     score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOES], axis=0)
     feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below[window])

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
+from keyrecon.io.video import Video
 from keyrecon.records import CameraPath
-from keyrecon.video import Video
 
 
 def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:

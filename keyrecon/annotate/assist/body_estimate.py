@@ -1,0 +1,100 @@
+"""What the frames annotated so far say about the body: its size, and poses whose signs are known.
+
+A keyframe of one half of the body shows no whole trunk, and without a trunk nobody can tell which
+way a limb points. Joints that are not marked are therefore taken from the frame's ghost, with the
+spread that carried joints have.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.annotate.assist.pose_reading import Sighting
+from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
+from keyrecon.body import Skeleton
+from keyrecon.lifting.bone_directions import breadths
+from keyrecon.lifting.depth_signs import choose_depth_signs
+from keyrecon.lifting.limb_lengths import BodySize, LengthOptions, estimate_lengths
+from keyrecon.lifting.priors.exemplars import ExemplarPrior
+from keyrecon.lifting.taylor import foreshorten_bones
+from keyrecon.records import Annotations, JointTracks
+
+HEAD_TO_FEET = 0.9
+"""Share of stature from the head's centre to the feet (Drillis and Contini)."""
+GUESSED = 0.3
+"""Weight of a sign that nobody gave, against one that was given."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyEstimate:
+    """The player's body, as far as annotated frames tell."""
+
+    size: BodySize
+    frames: Int[np.ndarray, "K"]
+    vectors: Float[np.ndarray, "K B 3"]
+    """Bone vectors of the annotated frames, body heights."""
+    trust: Float[np.ndarray, "K B"]
+    """0-1: how far the sign of each bone's depth can be believed."""
+    skeleton: Skeleton
+
+    def votes(self, frame: int) -> ExemplarPrior | None:
+        """All other frames, asked for the signs of this one; None without any."""
+        rows = np.flatnonzero(self.frames != frame)
+        if not len(rows):
+            return None
+        nowhere, unguided = np.full(len(rows), -1), np.zeros((1, self.vectors.shape[1]))
+        return ExemplarPrior(self.vectors[rows], nowhere, self.trust[rows], unguided, self.skeleton)
+
+    def sighting(
+        self,
+        frame: int,
+        joints: Float[np.ndarray, "J 2"],
+        nearer: Int[np.ndarray, "B"],
+        ghost: PoseSuggestion | None = None,
+    ) -> Sighting:
+        """A frame's marks (px), and what its ghost has where nothing is marked."""
+        marked = np.isfinite(joints[:, 0])
+        places = joints if ghost is None else np.where(marked[:, None], joints, ghost.joints)
+        spread = np.where(marked, LengthOptions.click_noise, LengthOptions.track_noise)
+        return Sighting(places / self.size.scale[frame], spread, nearer)
+
+
+def estimate_body(
+    annotations: Annotations,
+    ghosts: Mapping[int, PoseSuggestion],
+    height_px: Float[np.ndarray, "T"],
+    fps: float,
+) -> BodyEstimate:
+    """Size and signs from everything annotated; `ghosts` by frame number, where there are any."""
+    skeleton, bones = annotations.skeleton, len(annotations.skeleton.bones)
+    size = _measure(annotations, height_px, fps)
+    plain = BodyEstimate(
+        size, annotations.frames[:0], np.zeros((0, bones, 3)), np.zeros((0, bones)), skeleton
+    )
+    rows = zip(annotations.frames.tolist(), annotations.joints, annotations.nearer, strict=True)
+    seen = [plain.sighting(t, joints, signs, ghosts.get(t)) for t, joints, signs in rows]
+    if not seen:
+        return plain
+    joints, spread = np.stack([s.joints for s in seen]), np.stack([s.spread for s in seen])
+    shown = foreshorten_bones(joints, spread, size.lengths, skeleton)
+    signs = choose_depth_signs(shown, annotations.nearer, size.breadths, skeleton)
+    vectors = np.concatenate([shown.flat, (signs.sign * shown.depth)[..., None]], axis=-1)
+    known = np.isfinite(joints[:, skeleton.bones, 0]).all(axis=2)
+    guessed = GUESSED * (2 * signs.probability - 1)
+    trust = known * np.where(annotations.nearer != 0, 1.0, guessed)
+    return BodyEstimate(size, annotations.frames, vectors, trust, skeleton)
+
+
+def _measure(annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: float) -> BodySize:
+    """The body's size; that of the table while nothing is marked."""
+    skeleton = annotations.skeleton
+    ends = annotations.joints[:, skeleton.bones]
+    if not np.isfinite(ends).all(axis=(2, 3)).any():
+        across = np.array([breadth for *_, breadth in breadths(skeleton)])
+        return BodySize(skeleton.lengths, across, height_px / HEAD_TO_FEET)
+    nothing = np.full((len(height_px), len(skeleton.names), 2), np.nan)
+    nowhere = np.zeros(nothing.shape[:2])
+    tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))
+    return estimate_lengths(tracks, annotations, height_px, fps)

@@ -1,0 +1,197 @@
+"""The 3D pose of one keyframe while it is being marked.
+
+Taylor's reconstruction leaves the sign of every bone's depth open. Sign vectors of the trunk, and
+of each limb given the trunk, are weighed by what bodies do (`lifting.anatomy`) and by the keyframes
+whose signs a person settled, where they look alike in the picture. The least cost is the pose
+shown; sums over exp(-cost) tell how sure each sign is; the next cheapest poses that differ to the
+eye are the alternatives. Signs that the person gave hold.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from keyrecon.body import Skeleton
+from keyrecon.lifting.bone_directions import ancestry
+from keyrecon.lifting.depth_evidence import DepthSignOptions, ForeshortenedBones, sign_states
+from keyrecon.lifting.depth_signs import sign_costs
+from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.lifting.priors.anatomy import anatomy_of
+from keyrecon.lifting.priors.exemplars import ExemplarPrior
+from keyrecon.lifting.taylor import foreshorten_bones
+
+ALTERNATIVES = 3
+"""Other poses offered at most."""
+PLAUSIBLE = 6.0
+"""Cost above the best at which a pose is not worth offering, nats: odds of 400 to 1."""
+DIFFERENT = 0.12
+"""Poses look different when a joint's depth differs by this, body heights: a forearm's length."""
+SINGLE = replace(DepthSignOptions(), votes=1.0, confirmed=100.0)
+"""A picture by itself counts once, and what the person says holds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """One frame's joints: marked, or foreseen where they are not marked."""
+
+    joints: Float[np.ndarray, "J 2"]
+    """Body heights; NaN where nothing is known."""
+    spread: Float[np.ndarray, "J"]
+    """Standard deviation of each joint, body heights."""
+    nearer: Int[np.ndarray, "B"]
+    """Signs that the person gave, as in `Annotations`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another pose that fits the picture as well."""
+
+    nearer: Int[np.ndarray, "B"]
+    points3d: Float[np.ndarray, "J 3"]
+    cost: float
+    """Above that of the pose shown, nats."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseReading:
+    """What is known of the pose of one frame."""
+
+    points3d: Float[np.ndarray, "J 3"]
+    """Body heights, camera axes, the root at depth 0; NaN where the joint is unknown."""
+    nearer: Int[np.ndarray, "B"]
+    """Sign of every bone, given or chosen."""
+    sure: Float[np.ndarray, "B"]
+    """0 a coin toss, 1 certain; 1 where the person gave the sign, 0 where an end is unknown."""
+    stretch: Float[np.ndarray, "B"]
+    """Shown length over the bone's length; much above 1 it cannot be. NaN where unknown."""
+    alternatives: tuple[Alternative, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Costs:
+    """Cost of the trunk's states and of each limb's states given the trunk's, nats."""
+
+    groups: tuple[tuple[int, ...], ...]
+    """Bones of the trunk, then those of each limb."""
+    trunk: Float[np.ndarray, "S"]
+    limbs: tuple[Float[np.ndarray, "S _"], ...]
+
+    def signs(self, states: tuple[int, ...]) -> Int[np.ndarray, "B"]:
+        """Sign of every bone when the groups are in these states: 1 farther, as in `Signs`."""
+        sign = np.ones(sum(map(len, self.groups)), dtype=np.int64)
+        for bones, state in zip(self.groups, states, strict=True):
+            sign[list(bones)] = sign_states(len(bones))[state]
+        return sign
+
+
+def read_pose(
+    sighting: Sighting, size: BodySize, skeleton: Skeleton, votes: ExemplarPrior | None = None
+) -> PoseReading:
+    """The most plausible pose, how sure its signs are, and what else it could be.
+
+    `votes` holds keyframes whose signs are known (not this one). A limb of which a joint is unknown
+    stays undecided, and all signs do until the trunk is known.
+    """
+    ends = sighting.joints[skeleton.bones]
+    known = np.isfinite(ends).all(axis=(1, 2))
+    shown = foreshorten_bones(sighting.joints[None], sighting.spread[None], size.lengths, skeleton)
+    shown = replace(shown, depth=shown.depth * known)
+    costs = _weigh(shown, sighting.nearer, known, (size, skeleton, votes))
+    ranked = sorted(_vary(costs), key=lambda pose: pose[0])
+    sign = costs.signs(ranked[0][1])
+    given = sighting.nearer != 0
+    return PoseReading(
+        points3d=_points(sighting, shown.depth[0] * sign, skeleton),
+        nearer=-sign,
+        sure=np.where(given, 1.0, _sureness(costs, sign) * known),
+        stretch=np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) / size.lengths,
+        alternatives=tuple(_differing(sighting, shown.depth[0], (costs, ranked), skeleton)),
+    )
+
+
+def _weigh(
+    shown: ForeshortenedBones,
+    nearer: Int[np.ndarray, "B"],
+    known: Bool[np.ndarray, "B"],
+    context: tuple[BodySize, Skeleton, ExemplarPrior | None],
+) -> _Costs:
+    """Costs of all states; where joints are unknown only what the person said counts."""
+    size, skeleton, votes = context
+    anatomy = anatomy_of(skeleton)
+    trunk, limbs = sign_costs(shown, nearer[None], size.breadths, skeleton, SINGLE)
+    groups = (anatomy.trunk, *(limb.bones for limb in anatomy.limbs))
+    free = [SINGLE.confirmed * _contradicts(bones, nearer) for bones in groups]
+    if not known[list(anatomy.trunk)].all():
+        return _Costs(groups, free[0], tuple(cost[None] + 0 * trunk.T for cost in free[1:]))
+    each = []
+    for bones, cost, unjudged in zip(groups[1:], limbs, free[1:], strict=True):
+        judged = known[list(bones)].all()
+        vote = votes.cost(bones, shown, SINGLE) if votes and judged else 0.0
+        each.append(cost[0] + vote if judged else unjudged + 0 * cost[0])
+    if votes and anatomy.trunk:
+        trunk = trunk + votes.cost(anatomy.trunk, shown, SINGLE)
+    return _Costs(groups, trunk[0], tuple(each))
+
+
+def _contradicts(bones: tuple[int, ...], nearer: Int[np.ndarray, "B"]) -> Float[np.ndarray, "S"]:
+    """How many given signs each state contradicts."""
+    return (sign_states(len(bones)) * nearer[list(bones)] > 0).sum(axis=1).astype(float)
+
+
+def _vary(costs: _Costs) -> Iterator[tuple[float, tuple[int, ...]]]:
+    """For every state of the trunk its cheapest limbs, and these with one limb changed."""
+    for s, trunk in enumerate(costs.trunk.tolist()):
+        best = [int(limb[s].argmin()) for limb in costs.limbs]
+        total = trunk + sum(float(limb[s].min()) for limb in costs.limbs)
+        yield total, (s, *best)
+        for place, limb in enumerate(costs.limbs):
+            for state in set(range(limb.shape[1])) - {best[place]}:
+                changed = (s, *best[:place], state, *best[place + 1 :])
+                yield total + float(limb[s, state] - limb[s].min()), changed
+
+
+def _sureness(costs: _Costs, sign: Int[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
+    """|2 p - 1| of each sign's probability p over all poses."""
+    likely = [np.exp(limb.min(axis=1, keepdims=True) - limb) for limb in costs.limbs]
+    best = costs.trunk + sum(limb.min(axis=1) for limb in costs.limbs)
+    trunk = np.exp(best.min() - best) * np.prod([limb.sum(axis=1) for limb in likely], axis=0)
+    trunk = trunk / trunk.sum()
+    shares = [trunk, *(trunk @ (limb / limb.sum(axis=1, keepdims=True)) for limb in likely)]
+    sure = np.zeros(len(sign))
+    for bones, share in zip(costs.groups, shares, strict=True):
+        agree = sign_states(len(bones)) == sign[list(bones)]
+        sure[list(bones)] = np.abs(2 * (share[:, None] * agree).sum(axis=0) - 1)
+    return sure
+
+
+def _points(
+    sighting: Sighting, depth: Float[np.ndarray, "B"], skeleton: Skeleton
+) -> Float[np.ndarray, "J 3"]:
+    """Joints where the picture has them, depths added up from the root."""
+    along = ancestry(skeleton) @ depth
+    along = np.where(np.isfinite(sighting.joints[:, 0]), along, np.nan)
+    middle = np.nanmean(sighting.joints, axis=0) if np.isfinite(along).any() else np.zeros(2)
+    return np.column_stack([sighting.joints - middle, along])
+
+
+def _differing(
+    sighting: Sighting,
+    depth: Float[np.ndarray, "B"],
+    poses: tuple[_Costs, list[tuple[float, tuple[int, ...]]]],
+    skeleton: Skeleton,
+) -> Iterator[Alternative]:
+    """The cheapest poses of which each looks different from all before it."""
+    costs, ranked = poses
+    ways, least = ancestry(skeleton), ranked[0][0]
+    seen = [ways @ (depth * costs.signs(ranked[0][1]))]
+    for cost, states in ranked[1:]:
+        if cost - least > PLAUSIBLE or len(seen) > ALTERNATIVES:
+            return
+        sign = costs.signs(states)
+        along = ways @ (depth * sign)
+        if min(np.abs(along - other).max() for other in seen) > DIFFERENT:
+            seen.append(along)
+            points = _points(sighting, depth * sign, skeleton)
+            yield Alternative(-sign, points, cost - least)

@@ -1,0 +1,1 @@
+"""The page's server: who may talk to it, what it answers, long jobs, frames."""

@@ -1,0 +1,160 @@
+"""The annotator's server: the route table, and what turns a question into an answer.
+
+Routes lead to plain functions (questions.py), which run in worker threads; bodies are parsed
+against a declared type before. Everything goes through the guard first.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from anyio import CapacityLimiter
+from anyio.to_thread import run_sync
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from keyrecon.annotate.server import handlers
+from keyrecon.annotate.server.security import Credentials, SecurityMiddleware
+from keyrecon.annotate.server.session import Session
+from keyrecon.annotate.store.edits import EditList
+from keyrecon.annotate.store.journal import NotSaved
+from keyrecon.errors import KeyreconError
+
+PAGE = Path(__file__).parent.parent / "page"
+TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+
+
+@dataclass(frozen=True)
+class ApiRoute:
+    """One line of the route table."""
+
+    method: str
+    path: str
+    answer: Callable[..., Any]
+    body: type | None = None
+    alone: bool = False
+    """Whether one question at a time is answered. The others wait outside the worker threads, so
+    that slow help never keeps an edit waiting."""
+
+
+ROUTES = (
+    ApiRoute("GET", "/api/project", handlers.project, alone=True),
+    ApiRoute("GET", "/api/state", handlers.state),
+    ApiRoute("POST", "/api/edits", handlers.edits, EditList),
+    ApiRoute("POST", "/api/undo", handlers.undo, handlers.HistoryRequest),
+    ApiRoute("POST", "/api/redo", handlers.redo, handlers.HistoryRequest),
+    ApiRoute("GET", "/api/ghost/{frame:int}", handlers.pose_suggestion, alone=True),
+    ApiRoute("POST", "/api/pose", handlers.pose, handlers.PoseRequest, alone=True),
+    ApiRoute("GET", "/api/checks", handlers.checks, alone=True),
+    ApiRoute("GET", "/api/next", handlers.suggestions, alone=True),
+    ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.StripRequest, alone=True),
+    ApiRoute("GET", "/api/backprojection/{frame:int}", handlers.backprojection, alone=True),
+    ApiRoute("GET", "/api/jobs", handlers.jobs),
+    ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
+    ApiRoute("DELETE", "/api/jobs/{job:int}", handlers.cancel_job),
+    ApiRoute("GET", "/api/motion", handlers.motion),
+    ApiRoute("POST", "/api/import", handlers.import_file, handlers.ImportRequest),
+    ApiRoute("GET", "/api/export/{format}", handlers.export_file),
+)
+
+
+def make_app(desk: Session, door: Credentials) -> ASGIApp:
+    """The application behind its guard."""
+    page = read_page(PAGE)
+    app = Starlette(
+        routes=make_routes(desk, page),
+        exception_handlers={
+            NotSaved: lambda _, fault: _error(507, str(fault)),
+            KeyreconError: lambda _, fault: _error(400, str(fault)),
+            HTTPException: lambda _, fault: _error(fault.status_code, fault.detail),
+            Exception: lambda *_: _error(500, "A fault of keyrecon; the terminal tells more."),
+        },
+    )
+    app.router.redirect_slashes = False
+    return SecurityMiddleware(app, door)
+
+
+def make_routes(desk: Session, page: dict[str, Response]) -> list[Route]:
+    """All routes there are."""
+
+    async def index(request: Request) -> Response:
+        return _page_file(page, "index.html")
+
+    async def part(request: Request) -> Response:
+        return _page_file(page, request.path_params["name"])
+
+    async def events(request: Request) -> Response:
+        first = {"revision": desk.store.state.revision}
+        return StreamingResponse(desk.events.stream(first), media_type="text/event-stream")
+
+    async def still(request: Request) -> Response:
+        return await _still(desk, request)
+
+    return [
+        Route("/", index, methods=["GET"]),
+        Route("/page/{name}", part, methods=["GET"]),
+        Route("/api/events", events, methods=["GET"]),
+        Route("/api/still/{frame:int}", still, methods=["GET"]),
+        *(Route(way.path, _endpoint(desk, way), methods=[way.method]) for way in ROUTES),
+    ]
+
+
+def read_page(folder: Path) -> dict[str, Response]:
+    """The files of the page by name; no other file is ever served."""
+    found = (path for path in sorted(folder.iterdir()) if path.suffix in TYPES)
+    return {path.name: Response(path.read_bytes(), media_type=TYPES[path.suffix]) for path in found}
+
+
+def _page_file(page: dict[str, Response], name: str) -> Response:
+    if name not in page:
+        raise HTTPException(404, "There is no such page.")
+    return page[name]
+
+
+def _endpoint(desk: Session, way: ApiRoute) -> Callable[[Request], Any]:
+    """An endpoint that parses what was asked, answers in a worker thread, and writes JSON."""
+    limiter = CapacityLimiter(1) if way.alone else None
+
+    async def endpoint(request: Request) -> Response:
+        body = _parsed(await request.body(), way.body) if way.body else None
+        asked = handlers.ApiRequest(request.path_params, dict(request.query_params), body)
+        answer = await run_sync(way.answer, desk, asked, limiter=limiter)
+        return answer if isinstance(answer, Response) else _json(answer)
+
+    return endpoint
+
+
+def _parsed(body: bytes, kind: type) -> Any:
+    try:
+        return msgspec.json.decode(body, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as fault:
+        raise KeyreconError(f"The request is not what this route takes: {fault}") from fault
+
+
+def _json(answer: Any, status: int = 200) -> Response:
+    """An answer as JSON; numbers that are none become null."""
+    return Response(msgspec.json.encode(answer), status, media_type="application/json")
+
+
+def _error(status: int, text: str) -> Response:
+    return _json({"error": text}, status)
+
+
+async def _still(desk: Session, request: Request) -> Response:
+    """A frame as JPEG. With the right ?v= the browser may keep it for good: another project may
+    have the same port later, and then `v` differs."""
+    width, stills = request.query_params.get("width", ""), desk.stills
+    if width and not (width.isascii() and width.isdecimal() and len(width) < 6):
+        raise KeyreconError("'width' is a number of pixels.")
+    picture = stills.still(request.path_params["frame"], int(width or 0) or None)
+    lasting = request.query_params.get("v") == stills.identity
+    control = "private, max-age=31536000, immutable" if lasting else "no-store"
+    data = await asyncio.wrap_future(picture)
+    return Response(data, media_type="image/jpeg", headers={"Cache-Control": control})

@@ -1,0 +1,330 @@
+"""What the commands do to a project folder; each returns the text to show."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from keyrecon.body import read_skeleton
+from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.durable import make_folder, write_durably
+from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
+from keyrecon.io.formats.annotations import (
+    find_conflicts,
+    merge_annotations,
+    missing_marks,
+    read_annotations,
+)
+from keyrecon.io.formats.coco import read_coco, write_coco
+from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.video import Video, open_video
+from keyrecon.io.video_writer import write_picture
+from keyrecon.io.workspace import Workspace
+from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.metrics import evaluate_motion, read_truth
+from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_height
+from keyrecon.progress import Progress
+from keyrecon.records import Annotations, Keyframes, Motion, Pick
+from keyrecon.report.markup import ReportMaterial
+from keyrecon.report.page import write_report
+from keyrecon.report.summary import annotation_cost
+
+
+def start(
+    video: Path,
+    folder: Path,
+    trim: tuple[int, int | None] = (0, None),
+    slow_motion: float = 1.0,
+    skeleton: Path | None = None,
+) -> str:
+    """Make a project folder for a video; `trim` is the first frame and the one after the last."""
+    first, end = trim
+    opened = open_video(video, first, end, slow_motion)
+    if skeleton is not None:
+        read_skeleton(skeleton)
+    told = {"start": first or None, "end": end}
+    told["slow_motion"] = None if slow_motion == 1 else slow_motion
+    Workspace.create(folder, opened, video, told)
+    if skeleton is not None:
+        write_durably(folder / "skeleton.json", skeleton.read_bytes())
+    text = (
+        f"{folder}: {_counted(len(opened), 'frame')} of {opened.width}x{opened.height} at "
+        f"{opened.fps:.4g} frames per second."
+    )
+    if opened.variable_rate:
+        text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
+    return (
+        f"{text}\nNext: keyrecon annotate {quoted(folder)} to click the colours on a page, or "
+        f"keyrecon pick {quoted(folder)} --frame N --head X,Y --foot X,Y ..."
+    )
+
+
+def point(text: str, flag: str) -> tuple[float, float]:
+    """Parse X,Y."""
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError as fault:
+        raise KeyreconError(
+            f"{flag} needs X,Y in pixels, such as 640,210; got '{text}'."
+        ) from fault
+    return x, y
+
+
+def region_pick(frame: int, text: str) -> Pick:
+    """Parse NAME:X,Y."""
+    name, colon, where = text.partition(":")
+    if not colon or not name.strip():
+        raise KeyreconError(f"--region needs NAME:X,Y, such as shirt:640,290; got '{text}'.")
+    return Pick(frame, name.strip().lower(), *point(where, "--region"))
+
+
+def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
+    """Add clicks after checking that they are on the picture."""
+    if not picks:
+        raise KeyreconError("Nothing was picked; give --head, --foot or --region.")
+    video = workspace.video()
+    for p in picks:
+        if not 0 <= p.frame < len(video):
+            raise KeyreconError(
+                f"Frame {p.frame} is outside the video, which has frames 0 to {len(video) - 1}."
+            )
+        if not (0 <= p.x < video.width and 0 <= p.y < video.height):
+            raise KeyreconError(
+                f"The {p.part} pick {p.x:g},{p.y:g} on frame {p.frame} is outside the picture of "
+                f"{video.width}x{video.height}."
+            )
+    together = workspace.add_picks(picks)
+    counts = {part: sum(p.part == part for p in together) for part in {p.part for p in together}}
+    listed = ", ".join(f"{n} {part}" for part, n in sorted(counts.items()))
+    return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {quoted(workspace.folder)}"
+
+
+def find_keyframes(
+    workspace: Workspace, options: Options, chosen: dict[str, object], progress: Progress
+) -> str:
+    """Run the automatic part; write keyframes.json and a picture of each keyframe."""
+    wanted = {name: value for name, value in chosen.items() if value is not None}
+    options = workspace.options(options, Options())
+    options = replace(options, keyframes=replace(options.keyframes, **wanted))
+    keep = workspace.stages.keep
+    preparation = prepare(workspace.video(), workspace.picks(), options, keep, progress)
+    workspace.remember(options, Options())
+    write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
+    write_keyframe_pictures(workspace, preparation, progress)
+    return describe_keyframes(workspace, preparation)
+
+
+def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
+    """What was found, and what to do next."""
+    found, frames = preparation.keyframes, len(preparation.video)
+    folder = quoted(workspace.folder)
+    seen = float((preparation.track.trust > 0).mean())
+    halves = [
+        f"{name} body: {_counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
+        f"frames (beta {half.beta:.4f}; as printed in the paper it would take "
+        f"{half.printed_count})."
+        for name, half in (("Upper", found.upper), ("Lower", found.lower))
+    ]
+    return "\n".join(
+        [
+            f"Player found in {seen:.1%} of {frames} frames.",
+            *_describe_absence(preparation),
+            *halves,
+            f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
+            f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
+            f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
+            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
+        ]
+    )
+
+
+def _describe_absence(preparation: Preparation) -> list[str]:
+    """Stretches in which no keyframes are asked for."""
+    clarity, reach = preparation.comparison.clarity, preparation.keyframes.reach
+    stretches = list_stretches(absent_frames(clarity, reach))
+    if not stretches:
+        return []
+    listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
+    more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
+    return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def write_keyframe_pictures(
+    workspace: Workspace, preparation: Preparation, progress: Progress
+) -> None:
+    """One PNG per keyframe, named by frame number as labelling tools keep it."""
+    make_folder(workspace.pictures)
+    frames = preparation.keyframes.frames.tolist()
+    for frame in progress(frames, "Writing keyframe pictures", len(frames)):
+        path = workspace.pictures / f"frame_{frame:06d}.png"
+        if not path.exists():
+            write_picture(path, preparation.video.frame(frame))
+
+
+def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:
+    """Add marks from a file to the project's annotations."""
+    video = workspace.video()
+    size = (video.width, video.height)
+    merged = read_annotations(file, workspace.skeleton, len(video), size)
+    with workspace.exclusive():
+        if workspace.annotations_file.is_file():
+            merged = _merge(workspace, load_annotations(workspace, video), merged, replacing)
+        write_coco(workspace.annotations_file, merged, size)
+    warnings = [*joints_outside(merged, size), *implausible_bones(merged)]
+    return "\n".join(
+        [
+            f"{workspace.annotations_file}: marks on {len(merged.frames)} frames.",
+            *(f"Warning: {text}" for text in warnings),
+            f"Next: keyrecon run {quoted(workspace.folder)}",
+        ]
+    )
+
+
+def _merge(
+    workspace: Workspace, old: Annotations, new: Annotations, replacing: bool
+) -> Annotations:
+    conflicts = find_conflicts(old, new)
+    if conflicts and not replacing:
+        listed = ", ".join(conflicts[:5]) + (" ..." if len(conflicts) > 5 else "")
+        raise KeyreconError(
+            f"{len(conflicts)} marks differ from those in the project ({listed}); nothing was "
+            "changed. Add --replace to take the new ones and keep the old file beside them."
+        )
+    if conflicts:
+        workspace.put_aside(workspace.annotations_file)
+    return merge_annotations(old, new)
+
+
+def load_annotations(workspace: Workspace, video: Video) -> Annotations:
+    """The project's annotations, checked."""
+    size = (video.width, video.height)
+    return read_coco(workspace.annotations_file, workspace.skeleton, len(video), size)
+
+
+def settings(workspace: Workspace, told: Options, height: float | None = None) -> Options:
+    """The project's options and what is told now, with the height in metres; remembered."""
+    if height is not None and not 0.5 < height < 2.6:
+        raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
+    options = workspace.options(told, Options())
+    options = options if height is None else with_height(options, height)
+    workspace.remember(options, Options())
+    return options
+
+
+def run(
+    workspace: Workspace,
+    options: Options,
+    progress: Progress,
+    partial: bool = False,
+    truth: Mapping[str, np.ndarray] | None = None,
+) -> str:
+    """Everything after annotation; writes motion.npz and report.html.
+
+    `partial` goes on with what is annotated, `truth` is for the report.
+    """
+    started = time.perf_counter()
+    annotations = annotated(workspace, partial)
+    preparation = prepared(workspace, options, progress)
+    motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
+    write_motion(workspace.motion_file, motion)
+    material = ReportMaterial(
+        video=preparation.video,
+        track=preparation.track,
+        comparison=preparation.comparison,
+        keyframes=preparation.keyframes,
+        annotations=annotations,
+        motion=motion,
+        seconds=workspace.stages.seconds,
+        truth=truth,
+        options=options,
+    )
+    write_report(workspace.report_file, material, progress)
+    return (
+        f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.\n"
+        f"{workspace.report_file}: open it in a browser.\n"
+        f"Took {time.perf_counter() - started:.0f} s."
+    )
+
+
+def prepared(workspace: Workspace, options: Options, progress: Progress) -> Preparation:
+    """The automatic part, with the keyframes that the person was asked to annotate."""
+    video, asked = workspace.video(), asked_for(workspace)
+    keep = workspace.stages.keep
+    preparation = prepare(video, workspace.picks(), options, keep, progress)
+    return replace(preparation, keyframes=asked)
+
+
+def asked_for(workspace: Workspace) -> Keyframes:
+    """The keyframes that the person was asked to annotate."""
+    if not workspace.keyframes_file.is_file():
+        workspace.picks()
+        raise KeyreconError(
+            f"No keyframes have been chosen yet; run: keyrecon keyframes {quoted(workspace.folder)}"
+        )
+    asked = keyframes_from_json(workspace.keyframes_file.read_text())
+    n_frames = len(workspace.video())
+    if len(asked.upper.nearest) != n_frames:
+        raise KeyreconError(
+            f"{workspace.keyframes_file} was made for {len(asked.upper.nearest)} frames and the "
+            f"video has {n_frames}; run: keyrecon keyframes {quoted(workspace.folder)}"
+        )
+    return asked
+
+
+def annotated(workspace: Workspace, partial: bool = False) -> Annotations:
+    """The project's annotations; KeyreconError names the keyframes that lack theirs."""
+    file, found = workspace.annotations_file, asked_for(workspace)
+    annotations = load_annotations(workspace, workspace.video()) if file.is_file() else None
+    missing = missing_marks(annotations, found.upper.frames, found.lower.frames)
+    if annotations is None or (missing and not partial):
+        folder = quoted(workspace.folder)
+        named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
+        listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
+        raise KeyreconError(
+            f"{len(missing)} of {len(found.frames)} keyframes are not annotated: frame {listed}. "
+            f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
+            f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
+        )
+    return annotations
+
+
+def load_motion(path: Path) -> Motion:
+    """The motion of a project folder or file."""
+    file = path / "motion.npz" if path.is_dir() else path
+    if not file.is_file():
+        raise KeyreconError(
+            f"There is no motion at {file}; make it with: keyrecon run {quoted(path)}"
+        )
+    return read_motion(file)
+
+
+def evaluate(path: Path, truth: Path) -> str:
+    """Accuracy as a table."""
+    return describe_scores(load_motion(path), truth)
+
+
+def describe_scores(motion: Motion, truth: Path) -> str:
+    """The measures of the literature, one to a line."""
+    scores = evaluate_motion(motion, read_truth(truth))
+    rows = [
+        ("MPJPE", f"{scores.mpjpe:.1f} mm"),
+        ("PA-MPJPE", f"{scores.pa_mpjpe:.1f} mm"),
+        ("N-MPJPE", f"{scores.n_mpjpe:.1f} mm"),
+        ("acceleration error", f"{scores.acceleration:.1f} mm/frame^2"),
+        ("PCK@0.2 of the torso", f"{scores.pck:.1%}"),
+        ("median 2D error", f"{scores.median_px:.1f} px"),
+        ("limb-length variation", f"{scores.limb_variation:.4%}"),
+    ]
+    worst = sorted(scores.by_joint.items(), key=lambda item: -item[1])[:3]
+    lines = [f"{name:<24}{value:>16}" for name, value in rows]
+    lines.append("worst joints: " + ", ".join(f"{name} {error:.0f} mm" for name, error in worst))
+    if scores.scaled:
+        lines.append("The motion is in body heights; it was scaled to the truth by one factor.")
+    return "\n".join(lines)

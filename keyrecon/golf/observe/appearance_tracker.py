@@ -1,0 +1,241 @@
+"""Tracks of clicked points by an appearance that adapts: the WSL tracker.
+
+After Jepson, Fleet and El-Maraghi (PAMI 25, 2003): every pixel of a patch around the point is
+explained by one of three components. The stable one is a Gaussian learnt slowly over time, the
+wandering one is what was there in the last frame, the lost one is anything at all. The patch moves
+by translation, turn and scale so that the pixels agree with the component that owns them, stable
+pixels weighing most by their small deviation; so clothes that hardly change hold the patch in
+place, and what passes over it is lost. Here the pixels are Lab colours instead of the phases of
+steerable filters, and pixels off the player do not count.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+GRID = 21
+"""Pixels of a patch along each side."""
+LEVELS = (4.0, 2.0, 1.0)
+"""Blur of the picture and the patch from coarse to fine, pixels of the patch."""
+UNIFORM = 1e-6
+"""Density of the lost component over Lab colours."""
+LEAST_SPREAD = 4.0
+"""Deviation that a stable pixel has at least: video noise, grey levels."""
+CHROMA = 1.6
+"""Weight of a and b against L."""
+
+
+@dataclass(frozen=True)
+class AppearanceOptions:
+    """How a patch is tracked."""
+
+    size: float = 0.1
+    """Side of the patch, player heights."""
+    memory: float = 0.4
+    """Time over which the stable component is learnt, seconds."""
+    wander: float = 7.0
+    """Deviation of a pixel from that of the last frame, grey levels."""
+    steps: int = 6
+    """Steps of the least-squares at each level."""
+    turn: float = 0.05
+    """Usual turn of a patch from one frame to the next, radians; its scale likewise."""
+    move: float = 0.03
+    """Usual change of the movement from one frame to the next, player heights."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Appearance of a patch: colours with the share of each pixel's components."""
+
+    stable: Float[np.ndarray, "n 3"]
+    variance: Float[np.ndarray, "n"]
+    last: Float[np.ndarray, "n 3"]
+    share: Float[np.ndarray, "n 3"]
+    """Of the stable, wandering and lost component."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointTrack:
+    """Where a patch went."""
+
+    places: Float[np.ndarray, "T 2"]
+    """px of the pictures given"""
+    turns: Float[np.ndarray, "T"]
+    """Radians from the first frame."""
+    trust: Float[np.ndarray, "T"]
+    """Share of the patch that is not lost, 0-1."""
+
+
+def track_patch(
+    pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
+    weights: Sequence[UInt8[np.ndarray, "h w"]],
+    start: Float[np.ndarray, "2"],
+    scales: tuple[float, float],
+    options: AppearanceOptions = AppearanceOptions(),
+) -> PointTrack:
+    """Follow a point of the first of some Lab pictures through the others.
+
+    `weights` tell where the player is (255); `scales` are the height of the player in px and the
+    frames per second.
+    """
+    height, fps = scales
+    pixel = options.size * height / GRID
+    pose = np.array([*start, 0.0, np.log(pixel)])
+    seen, _ = _cut(pictures[0], weights[0], pose)
+    model = _Model(seen, np.full(len(seen), 100.0), seen, np.tile([0.4, 0.4, 0.2], (len(seen), 1)))
+    rate = 1 / max(2.0, options.memory * fps)
+    usual = np.array([options.move * height] * 2 + [options.turn] * 2)
+    poses, trust, speed = [pose], [1.0], np.zeros(4)
+    for picture, weight in zip(pictures[1:], weights[1:], strict=True):
+        before = pose
+        pose = _align(model, (picture, weight), before + speed, usual, options)
+        seen, inside = _cut(picture, weight, pose)
+        owners = _owners(model, seen, options)
+        model = _learn(model, seen, owners, rate)
+        speed = np.array([*(pose - before)[:2], 0.0, 0.0])
+        poses.append(pose)
+        trust.append(float((inside * (1 - owners[:, 2])).sum() / max(inside.sum(), 1e-9)))
+    path = np.array(poses)
+    return PointTrack(path[:, :2], path[:, 2], np.array(trust))
+
+
+def _places(pose: Float[np.ndarray, "4"]) -> Float[np.ndarray, "n 2"]:
+    """Picture positions of the patch's pixels."""
+    side = np.arange(GRID) - (GRID - 1) / 2
+    x, y = (c.ravel() * np.exp(pose[3]) for c in np.meshgrid(side, side))
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.stack([pose[0] + c * x - s * y, pose[1] + s * x + c * y], axis=1)
+
+
+def _cut(
+    picture: UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"],
+    weight: UInt8[np.ndarray, "h w"],
+    pose: Float[np.ndarray, "4"],
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]]:
+    """Colours of a patch, and how far each pixel is on the player, 0-1."""
+    return _read(picture, weight, _places(pose))
+
+
+def _read(
+    picture: UInt8[np.ndarray, "h w c"] | Float[np.ndarray, "h w c"],
+    weight: UInt8[np.ndarray, "h w"],
+    places: Float[np.ndarray, "n 2"],
+) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n"]]:
+    """Lab layers of a picture at some places, chroma strengthened, and the weights there."""
+    at = places.astype(np.float32)[:, None]
+    seen = cv2.remap(picture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    inside = cv2.remap(weight, at, None, cv2.INTER_LINEAR)
+    strength = np.tile((1.0, CHROMA, CHROMA), seen.shape[2] // 3)
+    return seen[:, 0].astype(float) * strength, inside.ravel() / 255.0
+
+
+def _align(
+    model: _Model,
+    frame: tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]],
+    guess: Float[np.ndarray, "4"],
+    usual: Float[np.ndarray, "4"],
+    options: AppearanceOptions,
+) -> Float[np.ndarray, "4"]:
+    """The pose at which a picture agrees best with the appearance, from coarse to fine."""
+    picture, weight = _around(frame, guess)
+    corner = np.array([*picture[1], 0.0, 0.0])
+    pose = guess - corner
+    expected = pose.copy()
+    for level in LEVELS:
+        layers = _differentiate(picture[0], level * np.exp(pose[3]) / 2)
+        smooth = _blur_model(model, level)
+        for _ in range(options.steps):
+            step = _step(smooth, (layers, weight), pose, (expected, usual), options)
+            pose = pose + step
+            if np.abs(step[:2]).max() < 0.02:
+                break
+    return pose + corner
+
+
+def _around(
+    frame: tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]],
+    guess: Float[np.ndarray, "4"],
+) -> tuple[tuple[Float[np.ndarray, "y x 3"], Float[np.ndarray, "2"]], UInt8[np.ndarray, "y x"]]:
+    """The part of a picture that a patch may reach, with its corner, and the weights there."""
+    reach = int(1.5 * GRID * np.exp(guess[3])) + 4
+    size = np.array(frame[1].shape[::-1])
+    low = np.clip(np.round(guess[:2]).astype(int) - reach, 0, size - 4)
+    high = np.clip(low + 2 * reach, low + 4, size)
+    part = np.s_[low[1] : high[1], low[0] : high[0]]
+    return (frame[0][part].astype(np.float32), low.astype(float)), frame[1][part]
+
+
+def _blur_model(model: _Model, level: float) -> _Model:
+    """The appearance as seen through the blur of a level."""
+
+    def blur(colors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        return cv2.GaussianBlur(colors.reshape(GRID, GRID, 3), (0, 0), level / 2).reshape(-1, 3)
+
+    return replace(model, stable=blur(model.stable), last=blur(model.last))
+
+
+def _differentiate(picture: Float[np.ndarray, "h w 3"], blur: float) -> Float[np.ndarray, "h w 9"]:
+    """A blurred picture and its slopes to the right and down."""
+    soft = cv2.GaussianBlur(picture, (0, 0), blur)
+    slopes = [cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=1 / 8) for dx in (1, 0)]
+    return np.concatenate([soft, *slopes], axis=2)
+
+
+def _step(
+    model: _Model,
+    frame: tuple[Float[np.ndarray, "h w 9"], UInt8[np.ndarray, "h w"]],
+    pose: Float[np.ndarray, "4"],
+    expected: tuple[Float[np.ndarray, "4"], Float[np.ndarray, "4"]],
+    options: AppearanceOptions,
+) -> Float[np.ndarray, "4"]:
+    """A Gauss-Newton step; `expected` holds the pose expected and its usual deviation."""
+    places = _places(pose)
+    read, inside = _read(*frame, places)
+    seen, right, down = np.split(read, 3, axis=1)
+    owners = _owners(model, seen, options)
+    weight = inside[:, None] * owners[:, :2] / np.stack(
+        [model.variance, np.full(len(seen), options.wander**2)], axis=1
+    )  # fmt: skip
+    x, y = (places - pose[:2]).T[..., None]
+    slopes = np.stack([right, down, down * x - right * y, right * x + down * y], axis=2)
+    total = weight.sum(axis=1)
+    miss = seen * total[:, None] - weight[:, :1] * model.stable - weight[:, 1:] * model.last
+    # Neighbouring pixels of a blurred picture tell the same: they count as a ninth of evidence.
+    normal = np.einsum("nci,nc,ncj->ij", slopes, np.repeat(total[:, None], 3, 1), slopes) / 9
+    slope = np.einsum("nci,nc->i", slopes, miss) / 9
+    middle, usual = expected
+    prior = np.diag(1 / usual**2)
+    return -np.linalg.solve(normal + prior, slope + prior @ (pose - middle))
+
+
+def _owners(
+    model: _Model, seen: Float[np.ndarray, "n 3"], options: AppearanceOptions
+) -> Float[np.ndarray, "n 3"]:
+    """Probability of each component, by how well it explains a pixel."""
+    densities = []
+    for colors, variance in ((model.stable, model.variance), (model.last, options.wander**2)):
+        square = ((seen - colors) ** 2).sum(axis=1) / variance
+        densities.append(np.exp(-0.5 * square) / (2 * np.pi * variance) ** 1.5)
+    densities.append(np.full(len(seen), UNIFORM))
+    likely = model.share * np.stack(densities, axis=1)
+    return likely / likely.sum(axis=1, keepdims=True)
+
+
+def _learn(
+    model: _Model,
+    seen: Float[np.ndarray, "n 3"],
+    owners: Float[np.ndarray, "n 3"],
+    rate: float,
+) -> _Model:
+    """The appearance after one more frame; pixels that lost their stable part begin anew."""
+    share = (1 - rate) * model.share + rate * owners
+    pull = rate * owners[:, 0] / share[:, 0]
+    off = seen - model.stable
+    stable = model.stable + pull[:, None] * off
+    variance = (1 - pull) * (model.variance + pull * (off**2).sum(axis=1) / 3)
+    anew = share[:, 0] < 0.1
+    stable[anew], variance[anew], share[anew] = seen[anew], 100.0, (0.2, 0.5, 0.3)
+    return _Model(stable, np.maximum(variance, LEAST_SPREAD**2), seen, share)

@@ -1,0 +1,200 @@
+"""The club in every frame: the most consistent of many hypotheses, then a smooth motion.
+
+First the cheapest path through the hypotheses of all frames is found by dynamic programming: it
+gains what was seen of the shafts it takes, and pays for the movement of hands and club head and
+for frames it passes over. Then a local model of the motion, hands and head each a quadratic in time
+over a window of frames, is fitted robustly to the path (the 2D motion model of Section 4.2 of the
+CVPR 2005 paper, after Lepetit, Shahrokni and Fua, CVPR 2003): what does not fit is left out, and
+frames without a shaft, those blurred at impact, get their club from the frames around.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
+from keyrecon.numerics.viterbi import find_cheapest_path
+
+NOWHERE = np.full((2, 2), np.nan)
+FEWEST = 5
+"""Shafts that a local motion is fitted to, at least."""
+ROUNDS = 8
+"""Reweightings of a window."""
+ALONG = 0.04
+"""Weight of an end along the shaft against across, where it may not be the true end."""
+
+
+@dataclass(frozen=True)
+class ClubOptions:
+    """How a club moves; lengths in player heights, times in seconds."""
+
+    gain: float = 12.0
+    """What one height of shaft is worth."""
+    hands: float = 3.0
+    """Usual speed of the hands, heights per second."""
+    head: float = 12.0
+    """Usual speed of the club head, heights per second."""
+    jump: float = 4.0
+    """Greatest cost of a movement from one frame to the next."""
+    miss: float = 0.5
+    """Cost of a frame without a shaft."""
+    gap: float = 1.2
+    """Longest time that is bridged: at the top a club may point at the camera for long."""
+    window: float = 0.07
+    """Time on either side that the local motion is fitted over."""
+    off: float = 0.035
+    """Distance from the local motion at which a shaft counts for a quarter, where it rests."""
+    off_moving: float = 0.2
+    """The same for a moving shaft, as a share of its movement from frame to frame: a quadratic
+    follows a fast club less well."""
+    trusted: float = 0.08
+    """A shaft that counts for less was something else."""
+
+
+@dataclass(frozen=True, eq=False)
+class Club:
+    """Where the club is."""
+
+    ends: Float[np.ndarray, "T 2 2"]
+    """Where the hands hold it, and its head, px; NaN before and after all that was seen."""
+    seen: Bool[np.ndarray, "T"]
+    """False where the club comes from the frames around."""
+    tip: Bool[np.ndarray, "T"]
+    """Whether the hand end is where the hands are; else they may be farther on in its line."""
+
+
+def track_club(
+    shafts: Sequence[ShaftHypotheses],
+    height: float,
+    fps: float,
+    options: ClubOptions = ClubOptions(),
+) -> Club:
+    """The club of every frame; `height` of the player in px, `fps` of the world.
+
+    Raises KeyreconError where hardly any shaft was seen.
+    """
+    path = choose_shafts(shafts, height, fps, options)
+    pairs = list(zip(shafts, path.tolist(), strict=True))
+    taken = np.array([s.ends[k] if k >= 0 else NOWHERE for s, k in pairs])
+    tip = np.array([k >= 0 and bool(s.tip[k]) for s, k in pairs])
+    model, trust = _local_motion(taken, tip, height, fps, options)
+    seen = (path >= 0) & (trust > options.trusted)
+    if seen.sum() < FEWEST:
+        raise KeyreconError(
+            f"A club was seen in only {seen.sum()} of {len(path)} frames; the video must show a "
+            "whole swing, sharp enough to see the shaft, with a camera that stands still."
+        )
+    ends = np.where(seen[:, None, None], _lengthen(taken, model), model)
+    return Club(ends, seen, tip & seen)
+
+
+def _local_motion(
+    taken: Float[np.ndarray, "T 2 2"],
+    tip: Bool[np.ndarray, "T"],
+    height: float,
+    fps: float,
+    options: ClubOptions,
+) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
+    """Hands and head by a robust quadratic in time around every frame, and trust in each shaft.
+
+    A head end that was seen is only known across the shaft: how far the shaft was seen along its
+    line depends on the light.
+    """
+    frames = np.flatnonzero(np.isfinite(taken[:, 0, 0]))
+    model, trust = np.full_like(taken, np.nan), np.zeros(len(taken))
+    if len(frames) < FEWEST:
+        return model, trust
+    for t in range(frames[0], frames[-1] + 1):
+        near = _neighbours(frames, t, max(FEWEST, round(2 * options.window * fps) + 1))
+        time = (near - t) / max(1, np.abs(near - t).max())
+        steps = np.abs(np.diff(taken[near], axis=0)).sum(axis=2) / np.diff(near)[:, None]
+        off = options.off * height + options.off_moving * float(np.median(steps.max(axis=1)))
+        fitted, weight = _fit_window(taken[near], tip[near], time, off)
+        model[t] = fitted
+        if t in near:
+            trust[t] = weight[np.searchsorted(near, t)]
+    return model, trust
+
+
+def _neighbours(frames: Int[np.ndarray, "n"], t: int, count: int) -> Int[np.ndarray, "m"]:
+    """The frames nearest to t among those with a shaft, in order."""
+    return np.sort(frames[np.argsort(np.abs(frames - t), kind="stable")[:count]])
+
+
+def _fit_window(
+    ends: Float[np.ndarray, "n 2 2"],
+    tip: Bool[np.ndarray, "n"],
+    time: Float[np.ndarray, "n"],
+    off: float,
+) -> tuple[Float[np.ndarray, "2 2"], Float[np.ndarray, "n"]]:
+    """Ends at time 0 and the weight of each shaft, by iteratively reweighted least squares."""
+    basis = np.stack([np.ones_like(time), time, time**2], axis=1)
+    unit = ends[:, 1] - ends[:, 0]
+    unit = unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-9)
+    across = np.eye(2) - unit[:, :, None] * unit[:, None, :]
+    along = np.stack([np.where(tip, 1.0, ALONG), np.full(len(tip), ALONG)], axis=1)
+    metric = across[:, None] + along[..., None, None] * (np.eye(2) - across)[:, None]
+    nearness = 1 / (1 + (2 * time) ** 2)
+    weight = np.ones(len(time))
+    for _ in range(ROUNDS):
+        metrics = metric * (nearness * weight)[:, None, None, None]
+        coefficients = np.stack(
+            [_weighted_quadratic(basis, ends[:, e], metrics[:, e]) for e in range(2)]
+        )
+        miss = ends - np.einsum("nk,ekx->nex", basis, coefficients)
+        square = np.einsum("nex,nexy,ney->n", miss, metric, miss) / off**2
+        weight = 1 / (1 + square) ** 2
+    return coefficients[:, 0], weight
+
+
+def _weighted_quadratic(
+    basis: Float[np.ndarray, "n 3"],
+    points: Float[np.ndarray, "n 2"],
+    metric: Float[np.ndarray, "n 2 2"],
+) -> Float[np.ndarray, "3 2"]:
+    """Coefficients of the quadratic nearest to points, each with a metric of its own."""
+    left = np.einsum("ni,nj,nxy->ixjy", basis, basis, metric).reshape(6, 6)
+    right = np.einsum("ni,nxy,ny->ix", basis, metric, points).ravel()
+    damping = 1e-6 * np.trace(left) * np.eye(6)
+    return np.linalg.solve(left + damping, right).reshape(3, 2)
+
+
+def _lengthen(
+    taken: Float[np.ndarray, "T 2 2"], model: Float[np.ndarray, "T 2 2"]
+) -> Float[np.ndarray, "T 2 2"]:
+    """Shafts as they were seen, reaching as far as the local motion tells if that is farther."""
+    along = taken[:, 1] - taken[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    unit = along / length
+    told = ((model[:, 1] - taken[:, 0]) * unit).sum(axis=1, keepdims=True)
+    return np.stack([taken[:, 0], taken[:, 0] + unit * np.maximum(length, told)], axis=1)
+
+
+def choose_shafts(
+    shafts: Sequence[ShaftHypotheses],
+    height: float,
+    fps: float,
+    options: ClubOptions = ClubOptions(),
+) -> Int[np.ndarray, "T"]:
+    """Hypothesis taken in every frame, -1 where none."""
+
+    def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
+        return _movement(shafts[before], shafts[t], height, (t - before) / fps, options)
+
+    own = [-options.gain * now.weight for now in shafts]
+    return find_cheapest_path(own, moving, max(1, round(options.gap * fps)), options.miss)
+
+
+def _movement(
+    before: ShaftHypotheses,
+    after: ShaftHypotheses,
+    height: float,
+    seconds: float,
+    options: ClubOptions,
+) -> Float[np.ndarray, "l m"]:
+    moved = np.linalg.norm(before.ends[:, None] - after.ends[None], axis=3) / height
+    usual = np.array([options.hands, options.head]) * seconds
+    return np.minimum(0.5 * ((moved / usual) ** 2).sum(axis=2), options.jump)

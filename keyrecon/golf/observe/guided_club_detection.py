@@ -1,0 +1,348 @@
+"""Lines of a picture near the one that is expected.
+
+A line counts by how far its middle is brighter, or darker, than both of its sides, in the picture
+as well as in its difference to the temporal median: a rope in the scene is missing in the second,
+the ghost of a club that rested there in the first, and the edge of an arm has one side only.
+
+The club looked for once more, where the fitted swing expects it.
+
+Nothing but the club itself can tell at first where it is, so what lies on the player is left out
+then: stripes, folds and gaps between arms look alike. Once a swing has been fitted, the global
+model that Gehrig, Lepetit and Fua (BMVC 2003) make of polynomials, the lines near the expected one
+and the one seen at first are all that need be compared. The cheapest path through the best lines
+of all frames departs from the expectation as slowly as the fit is wrong.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from keyrecon.golf.records import FittedSwing, Observations
+from keyrecon.io.frame_reader import side_by_side
+from keyrecon.io.video import Video
+from keyrecon.numerics.viterbi import find_cheapest_path
+
+PLACES = 32
+"""Places at which a line is looked at."""
+SHAFT = (0.2, 0.95)
+"""Where on the club they lie, between its ends: beside the hands and the head."""
+ASIDES = 21
+"""Offsets that are tried."""
+NEIGHBOURS = (7, 7)
+"""Turns and offsets among which only the best line is kept."""
+SHUTTER = 0.5
+"""Share of the time between frames for which a camera's shutter is open."""
+BLURS = (0.5, 1.0)
+"""A blur seems narrower where it is pale, and where the club is slower than expected."""
+Picture = Float[np.ndarray, "h w"]
+
+
+@dataclass(frozen=True)
+class LineOptions:
+    """Which lines may be the expected one; lengths in player heights."""
+
+    turn: float = 45.0
+    """Degrees by which the club may be turned from where it is expected."""
+    aside: float = 0.05
+    """How far beside the expected hands its line may pass."""
+    usual_turn: float = 10.0
+    """Degrees by which it usually is turned."""
+    usual_aside: float = 0.025
+    """How far beside it usually passes."""
+    far: float = 3.0
+    """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
+    widths: tuple[float, ...] = (0.006, 0.012)
+    """From the middle of the shaft to where the scene shows: less than half an arm's breadth. A
+    blurred one is as broad as what it passes over while the shutter is open."""
+    contrast: float = 12.0
+    """Grey levels by which a sure shaft stands out."""
+    gain: float = 15.0
+    """What a club that stands out from end to end is worth, in squared standard deviations."""
+    known: float = 3.0
+    """What a line is worth besides for having been seen at first, without any expectation."""
+    most: int = 6
+    """Lines kept in a frame."""
+    shortest: float = 0.1
+    """A club that seems shorter than this points at the camera: its angle tells nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedLine:
+    """A frame in which lines are looked for."""
+
+    pictures: tuple[Picture, Picture]
+    """The frame, and its difference to the median."""
+    height: float
+    """Of the player, px."""
+    swept: Float[np.ndarray, "2"]
+    """How far hands and head are expected to move from frame to frame, heights."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of a frame that may be the club."""
+
+    ends: Float[np.ndarray, "n 2 2"]
+    """Hands and head, heights."""
+    departure: Float[np.ndarray, "n 2"]
+    """Turn and offset from the expected club, in usual ones."""
+    worth: Float[np.ndarray, "n"]
+    """What each gains by standing out, less what it pays for departing from expectation."""
+
+
+def find_lines(
+    sight: ExpectedLine,
+    first: Float[np.ndarray, "2 2"],
+    expected: Float[np.ndarray, "2 2"],
+    options: LineOptions,
+) -> Lines:
+    """The lines near the expected club that stand out most, and the one that was seen at first.
+
+    Where nothing can be expected, NaN, the one that was seen at first has to stand out alone.
+    """
+    ends, expected = np.zeros((0, 2, 2)), expected / sight.height
+    if np.linalg.norm(expected[1] - expected[0]) > options.shortest:
+        ends = _best_lines(sight, expected, options)
+    known = int(np.isfinite(first).all())
+    if known:
+        line = _sharpen(sight, lay_on(first / sight.height, expected), options)
+        ends = np.concatenate([ends, line[None]])
+    departure = measure_departure(expected, ends, options)
+    worth = _weigh(departure, _contrast(sight, ends, options), options)
+    if np.isfinite(expected).all():
+        worth[len(ends) - known :] += options.known
+    return Lines(ends, departure, worth)
+
+
+def _best_lines(
+    sight: ExpectedLine, expected: Float[np.ndarray, "2 2"], options: LineOptions
+) -> Float[np.ndarray, "n 2 2"]:
+    """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
+    turns = np.arange(-options.turn, options.turn + 0.5)
+    asides = np.linspace(-options.aside, options.aside, ASIDES)
+    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
+    ends = _shift(expected, turn, aside)
+    contrast = _contrast(sight, ends, options)
+    worth = _weigh(measure_departure(expected, ends, options), contrast, options)
+    worth, sharp = (v.reshape(len(turns), ASIDES) for v in (worth, contrast.mean(axis=1)))
+    peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones(NEIGHBOURS)))
+    best = peaks[np.argsort(-worth.ravel()[peaks])][: options.most]
+    return ends[[_sharpest(sharp, divmod(peak, ASIDES)) for peak in best.tolist()]]
+
+
+def _sharpest(sharp: Float[np.ndarray, "a b"], peak: tuple[int, int]) -> int:
+    """Index of the line of most contrast among the neighbours of one."""
+    (i, j), (di, dj) = peak, (n // 2 for n in NEIGHBOURS)
+    low = max(0, i - di), max(0, j - dj)
+    part = sharp[low[0] : i + di + 1, low[1] : j + dj + 1]
+    k, m = divmod(int(part.argmax()), part.shape[1])
+    return (low[0] + k) * sharp.shape[1] + low[1] + m
+
+
+def lay_on(
+    line: Float[np.ndarray, "2 2"], club: Float[np.ndarray, "2 2"]
+) -> Float[np.ndarray, "2 2"]:
+    """A club moved on to a line, hands first; the line where there is no club."""
+    if np.isnan(club).any():
+        return line
+    unit = (line[1] - line[0]) / max(float(np.linalg.norm(line[1] - line[0])), 1e-9)
+    hands = line[0] + ((club[0] - line[0]) @ unit) * unit
+    return np.stack([hands, hands + np.linalg.norm(club[1] - club[0]) * unit])
+
+
+def _sharpen(
+    sight: ExpectedLine, line: Float[np.ndarray, "2 2"], options: LineOptions
+) -> Float[np.ndarray, "2 2"]:
+    """The line of most contrast among the neighbours of one: a shaft seen in part is askew."""
+    turns = np.arange(-(NEIGHBOURS[0] // 2), NEIGHBOURS[0] // 2 + 1.0)
+    asides = turns * 2 * options.aside / (ASIDES - 1)
+    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
+    ends = _shift(line, turn, aside)
+    return ends[int(_contrast(sight, ends, options).mean(axis=1).argmax())]
+
+
+def _shift(
+    expected: Float[np.ndarray, "2 2"], turn: Float[np.ndarray, "n"], aside: Float[np.ndarray, "n"]
+) -> Float[np.ndarray, "n 2 2"]:
+    """The expected club turned about its hands by degrees and shifted sideways."""
+    way = expected[1] - expected[0]
+    across = np.array([-way[1], way[0]])
+    angle = np.radians(turn)[:, None]
+    hands = expected[0] + aside[:, None] * across / np.linalg.norm(across)
+    return np.stack([hands, hands + np.cos(angle) * way + np.sin(angle) * across], axis=1)
+
+
+def measure_departure(
+    expected: Float[np.ndarray, "2 2"],
+    ends: Float[np.ndarray, "n 2 2"],
+    options: LineOptions,
+) -> Float[np.ndarray, "n 2"]:
+    """Turn of lines from the expected one, and how far aside of its hands they pass, in usual ones.
+
+    None where nothing is expected.
+    """
+    if np.isnan(expected).any():
+        return np.zeros((len(ends), 2))
+    way, theirs = expected[1] - expected[0], ends[:, 1] - ends[:, 0]
+    turn = np.arctan2(way[0] * theirs[:, 1] - way[1] * theirs[:, 0], theirs @ way)
+    off = ends[:, 0] - expected[0]
+    length = np.maximum(np.linalg.norm(theirs, axis=1), 1e-9)
+    aside = (theirs[:, 0] * off[:, 1] - theirs[:, 1] * off[:, 0]) / length
+    return np.stack([np.degrees(turn) / options.usual_turn, aside / options.usual_aside], axis=1)
+
+
+def _contrast(
+    sight: ExpectedLine, ends: Float[np.ndarray, "n 2 2"], options: LineOptions
+) -> Float[np.ndarray, "n p"]:
+    """Grey levels by which places along lines stand out in both pictures."""
+    share = np.linspace(*SHAFT, PLACES)
+    points = ends[:, None, 0] + share[:, None] * (ends[:, None, 1] - ends[:, None, 0])
+    way = ends[:, 1] - ends[:, 0]
+    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    blur = SHUTTER / 2 * (sight.swept[0] + share * (sight.swept[1] - sight.swept[0]))
+    widths = [np.full(PLACES, w) for w in options.widths]
+    widths += [options.widths[0] + share * blur for share in BLURS]
+    sides = [sight.height * width[:, None] * across[:, None] for width in widths]
+    return np.minimum(*(_stand_out(p, sight.height * points, sides) for p in sight.pictures))
+
+
+def _stand_out(
+    picture: Picture, points: Float[np.ndarray, "n p 2"], sides: list[Float[np.ndarray, "n p 2"]]
+) -> Float[np.ndarray, "n p"]:
+    """Grey levels by which points differ from what is on both sides, at the best of distances."""
+    middle = _read(picture, points)
+    best = np.zeros_like(middle)
+    for side in sides:
+        one, other = middle - _read(picture, points - side), middle - _read(picture, points + side)
+        alike = np.where(one * other > 0, np.minimum(np.abs(one), np.abs(other)), 0.0)
+        best = np.maximum(best, alike)
+    return best
+
+
+def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndarray, "n p"]:
+    if not len(points):
+        return np.zeros(points.shape[:2], np.float32)
+    return cv2.remap(
+        picture, points.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+
+
+def _weigh(
+    departure: Float[np.ndarray, "n 2"], contrast: Float[np.ndarray, "n p"], options: LineOptions
+) -> Float[np.ndarray, "n"]:
+    """What lines gain by standing out, less what they pay for departing from expectation."""
+    share = np.minimum(contrast / options.contrast, 1.0).mean(axis=1)
+    off = np.minimum((departure**2).sum(axis=1), options.far**2)
+    return options.gain * share - 0.5 * off
+
+
+PLATE = 15
+"""Frames whose median stands for the scene."""
+USUAL = 1.0
+"""Usual departures within which a line seen at first is the same club."""
+ALONG = 0.12
+"""Standard deviation along the shaft of hands that were only expected there, player heights."""
+BRIDGED = 0.5
+"""Longest time over which the fit's error is thought to last, seconds."""
+
+
+@dataclass(frozen=True)
+class GuidedDetectionOptions:
+    """How the club is looked for once more."""
+
+    lines: LineOptions = field(default_factory=LineOptions)
+    """What may be the club."""
+    miss: float = 3.0
+    """Cost of a frame in which the club is not seen: it must stand out over a fifth at least."""
+    pace: float = 0.1
+    """Seconds in which the fit's error may change by its usual size."""
+
+
+def detect_club_guided(
+    observations: Observations,
+    video: Video,
+    plate: Float[np.ndarray, "h w"],
+    fitted: FittedSwing,
+    height: float,
+    options: GuidedDetectionOptions = GuidedDetectionOptions(),
+) -> Observations:
+    """The observations with the club of a second look at the swing; `height` of the player in px.
+
+    `plate` is the median picture (`median_picture`).
+    How far a shaft reaches was seen at first, where that was the same one.
+    """
+    first, resting = observations.club, np.arange(len(observations.club)) < fitted.keys[0]
+    ends = detect_in_frame((video, plate), (first, fitted.club_seen), height, resting, options)
+    along = np.tile([ALONG * height, np.inf], (len(ends), 1))
+    for t in _find_same(ends, first, height, options.lines):
+        ends[t], along[t] = lay_on(ends[t], first[t]), observations.club_along[t]
+    return replace(observations, club=ends, club_along=along)
+
+
+def _find_same(
+    ends: Float[np.ndarray, "T 2 2"],
+    first: Float[np.ndarray, "T 2 2"],
+    height: float,
+    options: LineOptions,
+) -> Int[np.ndarray, "n"]:
+    """Frames in which the club is what was seen at first."""
+    pairs = zip(ends / height, first / height, strict=True)
+    apart = [measure_departure(e, f[None], options)[0] for e, f in pairs]
+    seen = np.isfinite(ends + first).all(axis=(1, 2))
+    return np.flatnonzero(seen & (np.abs(apart).max(axis=1) < USUAL))
+
+
+def detect_in_frame(
+    scene: tuple[Video, Float[np.ndarray, "h w"]],
+    clubs: tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T 2 2"]],
+    height: float,
+    resting: Bool[np.ndarray, "T"],
+    options: GuidedDetectionOptions = GuidedDetectionOptions(),
+) -> Float[np.ndarray, "T 2 2"]:
+    """Hand end and head of the club, px, NaN where it is not seen.
+
+    `scene` is the video with its median picture, in which a `resting` club is too; `clubs` are
+    where it was seen at first, NaN where it was not, and where it is expected; `height` is that of
+    the player in px.
+    """
+    (video, plate), (first, expected) = scene, clubs
+    swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
+
+    def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
+        frame, grey = numbered
+        picture = grey.astype(np.float32)
+        moved = picture if resting[frame] else picture - plate
+        sight = ExpectedLine((picture, moved), height, swept[frame])
+        return find_lines(sight, first[frame], expected[frame], options.lines)
+
+    lines = list(side_by_side(look, enumerate(video.grey_frames())))
+    chosen = _choose(lines, video.fps, options)
+    ends = np.full_like(expected, np.nan)
+    for t in np.flatnonzero(chosen >= 0):
+        ends[t] = height * lines[t].ends[chosen[t]]
+    return ends
+
+
+def median_picture(video: Video) -> Float[np.ndarray, "h w"]:
+    """The scene, and what of the player hardly moves."""
+    chosen = set(np.linspace(0, len(video) - 1, PLATE).astype(int).tolist())
+    pictures = [g for t, g in enumerate(video.grey_frames()) if t in chosen]
+    return np.median(np.stack(pictures), axis=0).astype(np.float32)
+
+
+def _choose(
+    lines: Sequence[Lines], fps: float, options: GuidedDetectionOptions
+) -> Int[np.ndarray, "T"]:
+    """The line taken in every frame, -1 where none."""
+
+    def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
+        change = lines[before].departure[:, None] - lines[t].departure
+        square = np.minimum((change**2).sum(axis=2), options.lines.far**2)
+        return 0.5 * square * min(1.0, options.pace * fps / (t - before))
+
+    own = [options.miss - b.worth for b in lines]
+    return find_cheapest_path(own, moving, max(1, round(BRIDGED * fps)), 0.0)

@@ -1,0 +1,320 @@
+"""When a filmed swing passes its key postures, told by the club (CVPR 2005, Section 5.1, Fig. 9).
+
+From whatever side a swing is filmed, the hands go up, down to the ball and up again: the hit is the
+lowest place between two high ones that follow one another within a second or so. Around this
+triple lie the four key postures: the top is amid the time for which the hands are highest, the hit
+where the club is nearest to how it lay at address, the upswing begins where the club leaves the
+place where it rested before, and the finish is where it first rests after the hit. The normalised
+time of every frame follows by monotone interpolation (Fritsch and Carlson's PCHIP; a free spline
+overshoots at the top, where the pace changes threefold).
+
+When the hands leave their rest at address and find one at the finish, told by the picture.
+
+A swing begins and ends where the hands are slower than a small share of their peak speed: so it is
+measured in captures (`keyposes`), and so it is here. Near its ends a fitted motion hardly moves and
+tells little of the time; but slow hands are followed by optical flow to a tenth of a pixel (Lucas
+and Kanade on pyramids, checked forward and backward). How much of their speed the line of sight
+hides, the fitted swing tells: seen down the line, hands leave their address towards the camera.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
+
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.observe.club import Club
+from keyrecon.golf.prior.key_postures import REST_SPEED, SMOOTH
+from keyrecon.golf.records import FittedSwing
+from keyrecon.io.video import Video
+
+NEAR_ADDRESS = 0.15
+"""What is farther from the address, player heights, is no noise."""
+
+
+@dataclass(frozen=True)
+class TimingOptions:
+    """How a swing is recognised; lengths in player heights, times in seconds."""
+
+    upswing: float = 1.2
+    """Longest time from the top to the hit, slowed down threefold at most."""
+    finish: float = 1.6
+    """Longest time from the hit to the highest hands of the finish."""
+    rise: float = 0.15
+    """The hands must rise by this before and after the hit."""
+    valley: float = 0.05
+    """Hands lower than the highest ones by less still are at the top."""
+    smooth: float = 0.03
+    """Standard deviation of the low-pass."""
+    address: float = 0.03
+    """Movement of hands and head together by which a club has left its address."""
+    rest: float = 0.1
+    """Speed at the finish, where the club sways on behind resting hands, as a share of its peak."""
+    pause: float = 0.05
+    """Time for which it must rest there: many let it sink at once."""
+
+
+def find_key_frames(
+    club: Club, height: float, fps: float, options: TimingOptions = TimingOptions()
+) -> Float[np.ndarray, "4"]:
+    """Frames of the four key postures, the hit between frames; `height` of the player in px.
+
+    Raises KeyreconError where the hands do not move as in a swing.
+    """
+    ends = gaussian_filter1d(_fill(club.ends), options.smooth * fps, axis=0)
+    hands = ends[:, 0] / height
+    top, low = _find_lowest(hands[:, 1], fps, options)
+    top = _middle_of_height(hands[:, 1], top, low, round(options.upswing * fps), options.valley)
+    speed = np.linalg.norm(np.gradient(ends, 1 / fps, axis=0), axis=2).sum(axis=1) / height
+    start = _last_at_address(ends / height, top, low, options.address)
+    hit = _return_to_address(club.ends, ends[start], (top, low), fps)
+    resting = speed < options.rest * speed[top:].max()
+    finish = _first_rest(resting, speed, round(hit), round(options.pause * fps))
+    return np.array([start, top, hit, finish], float)
+
+
+def interpolate_times(
+    keys: Float[np.ndarray, "4"], key_times: Float[np.ndarray, "4"], frames: int
+) -> Float[np.ndarray, "T"]:
+    """Normalised time of every frame; constant before the first and after the last key."""
+    inside = np.clip(np.arange(frames), keys[0], keys[-1])
+    return PchipInterpolator(keys, key_times)(inside)
+
+
+def keep_order(mu: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
+    """Normalised times that rise up to the finish, and after it may only fall."""
+    last = int(mu.argmax())
+    rising, falling = np.maximum.accumulate(mu[:last]), np.minimum.accumulate(mu[last:])
+    return np.clip(np.concatenate([rising, falling]), 0, 1)
+
+
+def _fill(ends: Float[np.ndarray, "T 2 2"]) -> Float[np.ndarray, "T 2 2"]:
+    """Ends of the club with those before the first and after the last one held."""
+    known = np.flatnonzero(np.isfinite(ends[:, 0, 0]))
+    nearest = np.abs(np.arange(len(ends))[:, None] - known).argmin(axis=1)
+    return ends[known[nearest]]
+
+
+def _find_lowest(y: Float[np.ndarray, "T"], fps: float, options: TimingOptions) -> tuple[int, int]:
+    """Frames of the high place before and of the low place, in the deepest dip of the hands."""
+    before, after = round(options.upswing * fps), round(options.finish * fps)
+    best, found = 0.0, (0, 0)
+    for t in range(2, len(y) - 2):
+        up = max(0, t - before)
+        top = up + int(y[up:t].argmin())
+        dip = min(y[t] - y[top], y[t] - y[t + 1 : t + after].min())
+        if dip > best:
+            best, found = dip, (top, t)
+    if best < options.rise:
+        raise KeyreconError(
+            f"There is no swing in this video: the hands dip by only {best:.2f} player heights "
+            f"between two high places, a swing by {options.rise:g} or more. Give a video with a "
+            "whole swing, from the address to the finish."
+        )
+    return found
+
+
+def _middle_of_height(
+    y: Float[np.ndarray, "T"], top: int, low: int, before: int, valley: float
+) -> int:
+    """Middle of the time for which the hands are at the top: surer than their highest frame."""
+    first = max(0, low - before)
+    high = first + np.flatnonzero(y[first:low] < y[top] + valley)
+    return round((high[0] + high[-1]) / 2)
+
+
+def _last_at_address(ends: Float[np.ndarray, "T 2 2"], top: int, low: int, address: float) -> int:
+    """Last frame before the top in which the club, in heights, still lies as it rested before it.
+
+    It rested where most frames with the hands low agree; by how much they do not is noise.
+    """
+    down = ends[:top, 0, 1] > (ends[top, 0, 1] + ends[low, 0, 1]) / 2
+    if not down.any():
+        return 0
+    frames, poses = np.flatnonzero(down), ends[:top][down]
+    apart = np.linalg.norm(poses[:, None] - poses, axis=3).sum(axis=2)
+    rest = int((apart < address).sum(axis=1).argmax())
+    noise = float(np.median(apart[rest][apart[rest] < NEAR_ADDRESS]))
+    return int(frames[np.flatnonzero(apart[rest] <= address + noise)[-1]])
+
+
+def _first_rest(resting: np.ndarray, speed: np.ndarray, hit: int, pause: int) -> int:
+    """First frame after the hit of a club that goes on resting; else its slowest."""
+    run = 0
+    for t in range(hit, len(resting)):
+        run = run + 1 if resting[t] else 0
+        if run > pause:
+            return t - pause
+    return hit + max(1, int(speed[hit:].argmin()))
+
+
+def _return_to_address(
+    ends: Float[np.ndarray, "T 2 2"],
+    address: Float[np.ndarray, "2 2"],
+    around: tuple[int, int],
+    fps: float,
+) -> float:
+    """When the shaft is nearest to how it lay at address, between frames if need be."""
+    top, low = around
+    first = max(top + 1, low - round(0.15 * fps))
+    last = min(len(ends) - 1, low + round(0.15 * fps))
+    best, hit = np.inf, float(low)
+    target = address[1] - address[0]
+    for t in range(first, last):
+        one, other = (ends[k, 1] - ends[k, 0] for k in (t, t + 1))
+        step = other - one
+        share = float(np.clip((target - one) @ step / max(step @ step, 1e-9), 0, 1))
+        apart = np.linalg.norm(one + share * step - target)
+        hands = (1 - share) * ends[t, 0] + share * ends[t + 1, 0]
+        apart += np.linalg.norm(hands - address[0])
+        if apart < best:
+            best, hit = apart, t + share
+    return hit
+
+
+FEWEST = 3
+"""Points that tell a movement, at least."""
+
+
+@dataclass(frozen=True)
+class SwingEventOptions:
+    """How resting hands are told; lengths in player heights, times in seconds."""
+
+    around: float = 0.15
+    """How much earlier or later than fitted the swing may begin or end."""
+    hands: float = 0.04
+    """Radius around the fitted hands in which points are followed."""
+    grid: float = 0.008
+    """Distance between these points."""
+    player: float = 0.02
+    """Distance from a sample of the player's mask within which a point is on the player."""
+    patch: float = 0.03
+    """Side of the patch by which a point is found again."""
+    slip: float = 0.004
+    """A point that is not back within this, found forward and then backward, is lost."""
+    direction: float = 0.1
+    """Time over which the fitted hands tell how much of their speed is seen."""
+    quiet: float = 0.2
+    """Share of the peak speed that fitted hands may have where they rest: seen along their way,
+    moving hands seem to rest too."""
+    least: float = 0.01
+    """Share of the peak speed below which all is rest: a player sways, a picture has noise."""
+
+
+def detect_swing_events(
+    video: Video,
+    player: tuple[Float[np.ndarray, "_ 2"], ...],
+    fitted: FittedSwing,
+    height: float,
+    options: SwingEventOptions = SwingEventOptions(),
+) -> Float[np.ndarray, "4"]:
+    """Key postures of a fitted swing, the first and the last one anew.
+
+    `player` are samples of the player's mask in every frame; `height` is that of the player in px.
+    """
+    fps, (start, top, hit, finish) = video.fps, fitted.keys
+    reach, last = round(options.around * fps), len(video) - 1
+    spans = [(max(0, round(k) - reach), min(last, round(k) + reach)) for k in (start, finish)]
+    speeds = _hand_speeds(video, player, fitted.club_seen[:, 0] / height, (spans, height), options)
+    span, expected = round(options.direction * fps), _fitted_speed(fitted, fps)
+    for speed, (low, high) in zip(speeds, spans, strict=True):
+        speed[expected[low : high + 1] > options.quiet * expected.max()] = np.inf
+    ways = (start, start + span), (finish - span, finish)
+    limits = [expected.max() * _resting_share(fitted, way, height, options) for way in ways]
+    start = spans[0][0] + _last_rest(speeds[0], limits[0])
+    finish = spans[1][0] + _first_of_slowest(speeds[1], limits[1])
+    return np.array([min(start, top - 1), top, hit, max(finish, hit + 1)], float)
+
+
+def _last_rest(speed: Float[np.ndarray, "n"], limit: float) -> int:
+    """Last frame in which hands rest; the slowest where they never do."""
+    resting = np.flatnonzero(speed < limit)
+    return int(resting[-1] if len(resting) else speed.argmin())
+
+
+def _first_of_slowest(speed: Float[np.ndarray, "n"], limit: float) -> int:
+    """First frame of the rest in which hands are slowest."""
+    slowest = int(speed.argmin())
+    moving = np.flatnonzero(speed[:slowest] >= limit)
+    return int(moving[-1]) + 1 if len(moving) else 0
+
+
+def _fitted_speed(fitted: FittedSwing, fps: float) -> Float[np.ndarray, "T"]:
+    """Speed of the fitted hands in space, heights per second."""
+    hands = gaussian_filter1d(fitted.club[:, 0], SMOOTH * fps, axis=0) / fitted.body.stature
+    return np.linalg.norm(np.gradient(hands, 1 / fps, axis=0), axis=1)
+
+
+def _resting_share(
+    fitted: FittedSwing, way: tuple[float, float], height: float, options: SwingEventOptions
+) -> float:
+    """Share of the peak speed below which hands rest, as far as it is seen between two frames."""
+    one, other = np.clip(np.round(way).astype(int), 0, len(fitted.club) - 1)
+    real = np.linalg.norm(fitted.club[other, 0] - fitted.club[one, 0]) / fitted.body.stature
+    seen = np.linalg.norm(fitted.club_seen[other, 0] - fitted.club_seen[one, 0]) / height
+    return max(REST_SPEED * float(seen / max(real, 1e-9)), options.least)
+
+
+def _hand_speeds(
+    video: Video,
+    player: tuple[Float[np.ndarray, "_ 2"], ...],
+    hands: Float[np.ndarray, "T 2"],
+    where: tuple[list[tuple[int, int]], float],
+    options: SwingEventOptions,
+) -> list[Float[np.ndarray, "_"]]:
+    """Speed of the hands in the picture in spans of frames, heights per second."""
+    spans, height = where
+    steps = np.full((len(hands), 2), np.nan)
+    before: UInt8[np.ndarray, "h w"] | None = None
+    for t, picture in enumerate(video.grey_frames()):
+        after = np.ascontiguousarray(picture)
+        if before is not None and any(low < t <= high for low, high in spans):
+            points = _points_on_hands(hands[t - 1] * height, player[t - 1], height, options)
+            steps[t - 1] = _find_step(before, after, points, height, options)
+        before = after
+    return [_speed(steps[low:high], video.fps) for low, high in spans]
+
+
+def _speed(steps: Float[np.ndarray, "n 2"], fps: float) -> Float[np.ndarray, "m"]:
+    """Speed at every frame from the steps between them; unknown steps are fast ones."""
+    between = np.nan_to_num(np.linalg.norm(steps, axis=1) * fps, nan=1.0)
+    smooth = gaussian_filter1d(between, SMOOTH * fps, mode="nearest")
+    return (np.append(smooth[:1], smooth) + np.append(smooth, smooth[-1:])) / 2
+
+
+def _points_on_hands(
+    hands: Float[np.ndarray, "2"],
+    player: Float[np.ndarray, "n 2"],
+    height: float,
+    options: SwingEventOptions,
+) -> Float[np.ndarray, "m 2"]:
+    """Points of a grid around the hands that are on the player, px."""
+    side = np.arange(-options.hands, options.hands + options.grid / 2, options.grid)
+    grid = np.stack(np.meshgrid(side, side), axis=2).reshape(-1, 2)
+    points = hands + height * grid[np.linalg.norm(grid, axis=1) <= options.hands]
+    return points[cKDTree(player).query(points)[0] < options.player * height]
+
+
+def _find_step(
+    before: UInt8[np.ndarray, "h w"],
+    after: UInt8[np.ndarray, "h w"],
+    points: Float[np.ndarray, "n 2"],
+    height: float,
+    options: SwingEventOptions,
+) -> Float[np.ndarray, "2"]:
+    """Median movement of points from one picture to the next, heights; NaN where they are lost."""
+    if len(points) < FEWEST:
+        return np.full(2, np.nan)
+    side = max(5, round(options.patch * height)) | 1
+    start = points.astype(np.float32)[:, None]
+    there, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, winSize=(side, side))
+    back, again, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, winSize=(side, side))
+    kept = (found.ravel() > 0) & (again.ravel() > 0)
+    kept &= np.linalg.norm(back - start, axis=2).ravel() < options.slip * height
+    if kept.sum() < FEWEST:
+        return np.full(2, np.nan)
+    return np.median((there - start)[kept, 0], axis=0) / height

@@ -1,0 +1,1 @@
+"""The swing model: PCA over captured swings in joint-angle space (CVPR 2005, Section 3)."""

@@ -1,0 +1,1 @@
+"""Video in and out, records on disk, the project folder, file formats."""

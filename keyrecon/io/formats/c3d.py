@@ -1,0 +1,227 @@
+"""C3D marker trajectories, and joint centres from the marker set of the CMU database.
+
+Markers lie on the skin, so joint centres are computed:
+
+- hip: from the four pelvis markers with Harrington's regression (J. Biomech. 40, 2007);
+- knee and elbow: the outer marker moved inwards along the joint's hinge axis by half the
+  joint's width. The axis is the mean of thigh x shank (upper arm x forearm), weighted by the
+  squared sine of flexion and held fixed in the segment above, so that a straight limb has one;
+- ankle: the outer marker moved inwards along the knee's axis;
+- wrist: midway between its two markers;
+- shoulder: below its marker along the trunk by 17 % of the distance between both (Rab et al.,
+  Gait & Posture 15, 2002);
+- neck: midway between C7 and clavicle; crown: above the plane of the head band;
+- club: the line through the markers on its shaft, from beside the hands to the last marker.
+
+Against bones this is wrong by 1-2 cm at limbs and 2-3 cm at hips, shoulders and crown; limb
+lengths vary by some per cent over a swing because skin moves. A marker that is missing for some
+frames is interpolated by a shape-preserving cubic and held at the ends.
+
+C3D: joints as markers at a constant rate, for biomechanics programs.
+
+Written with the `c3d` package, because it keeps files of more than 65,535 frames whole (22
+minutes at 50 fps); millimetres, as such programs expect, or body heights.
+"""
+
+import io
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import PchipInterpolator
+
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.conventions import at_constant_rate
+from keyrecon.records import Motion
+
+Points = Float[np.ndarray, "T 3"]
+
+NAMES = {
+    "LFWT": "LASI", "RFWT": "RASI", "LBWT": "LPSI", "RBWT": "RPSI",
+}  # fmt: skip
+"""CMU's names of the pelvis markers, in those of Plug-in Gait."""
+
+HALF_WIDTHS = {"knee": 0.055, "elbow": 0.040, "ankle": 0.042}
+"""From a 14 mm marker's centre to the joint's, metres: half an adult's mean joint width
+(knee 96, elbow 66, ankle 70 mm; ANSUR II, Gordon et al. 2014) and the marker's radius."""
+
+CLUB_MARKERS = "WEP"
+"""How the names of markers on a club or bat begin in the CMU database."""
+
+HEAD_BAND_TO_CROWN = 0.09
+"""Height of the crown above a head band at the forehead, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerJoints:
+    """Joints from markers, in metres and the file's axes."""
+
+    joints: Float[np.ndarray, "T 14 3"]
+    toes: Float[np.ndarray, "T 2 3"]
+    fps: float
+    club: Float[np.ndarray, "T 2 3"] | None
+    """Beside the hands, and the end of the head; None without markers on a club."""
+
+
+def read_markers(path: Path) -> MarkerJoints:
+    """Read a C3D file with CMU's or Plug-in Gait's markers.
+
+    Raises KeyreconError for a file that is no C3D, that lacks markers, or without ezc3d.
+    """
+    markers, fps = read_points(path)
+    named = {}
+    for label, points in markers.items():
+        name = label.split(":")[-1].strip().upper()
+        named[NAMES.get(name, name)] = points
+    needed = {
+        "C7", "CLAV", "LASI", "RASI", "LPSI", "RPSI", "LFHD", "RFHD", "LBHD", "RBHD",
+        *(side + name for side in "RL" for name in
+          ("SHO", "UPA", "ELB", "WRA", "WRB", "THI", "KNE", "ANK", "TOE")),
+    }  # fmt: skip
+    absent = sorted(n for n in needed if n not in named or np.isnan(named[n]).all())
+    if absent:
+        raise KeyreconError(
+            f"{path} has no markers {', '.join(absent)}; joint centres need the marker set of the "
+            "CMU database or Plug-in Gait."
+        )
+    shaft = sorted(name for name in named if name.startswith(CLUB_MARKERS))
+    filled = {name: fill_gaps(named[name]) for name in [*needed, *shaft]}
+    toes = np.stack([filled["RTOE"], filled["LTOE"]], axis=1)
+    joints = _joint_centres(filled)
+    return MarkerJoints(joints, toes, fps, _find_club(joints, [filled[name] for name in shaft]))
+
+
+def read_points(path: Path) -> tuple[dict[str, Points], float]:
+    """Trajectories by label, metres, NaN where missing (residual below 0), and the frame rate."""
+    try:
+        import ezc3d
+    except ImportError as fault:
+        raise KeyreconError(
+            "Reading C3D needs ezc3d; install it with: pip install 'keyrecon[c3d]'"
+        ) from fault
+    try:
+        file = ezc3d.c3d(str(path))
+    except (OSError, ValueError, RuntimeError, IndexError) as fault:
+        raise KeyreconError(f"{path} is not a C3D file ({fault}); export it again.") from fault
+    group = file["parameters"]["POINT"]
+    units = group["UNITS"]["value"] if "UNITS" in group else ["mm"]
+    metres = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(units[0].strip().lower() if units else "mm")
+    if metres is None:
+        raise KeyreconError(f"{path} is in '{units[0]}'; millimetres, centimetres or metres work.")
+    points = metres * file["data"]["points"][:3].transpose(1, 2, 0)
+    points[file["data"]["meta_points"]["residuals"][0] < 0] = np.nan
+    return dict(zip(group["LABELS"]["value"], points, strict=False)), float(
+        group["RATE"]["value"][0]
+    )
+
+
+def fill_gaps(points: Points) -> Points:
+    """Missing frames interpolated; those before the first and after the last seen are held."""
+    seen = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if len(seen) == len(points):
+        return points
+    if len(seen) == 1:
+        return np.repeat(points[seen], len(points), axis=0)
+    frames = np.clip(np.arange(len(points)), seen[0], seen[-1])
+    return PchipInterpolator(seen, points[seen])(frames)
+
+
+def _joint_centres(m: dict[str, Points]) -> Float[np.ndarray, "T 14 3"]:
+    """All joints of LSP14 from filled markers, metres."""
+    centres = dict(zip(("right_hip", "left_hip"), _hips(m), strict=True))
+    neck = (m["C7"] + m["CLAV"]) / 2
+    hips = (centres["right_hip"] + centres["left_hip"]) / 2
+    breadth = np.median(np.linalg.norm(m["RSHO"] - m["LSHO"], axis=1))
+    for side, other, letter in (("right", "left", "R"), ("left", "right", "L")):
+        hip = centres[f"{side}_hip"]
+        knee, axis = _hinge(hip, m[letter + "THI"], m[letter + "KNE"], m[letter + "ANK"])
+        inward = axis * np.sign(np.sum(axis * (centres[f"{other}_hip"] - hip)))
+        centres[f"{side}_knee"] = knee + HALF_WIDTHS["knee"] * inward
+        centres[f"{side}_ankle"] = m[letter + "ANK"] + HALF_WIDTHS["ankle"] * inward
+        shoulder = m[letter + "SHO"] + 0.17 * breadth * _unit(hips - neck)
+        wrist = (m[letter + "WRA"] + m[letter + "WRB"]) / 2
+        elbow, axis = _hinge(shoulder, m[letter + "UPA"], m[letter + "ELB"], wrist)
+        # Flexion turns the forearm forwards and up, so that upper arm x forearm points to the
+        # body's right on both arms, and inwards is left of the right elbow.
+        centres[f"{side}_shoulder"], centres[f"{side}_wrist"] = shoulder, wrist
+        centres[f"{side}_elbow"] = elbow + HALF_WIDTHS["elbow"] * axis * (
+            -1 if side == "right" else 1
+        )
+    band = (m["LFHD"] + m["RFHD"] + m["LBHD"] + m["RBHD"]) / 4
+    up = _unit(np.cross(m["RFHD"] - m["LBHD"], m["LFHD"] - m["RBHD"]))
+    centres["neck"], centres["head_top"] = neck, band + HEAD_BAND_TO_CROWN * up
+    return np.stack([centres[name] for name in LSP14.names], axis=1)
+
+
+def _find_club(
+    joints: Float[np.ndarray, "T 14 3"], shaft: list[Points]
+) -> Float[np.ndarray, "T 2 3"] | None:
+    """Both ends of a club from two or more markers along it."""
+    if len(shaft) < 2:
+        return None
+    wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
+    hands = joints[:, wrists].mean(axis=1)
+    far = sorted(shaft, key=lambda marker: np.linalg.norm(marker - hands, axis=1).mean())
+    way = _unit(far[-1] - far[0])
+    beside = far[0] + way * np.sum(way * (hands - far[0]), axis=1, keepdims=True)
+    return np.stack([beside, far[-1]], axis=1)
+
+
+def _hips(m: dict[str, Points]) -> tuple[Points, Points]:
+    """Right and left hip centre by Harrington's regression (his Table 2, in metres)."""
+    front, back = (m["RASI"] + m["LASI"]) / 2, (m["RPSI"] + m["LPSI"]) / 2
+    across = _unit(m["RASI"] - m["LASI"])
+    up = _unit(np.cross(across, front - back))
+    forward = np.cross(up, across)
+    width = np.median(np.linalg.norm(m["RASI"] - m["LASI"], axis=1))
+    depth = np.median(np.linalg.norm(front - back, axis=1))
+    middle = front - (0.24 * depth + 0.0099) * forward - (0.30 * width + 0.0109) * up
+    aside = (0.33 * width + 0.0073) * across
+    return middle + aside, middle - aside
+
+
+def _hinge(upper: Points, side: Points, marker: Points, lower: Points) -> tuple[Points, Points]:
+    """The marker, and the joint's axis held fixed in the segment of upper, side and marker."""
+    along = _unit(marker - upper)
+    across = np.cross(along, side - upper)
+    frame = np.stack([along, _unit(across), np.cross(along, _unit(across))], axis=2)
+    turn = np.cross(along, _unit(lower - marker))
+    # |turn| is the sine of flexion and its direction the axis: their product weighs by sin^2.
+    local = np.einsum("tij,ti,t->j", frame, turn, np.linalg.norm(turn, axis=1))
+    return marker, frame @ (local / np.linalg.norm(local))
+
+
+def _unit(vectors: Points) -> Points:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def write_c3d(path: Path, motion: Motion) -> None:
+    """Write joints with Y up, x right, z towards the camera.
+
+    A motion at a variable rate is resampled. Raises KeyreconError without the c3d package.
+    """
+    try:
+        import c3d
+    except ImportError as fault:
+        raise KeyreconError(
+            "Writing C3D needs the c3d package; install it with: pip install 'keyrecon[c3d]'"
+        ) from fault
+    points = at_constant_rate(motion)
+    millimetres = motion.units == "m"
+    # The column behind x, y, z is the residual: 0, measured by one camera group.
+    rows = np.zeros((*points.shape[:2], 5), dtype=np.float32)
+    rows[..., :3] = points * 1000 if millimetres else points
+    writer = c3d.Writer(point_rate=motion.fps, point_units="mm" if millimetres else "bh")
+    writer.set_point_labels(list(motion.skeleton.names))
+    writer.set_screen_axis(X="+X", Y="+Y")
+    no_analog = np.zeros((0, 0), dtype=np.float32)
+    writer.add_frames([(row, no_analog) for row in rows])
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "No analog data", UserWarning)
+        writer.write(buffer)
+    write_durably(path, buffer.getvalue())

@@ -1,0 +1,70 @@
+"""golf_clicks.json: the few clicks that start a golf fit, one JSON object.
+
+    {"keyrecon_golf_clicks": 1, "frame": 0, "size": [800, 720], "hidden": ["left_knee"],
+     "left_handed": false, "stature": 1.8, "focal": null, "principal": [400, 360],
+     "joints": {"head_top": [421, 115], "root": [237, 360], "right_knee": [277, 505], ...}}
+
+`size` is that of the picture that was clicked, so that a file taken for another video is noticed;
+`hidden` joints were clicked where they must be behind something.
+"""
+
+import json
+from pathlib import Path
+
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.clicks import STATURE, GolfClicks, check_joints
+from keyrecon.io.durable import write_durably
+
+FORMAT = 1
+"""Version of the file."""
+
+
+def read_clicks(path: Path) -> GolfClicks:
+    """Read and check a file of clicks; raises KeyreconError with what is wrong and what helps."""
+    try:
+        content = json.loads(path.read_text())
+        version = content["keyrecon_golf_clicks"]
+        if version != FORMAT:
+            raise KeyreconError(
+                f"{path} is a file of clicks of version {version}; this keyrecon reads {FORMAT}."
+            )
+        principal, focal = content.get("principal"), content.get("focal")
+        clicks = GolfClicks(
+            frame=int(content["frame"]),
+            size=_pair(content["size"], int),
+            joints={str(n): _pair(p, float) for n, p in content["joints"].items()},
+            hidden=tuple(str(n) for n in content.get("hidden", ())),
+            left_handed=bool(content.get("left_handed", False)),
+            stature=float(content.get("stature") or STATURE),
+            focal=None if focal is None else float(focal),
+            principal=None if principal is None else _pair(principal, float),
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise KeyreconError(
+            f"{path} is not a file of golf clicks ({fault!r}); it is a JSON object with "
+            '"keyrecon_golf_clicks", "frame", "size" and "joints".'
+        ) from fault
+    check_joints(clicks, str(path))
+    return clicks
+
+
+def write_clicks(path: Path, clicks: GolfClicks) -> None:
+    """Write clicks as a person would: one joint to a line."""
+    joints = ",\n    ".join(f'"{n}": [{x:g}, {y:g}]' for n, (x, y) in clicks.joints.items())
+    head = {
+        "keyrecon_golf_clicks": FORMAT,
+        "frame": clicks.frame,
+        "size": list(clicks.size),
+        "hidden": list(clicks.hidden),
+        "left_handed": clicks.left_handed,
+        "stature": clicks.stature,
+        "focal": clicks.focal,
+        "principal": clicks.principal and list(clicks.principal),
+    }
+    body = ",\n  ".join(f'"{name}": {json.dumps(value)}' for name, value in head.items())
+    write_durably(path, f'{{\n  {body},\n  "joints": {{\n    {joints}\n  }}\n}}\n')
+
+
+def _pair(values: list, kind: type) -> tuple:
+    first, second = values
+    return kind(first), kind(second)

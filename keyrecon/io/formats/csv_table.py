@@ -1,0 +1,36 @@
+"""CSV: one row per frame, everything that is known of every joint in its own columns."""
+
+from pathlib import Path
+
+import numpy as np
+
+from keyrecon.io.durable import write_durably
+from keyrecon.records import SOURCES, Motion
+
+
+def write_csv(path: Path, motion: Motion) -> None:
+    """Write a table that pandas reads with `read_csv(path, comment="#")`.
+
+    Unknown numbers are empty. The comment lines on top say units and axes.
+    """
+    names = motion.skeleton.names
+    head = [
+        "# keyrecon motion, relative to the camera",
+        f"# x, y, z: {motion.units}, camera axes (x right, y down, z away from the camera)",
+        "# u, v: px (u right, v down, pixel centres at integers)",
+        f"# confidence: 0 to 1; source: one of {' '.join(SOURCES)}",
+        "# frame: from 0 in presentation order; time: seconds",
+    ]
+    columns = ["x", "y", "z", "u", "v", "confidence", "source"]
+    head.append(",".join(["frame", "time", *(f"{n}_{c}" for n in names for c in columns)]))
+    numbers = np.concatenate(
+        [motion.points3d, motion.points2d, motion.confidence[..., None]], axis=2
+    )
+    rows = []
+    for frame, (values, source) in enumerate(zip(numbers, motion.source, strict=True)):
+        cells = [str(frame), f"{motion.time[frame]:.6f}"]
+        for joint, origin in zip(values, source, strict=True):
+            cells += ["" if np.isnan(v) else f"{v:.6g}" for v in joint]
+            cells.append(SOURCES[origin])
+        rows.append(",".join(cells))
+    write_durably(path, "\n".join(head + rows) + "\n")

@@ -1,0 +1,91 @@
+"""motion.npz: everything that is known of a motion, as plain arrays without pickles."""
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from keyrecon import __version__
+from keyrecon.body import Skeleton
+from keyrecon.errors import KeyreconError, explain
+from keyrecon.io.durable import write_durably
+from keyrecon.records import SOURCES, Motion
+
+ARRAYS = {
+    "points3d": "TJ3",
+    "points2d": "TJ2",
+    "points2d_propagated": "TJ2",
+    "confidence": "TJ",
+    "source": "TJ",
+    "scale": "T",
+    "time": "T",
+    "keyframes": "K",
+}
+"""Arrays of a `Motion` and the letters of their axes."""
+
+
+def write_motion(path: Path, motion: Motion) -> None:
+    """Write motion.npz; axes and units as in `records.Motion`, names as listed in the README."""
+    skeleton = motion.skeleton
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        **{name: getattr(motion, name) for name in ARRAYS},
+        source_names=np.array(SOURCES),
+        joint_names=np.array(skeleton.names),
+        parents=np.array(skeleton.parents),
+        mirrored=np.array(skeleton.mirrored).reshape(-1, 2),
+        proportions=np.array(skeleton.proportions),
+        lower=np.array(skeleton.lower, dtype=np.int64),
+        fps=np.array(motion.fps),
+        units=np.array(motion.units),
+        keyrecon_version=np.array(__version__),
+    )
+    write_durably(path, buffer.getvalue())
+
+
+def read_motion(path: Path) -> Motion:
+    """Read what `write_motion` wrote; raises KeyreconError for any other file."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            data = {name: stored[name] for name in stored.files}
+        _check_shapes(data)
+        return Motion(
+            skeleton=_skeleton(data),
+            **{name: data[name] for name in ARRAYS},
+            fps=float(data["fps"]),
+            units=str(data["units"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
+        raise KeyreconError(
+            f"{path} is not a motion ({explain(fault)}); make it with keyrecon run."
+        ) from fault
+
+
+def _skeleton(data: dict[str, np.ndarray]) -> Skeleton:
+    return Skeleton(
+        names=tuple(data["joint_names"].tolist()),
+        parents=tuple(data["parents"].tolist()),
+        mirrored=tuple((a, b) for a, b in data["mirrored"].tolist()),
+        proportions=tuple(data["proportions"].tolist()),
+        lower=tuple(data["lower"].tolist()),
+    )
+
+
+def _check_shapes(data: dict[str, np.ndarray]) -> None:
+    """Raise ValueError when arrays are out of step with each other."""
+    sizes = {
+        "T": len(data["time"]),
+        "J": len(data["joint_names"]),
+        "K": len(data["keyframes"]),
+        "2": 2,
+        "3": 3,
+    }
+    for name, axes in ARRAYS.items():
+        expected = tuple(sizes[axis] for axis in axes)
+        if data[name].shape != expected:
+            raise ValueError(f"{name} has shape {data[name].shape} instead of {expected}")
+    source = data["source"]
+    if source.size and not (source.min() >= 0 and source.max() < len(SOURCES)):
+        raise ValueError(f"a source is not one of 0 to {len(SOURCES) - 1}")

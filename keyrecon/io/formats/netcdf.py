@@ -1,0 +1,54 @@
+"""netCDF in the layout of the movement package (Sirmpilatze et al.), dims of its version 0.17."""
+
+from pathlib import Path
+
+import numpy as np
+
+from keyrecon import __version__
+from keyrecon.errors import KeyreconError
+from keyrecon.io.durable import write_durably
+from keyrecon.records import SOURCES, Motion
+
+
+def write_netcdf(path: Path, motion: Motion) -> None:
+    """Write `position` (time, space, keypoint, individual) and `confidence`, plus `source`.
+
+    Camera axes; metres or body heights as the attribute `space_unit` says. Raises KeyreconError
+    without xarray, h5netcdf and h5py.
+    """
+    try:
+        import h5netcdf  # noqa: F401
+        import h5py  # noqa: F401
+        import xarray
+    except ImportError as fault:
+        raise KeyreconError(
+            "Writing netCDF needs xarray, h5netcdf and h5py; install them with: "
+            "pip install 'keyrecon[netcdf]'"
+        ) from fault
+    dims = ("time", "keypoint", "individual")
+    data = xarray.Dataset(
+        {
+            "position": (
+                ("time", "space", "keypoint", "individual"),
+                motion.points3d.transpose(0, 2, 1)[..., None],
+            ),
+            "confidence": (dims, motion.confidence[..., None]),
+            "source": (dims, motion.source[..., None].astype(np.int8)),
+        },
+        coords={
+            "time": motion.time,
+            "space": ["x", "y", "z"],
+            "keypoint": list(motion.skeleton.names),
+            "individual": ["athlete"],
+        },
+        attrs={
+            "fps": motion.fps,
+            "time_unit": "seconds",
+            "space_unit": motion.units,
+            "axes": "relative to the camera: x right, y down, z away",
+            "source_software": f"keyrecon {__version__}",
+            "source_names": ", ".join(SOURCES),
+            "ds_type": "poses",
+        },
+    )
+    write_durably(path, bytes(data.to_netcdf(engine="h5netcdf")))

@@ -1,0 +1,137 @@
+"""Keep-or-make of stage results.
+
+A result is stored under a name that is a hash of everything that made it: the stage's code, its
+options and its inputs. The same inputs and options find it again; anything else makes it anew.
+Results of earlier stages count by their own hashes, so that nothing large is hashed twice.
+"""
+
+import hashlib
+import inspect
+import time
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.storage import load_record, save_record
+from keyrecon.io.video import Video
+from keyrecon.progress import Progress, silent
+
+PACKAGE = Path(__file__).parent.parent
+SHARED_CODE = (
+    "body.py",
+    "records.py",
+    "io/frame_reader.py",
+    "io/video.py",
+    "numerics/*.py",
+    "paper/*.py",
+    "segmentation/*.py",
+)
+"""Modules whose change makes the results of every stage anew."""
+KEPT_RESULTS = 3
+"""Results kept of each stage, so that options can be tried out and taken back."""
+STALE_SECONDS = 3600.0
+"""Half-written results older than this were left by a process that was killed."""
+
+
+class StageStore:
+    """Stage results in a folder that is safe to delete."""
+
+    def __init__(self, folder: Path, force: bool = False) -> None:
+        """Use `folder`; `force` makes every stage again."""
+        self.folder = folder
+        self.force = force
+        self.seconds: dict[str, float] = {}
+        """How long each stage took that was run, seconds."""
+        self._keys: dict[int, tuple[object, str]] = {}
+
+    def keep(
+        self,
+        name: str,
+        stage: Callable[..., Any],
+        *inputs: object,
+        options: object = None,
+        progress: Progress = silent,
+    ) -> Any:
+        """The result of a stage: stored if the same inputs and options made it, else made."""
+        key, path = self._place(name, stage, inputs, options)
+        if path.is_file() and not self.force:
+            result = load_record(path)
+        else:
+            started = time.perf_counter()
+            arguments = {} if options is None else {"options": options}
+            result = stage(*inputs, **arguments, progress=progress)
+            self.seconds[name] = time.perf_counter() - started
+            self._forget(name)
+            save_record(path, result)
+        self._keys[id(result)] = (result, key)
+        return result
+
+    def recall(
+        self,
+        name: str,
+        stage: Callable[..., Any],
+        *inputs: object,
+        options: object = None,
+        progress: Progress = silent,
+    ) -> Any:
+        """The stored result of a stage, as `keep` would find it; KeyreconError if there is none."""
+        key, path = self._place(name, stage, inputs, options)
+        if not path.is_file():
+            raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
+        result = load_record(path)
+        self._keys[id(result)] = (result, key)
+        return result
+
+    def _place(
+        self, name: str, stage: Callable[..., Any], inputs: tuple, options: object
+    ) -> tuple[str, Path]:
+        """What tells this result from others, and its file."""
+        key = self._key((_code_of(stage), name, options, *inputs))
+        return key, self.folder / f"{name}-{key}.npz"
+
+    def _forget(self, name: str) -> None:
+        """Drop all but the latest few results of a stage."""
+        found = sorted(self.folder.glob(f"{name}-*.npz"), key=lambda p: p.stat().st_mtime)
+        long_ago = time.time() - STALE_SECONDS
+        stale = [p for p in self.folder.glob("*.part") if p.stat().st_mtime < long_ago]
+        for old in (*found[: -KEPT_RESULTS + 1], *stale):
+            old.unlink()
+
+    def _key(self, value: object) -> str:
+        digest = hashlib.sha256()
+        self._digest(value, digest)
+        return digest.hexdigest()[:16]
+
+    def _digest(self, value: object, digest: "hashlib._Hash") -> None:
+        """Feed a value's content; a result that `keep` made counts by its own key."""
+        known = self._keys.get(id(value))
+        if known is not None:
+            digest.update(known[1].encode())
+        elif isinstance(value, Video):
+            digest.update(value.fingerprint.encode() + value.stamps.tobytes())
+            digest.update(value.time.tobytes())
+        elif isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+        elif is_dataclass(value):
+            digest.update(type(value).__name__.encode())
+            for field in fields(value):
+                digest.update(field.name.encode())
+                self._digest(getattr(value, field.name), digest)
+        elif isinstance(value, tuple):
+            digest.update(f"tuple{len(value)}".encode())
+            for part in value:
+                self._digest(part, digest)
+        else:
+            digest.update(repr(value).encode())
+
+
+def _code_of(stage: Callable[..., Any]) -> str:
+    """Hash of the stage's folder and of what all stages share: new code makes new results."""
+    own = Path(inspect.getfile(stage)).parent.rglob("*.py")
+    shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
+    sources = sorted({*own, *shared})
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()

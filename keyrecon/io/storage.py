@@ -1,0 +1,125 @@
+"""Records on disk: one npz file each, arrays beside a JSON description, no pickle.
+
+A record (a frozen dataclass of this package) is taken apart into arrays and a tree that says
+where they belong. Tuples of records of one kind (one per frame) are stored end to end with their
+lengths, so that a long video costs a handful of arrays, not thousands.
+"""
+
+import json
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from keyrecon.errors import KeyreconError, explain
+from keyrecon.io.durable import make_folder, replacing
+
+Tree = dict[str, Any]
+Arrays = dict[str, np.ndarray]
+
+
+def save_record(path: Path, value: object) -> None:
+    """Write a record (or tuple, number, text, None) so that it appears whole or not at all."""
+    arrays: Arrays = {}
+    tree = _take_apart(value, arrays)
+    text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
+    make_folder(path.parent)
+    with replacing(path, durably=False) as file:
+        np.savez(file, tree=text, **arrays)
+
+
+def load_record(path: Path) -> Any:
+    """Read what `save_record` wrote; raises KeyreconError for a file of another kind."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            tree = json.loads(stored["tree"].tobytes())
+            return _put_together(tree, stored)
+    except (OSError, ValueError, KeyError, TypeError, ImportError, BadZipFile) as fault:
+        raise KeyreconError(
+            f"{path} is not a stored result ({explain(fault)}); delete it and run again."
+        ) from fault
+
+
+def _take_apart(value: object, arrays: Arrays) -> Tree:
+    if isinstance(value, np.ndarray):
+        return {"array": _store(value, arrays)}
+    if is_dataclass(value):
+        parts = {f.name: _take_apart(getattr(value, f.name), arrays) for f in fields(value)}
+        return {"record": _name_type(value), "fields": parts}
+    if isinstance(value, tuple):
+        if _is_ragged(value):
+            return _take_apart_ragged(value, arrays)
+        return {"tuple": [_take_apart(part, arrays) for part in value]}
+    return {"value": value.item() if isinstance(value, np.generic) else value}
+
+
+def _is_ragged(parts: tuple) -> bool:
+    """Whether `parts` are records of one kind that hold nothing but arrays alike."""
+    if len(parts) < 2 or not is_dataclass(parts[0]):
+        return False
+    names = [f.name for f in fields(parts[0])]
+    first = [getattr(parts[0], name) for name in names]
+    return all(isinstance(a, np.ndarray) and a.ndim > 0 for a in first) and all(
+        type(part) is type(parts[0])
+        and all(
+            getattr(part, name).shape[1:] == a.shape[1:] and getattr(part, name).dtype == a.dtype
+            for name, a in zip(names, first, strict=True)
+        )
+        for part in parts
+    )
+
+
+def _take_apart_ragged(parts: tuple, arrays: Arrays) -> Tree:
+    stored = {}
+    for field in fields(parts[0]):
+        columns = [getattr(part, field.name) for part in parts]
+        stored[field.name] = {
+            "data": _store(np.concatenate(columns), arrays),
+            "lengths": _store(np.array([len(c) for c in columns]), arrays),
+        }
+    return {"ragged": _name_type(parts[0]), "count": len(parts), "fields": stored}
+
+
+def _store(array: np.ndarray, arrays: Arrays) -> str:
+    name = f"a{len(arrays)}"
+    arrays[name] = array
+    return name
+
+
+def _put_together(tree: Tree, stored: Any) -> Any:
+    if "array" in tree:
+        return stored[tree["array"]]
+    if "tuple" in tree:
+        return tuple(_put_together(part, stored) for part in tree["tuple"])
+    if "record" in tree:
+        parts = {name: _put_together(part, stored) for name, part in tree["fields"].items()}
+        return _record_type(tree["record"])(**parts)
+    if "ragged" in tree:
+        columns = {
+            name: np.split(stored[part["data"]], np.cumsum(stored[part["lengths"]])[:-1])
+            for name, part in tree["fields"].items()
+        }
+        kind = _record_type(tree["ragged"])
+        return tuple(
+            kind(**{name: column[i] for name, column in columns.items()})
+            for i in range(tree["count"])
+        )
+    return tree["value"]
+
+
+def _name_type(value: object) -> str:
+    return f"{type(value).__module__}:{type(value).__name__}"
+
+
+def _record_type(name: str) -> type:
+    """The record of that name; nothing but the package's own records is ever called."""
+    module, _, kind = name.partition(":")
+    if module.split(".")[0] != "keyrecon":
+        raise ValueError(f"unknown record '{name}'")
+    found = vars(import_module(module)).get(kind)
+    if not (isinstance(found, type) and is_dataclass(found)):
+        raise ValueError(f"unknown record '{name}'")
+    return found

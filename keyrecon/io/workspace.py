@@ -1,0 +1,284 @@
+"""The project folder: the only place that knows file names.
+
+    project.toml       the video (relative path, fingerprint, trim) and options that were set
+    picks.json         colours that a person clicked
+    keyframes.json     frames to annotate, with a picture of each in keyframes/
+    annotations.json   what a person marked
+    skeleton.json      joints and bones, where they are not the default ones
+    motion.npz, report.html
+    cache/             results of the stages; safe to delete
+
+What a person made is written durably and never replaced by something that does not parse.
+"""
+
+import json
+import os
+import tomllib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from keyrecon.body import LSP14, Skeleton, read_skeleton
+from keyrecon.errors import KeyreconError, explain, quoted
+from keyrecon.io.durable import hold_lock, make_folder, write_durably
+from keyrecon.io.formats.picks import read_picks, write_picks
+from keyrecon.io.stages import StageStore
+from keyrecon.io.video import Video, fingerprint_file, open_video
+from keyrecon.records import Pick
+
+VIDEO_FIELDS = {
+    "path": (str,),
+    "fingerprint": (str,),
+    "start": (int,),
+    "end": (int,),
+    "slow_motion": (int, float),
+}
+"""What project.toml tells of the video; the first two must be there."""
+OPTIONS_TABLE = "\n# Options that differ from the defaults.\n[options]\n"
+
+
+class Workspace:
+    """A project folder."""
+
+    def __init__(self, folder: Path, force: bool = False) -> None:
+        """Open the project in `folder`; `force` makes every stage again."""
+        self.folder = folder
+        self.stages = StageStore(folder / "cache", force)
+        if not self.project_file.is_file():
+            raise KeyreconError(
+                f"{folder} is not a keyrecon project (no project.toml); "
+                f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
+            )
+        try:
+            self.project = tomllib.loads(self.project_file.read_text())
+            _check_video(self.project["video"])
+        except (OSError, ValueError, KeyError, TypeError) as fault:
+            raise KeyreconError(
+                f"{self.project_file} cannot be read ({explain(fault)}); mend it or make the "
+                "project anew in another folder."
+            ) from fault
+
+    @property
+    def project_file(self) -> Path:
+        """project.toml"""
+        return self.folder / "project.toml"
+
+    @property
+    def picks_file(self) -> Path:
+        """picks.json"""
+        return self.folder / "picks.json"
+
+    @property
+    def keyframes_file(self) -> Path:
+        """keyframes.json"""
+        return self.folder / "keyframes.json"
+
+    @property
+    def annotations_file(self) -> Path:
+        """annotations.json"""
+        return self.folder / "annotations.json"
+
+    @property
+    def motion_file(self) -> Path:
+        """motion.npz"""
+        return self.folder / "motion.npz"
+
+    @property
+    def report_file(self) -> Path:
+        """report.html"""
+        return self.folder / "report.html"
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The joints to mark: those of skeleton.json where the project has one."""
+        file = self.folder / "skeleton.json"
+        return read_skeleton(file) if file.is_file() else LSP14
+
+    @property
+    def pictures(self) -> Path:
+        """Folder with a picture of every keyframe to annotate."""
+        return self.folder / "keyframes"
+
+    @classmethod
+    def create(cls, folder: Path, video: Video, video_file: Path, trim: dict) -> "Workspace":
+        """Start a project; never touches one that exists."""
+        file = folder / "project.toml"
+        if file.exists():
+            raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
+        make_folder(folder)
+        lines = ["# A keyrecon project.", "version = 1", "", "[video]"]
+        lines += [f"path = {json.dumps(_relative(video_file, folder))}"]
+        lines += [f'fingerprint = "{video.fingerprint}"']
+        lines += [f"{name} = {value}" for name, value in trim.items() if value is not None]
+        write_durably(file, "\n".join(lines) + "\n")
+        return cls(folder)
+
+    def video(self) -> Video:
+        """The project's video; looks beside the project when it has moved."""
+        wanted = self.project["video"]
+        path = (self.folder / wanted["path"]).resolve()
+        if not path.is_file():
+            path = self._find_video(Path(wanted["path"]).name, wanted["fingerprint"])
+        elif fingerprint_file(path) != wanted["fingerprint"]:
+            raise KeyreconError(
+                f"{path} has changed since the project was made (its fingerprint differs); "
+                "bring the old file back, or start a new project for the new one."
+            )
+        return open_video(
+            path,
+            wanted.get("start", 0),
+            wanted.get("end"),
+            wanted.get("slow_motion", 1.0),
+        )
+
+    def _places_of_video(self) -> tuple[Path, Path]:
+        """Where a video is looked for that has moved."""
+        return self.folder, self.folder.resolve().parent
+
+    def relink(self, video_file: Path) -> None:
+        """Point the project at the place its video has moved to."""
+        if not video_file.is_file():
+            raise KeyreconError(f"There is no video at {video_file}.")
+        if fingerprint_file(video_file) != self.project["video"]["fingerprint"]:
+            raise KeyreconError(
+                f"{video_file} is not the video of this project (its fingerprint differs); "
+                "start a new project for it with: keyrecon new"
+            )
+        old = f"path = {json.dumps(self.project['video']['path'])}"
+        new = f"path = {json.dumps(_relative(video_file, self.folder))}"
+        write_durably(self.project_file, self.project_file.read_text().replace(old, new, 1))
+        self.project = tomllib.loads(self.project_file.read_text())
+
+    def _find_video(self, name: str, fingerprint: str) -> Path:
+        for place in self._places_of_video():
+            candidate = place / name
+            if candidate.is_file() and fingerprint_file(candidate) == fingerprint:
+                return candidate
+        raise KeyreconError(
+            f"The video {self.project['video']['path']} is not where the project expects it; "
+            f"tell where it is now with: keyrecon relink {quoted(self.folder)} VIDEO"
+        )
+
+    def picks(self) -> tuple[Pick, ...]:
+        """What a person clicked, in one order: stage results do not hang on who clicked first.
+
+        Raises KeyreconError when there is nothing yet.
+        """
+        if not self.picks_file.is_file():
+            raise KeyreconError(
+                f"{self.folder} has no picks yet; click the player's head, feet and clothes on the "
+                f"page of keyrecon annotate {quoted(self.folder)}, or with: keyrecon pick "
+                f"{quoted(self.folder)} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
+            )
+        picks = read_picks(self.picks_file)
+        return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))
+
+    def add_picks(self, picks: Sequence[Pick]) -> tuple[Pick, ...]:
+        """Add clicks to those there are."""
+        with self.exclusive():
+            old = self.picks() if self.picks_file.is_file() else ()
+            together = tuple(dict.fromkeys((*old, *picks)))
+            write_picks(self.picks_file, together)
+        return together
+
+    @contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Hold the project's files that a person made while they are read and replaced.
+
+        Commands and the annotator may change one project at the same time; each sees the
+        other's marks whole.
+        """
+        lock = hold_lock(self.folder / ".change.lock")
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def kept_files(self) -> list[Path]:
+        """Files there are that hold a person's work, or from which the rest is made."""
+        names = ("*.toml", "*.json", "*.sqlite*", self.motion_file.name, self.report_file.name)
+        own = [file for name in names for file in self.folder.glob(name)]
+        video = Path(self.project["video"]["path"])
+        places = [self.folder / video, *(place / video.name for place in self._places_of_video())]
+        return own + [file for file in places if file.is_file()]
+
+    def put_aside(self, file: Path) -> None:
+        """Keep a copy of a file that a person made, before it changes."""
+        number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
+        write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
+
+    def options(self, told: Any, defaults: Any) -> Any:
+        """Options that this project has set, and on top of them what `told` has set otherwise."""
+        kept = _apply(defaults, self.project.get("options", {}), "options")
+        return _apply(kept, _nested(_differences(told, defaults)), "options")
+
+    def remember(self, options: Any, defaults: Any) -> None:
+        """Write the options that differ from the defaults into project.toml."""
+        text = self.project_file.read_text().split(OPTIONS_TABLE)[0]
+        changed = _differences(options, defaults)
+        if changed:
+            text += OPTIONS_TABLE + "".join(f"{n} = {json.dumps(v)}\n" for n, v in changed.items())
+        if text != self.project_file.read_text():
+            write_durably(self.project_file, text)
+            self.project = tomllib.loads(text)
+
+
+def _check_video(told: Any) -> None:
+    """Raise KeyError or TypeError where project.toml does not tell the video as we write it."""
+    if not isinstance(told, dict):
+        raise TypeError("video must be a table")
+    for name, kinds in VIDEO_FIELDS.items():
+        value = told[name] if name in ("path", "fingerprint") else told.get(name)
+        if value is not None and type(value) not in kinds:
+            raise TypeError(f"video.{name} cannot be {value!r}")
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """`path` as seen from `folder`, with forward slashes."""
+    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+
+
+def _differences(options: Any, defaults: Any, prefix: str = "") -> dict[str, Any]:
+    changed = {}
+    for field in fields(options):
+        value, default = getattr(options, field.name), getattr(defaults, field.name)
+        if is_dataclass(value):
+            changed |= _differences(value, default, f"{prefix}{field.name}.")
+        elif value != default and value is not None:
+            changed[prefix + field.name] = value
+    return changed
+
+
+def _nested(changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables within tables from names with dots, as TOML reads them."""
+    tables: dict[str, Any] = {}
+    for name, value in changes.items():
+        *path, last = name.split(".")
+        table = tables
+        for part in path:
+            table = table.setdefault(part, {})
+        table[last] = value
+    return tables
+
+
+def _apply(options: Any, changes: dict, where: str) -> Any:
+    """Set fields of nested option records from nested tables of project.toml."""
+    known = {field.name for field in fields(options)}
+    new = {}
+    for name, value in changes.items():
+        if name not in known:
+            raise KeyreconError(
+                f"project.toml sets {where}.{name}, which does not exist; "
+                f"{where} has {', '.join(sorted(known))}."
+            )
+        old = getattr(options, name)
+        same = isinstance(value, str) == isinstance(old, str)
+        if not same or isinstance(value, dict) != is_dataclass(old):
+            raise KeyreconError(f"project.toml: {where}.{name} cannot be {value!r}.")
+        if is_dataclass(old):
+            new[name] = _apply(old, value, f"{where}.{name}")
+        else:
+            new[name] = tuple(value) if isinstance(value, list) else value
+    return replace(options, **new)

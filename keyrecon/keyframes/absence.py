@@ -1,0 +1,67 @@
+"""Stretches without the player: nothing to annotate, and nothing that keyframes should stand for.
+
+A frame or two in which the player was not found are bridged like any other gap (Eq. 1). A stretch
+longer than that, in which the player has left the picture or is hidden, is taken out before
+keyframes are chosen, as if the video had been cut there, and put back afterwards.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import binary_opening
+
+from keyrecon.records import HalfKeyframes, PoseDistances
+
+
+def absent_frames(clarity: Float[np.ndarray, "T"], reach: int) -> Bool[np.ndarray, "T"]:
+    """Frames of stretches longer than `reach` in which nothing can be annotated."""
+    if not clarity.any():
+        return np.zeros(len(clarity), dtype=bool)
+    return binary_opening(clarity == 0, np.ones(reach + 1))
+
+
+def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
+    """First and last frame of every stretch."""
+    turns = np.flatnonzero(np.diff(absent, prepend=False, append=False))
+    return [(int(first), int(end) - 1) for first, end in turns.reshape(-1, 2)]
+
+
+def take_compared(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> PoseDistances:
+    """What is known of some of the frames, numbered anew; at least one of them is kept.
+
+    An exemplar that is not kept is replaced by the frame most like it of those it stands for.
+    """
+    if len(kept) == len(comparison.row):
+        return comparison
+    rows, row = np.unique(comparison.row[kept], return_inverse=True)
+    detour = comparison.detour[:, kept]
+    order = np.lexsort((detour.sum(axis=0), kept != comparison.frames[comparison.row[kept]], row))
+    first = order[np.unique(row[order], return_index=True)[1]]
+    square = np.ix_(rows, rows)
+    return PoseDistances(
+        upper=comparison.upper[square],
+        lower=comparison.lower[square],
+        frames=first,
+        row=row,
+        detour=detour,
+        step=comparison.step[:, kept[:-1][np.diff(kept) == 1]],
+        clarity=comparison.clarity[kept],
+    )
+
+
+def put_back(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int) -> HalfKeyframes:
+    """Keyframes of the kept frames as keyframes of all `frames`; the others stay unrepresented.
+
+    They are given the keyframe of the last frame before them, for want of a better one.
+    """
+    before = np.clip(np.searchsorted(kept, np.arange(frames), side="right") - 1, 0, None)
+    represented = np.zeros(frames, dtype=bool)
+    represented[kept] = half.represented
+    return replace(
+        half,
+        frames=kept[half.frames],
+        nearest=kept[half.nearest][before],
+        represented=represented,
+        distance=half.distance[before],
+    )

@@ -1,0 +1,147 @@
+"""Edge elements of many frames, shared out to cells of like position, direction and colour.
+
+A cell stands for all its members by their mean. Which cells may correspond (same colour,
+directions inside the cone, positions within reach) is worked out once for all frames.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Complex64, Float, Float32, Int
+
+from keyrecon.keyframes.edge_distance import CONE, HalfName, align_edges
+from keyrecon.records import Edges, Track
+
+STRIP = 512
+"""Cells whose neighbours are found together."""
+
+
+@dataclass(frozen=True, eq=False)
+class BinnedElements:
+    """Aligned edge elements of many frames, one after the other."""
+
+    frame: Int[np.ndarray, "E"]
+    points: Float32[np.ndarray, "E 2"]
+    """Player heights."""
+    angle: Float32[np.ndarray, "E"]
+    """Direction of the tangent, rad."""
+    color: Int[np.ndarray, "E"]
+    n_frames: int
+
+
+@dataclass(frozen=True, eq=False)
+class DescriptorBins:
+    """Groups of like elements, and which of them may correspond."""
+
+    of_element: Int[np.ndarray, "E"]
+    """Cell of each element."""
+    center: Complex64[np.ndarray, "G"]
+    """Mean position of the members, x + iy in player heights."""
+    first: Int[np.ndarray, "G+1"]
+    """Where each cell's neighbours start in `neighbor`, and the end of the last."""
+    neighbor: Int[np.ndarray, "P"]
+    """Compatible cells that a member's distance may reach."""
+
+
+def gather_elements(edges: tuple[Edges, ...], track: Track, half: HalfName) -> BinnedElements:
+    """Align and join the elements of one half of the body."""
+    aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
+    tangent = np.concatenate([e.tangent for e in aligned])
+    return BinnedElements(
+        frame=np.repeat(np.arange(len(aligned)), [len(e.points) for e in aligned]),
+        points=np.concatenate([e.points for e in aligned]).astype(np.float32),
+        angle=np.arctan2(tangent[:, 1], tangent[:, 0]).astype(np.float32),
+        color=np.concatenate([e.color for e in aligned]),
+        n_frames=len(aligned),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _BinGrid:
+    """Numbers of the places that a cell may have: colour, turn, column and row, one in another."""
+
+    place: Int[np.ndarray, "E"]
+    """Of each element."""
+    directions: int
+    near: int
+    """Columns and rows between cells within reach at most: so many more are free all around."""
+    columns: int
+    rows: int
+
+    @property
+    def layer(self) -> int:
+        """Places of one colour and turn."""
+        return self.columns * self.rows
+
+    def beside(
+        self, place: Int[np.ndarray, "n"]
+    ) -> tuple[Int[np.ndarray, "n D"], Int[np.ndarray, "n D"]]:
+        """Runs of places, from and up to, with all that may correspond."""
+        apart = int(np.ceil(CONE * self.directions / (2 * np.pi)))
+        turn = place // self.layer % self.directions
+        turned = (turn[:, None] + np.arange(-apart, apart + 1)) % self.directions
+        turned = place[:, None] + (turned - turn[:, None]) * self.layer
+        sideways = np.arange(-self.near, self.near + 1) * self.rows
+        middle = (turned[:, :, None] + sideways).reshape(len(place), -1)
+        return middle - self.near, middle + self.near + 1
+
+
+def group_elements(
+    elements: BinnedElements, pitch: float, directions: int, reach: float
+) -> DescriptorBins:
+    """Share the elements out to cells `pitch` wide and a turn / `directions` deep."""
+    reach = reach + pitch / 2
+    grid = _lay_grid(elements, pitch, directions, reach)
+    used, of_element = np.unique(grid.place, return_inverse=True)
+    weight = 1 / np.bincount(of_element, minlength=len(used))
+
+    def mean(values: Float[np.ndarray, "E"]) -> Float[np.ndarray, "G"]:
+        return np.bincount(of_element, values, minlength=len(used)) * weight
+
+    center = mean(elements.points[:, 0]) + 1j * mean(elements.points[:, 1])
+    heading = mean(np.cos(elements.angle)) + 1j * mean(np.sin(elements.angle))
+    heading /= np.maximum(np.abs(heading), 1e-9)
+    first, neighbor = _neighborhoods(used, grid, center, heading, reach)
+    return DescriptorBins(of_element, center.astype(np.complex64), first, neighbor)
+
+
+def _lay_grid(elements: BinnedElements, pitch: float, directions: int, reach: float) -> _BinGrid:
+    spatial = np.floor(elements.points / pitch).astype(np.int64)
+    turn = np.floor(elements.angle * (directions / (2 * np.pi))).astype(np.int64) % directions
+    near = int(np.ceil(reach / pitch))
+    low = spatial.min(axis=0, initial=0) - near
+    columns, rows = (spatial.max(axis=0, initial=0) - low + near + 1).tolist()
+    column, row = (spatial - low).T
+    place = ((elements.color * directions + turn) * columns + column) * rows + row
+    return _BinGrid(place, directions, near, columns, rows)
+
+
+def _neighborhoods(
+    used: Int[np.ndarray, "G"],
+    grid: _BinGrid,
+    center: Complex[np.ndarray, "G"],
+    heading: Complex[np.ndarray, "G"],
+    reach: float,
+) -> tuple[Int[np.ndarray, "G+1"], Int[np.ndarray, "P"]]:
+    """Cells of the same colour, within reach and inside the cone, for each cell."""
+    counts, neighbors = [np.zeros(1, int)], []
+    for at in range(0, len(used), STRIP):
+        strip = slice(at, at + STRIP)
+        # the cells are in order of their places, so that a run of places is a run of cells
+        start, stop = (np.searchsorted(used, p) for p in grid.beside(used[strip]))
+        room = (stop - start).sum(axis=1)
+        column = ranges(start.ravel(), (stop - start).ravel())
+        row = np.repeat(np.arange(len(room)), room)
+        away = center[column] - center[strip][row]
+        close = np.flatnonzero(away.real**2 + away.imag**2 < reach**2)
+        row, column = row[close], column[close]
+        aligned = (heading[column] * np.conj(heading[strip])[row]).real > np.cos(CONE)
+        neighbors.append(column[aligned].astype(np.int32))
+        counts.append(np.bincount(row[aligned], minlength=len(room)))
+    return np.cumsum(np.concatenate(counts)), np.concatenate(neighbors)
+
+
+def ranges(start: Int[np.ndarray, "E"], count: Int[np.ndarray, "E"]) -> Int[np.ndarray, "P"]:
+    """start[0], start[0] + 1, ... (count[0] numbers), then the same of the next, and so on."""
+    before = np.cumsum(count) - count
+    return np.arange(count.sum()) + np.repeat(start - before, count)

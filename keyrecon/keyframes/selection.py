@@ -1,0 +1,302 @@
+"""Choose the few frames that a person annotates (Section 4.3).
+
+A keyframe represents the frames whose pose is within beta of its own. The number of keyframes
+is given (the annotation budget), so beta is what is searched for: the smallest with which so
+many keyframes represent, or bridge by gaps of at most T frames, a share alpha of all frames
+(Eq. 1). Upper and lower body are chosen apart.
+
+method='paper' is the choice as printed: Eq. 2-4, distances smoothed with the same beta.
+method='coverage' maximises the coverage of Eq. 1 itself, reconsiders each keyframe, and at the
+end moves keyframes to the middle of what they represent. It smooths with a beta of its own, the
+distance between consecutive frames: two frames as alike as neighbours in time do show the same
+pose, which is what justifies averaging, whereas the beta of a small budget is far larger.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.errors import KeyreconError
+from keyrecon.keyframes.absence import absent_frames, put_back, take_compared
+from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
+from keyrecon.keyframes.coverage import choose_as_printed, choose_greedily
+from keyrecon.keyframes.smoothing import smooth_distances
+from keyrecon.keyframes.swaps import (
+    CoverageGoal,
+    add_closest,
+    drop_redundant,
+    shrink,
+    swap_for_closeness,
+    swap_for_coverage,
+)
+from keyrecon.progress import Progress, silent
+from keyrecon.records import HalfKeyframes, Keyframes, PoseDistances
+
+BETA_PRECISION = 0.01
+"""Beta is searched to one part in a hundred: less than one keyframe in a hundred."""
+LEAST_BETA = 1e-4
+"""Beta is not made smaller, player heights: contours are never found to a tenth of a pixel."""
+BETA_STEP = 0.96
+"""Factor on beta from one attempt of the exchange search to the next."""
+EXCHANGES = 100_000
+"""Keyframes times candidates up to which keyframes are reconsidered one by one: 50 keyframes of
+a 2000-frame video. Larger choices stay as the greedy choice has them, for the sake of time."""
+
+
+@dataclass(frozen=True)
+class KeyframeOptions:
+    """How many frames a person is asked to annotate, and what they must stand for."""
+
+    budget: float = 0.015
+    """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video."""
+    coverage: float = 0.95
+    """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
+    reach: int = 10
+    """T of Eq. 1: longest gap to interpolate, in frames at 50 frames per second; other rates
+    get as much time."""
+    beta_upper: float | None = None
+    """Pose distance up to which a keyframe represents a frame, upper body, player heights; None
+    finds the smallest that the budget allows. With a value the budget is not looked at."""
+    beta_lower: float | None = None
+    """The same for the lower body."""
+    smoothing: float = 0.6
+    """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
+    smooths. method='paper' smooths with the beta of the choice instead."""
+    form: Literal["both", "mean"] = "both"
+    """Smoothed distances: rows then columns averaged, or the mean of both averages."""
+    method: Literal["coverage", "paper"] = "coverage"
+    """'paper': Eq. 2-4 as printed. 'coverage': fewer keyframes for the same coverage."""
+
+
+@dataclass(frozen=True, eq=False)
+class HalfDistances:
+    """What is known of one half of the body, and what is asked of its keyframes."""
+
+    comparison: PoseDistances
+    matched: Float[np.ndarray, "M M"]
+    smoothed: Float[np.ndarray, "M M"]
+    """D of method='coverage'."""
+    first_beta: float
+    """Where the search for beta starts: frames as alike as neighbours in time."""
+    detour: Float[np.ndarray, "T"]
+    reach: int
+    uncovered: int
+    options: KeyframeOptions
+
+    def distances(self, beta: float) -> Float[np.ndarray, "M M"]:
+        """D for a choice with `beta`."""
+        if self.options.method == "paper":
+            return smooth_distances(self.matched, beta, self.options.form)
+        return self.smoothed
+
+    def goal(self, beta: float) -> CoverageGoal:
+        """What keyframes with `beta` represent, and have to."""
+        hoods = find_neighborhoods(self.distances(beta), self.comparison, self.detour, beta)
+        clarity = self.comparison.clarity[self.comparison.frames]
+        return CoverageGoal(hoods, self.reach, self.uncovered, clarity)
+
+
+def count_labels(options: KeyframeOptions, n_frames: int) -> int:
+    """Half-body labels that the budget allows in a video of `n_frames`.
+
+    Raises KeyreconError where it is less than one for each half, and for impossible options.
+    """
+    if not 0 < options.coverage <= 1:
+        raise KeyreconError(
+            f"--coverage is a share of the frames, 0.95 for 95 %, not {options.coverage:g}."
+        )
+    if options.reach < 0:
+        raise KeyreconError(f"--reach is a number of frames, not {options.reach}.")
+    if not 0 < options.budget <= 1:
+        raise KeyreconError(
+            f"--budget is a share of the frames, 0.015 for 1.5 %, not {options.budget:g}."
+        )
+    labels = int(2 * options.budget * n_frames + 1e-9)
+    if labels < 2 and None in (options.beta_upper, options.beta_lower):
+        raise KeyreconError(
+            f"A budget of {options.budget:.2%} of {n_frames} frames is {labels} half-body "
+            f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
+            "allows that."
+        )
+    return labels
+
+
+def choose_keyframes(
+    comparison: PoseDistances,
+    fps: float,
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """Keyframes of both halves of the body within the budget.
+
+    None in stretches without the player. Raises KeyreconError where the options ask for what
+    cannot be (`count_labels`).
+    """
+    frames = len(comparison.row)
+    labels = count_labels(options, frames)
+    reach = max(1, round(options.reach * fps / 50))
+    kept = np.flatnonzero(~absent_frames(comparison.clarity, reach))
+    comparison = take_compared(comparison, kept)
+    halves = []
+    wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
+    names = progress(("upper", "lower"), "Choosing keyframes", 2)
+    for index, (name, (most, beta)) in enumerate(zip(names, wanted, strict=True)):
+        half = _half(comparison, getattr(comparison, name), index, reach, options)
+        also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
+        halves.append(_choose_half(half, most, beta, also))
+    halves = [put_back(half, kept, frames) for half in halves]
+    return Keyframes(*halves, reach=reach, alpha=options.coverage)
+
+
+def _half(
+    comparison: PoseDistances,
+    matched: Float[np.ndarray, "M M"],
+    index: int,
+    reach: int,
+    options: KeyframeOptions,
+) -> HalfDistances:
+    step = comparison.step[index]
+    same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
+    return HalfDistances(
+        comparison=comparison,
+        matched=matched,
+        smoothed=smooth_distances(matched, same_pose, options.form),
+        first_beta=max(same_pose, LEAST_BETA),
+        detour=comparison.detour[index],
+        reach=reach,
+        uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
+        options=options,
+    )
+
+
+def _choose_half(
+    half: HalfDistances, most: int, beta: float | None, also: Int[np.ndarray, "K"]
+) -> HalfKeyframes:
+    """Keyframes of one half; `also` are frames that are annotated for the other half anyway."""
+    searched = beta is None
+    if beta is None:
+        beta, chosen = _smallest_beta(half, most)
+    else:
+        goal = half.goal(beta)
+        chosen = _choose(half, goal, len(goal.clarity))
+        if half.options.method == "coverage" and len(chosen) * len(half.matched) <= EXCHANGES:
+            chosen = shrink(goal, chosen)
+    goal = half.goal(beta)
+    if half.options.method == "coverage":
+        chosen = _center(half, goal, chosen, most if searched else 0, also)
+    return _record(half, goal, beta, half.comparison.frames[np.sort(chosen)])
+
+
+def _choose(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
+    """Keyframes by the selected method, at most `most`; the goal may be left unreached."""
+    if half.options.method == "paper":
+        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, most)
+    # What the greedy choice takes too many can often be dropped again.
+    chosen = choose_greedily(
+        goal.hoods, goal.reach, goal.uncovered, most + most // 5 + 1, goal.clarity
+    )
+    return drop_redundant(goal, chosen)[:most]
+
+
+def _smallest_beta(half: HalfDistances, most: int) -> tuple[float, list[int]]:
+    """The smallest beta with which `most` keyframes reach the coverage, and such keyframes."""
+    low, high = 0.0, half.first_beta
+    chosen = _choose(half, half.goal(high), most)
+    while not half.goal(high).reached(chosen):
+        low, high = high, 1.5 * high
+        chosen = _choose(half, half.goal(high), most)
+    while high - low > max(BETA_PRECISION * high, LEAST_BETA):
+        middle = (low + high) / 2
+        goal = half.goal(middle)
+        found = _choose(half, goal, most)
+        if goal.reached(found):
+            high, chosen = middle, found
+        else:
+            low = middle
+    if half.options.method == "paper" or most * len(half.matched) > EXCHANGES:
+        return high, chosen
+    return _lower_beta(half, most, high, chosen)
+
+
+def _lower_beta(
+    half: HalfDistances, most: int, beta: float, chosen: list[int]
+) -> tuple[float, list[int]]:
+    """Exchange keyframes to do with a smaller beta still."""
+    while beta * BETA_STEP > LEAST_BETA:
+        goal = half.goal(beta * BETA_STEP)
+        start = choose_greedily(goal.hoods, goal.reach, goal.uncovered, most, goal.clarity)
+        found = swap_for_coverage(goal, start)
+        if not goal.reached(found):
+            break
+        beta, chosen = beta * BETA_STEP, found
+    return beta, chosen
+
+
+def _center(
+    half: HalfDistances,
+    goal: CoverageGoal,
+    chosen: list[int],
+    most: int,
+    also: Int[np.ndarray, "K"],
+) -> list[int]:
+    """Move keyframes to the middle of what they represent, away from unclear frames.
+
+    What the budget still allows is spent on keyframes that lessen the distance most. A frame
+    that is annotated for the other half anyway costs the person one frame less to look at,
+    which is worth half a percent of the distance.
+    """
+    unclear = 2 - goal.clarity - 0.005 * np.isin(half.comparison.frames, also)
+    members = np.bincount(half.comparison.row, minlength=len(goal.clarity))
+    distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
+    weight = members.astype(distance.dtype)
+    chosen = add_closest(chosen, most, distance, weight)
+    if len(chosen) * len(half.matched) > EXCHANGES:
+        return chosen
+    return swap_for_closeness(goal, chosen, distance, weight)
+
+
+def _record(
+    half: HalfDistances, goal: CoverageGoal, beta: float, keyframes: Int[np.ndarray, "K"]
+) -> HalfKeyframes:
+    comparison, detour = half.comparison, half.detour
+    nearest, distance = assign_frames(half.distances(beta), comparison, detour, keyframes)
+    represented = represent_frames(goal.hoods, comparison, detour[keyframes] < beta, keyframes)
+    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
+    return HalfKeyframes(
+        frames=keyframes,
+        nearest=nearest,
+        represented=represented,
+        coverage=1 - goal.left_over(represented) / len(represented),
+        beta=beta,
+        distance=distance,
+        printed_count=len(printed),
+    )
+
+
+def adopt_keyframes(
+    comparison: PoseDistances,
+    asked: Keyframes,
+    annotated: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
+
+    Frames that nobody asked for count like the others, also where the player seemed to be absent.
+    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
+    """
+    away = absent_frames(comparison.clarity, asked.reach)
+    away[np.concatenate(annotated)] = False
+    kept, everyone = np.flatnonzero(~away), len(comparison.row)
+    comparison = take_compared(comparison, kept)
+    halves = []
+    names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
+    for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
+        half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
+        beta = getattr(asked, name).beta
+        chosen = np.searchsorted(kept, np.unique(frames))
+        found = _record(half, half.goal(beta), beta, chosen)
+        halves.append(put_back(found, kept, everyone))
+    return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)

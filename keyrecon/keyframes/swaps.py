@@ -1,0 +1,139 @@
+"""Make a choice of keyframes better by exchanging them one at a time.
+
+A greedy choice is never reconsidered. Three moves repair that: drop a keyframe whose frames the
+others cover; replace one by the candidate that leaves fewest frames uncovered, so that fewer
+keyframes (or a smaller beta) suffice; and, with the coverage held, replace one by the candidate
+that brings all frames nearest to their keyframes, as in k-medoids: keyframes move from the edge
+of the poses they stand for to their middle, and away from blurred frames.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from keyrecon.keyframes.coverage import (
+    Neighborhoods,
+    largest_gain,
+    measure_gains,
+    total_cost,
+    uncovered_cost,
+)
+
+ROUNDS = 8
+"""Times all keyframes are reconsidered at most; two or three usually change nothing more."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoverageGoal:
+    """What keyframes must cover."""
+
+    hoods: Neighborhoods
+    reach: int
+    """T of the paper, frames."""
+    uncovered: int
+    """Frames that may be left uncovered: (1 - alpha) of all."""
+    clarity: Float[np.ndarray, "M"]
+    """0-1: how well each candidate could be annotated."""
+
+    def left_over(self, represented: Bool[np.ndarray, "T"]) -> int:
+        """Frames not covered."""
+        return total_cost(represented, uncovered_cost(self.hoods.n_frames, self.reach))
+
+    def reached(self, chosen: list[int]) -> bool:
+        """Whether Eq. 1 holds."""
+        return self.left_over(self.hoods.union(chosen)) <= self.uncovered
+
+    def replacements(self, others: list[int]) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
+        """Frames left uncovered with each candidate beside `others`, and how many it adds."""
+        represented = self.hoods.union(others)
+        cost = uncovered_cost(self.hoods.n_frames, self.reach)
+        gain, added = measure_gains(
+            self.hoods.without(represented), np.arange(len(self.clarity)), represented, cost
+        )
+        return total_cost(represented, cost) - gain, added
+
+
+def drop_redundant(goal: CoverageGoal, chosen: list[int]) -> list[int]:
+    """Fewer keyframes: the last chosen go first."""
+    for candidate in reversed(chosen):
+        others = [c for c in chosen if c != candidate]
+        if goal.reached(others):
+            chosen = others
+    return chosen
+
+
+def swap_for_coverage(goal: CoverageGoal, chosen: list[int]) -> list[int]:
+    """As many keyframes that leave fewer frames uncovered; stops when the goal is reached."""
+    chosen = list(chosen)
+    left = goal.left_over(goal.hoods.union(chosen))
+    for _ in range(ROUNDS):
+        before = left
+        for place in range(len(chosen)):
+            if left <= goal.uncovered:
+                return chosen
+            left_with, added = goal.replacements(chosen[:place] + chosen[place + 1 :])
+            best = largest_gain(-left_with, added, goal.clarity)
+            if left_with[best] < left:
+                chosen[place], left = best, int(left_with[best])
+        if left == before:
+            break
+    return chosen
+
+
+def shrink(goal: CoverageGoal, chosen: list[int]) -> list[int]:
+    """Fewer keyframes by dropping one and exchanging the others, as long as that succeeds."""
+    while len(chosen) > 1:
+        others = [chosen[:place] + chosen[place + 1 :] for place in range(len(chosen))]
+        least = min(others, key=lambda kept: goal.left_over(goal.hoods.union(kept)))
+        fewer = swap_for_coverage(goal, least)
+        if not goal.reached(fewer):
+            break
+        chosen = fewer
+    return chosen
+
+
+def add_closest(
+    chosen: list[int],
+    most: int,
+    distance: Float[np.ndarray, "M M"],
+    weight: Float[np.ndarray, "M"],
+) -> list[int]:
+    """`most` keyframes: each further one brings frames nearest to their keyframes."""
+    chosen = list(chosen)
+    while len(chosen) < min(most, len(weight)):
+        nearest = distance[chosen].min(axis=0, initial=np.inf)
+        total = np.minimum(distance, nearest) @ weight
+        total[chosen] = np.inf
+        chosen.append(int(total.argmin()))
+    return chosen
+
+
+def swap_for_closeness(
+    goal: CoverageGoal,
+    chosen: list[int],
+    distance: Float[np.ndarray, "M M"],
+    weight: Float[np.ndarray, "M"],
+) -> list[int]:
+    """Keyframes nearer to the frames they stand for; the goal stays reached.
+
+    distance(k, i) is what it costs that candidate k stands for row i, `weight` how many frames
+    row i stands for.
+    """
+    chosen = list(chosen)
+    for _ in range(ROUNDS):
+        changed = False
+        for place, present in enumerate(chosen):
+            others = chosen[:place] + chosen[place + 1 :]
+            left_with, _ = goal.replacements(others)
+            left_with[others] = goal.uncovered + 1
+            allowed = np.flatnonzero(left_with <= goal.uncovered)
+            nearest = distance[others].min(axis=0, initial=np.inf)
+            total = np.full(len(weight), np.inf, distance.dtype)
+            total[allowed] = np.minimum(distance[allowed], nearest) @ weight
+            best = int(total.argmin())
+            if total[best] < total[present] * (1 - 1e-6):
+                chosen[place], changed = best, True
+        if not changed:
+            break
+    return chosen

@@ -1,0 +1,214 @@
+"""What depth limbs usually have in a picture like this: a regression learnt from captured motion.
+
+A flat picture of a whole body says more about depth than joint limits can put into words: which
+way an arm reaches goes with how hips, shoulders and the other limbs look. The rule is a polynomial
+of second degree in what the picture shows of the 13 bones, in shares of their lengths: both
+in-plane parts, and how much is left for depth (Taylor's sqrt(1 - q^2)). Its coefficients give the
+depths of captured people, seen from all around, with the least squared error. Only the sign of what
+it gives is of interest here, since lengths tell the rest better; a value near zero says that the
+picture fits both signs, and then it does not count.
+
+Learning what depth bones usually have: captured poses, varied and seen from all around.
+
+Every pose that is learnt from is drawn anew: mirrored or not, each limb turned a little as other
+people would hold it, seen by a camera from any side and from a tripod or a stand, with bones
+as long and joints as exact as lengths and tracks really are. Left and right share what is learnt,
+and so do all ways that a player may face. The coefficients then follow from one linear system
+(ridge regression): the same captures give the same rule.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from keyrecon.body import LSP14, Skeleton
+from keyrecon.errors import KeyreconError
+from keyrecon.lifting.bone_directions import bone_vectors, unit
+from keyrecon.progress import Progress, silent
+
+DEPTH_MODEL_VERSION = 1
+"""Of the bones and terms that a model has coefficients for."""
+_BONES = len(LSP14.bones)
+_SHOWN = 3 * _BONES
+TERMS = 1 + _SHOWN + _SHOWN * (_SHOWN + 1) // 2
+"""Of the polynomial: a constant, 39 linear ones, 780 products."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepthModel:
+    """A rule for the depth shares of LSP14's bones."""
+
+    coefficients: Float[np.ndarray, "terms 13"]
+    """Of each term, for each bone."""
+    provenance: str
+    """What it was learnt from."""
+    version: int = DEPTH_MODEL_VERSION
+
+    def __post_init__(self) -> None:
+        """Raise KeyreconError for another number of coefficients."""
+        if self.coefficients.shape != (TERMS, _BONES):
+            raise KeyreconError(
+                f"A depth model has {TERMS} x {_BONES} coefficients, this one "
+                f"{' x '.join(map(str, self.coefficients.shape))}."
+            )
+
+    def depth_shares(self, flat: Float[np.ndarray, "T 13 2"]) -> Float[np.ndarray, "T 13"]:
+        """Expected dz / length of LSP14's bones from their in-plane vectors / length."""
+        return polynomial(flat) @ self.coefficients
+
+
+def polynomial(flat: Float[np.ndarray, "n 13 2"]) -> Float[np.ndarray, "n terms"]:
+    """All terms of a picture: in-plane vectors over lengths, depth left, products of any two.
+
+    A bone cannot look longer than it is.
+    """
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1)
+    left = np.sqrt(np.clip(1 - (flat**2).sum(axis=-1), 0, 1))
+    shown = np.concatenate([flat.reshape(len(flat), -1), left], axis=1)
+    one, other = np.triu_indices(_SHOWN)
+    constant = np.ones((len(flat), 1), shown.dtype)
+    return np.concatenate([constant, shown, shown[:, one] * shown[:, other]], axis=1)
+
+
+def expected_depth(
+    model: DepthModel | None,
+    vectors: Float[np.ndarray, "T B 2"],
+    lengths: Float[np.ndarray, "B"],
+    skeleton: Skeleton,
+) -> Float[np.ndarray, "T B"]:
+    """Depth that bones usually have where they look like this, in units of `lengths`.
+
+    NaN for bones that the model does not know, for all of them where one of LSP14's is missing
+    from the skeleton. A bone that is not seen (NaN) tells nothing about the others.
+    """
+    usual = np.full(vectors.shape[:2], np.nan)
+    places = _places(skeleton)
+    if model is None or places is None:
+        return usual
+    flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
+    usual[:, places] = model.depth_shares(flat) * lengths[places]
+    return usual
+
+
+def _places(skeleton: Skeleton) -> list[int] | None:
+    """Where LSP14's bones stand in a skeleton; None unless all do."""
+    bones = {
+        (skeleton.names[parent], skeleton.names[child]): place
+        for place, (parent, child) in enumerate(skeleton.bones)
+    }
+    wanted = [(LSP14.names[parent], LSP14.names[child]) for parent, child in LSP14.bones]
+    return [bones[bone] for bone in wanted] if all(bone in bones for bone in wanted) else None
+
+
+_BONE_OF = {LSP14.names[child]: bone for bone, (_, child) in enumerate(LSP14.bones)}
+_LIMBS = [
+    [_BONE_OF[f"{side}_{upper}"], _BONE_OF[f"{side}_{lower}"]]
+    for side in ("right", "left")
+    for upper, lower in (("elbow", "wrist"), ("knee", "ankle"))
+]
+_ABOVE_HIPS = [bone for name, bone in _BONE_OF.items() if not LSP14.is_lower[LSP14.index(name)]]
+_MIRROR = [_BONE_OF[LSP14.names[LSP14.mirror[child]]] for _, child in LSP14.bones]
+_BATCH = 20_000
+"""Poses weighed at once: 66 MB."""
+
+
+@dataclass(frozen=True)
+class DepthTrainingOptions:
+    """How a depth model is learnt."""
+
+    poses: int = 400_000
+    """Poses drawn, rounded up to batches of 20000."""
+    ridge: float = 1e-4
+    """What a squared coefficient costs, in mean squared errors."""
+    limb_turn: float = 0.2
+    """Standard deviation by which limbs are turned, radians per axis; half of it within limbs
+    and for the body above the hips."""
+    camera_up: tuple[float, float] = (-3.0, 20.0)
+    """Range of the angle by which the camera looks down, degrees: from a tripod to a stand."""
+    camera_roll: float = 1.5
+    """Standard deviation of the camera's roll, degrees."""
+    length_error: float = 0.06
+    """Standard deviation of bone lengths, as shares."""
+    joint_error: float = 0.04
+    """Standard deviation of a bone's vector in the picture, in lengths of the bone."""
+    seed: int = 0
+    """Of the poses drawn."""
+
+
+def train_depth_model(
+    captures: Sequence[Float[np.ndarray, "_ 14 3"]],
+    provenance: str,
+    options: DepthTrainingOptions = DepthTrainingOptions(),
+    progress: Progress = silent,
+) -> DepthModel:
+    """Learn a depth model from joints of captured people: LSP14's, metres, Y up.
+
+    A capture counts by the root of its length, so that a long one does not drown the others.
+    Raises KeyreconError for options with which nothing can be learnt.
+    """
+    if options.poses < 1 or options.ridge <= 0:
+        raise KeyreconError(
+            f"Nothing can be learnt from {options.poses} poses with a ridge of {options.ridge:g}; "
+            "both must be above 0."
+        )
+    rng = np.random.default_rng(options.seed)
+    poses = [unit(bone_vectors(joints, LSP14)).astype(np.float32) for joints in captures]
+    batches = -(-options.poses // _BATCH)
+    normal, answer = np.zeros((TERMS, TERMS)), np.zeros((TERMS, len(LSP14.bones)))
+    for _ in progress(range(batches), "Learning depths", batches):
+        flat, depth = _draw(poses, rng, options)
+        terms = polynomial(flat)
+        normal += terms.T @ terms
+        answer += terms.T @ depth
+    damping = options.ridge * batches * _BATCH * np.eye(TERMS)
+    return DepthModel(scipy.linalg.solve(normal + damping, answer, assume_a="pos"), provenance)
+
+
+def _draw(
+    captures: Sequence[Float[np.ndarray, "_ 13 3"]],
+    rng: np.random.Generator,
+    options: DepthTrainingOptions,
+) -> tuple[Float[np.ndarray, "n 13 2"], Float[np.ndarray, "n 13"]]:
+    """Poses in the picture and their depth shares, in random order."""
+    chance = np.concatenate([np.full(len(c), len(c) ** -0.5) for c in captures])
+    rows = rng.choice(len(chance), _BATCH, p=chance / chance.sum())
+    poses = np.concatenate(captures)[rows]
+    mirrored = poses[:, _MIRROR] * np.float32([-1, 1, 1])
+    poses = np.where((rng.random(len(poses)) < 0.5)[:, None, None], mirrored, poses)
+    seen = _film(_vary(poses, rng, options.limb_turn), rng, options)
+    error = 1 + options.length_error * rng.standard_normal((*seen.shape[:2], 1))
+    flat = seen[..., :2] * error
+    flat = flat + options.joint_error * rng.standard_normal(flat.shape)
+    return flat.astype(np.float32), seen[..., 2].astype(np.float32)
+
+
+def _vary(
+    poses: Float[np.ndarray, "n 13 3"], rng: np.random.Generator, spread: float
+) -> Float[np.ndarray, "n 13 3"]:
+    """Poses with limbs held a little differently."""
+    poses = poses.copy()
+    for bones, angle in [
+        *((limb, spread) for limb in _LIMBS),
+        *((limb[1:], spread / 2) for limb in _LIMBS),
+        (_ABOVE_HIPS, spread / 2),
+    ]:
+        turn = Rotation.from_rotvec(angle * rng.standard_normal((len(poses), 3))).as_matrix()
+        poses[:, bones] = np.einsum("nij,nbj->nbi", turn, poses[:, bones])
+    return poses
+
+
+def _film(
+    poses: Float[np.ndarray, "n 13 3"], rng: np.random.Generator, options: DepthTrainingOptions
+) -> Float[np.ndarray, "n 13 3"]:
+    """Bone directions in the axes of cameras all around: x right, y down, z away."""
+    count = len(poses)
+    yaw = rng.uniform(0, 360, count)
+    down = rng.uniform(*options.camera_up, count)
+    roll = options.camera_roll * rng.standard_normal(count)
+    turns = np.column_stack([roll, 180 + down, yaw])
+    camera = Rotation.from_euler("ZXY", turns, degrees=True).as_matrix()
+    return np.einsum("nij,nbj->nbi", camera, poses)

@@ -1,1 +1,0 @@
-"""Which frames look alike: edge elements, pose distances, keyframes, joints carried over."""

@@ -1,0 +1,1 @@
+"""The stages as the two papers print them."""

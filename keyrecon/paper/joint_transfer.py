@@ -1,0 +1,304 @@
+"""Refinement of joints by appearance and apparent limb lengths: a tree of patches.
+
+Around every estimate lies a grid of places. A place is good where the picture looks like the
+keyframe around the joint (normalised cross-correlation, the patch turned by the limb's change of
+direction) and near the estimate; two places are good together where the limb between them has the
+keyframe's length times the common change of scale of all limbs. The best choice for all joints of
+a tree is found exactly, from the leaves to the root (Felzenszwalb and Huttenlocher, IJCV 61, 2005).
+
+The paper's way to the joints of a frame (Section 5).
+
+The keyframe assigned to the frame is aligned with it by head or feet and corresponded with it edge
+element by edge element (`distance.match_edges`). The elements around a joint define its
+translation: the geometric median of theirs, near ones counting more. Where too few of them find a
+match the joint is missing, and so is a joint that is hidden in the keyframe. Appearance and the
+keyframe's apparent limb lengths then refine the estimates (`patches.py`).
+
+Each half of the body has its own keyframes, so a bone between two halves is not compared.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from keyrecon.io.video import Video
+from keyrecon.keyframes.edge_distance import HalfName as HalfName
+from keyrecon.keyframes.edge_distance import align_edges, match_edges
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Annotations, Edges, HalfKeyframes, JointTracks, Survey
+
+DETAIL = 125
+"""Pixels per player height in the pictures compared: one pixel is one step of the grid."""
+SEARCH_RADIUS = 7
+"""Steps of the grid to each side: .056 player heights."""
+PATCH = 13
+"""Side of a patch, px: a tenth of a player height, wider than a forearm."""
+APPEARANCE_WEIGHT = 1.0
+"""Weight of appearance."""
+LENGTH_SPREAD = 0.12
+"""Spread of the logarithm of a limb's relative length; twice that far from any keyframe."""
+PLACE_SPREAD = (0.015, 0.06)
+"""Least and largest spread of an estimate, player heights."""
+
+
+@dataclass(frozen=True, eq=False)
+class PatchSource:
+    """A grey picture in which the player has roughly `DETAIL` pixels."""
+
+    grey: UInt8[np.ndarray, "h w"]
+    shrink: float
+    """Pixels of it per pixel of the video."""
+    height: float
+    """Player height, px of the video."""
+    origin: Float[np.ndarray, "2"]
+    """Origin of player coordinates, px of the video."""
+
+    @staticmethod
+    def width_for(video: Video, height: Float[np.ndarray, "T"]) -> int:
+        """Width to reduce the video to; never enlarged."""
+        return min(video.width, round(video.width * 1.25 * DETAIL / float(np.median(height))))
+
+    def around(self, origin: Float[np.ndarray, "2"]) -> "PatchSource":
+        """The same with another origin."""
+        return PatchSource(self.grey, self.shrink, self.height, origin)
+
+    def cut(
+        self, center: Float[np.ndarray, "2"], size: int, turn: float = 0.0
+    ) -> UInt8[np.ndarray, "s s"]:
+        """Square of `size` px around a point in player coordinates, turned by `turn` rad."""
+        scale = self.height * self.shrink / DETAIL
+        middle = (self.origin + center * self.height + 0.5) * self.shrink - 0.5
+        cosine, sine = scale * np.cos(turn), scale * np.sin(turn)
+        matrix = np.array([[cosine, sine, 0], [-sine, cosine, 0]])
+        matrix[:, 2] = middle - matrix[:, :2] @ np.full(2, (size - 1) / 2)
+        return cv2.warpAffine(
+            self.grey, matrix, (size, size), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
+        )  # fmt: skip
+
+
+def crop_patches(picture: UInt8[np.ndarray, "h w 3"], width: int, height: float) -> PatchSource:
+    """A reduced picture of a video `width` px wide, the player `height` px tall there."""
+    grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+    return PatchSource(grey, picture.shape[1] / width, height, np.zeros(2))
+
+
+@dataclass(frozen=True, eq=False)
+class JointSearch:
+    """Joints in the keyframe and estimates in another frame, player coordinates of each."""
+
+    model: Float[np.ndarray, "J 2"]
+    estimate: Float[np.ndarray, "J 2"]
+    """NaN where missing."""
+    spread: Float[np.ndarray, "J"]
+    represented: bool
+    """Whether the keyframe shows the same pose."""
+
+
+def refine_joints(
+    keyframe: PatchSource,
+    frame: PatchSource,
+    sought: JointSearch,
+    bones: Int[np.ndarray, "B 2"],
+    origin: Float[np.ndarray, "2"],
+) -> Float[np.ndarray, "J 2"]:
+    """Joints in px of the video; NaN where the estimate is missing."""
+    frame = frame.around(origin)
+    there = np.isfinite(sought.estimate).all(axis=1)
+    bones = bones[there[bones].all(axis=1)]
+    if not there.any():
+        return np.full(sought.estimate.shape, np.nan)
+    offsets = _grid()
+    cost = {
+        int(j): _place_cost(keyframe, frame, sought, int(j), _turn(sought, bones, int(j)))
+        for j in np.flatnonzero(there)
+    }
+    best = _best_places(cost, sought, bones, offsets)
+    found = np.full(sought.estimate.shape, np.nan)
+    for j, place in best.items():
+        found[j] = sought.estimate[j] + offsets[place]
+    return origin + found * frame.height
+
+
+def _grid() -> Float[np.ndarray, "G 2"]:
+    y, x = np.mgrid[-SEARCH_RADIUS : SEARCH_RADIUS + 1, -SEARCH_RADIUS : SEARCH_RADIUS + 1]
+    return np.stack([x.ravel(), y.ravel()], axis=1) / DETAIL
+
+
+def _turn(sought: JointSearch, bones: Int[np.ndarray, "B 2"], joint: int) -> float:
+    """Change of direction of the limb that ends at a joint, or else of one that starts there."""
+    ending = bones[bones[:, 1] == joint]
+    limbs = ending if len(ending) else bones[bones[:, 0] == joint]
+    if not len(limbs):
+        return 0.0
+    parent, child = limbs[0]
+    before, now = (p[child] - p[parent] for p in (sought.model, sought.estimate))
+    return float(np.arctan2(now[1], now[0]) - np.arctan2(before[1], before[0]))
+
+
+def _place_cost(
+    keyframe: PatchSource, frame: PatchSource, sought: JointSearch, joint: int, turn: float
+) -> Float[np.ndarray, "G"]:
+    """Cost of each place of the grid by looks and by distance from the estimate."""
+    patch = keyframe.cut(sought.model[joint], PATCH, turn)
+    around = frame.cut(sought.estimate[joint], PATCH + 2 * SEARCH_RADIUS)
+    alike = cv2.matchTemplate(around, patch, cv2.TM_CCOEFF_NORMED).ravel()
+    alike = np.nan_to_num(np.clip(alike, -1, 1), posinf=0, neginf=0)
+    spread = np.clip(sought.spread[joint], *PLACE_SPREAD)
+    return APPEARANCE_WEIGHT * (1 - alike) + (_grid() ** 2).sum(axis=1) / (2 * spread**2)
+
+
+def _best_places(
+    cost: dict[int, Float[np.ndarray, "G"]],
+    sought: JointSearch,
+    bones: Int[np.ndarray, "B 2"],
+    offsets: Float[np.ndarray, "G 2"],
+) -> dict[int, int]:
+    """Cheapest place of every joint, exactly; `bones` lead outwards from the roots."""
+    wanted = _wanted_lengths(sought, bones)
+    spread = LENGTH_SPREAD * (1 if sought.represented else 2)
+    total, choice = dict(cost), {}
+    for (parent, child), length in reversed(list(zip(bones.tolist(), wanted, strict=True))):
+        bone = sought.estimate[child] - sought.estimate[parent]
+        ends = bone + offsets[None] - offsets[:, None]
+        ratio = np.log(np.maximum((ends**2).sum(axis=2), 1e-8) / length**2) / 2
+        sums = total[child] + ratio**2 / (2 * spread**2)
+        choice[child] = sums.argmin(axis=1)
+        total[parent] = total[parent] + sums.min(axis=1)
+    children = set(bones[:, 1].tolist())
+    best = {joint: int(total[joint].argmin()) for joint in cost if joint not in children}
+    for parent, child in bones.tolist():
+        best[child] = int(choice[child][best[parent]])
+    return best
+
+
+def _wanted_lengths(sought: JointSearch, bones: Int[np.ndarray, "B 2"]) -> Float[np.ndarray, "B"]:
+    """The keyframe's limb lengths times the median change of all of them."""
+    if not len(bones):
+        return np.zeros(0)
+    before, now = (
+        np.maximum(np.linalg.norm(p[bones[:, 1]] - p[bones[:, 0]], axis=1), 0.01)
+        for p in (sought.model, sought.estimate)
+    )
+    return before * np.median(now / before)
+
+
+AROUND = 0.12
+"""Elements this close to a joint move it, player heights: about a thigh's width."""
+NEAR = 0.06
+"""Spread of the weight of elements around a joint, player heights."""
+LEAST_ELEMENTS, LEAST_SHARE = 5, 0.3
+"""Matched elements, and weighted share of the elements around, below which a joint is missing."""
+ROUNDS = 20
+"""Of Weiszfeld's iteration, which has converged to a hundredth of the spread by then."""
+
+
+@dataclass(frozen=True, eq=False)
+class TransferModel:
+    """An annotated keyframe of one half of the body, aligned by head or feet."""
+
+    edges: Edges
+    joints: Float[np.ndarray, "J 2"]
+    """Player heights; NaN where missing or hidden."""
+    scenery: PatchSource
+
+
+def transfer_joints(
+    video: Video, survey: Survey, annotations: Annotations, progress: Progress = silent
+) -> JointTracks:
+    """Joints from the assigned keyframe of each half; NaN where missing.
+
+    Confidence falls with the pose distance to the keyframe and with the share of elements around
+    the joint that find no match.
+    """
+    models = _gather_models(video, survey, annotations)
+    shape = (len(survey.track.height), len(annotations.skeleton.names))
+    joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    source = np.zeros(shape, dtype=np.int64)
+    bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
+    frames = progress(_sceneries(video, survey), "carrying joints", shape[0])
+    for t, scenery in enumerate(frames):
+        for name, members in (("upper", ~is_lower), ("lower", is_lower)):
+            keyframes = getattr(survey.keyframes, name)
+            source[t, members] = keyframes.nearest[t]
+            model = models.get((name, int(keyframes.nearest[t])))
+            if model is None:
+                continue
+            edges = align_edges(survey.figures.edges[t], survey.track, t, name)
+            sought, share = _shift_joints(model, edges, bool(keyframes.represented[t]))
+            found = refine_joints(model.scenery, scenery, sought, bones, _anchor(survey, t, name))
+            joints[t, members] = found[members]
+            likeness = np.exp(-keyframes.distance[t] / keyframes.beta)
+            confidence[t, members] = np.where(np.isnan(found[:, 0]), 0, share * likeness)[members]
+    return JointTracks(joints, confidence, source)
+
+
+def _anchor(survey: Survey, frame: int, name: HalfName) -> Float[np.ndarray, "2"]:
+    """Where aligned coordinates have their origin, px."""
+    return (survey.track.head if name == "upper" else survey.track.mid_feet)[frame]
+
+
+def _sceneries(video: Video, survey: Survey) -> Iterator[PatchSource]:
+    """Grey pictures of all frames in one size of the player."""
+    width = PatchSource.width_for(video, survey.track.height)
+    for t, picture in enumerate(video.frames(width=width)):
+        yield crop_patches(picture, video.width, float(survey.track.height[t]))
+
+
+def _gather_models(
+    video: Video, survey: Survey, annotations: Annotations
+) -> dict[tuple[HalfName, int], TransferModel]:
+    """Annotated keyframes by half and frame number."""
+    models = {}
+    width = PatchSource.width_for(video, survey.track.height)
+    for row, frame in enumerate(annotations.frames.tolist()):
+        height = float(survey.track.height[frame])
+        scenery = crop_patches(video.frame(frame, width), video.width, height)
+        seen = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
+        for name in ("upper", "lower"):
+            half: HalfKeyframes = getattr(survey.keyframes, name)
+            if frame not in half.frames:
+                continue
+            origin = _anchor(survey, frame, name)
+            edges = align_edges(survey.figures.edges[frame], survey.track, frame, name)
+            members = annotations.skeleton.is_lower == (name == "lower")
+            joints = np.where(members[:, None], (seen - origin) / height, np.nan)
+            models[name, frame] = TransferModel(edges, joints, scenery.around(origin))
+    return models
+
+
+def _shift_joints(
+    model: TransferModel, edges: Edges, represented: bool
+) -> tuple[JointSearch, Float[np.ndarray, "J"]]:
+    """(estimates from local translation, share of the elements around that found a match)."""
+    match, _ = match_edges(model.edges, edges)
+    found = match >= 0
+    moved = edges.points[match] - model.edges.points if len(edges.points) else np.zeros((0, 2))
+    joints = np.full(model.joints.shape, np.nan)
+    spread, share = np.full(len(joints), NEAR), np.zeros(len(joints))
+    for j in np.flatnonzero(np.isfinite(model.joints[:, 0])):
+        away = np.linalg.norm(model.edges.points - model.joints[j], axis=1)
+        weight = np.where(away < AROUND, np.exp(-0.5 * (away / NEAR) ** 2), 0)
+        share[j] = weight[found].sum() / max(weight.sum(), 1e-9)
+        used = found & (weight > 0)
+        if used.sum() < LEAST_ELEMENTS or share[j] < LEAST_SHARE:
+            share[j] = 0
+            continue
+        shift = geometric_median(moved[used], weight[used])
+        joints[j] = model.joints[j] + shift
+        spread[j] = np.average(np.linalg.norm(moved[used] - shift, axis=1), weights=weight[used])
+    return JointSearch(model.joints, joints, spread, represented), share
+
+
+def geometric_median(
+    points: Float[np.ndarray, "N 2"], weight: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "2"]:
+    """Point with the least weighted sum of distances (Weiszfeld 1937)."""
+    center = np.average(points, axis=0, weights=weight)
+    for _ in range(ROUNDS):
+        near = weight / np.maximum(np.linalg.norm(points - center, axis=1), 1e-4)
+        center = near @ points / near.sum()
+    return center

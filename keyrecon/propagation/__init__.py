@@ -1,0 +1,1 @@
+"""Joints carried from the keyframes to every frame (Section 5, taken further)."""

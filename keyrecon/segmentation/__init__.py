@@ -1,0 +1,1 @@
+"""What belongs to the player: colour model, background model, part labels, contours."""

@@ -1,0 +1,220 @@
+"""Coloured regions of the player and their directed edges (Section 4.1).
+
+Every frame is cut out around the player and brought to a common player height, and its pixels are
+told which part of the player they show (`regions.py`). Contours of each region, inner borders
+between two colours included, are walked so that the region lies on the left as seen on the
+picture, and sampled at regular arc length: each sample is an edge element, a point with a unit
+tangent.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int, UInt8
+
+from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
+from keyrecon.io.video import Video
+from keyrecon.keyframes.descriptor_bins import ranges
+from keyrecon.progress import Progress, silent
+from keyrecon.propagation.body_frame import from_complex
+from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
+from keyrecon.segmentation.background_model import ForegroundModel
+from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.part_labels import label_crop, mix_palette
+
+CROP_WIDTH, CROP_HEIGHT = 1.75, 1.5
+"""Size of the crop, player heights: a lunge with an arm stretched out; a raised arm."""
+WAIST = 0.42
+"""Where the body is cut, shares of the way from head to mid-feet: hips .44, waist .37."""
+OVERLAP = 0.05
+"""Width of the band that counts for both halves, in the same shares."""
+LEAST_SAMPLES = 6
+"""Contours with fewer samples have no direction to speak of."""
+SMOOTHING = np.exp(-0.5 * np.arange(-3, 4) ** 2)
+SMOOTHING /= SMOOTHING.sum()
+"""Low-pass along a contour, over samples: pixels make stairs."""
+
+
+@dataclass(frozen=True)
+class EdgeOptions:
+    """How regions and edges are found."""
+
+    player: int = 112
+    """Player height in the crops, px; smaller is faster and coarser."""
+    step: float = 0.018
+    """Distance between edge elements along a contour, player heights."""
+    most: int = 400
+    """Edge elements of one frame at most."""
+
+
+def find_edges(  # noqa: PLR0913
+    video: Video,
+    track: Track,
+    camera: CameraPath,
+    background: Background,
+    colors: Colors,
+    options: EdgeOptions = EdgeOptions(),
+    progress: Progress = silent,
+) -> PlayerContours:
+    """Label crops and directed edges of every frame; edges in px of the full picture."""
+    scene = ForegroundModel(background, camera)
+    palette = mix_palette(colors)
+    scale = options.player / track.height
+    size = (round(CROP_WIDTH * options.player), round(CROP_HEIGHT * options.player))
+    center = (track.box[:, :2] + track.box[:, 2:]) / 2
+    origin = center - (np.array(size) - 1) / 2 / scale[:, None]
+    # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
+    width = min(video.width, round(video.width * 1.2 * float(np.median(scale))))
+    shrink = width / video.width
+    labels = np.zeros((len(video), size[1], size[0]), np.uint8)
+
+    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Edges:
+        t, picture = entry
+        crop, to_picture, present = _cut_out(picture, origin[t], float(scale[t]), shrink, size)
+        foreground = scene.foreground(crop, t, to_picture)
+        spots = (track.head[t], track.mid_feet[t])
+        axis = np.stack([(p - origin[t]) * scale[t] for p in spots])
+        labels[t] = label_crop(crop, foreground * present, palette, axis, options.player)
+        found = trace_edges(labels[t], options)
+        return _place(found, origin[t], float(scale[t]), track, t)
+
+    pictures = progress(read_small(video, width), "Finding edges", len(video))
+    return PlayerContours(tuple(side_by_side(look, enumerate(pictures))), labels, origin, scale)
+
+
+def _cut_out(
+    picture: UInt8[np.ndarray, "h w 3"],
+    origin: Float[np.ndarray, "2"],
+    scale: float,
+    shrink: float,
+    size: tuple[int, int],
+) -> tuple[UInt8[np.ndarray, "y x 3"], Float[np.ndarray, "3 3"], UInt8[np.ndarray, "y x"]]:
+    """The crop in Lab, the way from its pixels to the full picture, and where there is one."""
+    to_picture = np.array([[1 / scale, 0, origin[0]], [0, 1 / scale, origin[1]], [0, 0, 1]])
+    to_small = shrinking(shrink) @ to_picture
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    crop = cv2.warpAffine(picture, to_small[:2], size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    columns = to_small[0, 0] * np.arange(size[0]) + to_small[0, 2]
+    rows = to_small[1, 1] * np.arange(size[1]) + to_small[1, 2]
+    inside = (rows >= 0) & (rows <= picture.shape[0] - 1)
+    across = (columns >= 0) & (columns <= picture.shape[1] - 1)
+    return to_lab(crop), to_picture, (inside[:, None] & across).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Edge elements of a crop."""
+
+    points: Float[np.ndarray, "E 2"]
+    tangent: Float[np.ndarray, "E 2"]
+    color: Int[np.ndarray, "E"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Contours:
+    """Closed contours, one after the other."""
+
+    pixels: Complex[np.ndarray, "N"]
+    """x + iy"""
+    sizes: Int[np.ndarray, "W"]
+    backwards: Bool[np.ndarray, "W"]
+    """Whether the region is on the right."""
+    color: Int[np.ndarray, "W"]
+
+
+def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elements:
+    """Contours of all regions as elements with the region on their left, in crop pixels."""
+    step = options.step * options.player
+    contours = _find_contours(labels, (LEAST_SAMPLES - 0.5) * step)
+    walks, lengths = _resample(contours, step)
+    points, tangent = _smooth_walks(walks, lengths)
+    found = _Elements(points, tangent, np.repeat(contours.color, lengths))
+    size = np.array(labels.shape[::-1])
+    keep = ((points > 1) & (points < size - 2)).all(axis=1) & tangent.any(axis=1)
+    return _thin(found, keep, options.most)
+
+
+def _find_contours(labels: UInt8[np.ndarray, "h w"], shortest: float) -> _Contours:
+    """Contours and holes of all regions, but for those too short to have a direction."""
+    found, backwards, color = [np.zeros((0, 1, 2), np.int32)], [], []
+    for value in range(1, int(labels.max(initial=0)) + 1):
+        mask = (labels == value).view(np.uint8)
+        contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        for contour, place in zip(contours, tree[0] if contours else (), strict=True):
+            if len(contour) * np.sqrt(2) >= shortest:
+                # Seen on the picture, the signed area is negative when walking counter-clockwise.
+                outside = cv2.contourArea(contour, oriented=True) > 0
+                found.append(contour)
+                backwards.append(outside != (place[3] >= 0))
+                color.append(value - 1)
+    x, y = np.concatenate(found)[:, 0].T
+    sizes = np.array([len(contour) for contour in found[1:]], int)
+    return _Contours(x + 1j * y, sizes, np.array(backwards, bool), np.array(color, int))
+
+
+def _resample(
+    contours: _Contours, step: float
+) -> tuple[Complex[np.ndarray, "E"], Int[np.ndarray, "W"]]:
+    """Regular samples of all contours, region on the left, and how many each has.
+
+    All contours lie on one axis of arc length, each closed by its first pixel and a step away from
+    the next: one interpolation serves them all. None where a contour is too short to tell.
+    """
+    first = np.cumsum(contours.sizes) - contours.sizes
+    last = first + contours.sizes + np.arange(len(first))
+    closed = np.insert(contours.pixels, first + contours.sizes, contours.pixels[first])
+    gaps = np.abs(np.diff(closed, prepend=closed[:1]))
+    gaps[last[:-1] + 1] = step
+    along = np.cumsum(gaps)
+    start = along[first + np.arange(len(first))]
+    length = along[last] - start
+    count = np.rint(length / step).astype(int)
+    count[count < LEAST_SAMPLES] = 0
+    within = ranges(np.zeros_like(count), count)
+    back = np.repeat(contours.backwards, count)
+    within = np.where(back, np.repeat(count, count) - 1 - within, within)
+    spacing = length / np.maximum(count, 1)
+    at = np.repeat(start, count) + within * np.repeat(spacing, count)
+    samples = np.interp(at, along, closed) if len(at) else np.zeros(0, complex)
+    return samples, count
+
+
+def _smooth_walks(
+    walks: Complex[np.ndarray, "E"], lengths: Int[np.ndarray, "W"]
+) -> tuple[Float[np.ndarray, "E 2"], Float[np.ndarray, "E 2"]]:
+    """Points and unit tangents of closed walks that stand one after the other."""
+    first = np.repeat(np.cumsum(lengths) - lengths, lengths)
+    within, room = np.arange(len(walks)) - first, np.repeat(lengths, lengths)
+    around = first[:, None] + (within[:, None] + np.arange(-3, 4)) % room[:, None]
+    smooth = walks[around] @ SMOOTHING
+    tangent = smooth[around[:, 5]] - smooth[around[:, 1]]
+    size = np.abs(tangent)
+    tangent = np.divide(tangent, size, out=np.zeros_like(tangent), where=size > 1e-6)
+    # The contour runs through the centres of the region's outermost pixels; the edge is outside.
+    smooth += 0.5j * tangent
+    return from_complex(smooth), from_complex(tangent)
+
+
+def _thin(found: _Elements, keep: Bool[np.ndarray, "E"], most: int) -> _Elements:
+    """The elements to keep, evenly thinned to `most`."""
+    chosen = np.flatnonzero(keep)
+    if len(chosen) > most:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(int)]
+    return _Elements(found.points[chosen], found.tangent[chosen], found.color[chosen])
+
+
+def _place(
+    found: _Elements, origin: Float[np.ndarray, "2"], scale: float, track: Track, frame: int
+) -> Edges:
+    """Elements in pixels of the full picture, told which half of the body they belong to."""
+    points = origin + found.points / scale
+    head, way = track.head[frame], track.mid_feet[frame] - track.head[frame]
+    share = (points - head) @ way / max(float(way @ way), 1e-9)
+    return Edges(
+        points=points,
+        tangent=found.tangent,
+        color=found.color,
+        upper=share < WAIST + OVERLAP / 2,
+        lower=share > WAIST - OVERLAP / 2,
+    )

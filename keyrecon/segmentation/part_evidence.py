@@ -1,0 +1,107 @@
+"""Where a small picture shows the player's colours: maps that candidates are searched in.
+
+Colours recur in the scene (clay like skin, lines like white shoes), so back-projection is weighted
+by how far a pixel is from the background. The background is learnt before the player is known, from
+what lacks the player's colours.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from keyrecon.records import CameraPath
+from keyrecon.segmentation.background_model import (
+    BackgroundOptions,
+    ForegroundModel,
+    combine_plate,
+    fill_plate,
+    sample_frames,
+)
+from keyrecon.segmentation.color_model import color_bins, to_lab
+from keyrecon.tracking.foot_pairs import SHOE_RADIUS
+
+Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]
+"""Gives the reduced pictures of the frames with the given numbers, in order."""
+HEAD_RADIUS = 0.062
+"""Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
+STILL_WEIGHT = 0.2
+"""Weight of colour where nothing differs from the background: a player may stand still."""
+LEAST_CLEAR = 0.15
+"""Share of the frames in which a place must lack the player's colours to be judged by those:
+a racket or a shadow passes more rarely than that, even where the scene has the colours itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Maps of one frame, 0-1."""
+
+    head: Float[np.ndarray, "h w"]
+    foot: Float[np.ndarray, "h w"]
+    player: Float[np.ndarray, "h w"]
+    """Any part of the player."""
+    inside: Float[np.ndarray, "h1 w1"]
+    """Integral of `player`."""
+
+
+def first_scene(
+    pictures: Reader,
+    numbers: Int[np.ndarray, "n"],
+    camera: CameraPath,
+    shrink: float,
+    player: Float[np.ndarray, "bins"],
+) -> ForegroundModel:
+    """A plate before the player is known: the median of what does not have their colours.
+
+    Where everything has, the background does, and the median of all it is. `pictures` gives the
+    frames with some of the `numbers`, reduced by `shrink`.
+    """
+    used = numbers[sample_frames(len(numbers), BackgroundOptions.samples)]
+    lab = [to_lab(p) for p in pictures(used)]
+    paths = camera.to_reference[used]
+    window = np.ones((3, 3), np.uint8)
+    free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
+    clear = combine_plate(lab, free, paths, shrink, least=LEAST_CLEAR)
+    plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
+    return ForegroundModel(fill_plate(clear, plain), camera)
+
+
+def weigh_evidence(
+    lab: UInt8[np.ndarray, "h w 3"],
+    tables: Float[np.ndarray, "3 bins"],
+    foreground: Float[np.ndarray, "h w"],
+    tall: float,
+) -> Evidence:
+    """Back-projection weighted by foreground, low-passed at the size of each part."""
+    bins = color_bins(lab)
+    weight = (STILL_WEIGHT + (1 - STILL_WEIGHT) * foreground).astype(np.float32)
+    head = tables[0][bins] * weight
+    foot = tables[1][bins] * weight
+    any_part = tables[2][bins] * foreground.astype(np.float32)
+    return Evidence(
+        head=cv2.GaussianBlur(head, (0, 0), max(0.8, 0.25 * HEAD_RADIUS * tall)),
+        foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
+        player=any_part,
+        inside=cv2.integral(any_part),
+    )
+
+
+def mean_inside(
+    evidence: Evidence,
+    places: Float[np.ndarray, "m 2"],
+    window: tuple[float, float, float, float],
+    tall: float,
+) -> Float[np.ndarray, "m"]:
+    """Mean evidence for the player in a window (player heights) around each place."""
+    rows, columns = np.array(evidence.inside.shape) - 1
+    x = np.rint(places[:, :1] + tall * np.array(window[0::2])).astype(int).clip(0, columns)
+    y = np.rint(places[:, 1:] + tall * np.array(window[1::2])).astype(int).clip(0, rows)
+    total = evidence.inside
+    inside = (
+        total[y[:, 1], x[:, 1]] - total[y[:, 0], x[:, 1]]
+        - total[y[:, 1], x[:, 0]] + total[y[:, 0], x[:, 0]]
+    )  # fmt: skip
+    area = tall * (window[2] - window[0]) * tall * (window[3] - window[1])
+    return inside / area

@@ -1,0 +1,150 @@
+"""Which part of the player every pixel of a crop shows (Section 4.1).
+
+A pixel belongs to part c of the player with
+
+    P(c) = f q_c(colour) / (sum of q + u),
+
+f the probability that it differs from the background, q the colour histograms, u a uniform colour:
+a racket differs from the background and yet is none of the player's colours. Where the background
+was never seen, the histogram of the surroundings stands in for it. The maps are low-passed, the
+most likely one names the pixel, and components that are small or hang on nothing are dropped.
+
+Most of a crop is background. The sum of all maps tells where the player may be at all, and only
+there the maps are told apart.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, UInt8
+
+from keyrecon.records import Colors
+from keyrecon.segmentation.color_model import BINS, color_bins, distinct_parts
+
+UNIFORM = 16.0
+"""Weight of a colour that is none of the player's, against all colours being equally likely."""
+SOFTEN = 0.008
+"""Low-pass of the maps, player heights: an edge stays where it is, noise goes."""
+GROWTH = 0.05
+"""How far a region grows into unknown colours, player heights."""
+LEAST_AREA = 0.0015
+"""Smaller components are dropped and smaller holes filled, squared player heights."""
+NEARBY = 0.06
+"""A component farther from the body is not part of it, player heights."""
+BORDER = 8
+"""Pixels beyond everything that regions may reach: no low-pass looks farther."""
+
+
+@dataclass(frozen=True, eq=False)
+class Palette:
+    """Probability of each part by colour bin, ready for looking up."""
+
+    different: Float32[np.ndarray, "bins G"]
+    """Of pixels that differ from the background."""
+    unseen: Float32[np.ndarray, "bins G"]
+    """Of pixels before a background that nobody has seen."""
+    any_different: Float32[np.ndarray, "bins"]
+    any_unseen: Float32[np.ndarray, "bins"]
+    """Sums over all parts."""
+    values: UInt8[np.ndarray, "G"]
+    """Label of each part."""
+
+
+def mix_palette(colors: Colors) -> Palette:
+    """Tables of the parts that can be told apart by colour."""
+    groups = distinct_parts(colors)
+    parts = [colors.seen[members].mean(axis=0) for members in groups.values()]
+    table = np.stack(parts, axis=1) / len(parts)
+    total = table.sum(axis=1, keepdims=True) + UNIFORM / np.prod(BINS)
+    different = (table / total).astype(np.float32)
+    unseen = (table / (total + colors.surroundings[:, None])).astype(np.float32)
+    values = np.array(list(groups), np.uint8) + 1
+    return Palette(different, unseen, different.sum(axis=1), unseen.sum(axis=1), values)
+
+
+def label_crop(
+    lab: UInt8[np.ndarray, "h w 3"],
+    foreground: Float[np.ndarray, "h w"],
+    palette: Palette,
+    axis: Float[np.ndarray, "2 2"],
+    player: int,
+) -> UInt8[np.ndarray, "h w"]:
+    """0 background, 1 + c part c; `axis` runs from head to mid-feet in crop pixels.
+
+    The player is `player` px tall.
+    """
+    bins = color_bins(lab)
+    unseen = foreground == 0.5
+    anything = np.take(palette.any_different, bins) * foreground
+    anything[unseen] = palette.any_unseen[bins[unseen]]
+    anything = _soften(anything, player)
+    labels = np.zeros(bins.shape, np.uint8)
+    window = _window(anything >= 0.5, round((GROWTH + NEARBY) * player) + BORDER)
+    if window is None:
+        return labels
+    likely = np.take(palette.different, bins[window], axis=0)
+    likely *= foreground[window][..., None]
+    likely[unseen[window]] = palette.unseen[bins[window][unseen[window]]]
+    inside = palette.values[_soften(likely, player).argmax(axis=2)]
+    inside[anything[window] < 0.5] = 0
+    inside = _fill(inside, _soften(foreground[window], player) > 0.7, player)
+    corner = np.array([window[1].start, window[0].start])
+    labels[window] = _clean(inside, axis - corner, player)
+    return labels
+
+
+def _soften(values: Float32[np.ndarray, "h w *c"], player: int) -> Float32[np.ndarray, "h w *c"]:
+    return cv2.GaussianBlur(values, (0, 0), SOFTEN * player).reshape(values.shape)
+
+
+def _window(mask: Bool[np.ndarray, "h w"], margin: int) -> tuple[slice, slice] | None:
+    """Rows and columns with anything in them, and a margin; None where there is nothing."""
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    if not width:
+        return None
+    rows = slice(max(0, y - margin), y + height + margin)
+    return rows, slice(max(0, x - margin), x + width + margin)
+
+
+def _fill(
+    labels: UInt8[np.ndarray, "h w"], differs: Bool[np.ndarray, "h w"], player: int
+) -> UInt8[np.ndarray, "h w"]:
+    """Let regions grow a little into what differs from the background without a known colour.
+
+    Folds, prints and deep shade are closed; a racket keeps out, but for what the hand holds.
+    """
+    for _ in range(round(GROWTH * player / 2)):
+        grown = cv2.dilate(labels, np.ones((5, 5), np.uint8))
+        labels = np.where((labels == 0) & differs, grown, labels)
+    return labels
+
+
+def _clean(
+    labels: UInt8[np.ndarray, "h w"], axis: Float[np.ndarray, "2 2"], player: int
+) -> UInt8[np.ndarray, "h w"]:
+    """Keep what hangs together with the body; give specks to what surrounds them."""
+    least = LEAST_AREA * player**2
+    size = max(3, round(NEARBY * player) | 1)
+    near = cv2.dilate((labels > 0).astype(np.uint8), np.ones((size, size), np.uint8))
+    _, pieces = cv2.connectedComponents(near, connectivity=4)
+    along = np.linspace(0, 1, 40)[:, None]
+    spots = np.rint(axis[0] + along * (axis[1] - axis[0])).astype(int)
+    spots = spots[((spots >= 0) & (spots < labels.shape[::-1])).all(axis=1)]
+    votes = np.bincount(pieces[spots[:, 1], spots[:, 0]], minlength=2)
+    votes[0] = 0
+    labels = np.where(pieces == votes.argmax(), labels, 0).astype(np.uint8)
+    filled = cv2.medianBlur(labels, 5)
+    for value in range(int(labels.max()) + 1):
+        window = _window(labels == value, 0)
+        if window is None:
+            continue
+        mask = (labels[window] == value).view(np.uint8)
+        _, parts, stats, _ = cv2.connectedComponentsWithStats(mask, ltype=cv2.CV_16U)
+        small = stats[:, cv2.CC_STAT_AREA] < least
+        small[0] = False
+        if small.any():
+            specks = small[parts]
+            instead = filled[window][specks]
+            labels[window][specks] = np.where(instead == value, 0, instead)
+    return labels

@@ -1,0 +1,143 @@
+"""The player cut out of every frame at one size, and channels that tell its parts apart.
+
+Crops hang on the rough place of the head, so that arms, racket and a false foot do not move them.
+Channels are: how far a pixel is from the background, back-projection of every part, and edges of
+four directions, doubled in angle so that dark-on-bright and bright-on-dark count alike.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from scipy.fft import next_fast_len
+
+from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
+from keyrecon.io.video import Video
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Colors, Track
+from keyrecon.segmentation.background_model import ForegroundModel
+from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_tables, to_lab
+from keyrecon.segmentation.part_evidence import STILL_WEIGHT
+
+ABOVE, BELOW, ASIDE = 0.3, 1.25, 0.86
+"""Reach of a crop from the head, player heights: a jump or a deep lunge stays inside."""
+DIRECTIONS = 4
+"""Of edges: level, upright and the two diagonals."""
+FAINT = 8.0
+"""Grey-level slope per pixel that counts half: noise counts for little, all edges alike."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cropping:
+    """Where the crop of each frame lies."""
+
+    track: Track
+    """The rough one."""
+    player: float
+    """Player height in the crops, px."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns, even, and quick to transform."""
+        rows, columns = (ABOVE + BELOW) * self.player, 2 * ASIDE * self.player
+        return 2 * next_fast_len(round(rows / 2)), 2 * next_fast_len(round(columns / 2))
+
+    @cached_property
+    def scale(self) -> Float[np.ndarray, "T"]:
+        """Crop pixels per picture pixel."""
+        return self.player / self.track.height
+
+    @cached_property
+    def origin(self) -> Float[np.ndarray, "T 2"]:
+        """Picture position of each crop's pixel (0, 0)."""
+        corner = np.array([(self.size[1] - 1) / 2, ABOVE * self.player])
+        return self.track.head - corner / self.scale[:, None]
+
+    def to_picture(self, places: Float[np.ndarray, "m 2"], t: int) -> Float[np.ndarray, "m 2"]:
+        """Picture pixels of places in the crop of frame t."""
+        return self.origin[t] + places / self.scale[t]
+
+    def from_picture(self, places: Float[np.ndarray, "m 2"], t: int) -> Float[np.ndarray, "m 2"]:
+        """Places in the crop of frame t of picture pixels."""
+        return (places - self.origin[t]) * self.scale[t]
+
+
+@dataclass(frozen=True, eq=False)
+class Crops:
+    """The player in every frame."""
+
+    lab: UInt8[np.ndarray, "T h w 3"]
+    foreground: UInt8[np.ndarray, "T h w"]
+    """Probability that a pixel is not background, of 255; 0 outside the picture."""
+
+
+def cut_crops(
+    video: Video, cropping: Cropping, scene: ForegroundModel, progress: Progress = silent
+) -> Crops:
+    """Read all frames and cut the player out."""
+    count, (rows, columns) = len(video), cropping.size
+    lab = np.zeros((count, rows, columns, 3), np.uint8)
+    foreground = np.zeros((count, rows, columns), np.uint8)
+    # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
+    width = min(video.width, round(video.width * 1.2 * float(np.median(cropping.scale))))
+    to_small = shrinking(width / video.width)
+
+    def cut(entry: tuple[int, UInt8[np.ndarray, "y x 3"]]) -> None:
+        t, picture = entry
+        scale, corner = float(cropping.scale[t]), cropping.origin[t]
+        to_picture = np.array([[1 / scale, 0, corner[0]], [0, 1 / scale, corner[1]], [0, 0, 1]])
+        way, flags = (to_small @ to_picture)[:2], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        crop = cv2.warpAffine(
+            picture, way, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE
+        )
+        inside = np.full(picture.shape[:2], 255, np.uint8)
+        inside = cv2.warpAffine(inside, way, (columns, rows), flags=flags)
+        lab[t] = to_lab(crop)
+        foreground[t] = np.rint(scene.foreground(lab[t], t, to_picture) * inside)
+
+    pictures = progress(read_small(video, width), "Following the player", count)
+    deque(side_by_side(cut, enumerate(pictures)), maxlen=0)
+    return Crops(lab, foreground)
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """What filters see of a crop."""
+
+    tables: Float[np.ndarray, "C bins"]
+    """Posterior of each part by colour bin."""
+    border: Float[np.ndarray, "h w"]
+    """Falls to zero towards the border, as filters take a crop for periodic."""
+
+    @classmethod
+    def of(cls, colors: Colors, size: tuple[int, int]) -> "Channels":
+        """Channels for the colours of a player and crops of one size."""
+        tables = np.stack([*posterior_tables(colors), foot_table(colors)])
+        rows, columns = (np.hanning(n + 2)[1:-1] ** 0.25 for n in size)
+        return cls(tables.astype(np.float32), np.outer(rows, columns).astype(np.float32))
+
+    def see(
+        self, lab: UInt8[np.ndarray, "h w 3"], foreground: UInt8[np.ndarray, "h w"]
+    ) -> Float[np.ndarray, "D h w"]:
+        """All channels of a crop."""
+        parts = len(self.tables)
+        seen = np.empty((1 + parts + DIRECTIONS, *foreground.shape), np.float32)
+        np.multiply(foreground, np.float32(1 / 255), out=seen[0])
+        np.take(self.tables, color_bins(lab), axis=1, out=seen[1 : 1 + parts])
+        seen[1 : 1 + parts] *= STILL_WEIGHT + (1 - STILL_WEIGHT) * seen[0]
+        light = np.ascontiguousarray(lab[..., 0])
+        gx, gy = (cv2.Sobel(light, cv2.CV_32F, *d, scale=0.25) for d in ((1, 0), (0, 1)))
+        size = np.hypot(gx, gy)
+        share = 1 / ((size + FAINT) * (size + 1e-6))
+        along, across = (gx * gx - gy * gy) * share, 2 * gx * gy * share
+        for channel, map_ in zip(seen[-DIRECTIONS:], (along, -along, across, -across), strict=True):
+            np.maximum(map_, 0, out=channel)
+        seen *= self.border
+        return seen
+
+    def player(self, seen: Float[np.ndarray, "D h w"]) -> Float[np.ndarray, "h w"]:
+        """Any part of the player where the scene is covered, from the channels of a crop."""
+        return seen[1 : 1 + len(self.tables)].max(axis=0) * seen[0]

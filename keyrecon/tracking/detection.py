@@ -1,0 +1,188 @@
+"""Find the player: roughly, where the head and the feet are, and how tall they stand (Section 4.1).
+
+In pictures reduced so that the player is about 96 px tall, a few frames a second are searched
+whole:
+
+    colour back-projection x foreground -> Gaussian low-pass -> radial symmetry -> candidates,
+
+round for the head, elliptical for the shoes. The cheapest path through the candidates (see
+`viterbi`) gives the head, then the feet given the head; between the searched frames both are
+interpolated. Searched in every frame (`EVERY_FRAME`), this is the tracker that the paper prints.
+
+The unit of length is the standing height from head to mid-feet. Players crouch, lunge and jump, so
+it is an upper envelope over time, divided by the camera's zoom, not the distance of the moment.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
+from keyrecon.io.video import Video
+from keyrecon.numerics.viterbi import TransitionModel, cheapest_path
+from keyrecon.progress import Progress, silent
+from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
+from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
+from keyrecon.segmentation.part_evidence import Reader, first_scene, weigh_evidence
+from keyrecon.tracking.candidates import PartCandidates, search_frame
+from keyrecon.tracking.foot_pairs import foot_pairs, pair_costs
+from keyrecon.tracking.scale import player_boxes, standing_height, zoom
+from keyrecon.tracking.smoothing import (
+    fill_gaps,
+    state_confidence,
+    taken_states,
+    to_reference_frame,
+)
+
+EVERY_FRAME = 1e4
+"""A pace that no video has: every frame is searched."""
+MOST_KEPT = 2**28
+"""Pictures that take no more memory than this are kept rather than read twice, bytes."""
+PAIRS = 30
+"""Pairs of feet kept, per frame."""
+NO_SHOE = 2.0
+"""Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
+FAIR = 0.15
+"""Share of the best scores that is as good as half sure."""
+LEAST_FOUND = 0.4
+"""Share of the frames in which a head must be found for a track to be believed."""
+
+
+@dataclass(frozen=True)
+class FindOptions:
+    """How the player is looked for."""
+
+    player: float = 96.0
+    """Height of the player in the searched pictures, px; smaller is faster and less exact."""
+    pace: float = 12.5
+    """Pictures searched per second of the video; between them the player is interpolated."""
+    head_speed: float = 3.0
+    """Usual speed of the head, player heights per second."""
+    foot_speed: float = 5.0
+    """Usual speed of the feet, player heights per second."""
+    envelope: float = 5.0
+    """The standing height may change over this time, seconds."""
+
+
+def find_player(
+    video: Video,
+    colors: Colors,
+    camera: CameraPath,
+    options: FindOptions = FindOptions(),
+    progress: Progress = silent,
+) -> Track:
+    """Head, feet, standing height, box and trust in every frame, by colour and shape alone.
+
+    Raises KeyreconError where no head is found in most frames.
+    """
+    width = reduced_width(video, colors.height, BackgroundOptions(player=options.player))
+    shrink = width / video.width
+    parts = posterior_tables(colors)
+    every = max(1, round(video.fps / options.pace))
+    numbers = np.unique(np.append(np.arange(0, len(video), every), len(video) - 1))
+    pictures = _read_pictures(video, width, numbers, progress)
+    scene = first_scene(pictures, numbers, camera, shrink, parts.max(axis=0))
+    tall = colors.height * shrink
+    head = parts[colors.names.index("head")]
+    tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
+    to_picture = np.linalg.inv(shrinking(shrink))
+
+    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> PartCandidates:
+        lab = to_lab(entry[1])
+        foreground = scene.foreground(lab, entry[0], to_picture)
+        return search_frame(weigh_evidence(lab, tables, foreground, tall), tall)
+
+    shown = progress(pictures(numbers), "Finding the player", len(numbers))
+    small = list(side_by_side(look, zip(numbers.tolist(), shown, strict=True)))
+    found = [_enlarge(c, shrink) for c in small]
+    return _connect(found, numbers, video, camera, colors.height, options)
+
+
+def _read_pictures(
+    video: Video, width: int, numbers: Int[np.ndarray, "n"], progress: Progress
+) -> Reader:
+    """Reduced pictures of some frames: kept if they take little memory, else read when wanted."""
+    if 3 * len(numbers) * width * round(video.height * width / video.width) > MOST_KEPT:
+        return lambda wanted: read_small(video, width, set(wanted.tolist()))
+    pictures = read_small(video, width, set(numbers.tolist()))
+    pictures = progress(pictures, "Reading pictures of the player", len(numbers))
+    kept = dict(zip(numbers.tolist(), pictures, strict=True))
+    return lambda wanted: (kept[number] for number in wanted.tolist())
+
+
+def _enlarge(found: PartCandidates, shrink: float) -> PartCandidates:
+    """Candidates in pixels of the full picture."""
+    back = (1 / shrink - 1) / 2
+    heads, feet = (places / shrink + back for places in (found.heads, found.feet))
+    return PartCandidates(heads, found.head_score, feet, found.foot_score)
+
+
+def _connect(
+    found: list[PartCandidates],
+    numbers: Int[np.ndarray, "n"],
+    video: Video,
+    camera: CameraPath,
+    height: float,
+    options: FindOptions,
+) -> Track:
+    """The path of the head, then that of the feet."""
+    from_reference = np.linalg.inv(camera.to_reference)
+    searched = camera.to_reference[numbers]
+    step = height / video.fps * float(np.median(np.diff(numbers))) if len(numbers) > 1 else height
+    head_cost = _costs([c.head_score for c in found])
+    stable = [h[:, None] for h in to_reference_frame([c.heads for c in found], searched)]
+    chosen = cheapest_path(head_cost, stable, TransitionModel(options.head_speed * step))
+    if (chosen >= 0).mean() < LEAST_FOUND:
+        raise _lost(chosen, numbers)
+    head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
+    pairs, costs = _pair(found, head[numbers], height)
+    stable = to_reference_frame([c.feet for c in found], searched)
+    stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
+    taken = cheapest_path(
+        costs, stable, TransitionModel(options.foot_speed * step, gap=12, miss=7.0)
+    )
+    feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
+    frames = round(options.envelope * video.fps)
+    standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
+    halves = [c / 2 for c in costs]
+    trust = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
+    trust = np.interp(np.arange(len(head)), numbers, trust)
+    return Track(head, feet, standing, player_boxes(head, feet, standing), trust)
+
+
+def _pair(
+    found: list[PartCandidates], head: Float[np.ndarray, "n 2"], height: float
+) -> tuple[list[Int[np.ndarray, "_ 2"]], list[Float[np.ndarray, "_"]]]:
+    """The best pairs of feet of every frame, and their costs."""
+    foot_cost = _costs([c.foot_score for c in found])
+    pairs, costs = [], []
+    for t, candidates in enumerate(found):
+        every = foot_pairs(len(candidates.feet))
+        cost = pair_costs(foot_cost[t], every, candidates.feet, head[t], height)
+        best = np.argsort(cost)[:PAIRS]
+        pairs.append(every[best])
+        costs.append(cost[best])
+    return pairs, costs
+
+
+def _lost(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) -> KeyreconError:
+    """What to tell when there is no track."""
+    seen = chosen >= 0
+    gaps = numbers[~seen]
+    middle = int(gaps[len(gaps) // 2])
+    return KeyreconError(
+        f"The head was found in only {seen.sum()} of {len(seen)} frames; pick its colour again "
+        f"on a frame where it was missed, for instance frame {middle}."
+    )
+
+
+def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]:
+    """-log of each score against the best scores of the sequence."""
+    best = [float(np.nanmax(s)) for s in scores if np.isfinite(s).any()]
+    reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
+    # Shoes differ in contrast; beyond a fair score more of it says little.
+    costs = [-np.log((s + 0.001 * reference) / (s + FAIR * reference)) for s in scores]
+    return [np.where(np.isnan(c), NO_SHOE, c) for c in costs]

@@ -1,0 +1,40 @@
+"""Whether the player is in the picture at all.
+
+A path through candidates goes on while the player is off the picture or behind something: it has to
+be somewhere. But then the strip between the head and the feet that it claims looks like the empty
+scene, while a player fills it in every other frame: over half of what is usual where trunk and legs
+have the court's colours, nothing where nobody is.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from keyrecon.records import Track
+from keyrecon.segmentation.player_crops import Cropping, Crops
+
+LEAST_FOREGROUND = 0.3
+"""Share of the usual foreground between head and feet below which nobody is there."""
+_BROAD = 0.08
+"""Half the breadth of the strip, player heights: that of a trunk seen from the side."""
+_ALONG, _ACROSS = 24, 9
+"""Places looked at."""
+
+
+def is_visible(crops: Crops, cropping: Cropping, track: Track) -> Bool[np.ndarray, "T"]:
+    """Frames in which something stands between the track's head and feet."""
+    share = _foreground(crops, cropping, track)
+    return share >= LEAST_FOREGROUND * np.median(share)
+
+
+def _foreground(crops: Crops, cropping: Cropping, track: Track) -> Float[np.ndarray, "T"]:
+    """Mean probability that the strip from head to mid-feet is not background."""
+    scale, origin = cropping.scale[:, None], cropping.origin
+    head, feet = (scale * (place - origin) for place in (track.head, track.mid_feet))
+    along = np.linspace(0, 1, _ALONG)[None, :, None]
+    spine = head[:, None] + along * (feet - head)[:, None]
+    aside = np.linspace(-_BROAD, _BROAD, _ACROSS) * scale * track.height[:, None]
+    rows, columns = cropping.size
+    x = np.clip(np.rint(spine[:, :, None, 0] + aside[:, None]), 0, columns - 1).astype(int)
+    y = np.clip(np.rint(spine[:, :, None, 1]), 0, rows - 1).astype(int)
+    frames = np.arange(len(head))[:, None, None]
+    return crops.foreground[frames, y, x].mean(axis=(1, 2)) / 255

@@ -1,0 +1,388 @@
+"""The annotator's page in a real browser: what a person does there is what stands in the files."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from page_driver import CHROMIUM, SCREEN, Person, far, serving
+from page_project import (
+    FPS,
+    FRAMES,
+    PIXELS,
+    STATURE,
+    block,
+    count_slowly,
+    make_project,
+    read_number,
+    true_signs,
+    truth,
+    write_numbered_video,
+)
+
+from keyrecon.annotate.assist.answers import describe_pose
+from keyrecon.annotate.assist.body_estimate import estimate_body
+from keyrecon.annotate.assist.project_cache import ProjectCache
+from keyrecon.annotate.store.assistant import Assistant
+from keyrecon.body import LSP14
+from keyrecon.io.formats.coco import read_coco
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+)
+POINTS3D, POINTS2D = truth()
+
+
+@pytest.fixture(scope="session")
+def video_file(tmp_path_factory):
+    return write_numbered_video(tmp_path_factory.mktemp("page") / "numbered.mp4")
+
+
+@pytest.fixture
+def folder(tmp_path, video_file):
+    return make_project(tmp_path / "rally", video_file)
+
+
+@pytest.fixture
+def context(chromium):
+    opened = chromium.new_context(viewport=SCREEN)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def person(context, folder):
+    """Somebody at the page of a new project, whom nothing may have disturbed."""
+    with serving(folder) as server:
+        person = Person(context, server.door.address)
+        person.server = server
+        yield person
+        context.close()
+    assert person.complaints == []
+
+
+def place_of(frame, joint):
+    return POINTS2D[frame, LSP14.names.index(joint)]
+
+
+def marks_on_file(folder):
+    return read_coco(folder / "annotations.json", LSP14, 100, (640, 360))
+
+
+def test_a_keyframe_without_help_is_fourteen_clicks(person, folder):
+    person.open(10)
+    person.mark_joints(partial(place_of, 10))
+    person.await_saved()
+    marks = marks_on_file(folder)
+    assert (person.clicks, person.keys) == (14, 0)
+    assert marks.frames.tolist() == [10]
+    assert np.abs(marks.joints[0] - POINTS2D[10]).max() < 1.0
+    assert marks.visible.all()
+
+
+def test_the_picture_is_that_of_the_keyframe(person):
+    for frame in (10, 40, 55, 70):
+        person.open(frame)
+        blocks = person.page.evaluate(
+            """places => {
+              const [picture] = document.querySelectorAll("#picture canvas");
+              const ratio = devicePixelRatio, pen = picture.getContext("2d");
+              return places.map(([x, y]) => pen.getImageData(x * ratio, y * ratio, 1, 1).data[0]);
+            }""",
+            [corner_of(person, block(bit)) for bit in range(8)],
+        )
+        assert read_number(blocks) == frame
+
+
+def corner_of(person, place):
+    box = person.page.locator("#picture").bounding_box()
+    x, y = person.on_screen(place)
+    return [x - box["x"], y - box["y"]]
+
+
+def test_upper_body_keyframes_ask_for_no_legs(person):
+    person.open(40)
+    joints = person.page.locator(".joint:not([hidden]) .name").all_inner_texts()
+    assert len(joints) == 8
+    assert not {"left hip", "right knee", "left ankle"} & set(joints)
+
+
+def test_work_goes_on_when_the_server_is_gone(person, folder):
+    person.open(10)
+    person.click(place_of(10, person.asked()))
+    person.await_saved()
+    person.server.stop()
+    first = person.asked()
+    person.click(place_of(10, first))
+    person.await_text("#saving", "Not saved: 1")
+    second = person.asked()
+    person.click(place_of(10, second))
+    person.await_text("#saving", "Not saved: 2")
+    person.server.start()
+    person.await_saved()
+    marks = marks_on_file(folder)
+    for joint in (first, second):
+        assert far(marks.joints[0, LSP14.index(joint)], place_of(10, joint)) < 1.0
+
+
+def test_edits_kept_in_the_browser_outlive_the_page(person, folder, context):
+    person.open(10)
+    person.server.stop()
+    joint = person.asked()
+    person.click(place_of(10, joint))
+    person.await_text("#saving", "Not saved: 1")
+    person.page.close()
+    person.server.start()
+    again = Person(context, person.server.door.address)
+    again.await_saved()
+    again.await_text("#joints", "visible")
+    assert np.isfinite(marks_on_file(folder).joints[0, LSP14.index(joint)]).all()
+
+
+def test_two_pages_see_each_other_and_overwrite_nothing(person, context, folder):
+    other = Person(context, person.server.door.address)
+    for one in (person, other):
+        one.open(10)
+    person.click(place_of(10, "head_top"))
+    other.await_text(".joint[data-joint=head_top] .seen", "visible")
+    before = marks_on_file(folder).joints[0, LSP14.index("head_top")]
+    context.route("**/api/events", lambda route: route.abort())
+    other.page.reload()
+    other.open(10)
+    person.drag(before, before + 20)
+    person.await_saved()
+    other.drag(before, before - 20)
+    other.await_text("#notice", "Another page changed the same place")
+    kept = marks_on_file(folder).joints[0, LSP14.index("head_top")]
+    assert far(kept, before + 20) < 1.5
+    other.page.click("#notice-offer")
+    other.await_saved()
+    taken = marks_on_file(folder).joints[0, LSP14.index("head_top")]
+    assert far(taken, before - 20) < 1.5
+    other.complaints.clear()
+
+
+def test_undo_takes_the_last_edit_back_after_a_reload(person, folder):
+    person.open(10)
+    person.click(place_of(10, "head_top"))
+    person.click(place_of(10, "neck"))
+    person.await_saved()
+    person.page.reload()
+    person.open(10)
+    person.press("Control+z")
+    person.await_text(".joint[data-joint=neck] .seen", "^$")
+    marks = marks_on_file(folder).joints[0]
+    assert np.isnan(marks[LSP14.index("neck")]).all()
+    assert np.isfinite(marks[LSP14.index("head_top")]).all()
+    person.press("Control+y")
+    person.await_text(".joint[data-joint=neck] .seen", "visible")
+
+
+def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
+    person.open(10)
+    joint = person.asked()
+    for key in ("Shift+ArrowUp", "ArrowLeft", "Space"):
+        person.press(key)
+    person.await_saved()
+    start = marks_on_file(folder).joints[0, LSP14.index(joint)]
+    person.press("w")
+    for _ in range(3):
+        person.press("ArrowRight")
+    person.press("v")
+    person.await_text(f".joint[data-joint={joint}] .seen", "hidden")
+    person.await_saved()
+    marks = marks_on_file(folder)
+    moved = marks.joints[0, LSP14.index(joint)]
+    assert moved == pytest.approx([start[0] + 3, start[1]], abs=0.11)
+    assert not marks.visible[0, LSP14.index(joint)]
+
+
+def test_one_key_swaps_left_and_right_of_the_arms(person, folder):
+    person.open(40)
+    person.mark_joints(partial(place_of, 40))
+    person.press("c")
+    person.await_saved()
+    joints = marks_on_file(folder).joints[0]
+    for part in ("wrist", "elbow", "shoulder"):
+        left = joints[LSP14.index(f"left_{part}")]
+        assert far(left, place_of(40, f"right_{part}")) < 1.0
+
+
+def test_a_picture_zoomed_at_the_pointer_is_still_marked_right(person, folder):
+    person.open(10)
+    person.point_at(place_of(10, "head_top"))
+    person.page.mouse.wheel(0, -600)
+    person.click(place_of(10, "head_top"))
+    person.await_saved()
+    marks = marks_on_file(folder).joints[0]
+    assert far(marks[LSP14.index("head_top")], place_of(10, "head_top")) < 0.3
+
+
+def ghost_assistant(errors):
+    """A suggestion from the truth, off by `errors` (px) where they are given."""
+
+    def ghost(annotations, frame):
+        joints = {
+            name: [*(place_of(frame, name) + errors.get(name, 0.0)).tolist(), 0.8]
+            for name in LSP14.names
+        }
+        return {"joints": joints, "from": [3], "nearer": {}}
+
+    return Assistant(ghost=ghost)
+
+
+def test_a_suggestion_costs_one_action_and_one_more_per_joint_that_is_off(context, folder):
+    wrong = {"left_wrist": 25.0, "right_knee": -18.0}
+    with serving(folder, ghost_assistant(wrong)) as server:
+        person = Person(context, server.door.address)
+        person.open(10)
+        person.await_text("#guide-text", "suggestion for 14 joints")
+        for joint, error in wrong.items():
+            person.drag(place_of(10, joint) + error, place_of(10, joint))
+        person.press("Enter")
+        person.await_text("#done-count", "1 of")
+        person.await_saved()
+        context.close()
+    assert person.actions == 3
+    assert np.abs(marks_on_file(folder).joints[0] - POINTS2D[10]).max() < 1.5
+    assert person.complaints == []
+
+
+def test_a_list_of_five_hundred_keyframes_makes_few_rows(person):
+    rows = person.call(
+        "list",
+        """(() => {
+          const root = document.querySelector("#frame-list").cloneNode();
+          document.querySelector("#frame-list").replaceWith(root);
+          const list = m.createList(root, {
+            height: 44, fill: (row, item) => { row.textContent = item; }, choose() {},
+          });
+          list.show(Array.from({ length: 500 }, (_, n) => `row ${n}`), 499);
+          return [...root.querySelectorAll(".row")].map((row) => row.textContent);
+        })()""",
+    )
+    assert len(rows) < 30
+    assert "row 499" in rows
+
+
+def test_zooming_keeps_what_is_under_the_pointer(person):
+    there, back = person.call(
+        "geometry",
+        """(() => {
+          const view = { scale: 1.5, x: 40, y: -20 }, pointer = [300, 200];
+          const nearer = m.zoomAt(view, pointer, 2.5, [0.1, 20]);
+          return [m.toPicture(view, pointer), m.toPicture(nearer, pointer)];
+        })()""",
+    )
+    assert there == pytest.approx(back)
+
+
+def test_swapping_sides_twice_changes_nothing(person):
+    before, after = person.call(
+        "state",
+        """import("/page/edits.js").then((edits) => {
+          const marks = { left_knee: [1, 2, 2], right_knee: [3, 4, 1], neck: [5, 6, 2] };
+          const state = { ...m.emptyState(), marks: { 7: marks }, nearer: { 7: { left_knee: 1 } } };
+          const pairs = [["left_knee", "right_knee"]];
+          const swapped = (from) => m.apply(from, edits.swapSides(from, 7, pairs));
+          const [once, twice] = [swapped(state), swapped(swapped(state))];
+          return [[state.marks, state.nearer, [3, 4, 1], -1], [twice.marks, twice.nearer,
+            once.marks[7].left_knee, once.nearer[7].right_knee === 1 ? -1 : 0]];
+        })""",
+    )
+    assert before == after
+
+
+def test_no_key_of_any_page_fails(person):
+    pages = person.call("keys", "m.KEYS")
+    for number, page in enumerate(("pick", "keyframes", "motion"), start=1):
+        person.press(f"Alt+{number}")
+        for keys, _, action in pages[page]:
+            if action not in ("primary", "add"):
+                person.press(keys[-1].replace(" ", "Space"))
+    person.press("?")
+    assert "swap left and right" in person.text("#keys-panel")
+
+
+def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
+    person.press("Alt+1")
+    person.page.wait_for_selector("#pick-picture[data-frame]")
+    box = person.page.locator("#pick-picture").bounding_box()
+    for dx in (0, 20, 40, 60):
+        person.page.mouse.click(box["x"] + 300 + dx, box["y"] + 200)
+    person.await_text("#pick-text", "The colours are known")
+    person.await_saved()
+    picks = person.server.ask("state")["picks"]
+    assert [pick["part"] for pick in sorted(picks, key=lambda pick: pick["x"])] == [
+        "head",
+        "foot",
+        "foot",
+        "shirt",
+    ]
+    person.page.mouse.click(box["x"] + 300, box["y"] + 200)
+    person.await_text("#pick-text", "Click the middle of the head")
+
+
+class Onlooker(ProjectCache):
+    """Knows the player's height, and nothing else before it is marked."""
+
+    def __init__(self):
+        """There is nothing prepared to study."""
+
+    def knowledge(self, annotations, wait=False):
+        return estimate_body(annotations, {}, np.full(FRAMES, 0.9 * STATURE * PIXELS), FPS)
+
+    def any_ghost(self, annotations, frame):
+        return None
+
+
+def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, folder):
+    """Pointing at a limb costs nothing: what is turned is turned by a key."""
+    truth = true_signs(POINTS3D[70])
+    with serving(folder, Assistant(pose=partial(describe_pose, Onlooker()))) as server:
+        person = Person(context, server.door.address)
+        person.open(70)
+        person.mark_joints(partial(place_of, 70))
+        person.await_text("#guide-text", "Which ends are nearer")
+        person.settle_depths(truth, partial(place_of, 70))
+        person.await_text("#guide-text", "done|Next|All keyframes")
+        person.await_saved()
+        context.close()
+    marks = marks_on_file(folder)
+    found = {LSP14.names[c]: s for (_, c), s in zip(LSP14.bones, marks.nearer[0], strict=True)}
+    assert {name: found[name] for name in truth} == truth
+    assert (person.clicks, person.drags) == (14, 0)
+    assert person.keys <= 6
+    assert person.complaints == []
+
+
+def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
+    with serving(folder, commands={"run": count_slowly}) as server:
+        person = Person(context, server.door.address)
+        person.open(40)
+        person.mark_joints(partial(place_of, 40))
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Make the motion")
+        person.press("Enter")
+        person.await_text("#job-text", "Counting")
+        person.page.click("#job-cancel")
+        person.await_text("#notice-text", "Cancelled")
+        person.await_text("#motion-text", "Make the motion")
+        context.close()
+    assert person.complaints == []
+
+
+def test_a_page_that_can_tell_nothing_of_the_body_says_why(person):
+    person.await_text("#space-empty", "stored results are missing.* Make the motion")
+
+
+def test_edits_made_without_the_server_can_be_taken_back(person, folder):
+    person.open(10)
+    person.server.stop()
+    for _ in range(3):
+        person.mark_one(partial(place_of, 10))
+    person.await_text("#saving", "Not saved")
+    person.press("Control+z")
+    person.press("Control+z")
+    person.server.start()
+    person.await_saved()
+    assert np.isfinite(marks_on_file(folder).joints[0, :, 0]).sum() == 1

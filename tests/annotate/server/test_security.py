@@ -1,0 +1,232 @@
+"""Nothing gets in: good and bad Host, Origin, token, method, path and body on every route."""
+
+import itertools
+import json
+
+import pytest
+from annotator import DOOR, HEADERS, new_project, open_project, request, run_apart
+
+from keyrecon.annotate.server import routes as server
+from keyrecon.annotate.server.security import MOST_BYTES
+
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE")
+BAD_HOSTS = (
+    *("evil.com", "evil.com:8000", "127.0.0.1", "127.0.0.1:80", "127.0.0.1.evil.com:8000"),
+    *("localhost", "LOCALHOST.:8000", "[::1]:8000", "0.0.0.0:8000", "", "127.0.0.1:8000@evil.com"),
+)
+BAD_ORIGINS = (
+    *("http://evil.com", "null", "https://127.0.0.1:8000", "http://127.0.0.1", "http://[::1]:8000"),
+    *("http://127.0.0.1:8001", "http://localhost.evil.com:8000", "", "http://127.0.0.1:8000/"),
+)
+BAD_COOKIES = (
+    *("", f"{DOOR.cookie}=", f"{DOOR.cookie}=guess", f"{DOOR.cookie}={DOOR.token}"),
+    *(
+        f"other={DOOR.session}",
+        f"{DOOR.cookie}={DOOR.session}x",
+        f"{DOOR.cookie}={DOOR.session[:-1]}",
+    ),
+)
+"""The token opens the door but is not the key that is carried around."""
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory, write_numbered):
+    folder = tmp_path_factory.mktemp("guarded") / "p"
+    new_project(folder, write_numbered("v.mp4", list(range(0, 240, 12))))
+    desk = open_project(folder)
+    yield desk
+    desk.close()
+
+
+@pytest.fixture(scope="module")
+def routes(desk):
+    """(method, address) of every route, from the table itself."""
+    filled = {"{name}": "index.html", "{frame:int}": "3", "{job:int}": "1", "{format}": "coco"}
+    table = []
+    for route in server.make_routes(desk, server.read_page(server.PAGE)):
+        path = route.path
+        for gap, value in filled.items():
+            path = path.replace(gap, value)
+        assert "{" not in path
+        table += [(method, path) for method in route.methods if method != "HEAD"]
+    assert len(table) > 20
+    return table
+
+
+@pytest.fixture(scope="module")
+def ask(desk):
+    """Ask with exactly these headers; returns the answer."""
+    app = server.make_app(desk, DOOR)
+
+    def send(method, path, headers=HEADERS, body=b""):
+        return request(app, method, path, headers, body)
+
+    return send
+
+
+def changed(**headers):
+    """Good headers with some changed or left out."""
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    return {n: v for n, v in {**HEADERS, **named}.items() if v is not None}
+
+
+def test_the_page_itself_gets_in_everywhere(ask, routes):
+    for method, path in routes:
+        assert ask(method, path).status not in (401, 403, 405, 415, 421), path
+
+
+def test_no_route_answers_under_another_host(ask, routes):
+    for (method, path), host in itertools.product(routes, BAD_HOSTS):
+        assert ask(method, path, changed(host=host)).status == 421, (path, host)
+
+
+def test_no_route_answers_another_origin(ask, routes):
+    for (method, path), origin in itertools.product(routes, BAD_ORIGINS):
+        assert ask(method, path, changed(origin=origin)).status == 403, (path, origin)
+
+
+def test_what_changes_something_needs_an_origin(ask, routes):
+    for method, path in routes:
+        status = ask(method, path, changed(origin=None)).status
+        assert (status == 403) == (method != "GET"), path
+
+
+def test_no_route_answers_without_the_cookie(ask, routes):
+    for (method, path), cookie in itertools.product(routes, (*BAD_COOKIES, None)):
+        assert ask(method, path, changed(cookie=cookie)).status == 403, (path, cookie)
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "anything"])
+def test_no_route_answers_what_a_browser_calls_foreign(ask, routes, site):
+    for method, path in routes:
+        assert ask(method, path, changed(sec_fetch_site=site)).status == 403, path
+
+
+def test_two_hosts_origins_or_cookies_at_once_are_not_good(ask):
+    for name, other in (("host", "evil.com"), ("origin", "http://evil.com")):
+        twice = [*HEADERS.items(), (name, other)]
+        assert ask("GET", "/api/state", twice).status in (403, 421)
+
+
+def test_other_methods_are_refused(ask, routes):
+    known = {}
+    for method, path in routes:
+        known.setdefault(path, {"HEAD"}).add(method)
+    for path, methods in known.items():
+        for method in {*METHODS} - methods - {"GET"}:
+            assert ask(method, path).status in (403, 405), (method, path)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/../server.py",
+        "/page/..%2fserver.py",
+        "/page/%2e%2e/server.py",
+        "/page//etc/passwd",
+        "/page/%2fetc%2fpasswd",
+        "/page/index.html%00.js",
+        "/page/",
+        "/api/still/../../project.toml",
+        "/api/still/..%2f..%2fproject.toml",
+        "/api/still/-1",
+        "/api/still/20",
+        "/api/still/99999999999999999999",
+        "/api/still/3?width=-5",
+        "/api/still/3?width=1e9",
+        "/api/still/3?width=%D9%A3",
+        "/api/export/..%2fannotations.json",
+        "/project.toml",
+        "/static/annotations.json",
+        "//evil.com",
+    ],
+)
+def test_nothing_but_what_is_listed_is_served(ask, path):
+    answer = ask("GET", path)
+    assert answer.status in (400, 404)
+    assert b"fingerprint" not in answer.content
+
+
+BODIES = {
+    "": 400,
+    "{": 400,
+    "null": 400,
+    "[]": 400,
+    "[" * 100_000: 400,
+    '{"edits": [' + '{"id":' * 50_000: 400,
+    '{"edits": 3}': 400,
+    '{"edits": [{"kind": "__class__", "id": "a"}]}': 400,
+    '{"id": "' + "x" * 100 + '"}': 400,
+    '{"more": 1}': 400,
+    '{"frames": [1e99]}': 400,
+    '\ufeff{"edits": []}': 400,
+    '"' + "x" * (MOST_BYTES + 1) + '"': 413,
+}
+
+
+def test_no_body_of_another_form_gets_in(ask, routes, desk):
+    before = desk.store.state
+    for (method, path), body in itertools.product(routes, BODIES):
+        if method == "POST":
+            answer = ask(method, path, body=body.encode())
+            assert answer.status == BODIES[body], (path, body[:40])
+            assert answer.json()["error"]
+    assert desk.store.state == before
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *("text/plain", "application/x-www-form-urlencoded", "multipart/form-data", None),
+        "application/json; charset=utf-7",
+    ],
+)
+def test_forms_of_other_sites_are_no_json(ask, routes, kind):
+    for method, path in routes:
+        if method == "POST":
+            assert ask(method, path, changed(content_type=kind), body=b"{}").status == 415
+
+
+def test_the_token_gives_the_cookie_once_more_for_each_page(ask):
+    bare = {"host": HEADERS["host"]}
+    for _ in range(2):
+        answer = ask("GET", f"/?token={DOOR.token}", bare)
+        assert (answer.status, answer.headers["location"]) == (303, "/")
+        cookie = answer.headers["set-cookie"]
+        assert "HttpOnly" in cookie
+        assert "samesite=strict" in cookie.lower()
+        assert DOOR.token not in cookie
+    for token in ("", "guess", DOOR.session, DOOR.token[:-1], DOOR.token + "%C3%A9"):
+        assert ask("GET", f"/?token={token}", bare).status == 403
+    assert ask("GET", f"/api/state?token={DOOR.token}", bare).status == 403
+
+
+def test_every_answer_forbids_what_the_page_does_not_need(ask, routes):
+    answers = [ask("GET", "/"), ask("GET", "/nothing"), ask("GET", "/", {"host": "evil.com"})]
+    for answer in answers:
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert "frame-ancestors 'none'" in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert "access-control-allow-origin" not in answer.headers
+
+
+def test_sockets_are_closed_at_once(desk):
+    sent = []
+
+    async def send(message):
+        sent.append(message)
+
+    headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+    scope = {"type": "websocket", "path": "/api/events", "headers": headers}
+    run_apart(server.make_app(desk, DOOR)(scope, None, send))
+    assert sent == [{"type": "websocket.close", "code": 1008}]
+
+
+def test_an_unforeseen_fault_shows_nothing_of_the_inside(ask, desk, monkeypatch):
+    monkeypatch.setattr(desk.jobs, "listed", lambda: 1 / 0)
+    answer = ask("GET", "/api/jobs")
+    assert answer.status == 500
+    assert b"ZeroDivision" not in answer.content
+    assert json.loads(answer.content)["error"]

@@ -1,0 +1,113 @@
+"""The command: its address, who can reach it, and a server that is killed."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+from annotator_edits import mark
+
+from keyrecon import KeyreconError
+from keyrecon.annotate.server import address
+from keyrecon.app.annotator import announce
+
+
+@pytest.fixture
+def serve(folder):
+    """Start the command; returns the process and a way to ask it as the page does."""
+    running = []
+
+    def start(*words):
+        command = [sys.executable, "-m", "keyrecon.cli", "annotate", str(folder), "--no-browser"]
+        paths = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        program = subprocess.Popen([*command, *words], stdout=subprocess.PIPE, env=paths, text=True)
+        running.append(program)
+        program.stdout.readline()
+        printed = program.stdout.readline().strip()
+        base = printed.partition("/?")[0]
+        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        json_headers = {"Origin": base, "Content-Type": "application/json"}
+        opener.open(printed)
+
+        def ask(path, body=None):
+            data = None if body is None else json.dumps(body).encode()
+            question = urllib.request.Request(base + path, data, json_headers)
+            with opener.open(question, timeout=20) as answer:
+                return json.load(answer)
+
+        return program, ask
+
+    yield start
+    for program in running:
+        program.kill()
+        program.communicate()
+
+
+def test_a_killed_server_starts_again_with_all_it_acknowledged(serve, folder):
+    program, ask = serve()
+    for frame in range(10):
+        answer = ask("/api/edits", {"edits": [mark(frame, "neck", [10, 20, 2])]})
+        assert answer["results"][0]["ok"]
+    program.kill()
+    program.wait()
+    program, _ = serve()
+    # the page that was open goes on: same port, same cookie
+    assert ask("/api/state")["marks"].keys() == {str(frame) for frame in range(10)}
+    assert ask("/api/state")["undo"] == 10
+    program.send_signal(signal.SIGINT)
+    rest = program.communicate(timeout=20)[0]
+    assert "Everything that was marked is kept" in rest
+    assert program.returncode == 0
+    assert not {*folder.glob("annotate.sqlite-*")}  # the log is folded into the database
+
+
+def test_an_address_that_others_can_reach_is_warned_of():
+    address = "http://127.0.0.1:1/?token=x"
+    assert announce(Path("p"), address, "127.0.0.1").endswith(address)
+    assert "reached from other machines" in announce(Path("p"), address, "0.0.0.0")
+
+
+def test_an_address_answers_only_under_the_names_it_is_reached_by():
+    for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", socket.gethostname())):
+        with address.listen(host, 0) as listener:
+            port = listener.getsockname()[1]
+            door = address.make_door(listener, host)
+            assert door.hosts[0] == f"{first}:{port}"
+            assert f"localhost:{port}" in door.hosts
+            for taken in (port, 99_999):
+                with pytest.raises(KeyreconError, match="choose another --port"):
+                    address.listen(host, taken)
+
+
+@pytest.mark.parametrize(
+    ("host", "ours"),
+    [("127.0.0.1", True), ("localhost", True), ("::1", True), ("0.0.0.0", False), ("evil", False)],
+)
+def test_only_this_machine_reaches_a_loopback_address(host, ours):
+    assert address.is_loopback(host) == ours
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"port": 80, "session": "guess"}', "null"])
+def test_a_damaged_memory_of_the_address_is_no_memory(tmp_path, text):
+    (tmp_path / "annotator.json").write_text(text)
+    assert address.recall(tmp_path / "annotator.json") == address.Memory()
+
+
+def test_the_last_address_is_kept_for_oneself_and_used_again_if_free(tmp_path):
+    file = tmp_path / "cache" / "annotator.json"
+    with address.listen("127.0.0.1", 0) as first:
+        door = address.make_door(first, "127.0.0.1")
+        address.remember(file, door)
+        memory = address.recall(file)
+        with address.listen("127.0.0.1", 0, memory) as second:
+            assert second.getsockname()[1] != door.port
+    with address.listen("127.0.0.1", 0, memory) as third:
+        again = address.make_door(third, "127.0.0.1", memory)
+    assert (again.port, again.session) == (door.port, door.session)
+    assert again.token != door.token
+    assert file.stat().st_mode & 0o077 == 0

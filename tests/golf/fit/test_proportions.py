@@ -1,0 +1,62 @@
+"""The player's proportions from postures whose every joint is marked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from golf_truth import camera_before, even_times
+
+from keyrecon.golf.fit.proportions import PARTS, ProportionOptions, fit_proportions, scale_body
+from keyrecon.golf.fit.residuals import project
+from keyrecon.golf.prior.kinematics import find_joints, place_body
+from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, SwingMarks, SwingState
+from keyrecon.io.formats.model_file import read_motion_model
+
+CAMERA = Camera(1000.0, np.array([640.0, 360.0]))
+FACTORS = np.array([1.04, 0.96, 1.0, 0.95, 1.08, 1.02, 1.06, 0.98])
+FRAMES = np.array([0, 14, 25, 39])
+
+
+@pytest.fixture(scope="module")
+def posed():
+    """The average body in the mean swing, and the marks of a player of other proportions."""
+    model, body = read_motion_model(), size_body(1.8)
+    rotation, position = camera_before(180.0)
+    state = SwingState(
+        np.zeros(0), even_times(40, 5), np.tile(rotation, (40, 1, 1)), np.tile(position, (40, 1))
+    )
+    posture = posture_at(model, state.mu, state.alpha)
+    joints = find_joints(theirs := scale_body(body, FACTORS), place_body(theirs, posture, state))
+    pixels = project(joints[FRAMES].reshape(-1, 3), CAMERA)[0].reshape(4, 14, 2)
+    return body, place_body(body, posture, state), SwingMarks(FRAMES, pixels)
+
+
+def lengths(body):
+    return np.linalg.norm(body.joint_place, axis=1)
+
+
+def test_marks_of_four_postures_tell_how_long_the_limbs_are(posed):
+    body, pose, marks = posed
+    found = fit_proportions(body, pose, marks, CAMERA, ProportionOptions(spread=1.0))
+    share = lengths(found) / lengths(scale_body(body, FACTORS))
+    assert np.ptp(share) < 0.02  # how large all of the player is, one camera cannot tell
+
+
+def test_without_marks_the_player_is_average(posed):
+    body, pose, marks = posed
+    nothing = replace(marks, joints=np.full_like(marks.joints, np.nan))
+    found = fit_proportions(body, pose, nothing, CAMERA)
+    np.testing.assert_allclose(found.offsets, body.offsets, atol=1e-9)
+
+
+def test_a_longer_part_moves_what_hangs_on_it():
+    body = size_body(1.8)
+    longer = scale_body(body, 1 + 0.1 * np.eye(len(PARTS))[PARTS.index("thigh")])
+    state = SwingState(np.zeros(0), np.zeros(1), np.eye(3)[None], np.zeros((1, 3)))
+    posture = posture_at(read_motion_model(), state.mu, state.alpha)
+    legs = [find_joints(b, place_body(b, posture, state))[0, :6] for b in (body, longer)]
+    thighs = [np.linalg.norm(leg[2] - leg[1]) for leg in legs]
+    shanks = [np.linalg.norm(leg[1] - leg[0]) for leg in legs]
+    assert thighs[1] == pytest.approx(1.1 * thighs[0]) and shanks[1] == pytest.approx(shanks[0])

@@ -1,0 +1,92 @@
+"""The swing prior in the keyframe pipeline."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from golf_truth import camera_before, even_times
+
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.prior.kinematics import find_joints, place_body
+from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import SwingState
+from keyrecon.golf.swing_prior import fit_swing_prior
+from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
+from keyrecon.metrics import pa_mpjpe
+from keyrecon.records import Annotations, JointTracks
+
+FRAMES, FPS = 50, 30.0
+SIZE = (1280, 720)
+
+
+@pytest.fixture(scope="module")
+def filmed():
+    """Joints of a swing of the prior in camera axes, and in the picture."""
+    model = read_motion_model()
+    rotation, position = camera_before(170.0)
+    alpha = np.random.default_rng(5).normal(0, 0.6, len(model.components))
+    state = SwingState(
+        alpha, even_times(FRAMES, 6), np.tile(rotation, (FRAMES, 1, 1)),
+        np.tile(position, (FRAMES, 1)),
+    )  # fmt: skip
+    joints = find_joints(
+        size_body(1.75), place_body(size_body(1.75), posture_at(model, state.mu, alpha), state)
+    )
+    pixels = 1100.0 * joints[..., :2] / joints[..., 2:] + np.array([639.5, 359.5])
+    return joints, pixels
+
+
+def followed(pixels):
+    confidence = np.full(pixels.shape[:2], 0.8)
+    return JointTracks(pixels, confidence, np.zeros(pixels.shape[:2], np.int64))
+
+
+def marked(pixels, frames):
+    nothing = np.zeros((len(frames), len(LSP14.bones)), np.int64)
+    return Annotations(
+        LSP14, np.array(frames), pixels[frames], np.ones((len(frames), 14), bool), nothing
+    )
+
+
+def test_a_swing_is_found_behind_followed_joints(filmed):
+    joints, pixels = filmed
+    noisy = pixels + np.random.default_rng(0).normal(0, 3.0, pixels.shape)
+    seen = (np.full(FRAMES, 380.0), SIZE)
+    time = np.arange(FRAMES) / FPS
+    found = fit_swing_prior(
+        followed(noisy), marked(pixels, [6, 22, 34]), read_motion_model(), seen, time
+    )
+    assert 1000 * pa_mpjpe(found, joints) < 40
+
+
+def test_a_player_who_stands_still_does_not_swing(filmed):
+    still = np.repeat(filmed[1][:1], FRAMES, axis=0)
+    with pytest.raises(KeyreconError, match="no swing"):
+        fit_swing_prior(
+            followed(still), marked(still, [6]), read_motion_model(),
+            (np.full(FRAMES, 380.0), SIZE), np.arange(FRAMES) / FPS,
+        )  # fmt: skip
+
+
+def test_a_prior_of_another_version_is_refused(tmp_path):
+    file = tmp_path / "old.npz"
+    write_motion_model(file, replace(read_motion_model(), version=99))
+    with pytest.raises(KeyreconError, match="version 99"):
+        read_motion_model(file)
+
+
+def test_a_file_that_is_no_prior_is_refused(tmp_path):
+    file = tmp_path / "other.npz"
+    np.savez(file, something=np.zeros(3))
+    with pytest.raises(KeyreconError, match="not a swing prior"):
+        read_motion_model(file)
+
+
+def test_a_prior_on_disk_is_the_one_that_was_written(tmp_path):
+    model = read_motion_model()
+    write_motion_model(tmp_path / "copy.npz", model)
+    again = read_motion_model(tmp_path / "copy.npz")
+    assert again.provenance == model.provenance
+    assert np.array_equal(again.components, model.components)

@@ -1,0 +1,134 @@
+import av
+import numpy as np
+import pytest
+from numbered_pictures import read_number
+from numbered_videos import EVEN, KINDS, OPEN_GOP, UNEVEN, copy_packets, trim_with_edit_list, turn
+
+from keyrecon import KeyreconError
+from keyrecon.io.video import open_video
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_picture_of_frame_n_is_frame_n(write_numbered, kind):
+    ticks, options = KINDS[kind]
+    video = open_video(write_numbered("numbered.mp4", ticks, options))
+    assert len(video) == len(ticks)
+    assert [read_number(p) for p in video.frames()] == list(range(len(ticks)))
+    order = np.random.default_rng(0).permutation(len(ticks))[:25]
+    assert [read_number(video.frame(int(n))) for n in order] == order.tolist()
+
+
+def numbers(video):
+    """What the pictures say, all in a row and one by one in any order."""
+    in_a_row = [read_number(np.rot90(p, -video.turns)) for p in video.frames()]
+    order = np.random.default_rng(0).permutation(len(video))[:25].tolist()
+    single = {n: read_number(np.rot90(video.frame(n), -video.turns)) for n in order}
+    assert single == {n: in_a_row[n] for n in order}
+    return in_a_row
+
+
+@pytest.mark.parametrize("options", [{"bf": "3", "g": "20"}, OPEN_GOP])
+def test_frames_before_the_start_of_an_edit_list_do_not_count(write_numbered, tmp_path, options):
+    whole = write_numbered("whole.mp4", EVEN, options)
+    for first in (7, 25):
+        cut = copy_packets(whole, tmp_path / f"{first}.mp4", earlier=12 * first)
+        assert numbers(open_video(cut)) == list(range(first, 60))
+
+
+@pytest.mark.parametrize("options", [{"bf": "3", "g": "20"}, OPEN_GOP])
+def test_frames_outside_both_ends_of_an_edit_list_do_not_count(write_numbered, tmp_path, options):
+    whole = write_numbered("whole.mp4", EVEN, options)
+    trimmed = trim_with_edit_list(whole, tmp_path / "trimmed.mp4", 13, 20)
+    assert numbers(open_video(trimmed)) == list(range(13, 33))
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_file_cut_inside_an_open_gop_begins_with_its_first_whole_picture(
+    write_numbered, tmp_path, suffix
+):
+    whole = write_numbered(f"whole.{suffix}", EVEN, OPEN_GOP)
+    cut = copy_packets(whole, tmp_path / f"cut.{suffix}", skip_until=1)
+    assert numbers(open_video(cut)) == list(range(20, 60))
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 270])
+def test_a_file_that_says_it_is_turned_is_turned_as_players_do(write_numbered, tmp_path, degrees):
+    whole = write_numbered("whole.mp4", EVEN)
+    video = open_video(turn(whole, tmp_path / "turned.mp4", degrees))
+    assert video.turns == -degrees // 90 % 4  # clockwise in the file, counter-clockwise here
+    assert (video.width, video.height) == ((128, 64) if degrees == 180 else (64, 128))
+    assert numbers(video) == list(range(60))
+
+
+def test_times_are_those_of_the_file_and_slow_motion_divides_them(write_numbered):
+    path = write_numbered("uneven.mp4", UNEVEN)
+    assert np.allclose(open_video(path).time, np.array(UNEVEN) / 600, atol=1e-3)
+    assert np.allclose(open_video(path, slow_motion=4.0).time, np.array(UNEVEN) / 2400, atol=1e-3)
+    assert open_video(path).variable_rate
+    assert not open_video(write_numbered("even.mp4", EVEN)).variable_rate
+
+
+def test_a_trimmed_video_counts_from_its_first_frame(write_numbered):
+    video = open_video(write_numbered("trim.mp4", EVEN), start=20, end=30)
+    assert [read_number(p) for p in video.frames()] == list(range(20, 30))
+    assert read_number(video.frame(3)) == 23
+    assert video.time[0] == 0
+
+
+def test_a_reduced_picture_shows_the_same_frame(write_numbered):
+    video = open_video(write_numbered("small.mp4", EVEN))
+    small = next(video.frames(7, 8, width=64))
+    assert small.shape == (32, 64, 3)
+
+
+def test_a_missing_video_is_named(tmp_path):
+    with pytest.raises(KeyreconError, match="no video at"):
+        open_video(tmp_path / "none.mp4")
+
+
+def test_an_empty_file_is_called_empty(tmp_path):
+    (tmp_path / "empty.mp4").touch()
+    with pytest.raises(KeyreconError, match="empty"):
+        open_video(tmp_path / "empty.mp4")
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path):
+    (tmp_path / "text.mp4").write_text("not a video at all" * 100)
+    with pytest.raises(KeyreconError, match="cannot be read as a video"):
+        open_video(tmp_path / "text.mp4")
+
+
+def test_sound_alone_is_not_a_video(tmp_path):
+    with av.open(str(tmp_path / "sound.mp4"), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), "fltp", "mono")
+        frame.sample_rate = 8000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(KeyreconError, match="only sound"):
+        open_video(tmp_path / "sound.mp4")
+
+
+def test_a_file_cut_off_while_copied_is_refused_with_one_message(write_numbered, tmp_path):
+    whole = write_numbered("whole.mp4", EVEN).read_bytes()
+    (tmp_path / "cut.mp4").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(KeyreconError, match=r"cannot be read|cut off|damaged"):
+        list(open_video(tmp_path / "cut.mp4").frames())
+
+
+def test_damage_inside_a_file_names_the_frame(write_numbered, tmp_path):
+    path = write_numbered("whole.mkv", EVEN, {"g": "60"})
+    content = path.read_bytes()
+    (tmp_path / "cut.mkv").write_bytes(content[: int(len(content) * 0.6)])
+    try:
+        video = open_video(tmp_path / "cut.mkv")
+        assert len(video) < len(EVEN)
+        shown = [read_number(p) for p in video.frames()]
+        assert shown == list(range(len(shown)))
+    except KeyreconError as fault:
+        assert "damaged" in str(fault) or "breaks off" in str(fault)
+
+
+def test_a_trim_that_does_not_fit_is_refused(write_numbered):
+    with pytest.raises(KeyreconError, match="has 60 frames"):
+        open_video(write_numbered("short.mp4", EVEN), start=70)

@@ -1,0 +1,115 @@
+import pytest
+
+from keyrecon import KeyreconError
+from keyrecon.app.project import settings
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.video import open_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.keyframes.selection import KeyframeOptions
+from keyrecon.pipeline import Options
+from keyrecon.records import Pick
+
+
+@pytest.fixture
+def project(tmp_path, write_numbered):
+    path = tmp_path / "video.mp4"
+    path.write_bytes(write_numbered("v.mp4", list(range(0, 240, 12))).read_bytes())
+    return Workspace.create(tmp_path / "project", open_video(path), path, {"end": 15})
+
+
+def test_a_project_finds_its_video_and_trim(project):
+    assert len(project.video()) == 15
+    assert len(Workspace(project.folder).video()) == 15
+
+
+def test_a_folder_without_a_project_says_how_to_make_one(tmp_path):
+    with pytest.raises(KeyreconError, match="keyrecon new"):
+        Workspace(tmp_path)
+
+
+def test_a_new_project_never_replaces_one(project, tmp_path):
+    video = tmp_path / "video.mp4"
+    with pytest.raises(KeyreconError, match="exists already"):
+        Workspace.create(project.folder, open_video(video), video, {})
+
+
+def test_a_damaged_project_file_is_not_taken_for_an_empty_one(project):
+    project.project_file.write_text("[video\n")
+    with pytest.raises(KeyreconError, match="cannot be read"):
+        Workspace(project.folder)
+
+
+def test_a_project_moved_with_its_video_still_opens(project, tmp_path):
+    moved = tmp_path / "elsewhere" / "deeper"
+    moved.mkdir(parents=True)
+    project.folder.rename(moved / "project")
+    (tmp_path / "video.mp4").rename(moved / "video.mp4")
+    assert len(Workspace(moved / "project").video()) == 15
+
+
+def test_a_moved_video_is_asked_for_and_relinked_by_fingerprint(project, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "video.mp4").rename(tmp_path / "far" / "renamed.mp4")
+    with pytest.raises(KeyreconError, match="keyrecon relink"):
+        project.video()
+    project.relink(tmp_path / "far" / "renamed.mp4")
+    assert len(Workspace(project.folder).video()) == 15
+
+
+def test_a_changed_video_is_refused(project, tmp_path, write_numbered):
+    other = write_numbered("w.mp4", list(range(0, 480, 12)))
+    (tmp_path / "video.mp4").write_bytes(other.read_bytes())
+    with pytest.raises(KeyreconError, match="changed since"):
+        project.video()
+    with pytest.raises(KeyreconError, match="not the video of this project"):
+        project.relink(other)
+
+
+def test_picks_add_up(project):
+    with pytest.raises(KeyreconError, match="no picks yet"):
+        project.picks()
+    project.add_picks([Pick(0, "head", 10.0, 20.0)])
+    project.add_picks([Pick(3, "foot", 1.5, 2.0), Pick(0, "head", 10.0, 20.0)])
+    assert read_picks(project.picks_file) == (
+        Pick(0, "head", 10.0, 20.0),
+        Pick(3, "foot", 1.5, 2.0),
+    )
+
+
+def test_picks_that_do_not_parse_are_left_alone(project):
+    project.picks_file.write_text('{"picks": [')
+    with pytest.raises(KeyreconError, match="not a file of picks"):
+        project.add_picks([Pick(0, "head", 1.0, 1.0)])
+    assert project.picks_file.read_text() == '{"picks": ['
+
+
+def test_the_order_of_clicks_makes_no_difference(project):
+    clicks = [Pick(3, "shirt", 4.0, 5.0), Pick(3, "head", 1.0, 2.0), Pick(0, "shirt", 4.0, 5.0)]
+    project.add_picks(clicks)
+    found = project.picks()
+    project.picks_file.unlink()
+    project.add_picks(clicks[::-1])
+    assert project.picks() == found
+
+
+def test_what_is_told_now_goes_before_what_the_project_has_set(project):
+    def options(budget, reach):
+        return Options(keyframes=KeyframeOptions(budget=budget, reach=reach))
+
+    usual = Options().keyframes
+    project.remember(options(0.05, 12), Options())
+    told = options(0.03, usual.reach)
+    assert project.options(told, Options()) == options(0.03, 12)
+    assert project.options(Options(), Options()) == options(0.05, 12)
+
+
+def test_the_athletes_height_is_remembered(project):
+    assert settings(project, Options(), 1.7).lift.height == 1.7
+    assert settings(Workspace(project.folder), Options()).lift.height == 1.7
+
+
+@pytest.mark.parametrize("height", [0.2, 170.0])
+def test_a_height_that_nobody_has_is_not_remembered(project, height):
+    with pytest.raises(KeyreconError, match="height in metres"):
+        settings(project, Options(), height)
+    assert settings(Workspace(project.folder), Options()) == Options()

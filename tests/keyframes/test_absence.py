@@ -1,0 +1,91 @@
+"""Stretches in which nobody is to be seen."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from test_keyframes import comparison_of, sporting_poses
+
+from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes
+from keyrecon.records import HalfKeyframes, Track
+from keyrecon.segmentation.player_crops import Cropping, Crops
+from keyrecon.tracking.visibility import is_visible
+
+AWAY = np.zeros(400, dtype=bool)
+AWAY[150:230] = True
+SPARSE = KeyframeOptions(budget=0.02)
+
+
+@pytest.fixture(scope="module")
+def poses():
+    return sporting_poses(seed=1), sporting_poses(seed=2)
+
+
+@pytest.mark.parametrize("stand_ins", [False, True])
+def test_nobody_is_asked_to_mark_where_nobody_is(poses, stand_ins):
+    row = None
+    if stand_ins:  # every third frame stands for its neighbours, as in long videos
+        row = np.arange(400) // 3
+        poses = tuple(p[::3][: row[-1] + 1] for p in poses)
+    chosen = choose_keyframes(comparison_of(*poses, 1.0 - AWAY, row), 50.0, SPARSE)
+    for half in (chosen.upper, chosen.lower):
+        assert not AWAY[half.frames].any() and not AWAY[half.nearest].any()
+        assert not half.represented[AWAY].any() and half.coverage >= 0.95
+
+
+def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
+    whole = choose_keyframes(comparison_of(*poses, 1.0 - AWAY), 50.0, SPARSE)
+    kept = np.flatnonzero(~AWAY)
+    cut = comparison_of(*(p[kept] for p in poses))
+    alone = choose_keyframes(cut, 50.0, KeyframeOptions(budget=0.02 * 400 / len(kept)))
+    assert len(whole.upper.frames) == len(alone.upper.frames)
+    assert whole.upper.beta == pytest.approx(alone.upper.beta, rel=0.1)
+
+
+def test_a_player_missed_for_a_moment_is_not_away():
+    clarity = np.ones(100)
+    clarity[40:50] = 0
+    assert not absent_frames(clarity, reach=10).any()
+    clarity[50] = 0
+    assert list_stretches(absent_frames(clarity, reach=10)) == [(40, 50)]
+
+
+def test_stretches_at_either_end_are_listed_whole():
+    away = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
+    assert list_stretches(away) == [(0, 1), (3, 3), (6, 6)]
+
+
+def test_what_a_person_marked_counts_wherever_it_is(poses):
+    comparison = comparison_of(*poses, 1.0 - AWAY)
+    asked = choose_keyframes(comparison, 50.0, SPARSE)
+    marked = np.array([20, 180, 300])
+    adopted = adopt_keyframes(comparison, asked, (marked, marked), SPARSE)
+    np.testing.assert_array_equal(adopted.upper.frames, marked)
+    assert adopted.upper.nearest[180] == 180
+
+
+def test_a_comparison_of_present_frames_alone_is_left_as_it_is(poses):
+    one, other = (
+        choose_keyframes(comparison_of(*poses, clarity), 50.0, SPARSE).upper
+        for clarity in (None, np.full(400, 0.5))
+    )
+    for field in fields(HalfKeyframes):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+def test_an_empty_scene_between_head_and_feet_is_no_player():
+    frames, height = 30, 100.0
+    head = np.tile([200.0, 100.0], (frames, 1))
+    feet = np.tile([[190.0, 200.0], [210.0, 200.0]], (frames, 1, 1))
+    track = Track(head, feet, np.full(frames, height), np.zeros((frames, 4)), np.ones(frames))
+    cropping = Cropping(track, 56.0)
+    rows, columns = cropping.size
+    foreground = np.zeros((frames, rows, columns), np.uint8)
+    foreground[:, :, columns // 2 - 6 : columns // 2 + 6] = 230
+    foreground[10:14] //= 2  # half hidden behind the net
+    foreground[20:25] = 0
+    crops = Crops(np.zeros((frames, rows, columns, 3), np.uint8), foreground)
+    np.testing.assert_array_equal(
+        np.flatnonzero(~is_visible(crops, cropping, track)), range(20, 25)
+    )

@@ -1,0 +1,75 @@
+"""Facts about keyframes that a person annotated, asked for or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_keyframes import comparison_of, sporting_poses
+
+from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes
+from keyrecon.propagation.propagation import distances_to
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    return comparison_of(sporting_poses(seed=1), sporting_poses(seed=2))
+
+
+@pytest.fixture(scope="module")
+def chosen(comparison):
+    return choose_keyframes(comparison, 50.0)
+
+
+def every_second_frame_is_an_exemplar(poses):
+    """A comparison in which each frame stands for itself and the next, and the detour between."""
+    comparison = comparison_of(poses[::2], row=np.repeat(np.arange(len(poses) // 2), 2))
+    step = np.linalg.norm(poses[1::2] - poses[::2], axis=1)
+    detour = np.zeros((2, len(poses)), dtype=np.float32)
+    detour[:, 1::2] = step
+    return replace(comparison, detour=detour)
+
+
+def test_adopting_the_choice_gives_the_choice_back(comparison, chosen):
+    frames = chosen.upper.frames, chosen.lower.frames
+    adopted = adopt_keyframes(comparison, chosen, frames)
+    for ours, theirs in ((adopted.upper, chosen.upper), (adopted.lower, chosen.lower)):
+        assert np.array_equal(ours.nearest, theirs.nearest)
+        assert np.array_equal(ours.represented, theirs.represented)
+        assert ours.coverage == theirs.coverage
+
+
+def test_one_more_keyframe_stands_for_what_it_is_nearest_to(comparison, chosen):
+    worst = int(chosen.upper.distance.argmax())
+    frames = np.union1d(chosen.upper.frames, [worst]), chosen.lower.frames
+    adopted = adopt_keyframes(comparison, chosen, frames).upper
+    assert adopted.nearest[worst] == worst
+    assert adopted.distance.sum() < chosen.upper.distance.sum()
+    assert (adopted.distance <= chosen.upper.distance).all()
+    assert adopted.coverage >= chosen.upper.coverage
+
+
+def test_a_person_may_annotate_a_frame_that_is_no_exemplar():
+    poses = sporting_poses(400, seed=4)
+    comparison = every_second_frame_is_an_exemplar(poses)
+    asked = choose_keyframes(comparison, 50.0)
+    own = 101
+    adopted = adopt_keyframes(comparison, asked, (np.array([own]), asked.lower.frames)).upper
+    assert adopted.frames.tolist() == [own]
+    assert (adopted.nearest == own).all()
+    assert adopted.distance[own] == 0
+    assert adopted.represented[own]
+
+
+def test_a_frame_goes_to_the_keyframe_next_to_it_when_one_exemplar_stands_for_both():
+    still = comparison_of(np.zeros((1, 2)), row=np.zeros(60, dtype=np.int64))
+    asked = choose_keyframes(still, 50.0, KeyframeOptions(budget=0.02))
+    own = np.array([10, 40])
+    adopted = adopt_keyframes(still, asked, (own, own)).upper
+    assert adopted.nearest[[0, 10, 20, 30, 40, 59]].tolist() == [10, 10, 10, 40, 40, 40]
+
+
+def test_a_keyframe_is_no_distance_from_itself_even_where_an_exemplar_stands_for_it():
+    comparison = every_second_frame_is_an_exemplar(sporting_poses(100, seed=5))
+    apart = distances_to(comparison, "upper", np.array([31, 60]))
+    assert apart[31, 0] == apart[60, 1] == 0
+    assert (np.delete(apart[:, 0], 31) >= comparison.detour[0, 31]).all()

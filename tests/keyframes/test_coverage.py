@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+
+from keyrecon.keyframes.coverage import (
+    Neighborhoods,
+    choose_as_printed,
+    choose_greedily,
+    measure_gains,
+    printed_cost,
+    total_cost,
+    uncovered_cost,
+)
+
+
+def hoods_from(near):
+    """Neighbourhoods from a matrix that says who represents whom."""
+    row, column = np.nonzero(near)
+    first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(near)))])
+    return Neighborhoods(first, column, near.shape[1])
+
+
+def random_near(rng, n):
+    """Frames near one another in time and in a pose that comes back."""
+    pose = np.cumsum(rng.normal(size=(n, 2)), axis=0) * 0.3
+    pose = np.sin(pose)
+    apart = np.linalg.norm(pose[:, None] - pose[None], axis=-1)
+    return apart < rng.uniform(0.1, 0.4)
+
+
+def literal_eq2(represented):
+    """Eq. 2 frame by frame, with represented frames just outside the sequence."""
+    n = len(represented)
+    inside = [f for f in range(n) if represented[f]]
+    total = 0
+    for i in range(n):
+        before = [f for f in inside if f < i] + [-1]
+        after = [f for f in inside if f > i] + [n]
+        total += (i - max(before)) + (min(after) - i)
+    return total
+
+
+def literal_uncovered(represented, reach):
+    """Eq. 1 frame by frame."""
+    n, left = len(represented), 0
+    for i in range(n):
+        before = [f for f in range(i) if represented[f]]
+        after = [f for f in range(i + 1, n) if represented[f]]
+        bridged = before and after and min(after) - max(before) <= reach
+        left += not (represented[i] or bridged)
+    return left
+
+
+def test_squared_gaps_are_equation_2():
+    rng = np.random.default_rng(0)
+    for n in (1, 2, 17, 60):
+        cost = printed_cost(n)
+        constant = n + 1
+        for share in (0, 0.05, 0.5, 1):
+            represented = rng.random(n) < share
+            assert total_cost(represented, cost) + constant == literal_eq2(represented)
+
+
+def test_gaps_count_uncovered_frames_as_equation_1_does():
+    rng = np.random.default_rng(1)
+    for n, reach in ((1, 3), (50, 4), (80, 10)):
+        for share in (0, 0.1, 0.4, 1):
+            represented = rng.random(n) < share
+            counted = total_cost(represented, uncovered_cost(n, reach))
+            assert counted == literal_uncovered(represented, reach)
+
+
+@pytest.mark.parametrize("make_cost", [printed_cost, lambda n: uncovered_cost(n, 6)])
+def test_gains_of_all_candidates_are_differences_of_the_total(make_cost):
+    rng = np.random.default_rng(2)
+    hoods = hoods_from(random_near(rng, 90))
+    cost = make_cost(90)
+    represented = hoods.union([3, 40])
+    gain, added = measure_gains(hoods.without(represented), np.arange(90), represented, cost)
+    for candidate in range(90):
+        more = represented | hoods.union([candidate])
+        assert gain[candidate] == total_cost(represented, cost) - total_cost(more, cost)
+        assert added[candidate] == more.sum() - represented.sum()
+
+
+def test_lazy_choice_is_the_exhaustive_one():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        n, reach = 150, 5
+        near = random_near(rng, n)
+        chosen, represented = [], np.zeros(n, dtype=bool)
+        while literal_uncovered(represented, reach) > 0.05 * n:
+            totals = [literal_eq2(represented | near[k]) for k in range(n)]
+            chosen.append(int(np.argmin(totals)))
+            represented |= near[chosen[-1]]
+        assert choose_as_printed(hoods_from(near), reach, int(0.05 * n), n) == chosen
+
+
+def test_equation_2_only_ever_gains_less_as_keyframes_are_added():
+    rng = np.random.default_rng(7)
+    hoods, cost = hoods_from(random_near(rng, 80)), printed_cost(80)
+    few, more = hoods.union([5]), hoods.union([5, 30, 60])
+    early, _ = measure_gains(hoods.without(few), np.arange(80), few, cost)
+    late, _ = measure_gains(hoods.without(more), np.arange(80), more, cost)
+    assert (late <= early).all()
+    assert (late >= 0).all()
+
+
+def test_choosing_for_coverage_takes_no_more_keyframes_than_the_printed_choice():
+    taken = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        hoods = hoods_from(random_near(rng, 200))
+        for_coverage = choose_greedily(hoods, 6, 10, 200, np.ones(200))
+        taken.append((len(for_coverage), len(choose_as_printed(hoods, 6, 10, 200))))
+    for_coverage, as_printed = np.sum(taken, axis=0)
+    assert for_coverage < as_printed
+
+
+def test_among_equal_candidates_the_clearer_frame_is_chosen():
+    near = np.ones((5, 5), dtype=bool)
+    clarity = np.array([0.1, 0.4, 0.2, 0.9, 0.3])
+    assert choose_greedily(hoods_from(near), 3, 0, 5, clarity) == [3]

@@ -1,0 +1,149 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from stick_figure import moving_figure
+
+from keyrecon.errors import KeyreconError
+from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames, measure_matrix
+from keyrecon.keyframes.edge_distance import align_edges, edge_distance
+from keyrecon.keyframes.exemplars import LAG, choose_exemplars, measure_band
+from keyrecon.records import Edges
+
+
+@pytest.fixture(scope="module")
+def clip():
+    edges, track = moving_figure(150, noise=0.002)
+    for frame in edges:
+        for array in (frame.points, frame.tangent, frame.color):
+            array.setflags(write=False)
+    return edges, track
+
+
+@pytest.fixture(scope="module")
+def some_frames(clip):
+    edges, track = clip
+    kept = np.arange(0, 150, 4)
+    return tuple(edges[t] for t in kept), replace(
+        track,
+        head=track.head[kept],
+        feet=track.feet[kept],
+        height=track.height[kept],
+        box=track.box[kept],
+        trust=track.trust[kept],
+    )
+
+
+def exact_parts(edges, track, half):
+    aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
+    return [[edge_distance(one, other) for other in aligned] for one in aligned]
+
+
+def off_diagonal(matrix):
+    return matrix[~np.eye(len(matrix), dtype=bool)]
+
+
+@pytest.mark.parametrize("half", ["upper", "lower"])
+def test_the_fast_matrix_agrees_with_its_exact_twin(some_frames, half):
+    exact = np.array([[d.pooled() for d in row] for row in exact_parts(*some_frames, half)])
+    exact = off_diagonal((exact + exact.T) / 2)
+    fast = off_diagonal(measure_matrix(*some_frames, half))
+    assert np.corrcoef(fast, exact)[0, 1] > 0.997
+    assert np.abs(fast - exact).mean() < 0.05 * exact.mean()
+
+
+def test_max_b_can_be_the_largest_mean_distance_of_the_video(some_frames):
+    parts = exact_parts(*some_frames, "upper")
+    largest = max(
+        d.mean for i, row in enumerate(parts) for j, d in enumerate(row) if i != j and d.matched
+    )
+    exact = np.array([[d.pooled(largest) for d in row] for row in parts])
+    exact = off_diagonal((exact + exact.T) / 2)
+    fast = off_diagonal(measure_matrix(*some_frames, "upper", CompareOptions(largest="observed")))
+    assert np.corrcoef(fast, exact)[0, 1] > 0.99
+    assert np.abs(fast - exact).mean() < 0.06 * exact.mean()
+
+
+def test_smaller_cells_come_closer_to_the_twin(some_frames):
+    exact = np.array([[d.pooled() for d in row] for row in exact_parts(*some_frames, "upper")])
+    exact = (exact + exact.T) / 2
+    np.fill_diagonal(exact, 0)
+    coarse, fine = (
+        np.abs(measure_matrix(*some_frames, "upper", options) - exact).mean()
+        for options in (CompareOptions(cell=1 / 24), CompareOptions(cell=1 / 128, directions=48))
+    )
+    assert fine < coarse / 2
+
+
+def test_distances_are_symmetric_bounded_and_zero_to_themselves(clip):
+    comparison = compare_frames(*clip)
+    for matrix in (comparison.upper, comparison.lower):
+        assert matrix.dtype == np.float32
+        assert np.array_equal(matrix, matrix.T)
+        assert (np.diag(matrix) == 0).all()
+        assert matrix.min() >= 0
+        assert matrix.max() <= np.float32(0.12)
+    assert np.array_equal(comparison.step[0], np.diag(comparison.upper, 1))
+
+
+def test_a_frame_without_edges_is_as_far_as_can_be_from_all_others(some_frames):
+    edges, track = some_frames
+    nothing = Edges(
+        np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, int), np.zeros(0, bool), np.zeros(0, bool)
+    )
+    comparison = compare_frames((*edges[:5], nothing, *edges[6:]), track)
+    others = np.delete(comparison.upper[5], 5)
+    assert np.allclose(others, 0.12)
+    assert comparison.clarity[5] == 0
+
+
+def test_a_video_without_edges_says_what_would_help(some_frames):
+    edges, track = some_frames
+    hidden = tuple(replace(e, lower=np.zeros_like(e.lower)) for e in edges)
+    with pytest.raises(KeyreconError, match="lower body; pick the colours"):
+        compare_frames(hidden, track)
+
+
+def test_untrusted_frames_are_not_clear(some_frames):
+    edges, track = some_frames
+    trust = np.ones(len(edges))
+    trust[3] = 0
+    clarity = compare_frames(edges, replace(track, trust=trust)).clarity
+    assert clarity[3] == 0
+    assert clarity[4] > 0.5
+
+
+def test_the_band_holds_the_matrix_along_its_diagonal():
+    rng = np.random.default_rng(0)
+    full = rng.random((2, 700, 700)).astype(np.float32)
+    band = measure_band(lambda window: full[:, window, window], 700)
+    assert band.shape == (2, 700, LAG)
+    for frame, lag in ((0, 1), (447, 1), (448, 64), (635, 64), (450, 30)):
+        assert np.array_equal(band[:, frame, lag - 1], full[:, frame, frame + lag])
+    assert np.isinf(band[:, 690, 9:]).all()
+
+
+def test_exemplars_gather_where_the_player_moves():
+    position = np.concatenate([np.zeros(200), np.arange(100.0), np.full(200, 100.0)])
+    square = np.abs(position[:, None] - position[None]).astype(np.float32)
+    band = measure_band(lambda window: np.stack([square[window, window]] * 2), len(position))[0]
+    frames, row = choose_exemplars(band, 40)
+    assert len(frames) <= 40
+    assert (np.diff(row) >= 0).all()
+    assert np.array_equal(row[frames], np.arange(len(frames)))
+    moving = (frames >= 200) & (frames < 300)
+    assert moving.mean() > 0.6
+    apart = np.abs(position - position[frames[row]])
+    assert apart.max() <= 3
+
+
+def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(clip):
+    edges, track = clip
+    full = compare_frames(edges, track)
+    short = compare_frames(edges, track, CompareOptions(most=75))
+    assert len(short.frames) <= 75
+    spread = np.ix_(short.row, short.row)
+    for half in ("upper", "lower"):
+        direct, by_exemplars = getattr(full, half), getattr(short, half)[spread]
+        assert np.corrcoef(direct.ravel(), by_exemplars.ravel())[0, 1] > 0.97
+    assert np.allclose(short.step, full.step, atol=2e-3)

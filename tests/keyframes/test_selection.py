@@ -1,0 +1,209 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import uniform_filter1d
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
+from keyrecon.keyframes.assignment import find_neighborhoods
+from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes, count_labels
+from keyrecon.keyframes.swaps import CoverageGoal, swap_for_coverage
+from keyrecon.records import PoseDistances
+
+
+def comparison_of(upper, lower=None, clarity=None, row=None):
+    """A comparison from poses (M, dimensions), all frames compared unless `row` tells."""
+    lower = upper if lower is None else lower
+    matrices = [
+        np.minimum(0.12, np.linalg.norm(p[:, None] - p[None], axis=-1)).astype(np.float32)
+        for p in (upper, lower)
+    ]
+    row = np.arange(len(upper)) if row is None else row
+    step = [m[row[:-1], row[1:]] for m in matrices]
+    return PoseDistances(
+        upper=matrices[0],
+        lower=matrices[1],
+        frames=np.flatnonzero(np.diff(row, prepend=-1)),
+        row=row,
+        detour=np.zeros((2, len(row)), dtype=np.float32),
+        step=np.stack(step),
+        clarity=np.ones(len(row)) if clarity is None else clarity,
+    )
+
+
+def sporting_poses(count=400, seed=0, dimensions=3):
+    """Strokes that come back, with rests between them."""
+    rng = np.random.default_rng(seed)
+    stroke = uniform_filter1d(rng.normal(size=(40, dimensions)), 9, axis=0) * 0.1
+    parts = [np.zeros((1, dimensions))]
+    while sum(map(len, parts)) < count:
+        rest = np.tile(stroke[:1], (rng.integers(10, 30), 1))
+        parts += [rest, stroke + rng.normal(size=dimensions) * 0.004]
+    return np.concatenate(parts)[:count] + 0.001 * rng.normal(size=(count, dimensions))
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    return comparison_of(sporting_poses(seed=1), sporting_poses(seed=2))
+
+
+def test_the_whole_budget_is_spent(comparison):
+    for budget, upper, lower in ((0.02, 8, 8), (0.0163, 7, 6), (0.0025, 1, 1)):
+        chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=budget))
+        assert (len(chosen.upper.frames), len(chosen.lower.frames)) == (upper, lower)
+
+
+@pytest.mark.parametrize("method", ["coverage", "paper"])
+def test_the_budget_is_kept_and_the_coverage_reached(comparison, method):
+    chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.02, method=method))
+    labels = len(chosen.upper.frames) + len(chosen.lower.frames)
+    assert labels / 2 / 400 <= 0.02
+    for half in (chosen.upper, chosen.lower):
+        assert half.coverage >= 0.95
+        assert np.isin(half.nearest, half.frames).all()
+        assert np.array_equal(half.nearest[half.frames], half.frames)
+        assert (half.distance[half.frames] == 0).all()
+        assert np.array_equal(half.represented, half.distance < half.beta)
+        assert np.array_equal(half.frames, np.unique(half.frames))
+
+
+def test_every_frame_is_assigned_to_its_nearest_keyframe(comparison):
+    half = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.02, smoothing=0.0)).upper
+    to_keyframes = comparison.upper[half.frames]
+    assert np.allclose(half.distance, to_keyframes.min(axis=0), atol=1e-3)
+
+
+def test_a_still_clip_needs_one_keyframe():
+    still = comparison_of(1e-4 * np.random.default_rng(0).normal(size=(200, 2)))
+    chosen = choose_keyframes(still, 50.0, KeyframeOptions(beta_upper=0.01, beta_lower=0.01))
+    assert len(chosen.upper.frames) == len(chosen.lower.frames) == 1
+    assert chosen.upper.coverage == 1
+
+
+def test_frames_that_are_all_the_same_need_no_particular_keyframe():
+    chosen = choose_keyframes(comparison_of(np.zeros((100, 2))), 50.0)
+    assert chosen.upper.coverage == 1
+    assert (chosen.upper.distance == 0).all()
+
+
+def test_choosing_for_coverage_beats_the_choice_as_printed_at_equal_beta(comparison):
+    for beta in (0.01, 0.02):
+        options = KeyframeOptions(beta_upper=beta, beta_lower=beta)
+        chosen = choose_keyframes(comparison, 50.0, options)
+        assert len(chosen.upper.frames) < chosen.upper.printed_count
+        assert len(chosen.lower.frames) <= chosen.lower.printed_count
+
+
+def test_a_smaller_beta_takes_more_keyframes(comparison):
+    counts = [
+        len(
+            choose_keyframes(
+                comparison, 50.0, KeyframeOptions(beta_upper=beta, beta_lower=0.05)
+            ).upper.frames
+        )
+        for beta in (0.005, 0.01, 0.03)
+    ]
+    assert counts[0] > counts[1] > counts[2]
+
+
+def test_a_larger_budget_brings_frames_nearer_to_their_keyframes(comparison):
+    small, large = (
+        choose_keyframes(comparison, 50.0, KeyframeOptions(budget=b)) for b in (0.01, 0.04)
+    )
+    assert large.upper.beta < small.upper.beta
+    assert large.upper.distance.mean() < small.upper.distance.mean()
+
+
+def test_a_budget_below_one_keyframe_for_each_half_is_refused():
+    short = comparison_of(sporting_poses(60))
+    with pytest.raises(KeyreconError, match=r"60 frames is 1 half-body.*0\.017 or more"):
+        choose_keyframes(short, 50.0, KeyframeOptions(budget=0.015))
+    chosen = choose_keyframes(short, 50.0, KeyframeOptions(budget=0.017))
+    assert len(chosen.upper.frames) == len(chosen.lower.frames) == 1
+
+
+def test_the_longest_gap_is_a_time_not_a_number_of_frames(comparison):
+    assert choose_keyframes(comparison, 50.0).reach == 10
+    assert choose_keyframes(comparison, 25.0).reach == 5
+    assert choose_keyframes(comparison, 120.0).reach == 24
+
+
+def test_unclear_frames_are_left_to_clear_ones_as_good():
+    poses = sporting_poses(300, seed=3)
+    clarity = np.ones(300)
+    clarity[::2] = 0.2
+    chosen = choose_keyframes(comparison_of(poses, clarity=clarity), 50.0)
+    assert (clarity[chosen.frames] == 1).mean() > 0.7
+
+
+def test_exchanging_keyframes_never_covers_less(comparison):
+    hoods = find_neighborhoods(comparison.upper, comparison, comparison.detour[0], 0.01)
+    goal = CoverageGoal(hoods, 10, 0, np.ones(400))
+    start = [0, 100, 200, 300]
+    better = swap_for_coverage(goal, start)
+    assert len(better) == len(start)
+    assert goal.left_over(hoods.union(better)) < goal.left_over(hoods.union(start))
+
+
+def test_exemplars_choose_as_their_frames_would():
+    poses = sporting_poses(200, seed=4)
+    twice = np.repeat(poses, 2, axis=0)
+    direct = choose_keyframes(comparison_of(twice), 100.0)
+    by_exemplars = choose_keyframes(comparison_of(poses, row=np.repeat(np.arange(200), 2)), 100.0)
+    assert by_exemplars.upper.beta == pytest.approx(direct.upper.beta, rel=0.1)
+    assert len(by_exemplars.upper.nearest) == 400
+    assert (by_exemplars.upper.frames % 2 == 0).all()
+    assert by_exemplars.upper.coverage >= 0.95
+
+
+def test_keyframes_json_gives_back_what_was_written(comparison):
+    chosen = choose_keyframes(comparison, 50.0)
+    text = keyframes_to_json(chosen)
+    again = keyframes_from_json(text)
+    assert again.reach == chosen.reach
+    assert again.alpha == chosen.alpha
+    for one, other in ((chosen.upper, again.upper), (chosen.lower, again.lower)):
+        assert np.array_equal(one.frames, other.frames)
+        assert np.array_equal(one.nearest, other.nearest)
+        assert np.array_equal(one.represented, other.represented)
+        assert np.allclose(one.distance, other.distance, atol=1e-5)
+        assert (one.beta, one.coverage, one.printed_count) == (
+            other.beta,
+            other.coverage,
+            other.printed_count,
+        )
+    data = json.loads(text)
+    assert data["frames"] == sorted({*data["upper"], *data["lower"]})
+    assert data["cost"] <= 0.015
+
+
+def test_a_damaged_keyframes_json_says_what_is_wrong(comparison):
+    data = json.loads(keyframes_to_json(choose_keyframes(comparison, 50.0)))
+    for change, message in (
+        ({"upper": [900]}, "outside 0..399"),
+        ({"lower": [5, 3]}, "ascending"),
+        ({"n_frames": 12}, "outside"),
+    ):
+        with pytest.raises(KeyreconError, match=message):
+            keyframes_from_json(json.dumps({**data, **change}))
+    with pytest.raises(KeyreconError, match=r"keyframes\.json cannot be read"):
+        keyframes_from_json("{")
+
+
+def test_inputs_are_left_as_they_were(comparison):
+    frozen = replace(comparison, upper=comparison.upper.copy())
+    for array in (frozen.upper, frozen.lower, frozen.step, frozen.clarity, frozen.row):
+        array.setflags(write=False)
+    choose_keyframes(frozen, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("coverage", 1.5), ("coverage", float("nan")), ("budget", -1.0), ("budget", 3.0),
+     ("budget", float("nan")), ("reach", -5)],
+)  # fmt: skip
+def test_what_cannot_be_asked_of_keyframes_is_told_by_its_name(option, value):
+    with pytest.raises(KeyreconError, match=f"--{option} is"):
+        count_labels(KeyframeOptions(**{option: value}), 1000)

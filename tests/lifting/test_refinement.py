@@ -1,0 +1,246 @@
+"""Facts about interpolation between key poses and about the fit to observed joints."""
+
+import numpy as np
+import pytest
+
+from keyrecon.body import LSP14
+from keyrecon.lifting import terms
+from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions, unit
+from keyrecon.lifting.foreshortening import depth_share, log_density
+from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
+from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
+from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
+from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
+from keyrecon.records import HalfKeyframes
+
+LENGTHS = LSP14.lengths
+
+
+def smooth_state(frames=60, seed=0):
+    """A root and bone directions that move smoothly."""
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 1, frames)[:, None, None]
+    ends = rng.normal(size=(3, 13, 3))
+    directions = unit(ends[0] + 0.5 * time * ends[1] + 0.3 * np.sin(5 * time) * ends[2])
+    return MotionState(0.2 * time[:, 0] * rng.normal(size=2), directions)
+
+
+def positions(state):
+    points = pose_from_directions(state.directions, LENGTHS, LSP14)
+    points[..., :2] += state.root[:, None]
+    return points
+
+
+def half_keyframes(nearest, represented):
+    nearest = np.asarray(nearest)
+    return HalfKeyframes(
+        frames=np.unique(nearest),
+        nearest=nearest,
+        distance=np.zeros(len(nearest)),
+        represented=np.asarray(represented, dtype=bool),
+        coverage=1.0,
+        beta=1.0,
+        printed_count=len(np.unique(nearest)),
+    )
+
+
+def test_slerp_keeps_unit_length_and_returns_its_ends():
+    rng = np.random.default_rng(1)
+    a, b = unit(rng.normal(size=(50, 3))), unit(rng.normal(size=(50, 3)))
+    for share in (0.0, 0.3, 1.0):
+        between = slerp(a, b, np.full(50, share))
+        np.testing.assert_allclose(np.linalg.norm(between, axis=-1), 1.0)
+    np.testing.assert_allclose(slerp(a, b, np.zeros(50)), a, atol=1e-9)
+    np.testing.assert_allclose(slerp(a, b, np.ones(50)), b, atol=1e-9)
+
+
+def test_slerp_moves_at_constant_speed():
+    a, b = np.array([[1.0, 0, 0]]), unit(np.array([[0.2, 1.0, 0.5]]))
+    whole = np.arccos((a * b).sum())
+    third = slerp(a, b, np.array([1 / 3]))
+    assert np.arccos((a * third).sum()) == pytest.approx(whole / 3)
+
+
+def test_opposite_directions_turn_through_the_image_plane():
+    toward, away = np.array([[0.0, 0, -1.0]]), np.array([[0.0, 0, 1.0]])
+    middle = slerp(toward, away, np.array([0.5]))
+    assert abs(middle[0, 2]) < 1e-9 and np.linalg.norm(middle) == pytest.approx(1.0)
+
+
+def test_directions_are_held_outside_the_control_frames():
+    poses = unit(np.random.default_rng(0).normal(size=(2, 1, 3)))
+    carried = slerp_between(poses, np.array([3, 6]), 10)
+    np.testing.assert_allclose(carried[:4], np.repeat(poses[:1], 4, axis=0))
+    np.testing.assert_allclose(carried[6:], np.repeat(poses[1:], 4, axis=0))
+
+
+def test_control_points_never_part_further_than_their_reach():
+    rng = np.random.default_rng(4)
+    nearest = np.repeat(rng.permutation(20), 6)
+    kept = drop_controls(half_keyframes(nearest, np.ones(120)), rng.random(120), 5)
+    assert np.diff(kept).max() <= 5
+    assert set(nearest[kept]) == set(nearest), "every run keeps a frame"
+
+
+def test_the_best_frame_of_a_run_stays_and_the_worst_go_first():
+    misfit = np.array([0.0, 5, 4, 1, 4, 5, 0.0])
+    kept = drop_controls(half_keyframes([0, 1, 1, 1, 1, 1, 2], np.ones(7)), misfit, 10)
+    np.testing.assert_array_equal(kept, [0, 3, 6])
+
+
+def test_a_second_projection_leaves_lengths_alone():
+    points = np.random.default_rng(2).normal(size=(20, 14, 3))
+    project = keep_lengths(LENGTHS, LSP14)
+    once = project(points)
+    np.testing.assert_allclose(np.linalg.norm(bone_vectors(once, LSP14), axis=-1), [LENGTHS] * 20)
+    np.testing.assert_allclose(project(once), once, atol=1e-12)
+
+
+def test_the_truth_is_a_fixed_point_of_the_descent_up_to_the_filter():
+    truth = positions(smooth_state(200))
+    found = descend(truth, truth[..., :2], (keep_lengths(LENGTHS, LSP14), low_pass(0.5)), 0.2, 30)
+    assert np.abs(found - truth)[10:-10].max() < 1e-3
+
+
+def test_descent_filters_as_one_pass_whose_gain_follows_the_923_rule():
+    frames, step = 2000, 0.2
+    frequency = np.fft.rfftfreq(frames)
+    impulse = np.zeros((frames, 1, 3))
+    impulse[frames // 2] = 1.0
+    gain = np.abs(np.fft.rfft(low_pass(0.5)(impulse)[:, 0, 0]))
+    cut = frequency[np.argmin(np.abs(gain - 0.707 / (step + 0.707 * (1 - step))))]
+    wave = np.sin(2 * np.pi * cut * np.arange(frames))
+    observed = np.repeat(wave[:, None, None], 2, axis=2)
+    start = np.zeros((frames, 1, 3))
+    found = descend(start, observed, (low_pass(0.5),), step, 200)
+    middle = slice(200, -200)
+    loss = found[middle, 0, 0].std() / observed[middle, 0, 0].std()
+    assert loss == pytest.approx(0.707, abs=0.01)
+
+
+def known(joints, spread, knee=HUBER_DELTA):
+    """Joints of which all are known equally well."""
+    return PreparedTracks(
+        joints, np.full(joints.shape[:2], spread), np.full(joints.shape[:2], knee)
+    )
+
+
+@pytest.mark.parametrize("name", ["reprojection", "breadth", "alignment"])
+def test_slopes_agree_with_finite_differences(name):
+    state = smooth_state(4)
+    rng = np.random.default_rng(3)
+    observed = positions(state)[..., :2] + rng.normal(0, 0.01, (4, 14, 2))
+    term = {
+        "reprojection": terms.reprojection(known(observed, 0.02, np.inf), LENGTHS, LSP14),
+        "alignment": terms.alignment(np.linspace(0, 1, 13), 0.3),
+        "breadth": terms.breadth((2, 3), 0.2, 0.01, LENGTHS, LSP14),
+    }[name]
+    line, step = term(state), 1e-6
+    basis = tangents(state.directions)
+    for bone in range(13):
+        turn = np.zeros_like(state.directions)
+        turn[:, bone] = step * basis[:, bone, :, 0]
+        moved = term(MotionState(state.root, state.directions + turn)).residual
+        slope = np.einsum("tmi,ti->tm", line.by_direction[:, :, bone], turn[:, bone] / step)
+        np.testing.assert_allclose((moved - line.residual) / step, slope, atol=1e-3)
+    if line.by_root is not None:
+        moved = term(MotionState(state.root + np.array([step, 0.0]), state.directions)).residual
+        np.testing.assert_allclose((moved - line.residual) / step, line.by_root[..., 0], atol=1e-3)
+
+
+def test_the_pull_to_key_poses_is_the_slope_of_its_cost():
+    state, wanted = smooth_state(3), smooth_state(3, seed=8).directions
+    term, step = terms.key_pose_prior(wanted, 0.4), 1e-6
+    line = term(state)
+    slope = np.einsum("tm,tmbi->tbi", line.residual, line.by_direction)
+    for bone in (0, 7):
+        nudged = state.directions.copy()
+        nudged[1, bone, 2] += step
+        change = (term(MotionState(state.root, nudged)).cost - line.cost) / step
+        assert change == pytest.approx(slope[1, bone, 2], abs=1e-3)
+
+
+def test_the_solver_returns_to_the_truth_from_a_disturbed_start():
+    truth = smooth_state(80)
+    observed = positions(truth)[..., :2]
+    deep = np.sign(truth.directions[..., 2:]) * 0.2
+    start = MotionState(
+        truth.root + 0.02, unit(truth.directions + [0.05, -0.05, 0] + deep * [0, 0, 1])
+    )
+    term = terms.reprojection(known(observed, 0.005), LENGTHS, LSP14)
+    smoothness = Smoothness(1e2, 1e2 * LENGTHS**2)
+    found = solve(start, [term], smoothness, 40, 1e-8)
+    error = np.linalg.norm(positions(found) - positions(truth), axis=-1)
+    assert np.median(error) < 0.005
+
+
+def test_a_solver_step_never_raises_the_cost():
+    truth = smooth_state(40)
+    rng = np.random.default_rng(5)
+    observed = positions(truth)[..., :2] + rng.normal(0, 0.05, (40, 14, 2))
+    term = terms.reprojection(known(observed, 0.01), LENGTHS, LSP14)
+    smoothness = Smoothness(1e3, 1e3 * LENGTHS**2)
+    costs = [term(solve(truth, [term], smoothness, rounds, 0.0)).cost for rounds in (0, 1, 3, 8)]
+    assert costs[-1] < costs[0]
+
+
+def test_what_a_person_saw_holds_against_neighbours_that_slipped():
+    truth, wrist, marked = smooth_state(60), LSP14.index("right_wrist"), 30
+    joints = positions(truth)[..., :2]
+    slipped = joints.copy()
+    slipped[20:41, wrist, 0] += 0.1
+    slipped[marked] = joints[marked]
+    off = {}
+    for knee in (HUBER_DELTA, np.inf):
+        observed = known(slipped, 0.02)
+        observed.spread[marked], observed.knee[marked] = 0.007, knee
+        term = terms.reprojection(observed, LENGTHS, LSP14)
+        found = solve(truth, [term], Smoothness(1e4, 1e4 * LENGTHS**2), 20, 1e-6)
+        off[knee] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])
+    assert off[np.inf] < 0.5 * off[HUBER_DELTA]
+
+
+def test_gaps_are_bridged_by_straight_lines():
+    values = np.array([0.0, np.nan, np.nan, 3.0, np.nan])[:, None, None]
+    np.testing.assert_allclose(bridge_gaps(values)[:, 0, 0], [0, 1, 2, 3, 3])
+
+
+def test_spikes_are_rejected_and_steady_offsets_are_not():
+    residual = np.random.default_rng(6).normal(0, 0.01, (100, 2, 2))
+    residual[:, 1] += 0.5
+    residual[40, 0] += 0.3
+    rejected = reject_spikes(residual, 9, 5.0)
+    assert rejected[40, 0] and rejected.sum() <= 3
+
+
+def test_expected_depth_is_taylors_without_noise():
+    shown = np.array([0.1, 0.5, 0.8, 0.95])
+    found = depth_share(shown, np.full(4, 0.005))
+    np.testing.assert_allclose(found, np.sqrt(1 - shown**2), atol=0.01)
+
+
+def test_long_shown_lengths_are_likelier_than_short_ones_up_to_the_full_length():
+    shown = np.array([0.3, 0.7, 0.97, 1.3])
+    value, slope = log_density(shown, np.full(4, 0.03))
+    assert value[0] < value[1] < value[2] and value[3] < value[0]
+    nudged, _ = log_density(shown + 1e-5, np.full(4, 0.03))
+    np.testing.assert_allclose((nudged - value) / 1e-5, slope, rtol=0.02, atol=0.02)
+
+
+def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
+    share = LENGTHS / LENGTHS.sum()
+    leaning = np.tile(unit(np.array([0.0, -1.0, 0.3])), (5, 13, 1))
+    upright = np.tile(unit(np.array([0.0, -1.0, -0.1])), (5, 13, 1))
+    term = terms.balance(share, 0.1, 0.05)
+    assert np.abs(term(MotionState(np.zeros((5, 2)), upright)).residual).max() < 1e-9
+    solved = solve(
+        MotionState(np.zeros((5, 2)), leaning), [term], Smoothness(1.0, LENGTHS), 20, 1e-9
+    )
+    assert np.abs(term(solved).residual).max() < 0.01
+
+
+def test_a_step_of_a_foot_that_rests_is_no_slip():
+    residual = np.random.default_rng(0).normal(0, 1e-4, (200, 1, 2))
+    residual[90:96, 0, 1] -= 0.03 * np.sin(np.linspace(0, np.pi, 6))
+    residual[150, 0] += 0.3
+    assert np.flatnonzero(reject_spikes(residual, 9, 4.0, 0.0125)[:, 0]).tolist() == [150]

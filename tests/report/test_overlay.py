@@ -1,0 +1,103 @@
+"""Poses drawn on pictures."""
+
+import numpy as np
+from report_material import make_material
+
+from keyrecon.body import LSP14
+from keyrecon.io.video import open_video
+from keyrecon.report.drawing import (
+    LEFT,
+    RIGHT,
+    bone_sides,
+    draw_pose,
+    drawn_bones,
+    head_bone,
+    trunk_outline,
+)
+from keyrecon.report.overlay import write_overlay
+
+GREY = np.full((240, 240, 3), 120, np.uint8)
+
+
+def cross():
+    """Both shins cross at (120, 120); all other joints are unknown."""
+    points = np.full((14, 2), np.nan)
+    for name, place in (
+        ("left_knee", (60, 60)),
+        ("left_ankle", (180, 180)),
+        ("right_knee", (180, 60)),
+        ("right_ankle", (60, 180)),
+    ):
+        points[LSP14.index(name)] = place
+    return points
+
+
+def test_the_nearer_limb_is_drawn_over_the_farther_one():
+    depth = np.zeros(14)
+    right = [LSP14.index("right_knee"), LSP14.index("right_ankle")]
+    depth[right] = 1.0
+    assert tuple(draw_pose(GREY, cross(), LSP14, depth)[120, 120]) == LEFT
+    depth[right] = -1.0
+    assert tuple(draw_pose(GREY, cross(), LSP14, depth)[120, 120]) == RIGHT
+
+
+def test_a_pose_without_known_joints_leaves_the_picture_alone():
+    drawn = draw_pose(GREY, np.full((14, 2), np.nan), LSP14)
+    assert (drawn == GREY).all()
+
+
+def test_drawing_does_not_alter_the_picture_it_is_given():
+    before = GREY.copy()
+    draw_pose(GREY, cross(), LSP14)
+    assert (before == GREY).all()
+
+
+def test_joints_far_outside_the_picture_are_no_trouble():
+    draw_pose(GREY, cross() * 1e6, LSP14)
+
+
+def test_marks_of_a_person_look_unlike_joints_that_were_filled_in():
+    pictures = [
+        draw_pose(GREY, cross(), LSP14, source=np.full(14, kind), height=200.0) for kind in range(3)
+    ]
+    knee = tuple(int(part) for part in cross()[LSP14.index("left_knee")])
+    assert tuple(pictures[0][knee]) == tuple(pictures[1][knee]) == LEFT
+    assert tuple(pictures[2][knee]) != LEFT
+    assert (pictures[0] != pictures[1]).any()
+
+
+def test_bones_are_thicker_on_a_larger_player():
+    def inked(height):
+        return (draw_pose(GREY, cross(), LSP14, height=height) != GREY).any(axis=2).sum()
+
+    assert inked(800.0) > 2 * inked(200.0)
+
+
+def test_limbs_have_sides_and_the_trunk_has_none():
+    sides = {
+        (LSP14.names[a], LSP14.names[b]): side
+        for (a, b), side in zip(drawn_bones(LSP14), bone_sides(LSP14), strict=True)
+    }
+    assert sides["left_hip", "left_knee"] == 0
+    assert sides["right_elbow", "right_wrist"] == 1
+    assert sides["neck", "left_hip"] == sides["left_hip", "right_hip"] == 2
+
+
+def test_trunk_and_head_are_found_in_the_skeleton():
+    assert [LSP14.names[joint] for joint in trunk_outline(LSP14)] == [
+        "left_shoulder",
+        "right_shoulder",
+        "right_hip",
+        "left_hip",
+    ]
+    assert [LSP14.names[joint] for joint in head_bone(LSP14)] == ["neck", "head_top"]
+
+
+def test_the_overlay_has_every_frame_of_the_video_with_the_player_drawn(tmp_path):
+    material = make_material(tmp_path, 12)
+    path = tmp_path / "overlay.mp4"
+    write_overlay(path, material.video, material.motion)
+    overlay = open_video(path)
+    assert len(overlay) == len(material.video)
+    assert (overlay.width, overlay.height) == (material.video.width, material.video.height)
+    assert overlay.fps == material.video.fps

@@ -1,0 +1,294 @@
+"""report.html: complete, self-contained, and true to its numbers."""
+
+import base64
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_material import make_material, renamed_video, walk
+
+from keyrecon.body import LSP14
+from keyrecon.report import summary
+from keyrecon.report.markup import pack
+from keyrecon.report.page import build_page, write_report
+from keyrecon.report.pictures import Windows, cut_pictures
+from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
+from keyrecon.report.views import VIEWS, pose_drawing
+
+OWN = Path(__file__).parents[2] / "keyrecon" / "report"
+
+
+class References(HTMLParser):
+    """Everything that a page would load, and the elements it has."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.found, self.tags, self.ids = [], [], []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.found += [value for name, value in attrs if name in ("src", "href", "data", "poster")]
+        self.ids += [value for name, value in attrs if name == "id"]
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory):
+    return make_material(tmp_path_factory.mktemp("report"), 40)
+
+
+@pytest.fixture(scope="module")
+def pictures(material):
+    return cut_pictures(material.video, material.track, material.annotations, material.motion, 6)
+
+
+@pytest.fixture(scope="module")
+def page(material, pictures):
+    return build_page(material, pictures)
+
+
+def test_the_page_refers_to_nothing_outside_itself(page):
+    outside = [r for r in References(page).found if not r.startswith(("data:", "#"))]
+    assert not outside
+    assert "default-src 'none'" in page
+
+
+def test_our_scripts_and_styles_know_no_addresses():
+    for path in (*OWN.glob("*.js"), *OWN.glob("*.css")):
+        source = path.read_text()
+        assert not re.search(r"https?:|//[a-z]|@import|fetch\(|XMLHttpRequest|url\(", source), path
+
+
+def test_the_page_shows_every_section_once(page):
+    ids = References(page).ids
+    for name in (
+        "video",
+        "keyframes",
+        "occurrence",
+        "distances",
+        "curves",
+        "figure",
+        "views",
+        "body",
+        "sources",
+        "angles",
+        "making",
+    ):
+        assert ids.count(name) == 1
+    assert len(ids) == len(set(ids))
+
+
+def test_names_from_files_cannot_become_markup(material, pictures, page):
+    hostile = renamed_video(material, Path("<img src=x onerror=alert(1)></title><script>.mp4"))
+    wrong = build_page(hostile, pictures)
+    assert References(wrong).tags == References(page).tags
+    assert "<img src=x" not in wrong
+
+
+def test_pictures_are_cut_for_the_strip_and_for_every_keyframe(material, pictures):
+    assert len(pictures.strip) == 6
+    assert set(pictures.keyframes) == set(material.annotations.frames.tolist())
+    assert pictures.clip.startswith("data:video/mp4;base64,")
+
+
+def test_without_truth_the_report_tells_confidence_and_no_accuracy(material, pictures, page):
+    blind = build_page(replace(material, truth=None), pictures)
+    assert "PA-MPJPE" in page and "PA-MPJPE" not in blind
+    assert "Confidence" in blind and 'id="ghost"' not in blind
+
+
+def test_the_file_is_written_whole(material, tmp_path):
+    write_report(tmp_path / "report.html", material)
+    text = (tmp_path / "report.html").read_text()
+    assert text.startswith("<!doctype html>") and text.endswith("</html>")
+
+
+def test_packed_numbers_come_back_and_unknown_ones_stay_unknown():
+    values = np.random.default_rng(0).normal(0, 300, (50, 3))
+    values[7, 1] = np.nan
+    packed = pack(values)
+    whole = np.frombuffer(base64.b64decode(packed["data"]), "<i2").reshape(packed["shape"])
+    assert whole[7, 1] == -32768
+    known = np.isfinite(values)
+    assert np.abs(whole * packed["step"] - values)[known].max() <= packed["step"]
+
+
+def test_a_point_and_its_crop_agree():
+    picture = np.zeros((200, 300, 3), np.uint8)
+    picture[80:84, 120:124] = 255
+    windows = Windows(np.array([[130.0, 90.0]]), np.array([60.0]))
+    crop = windows.cut(0, picture, 240)
+    rows, columns = np.nonzero(crop[..., 0] > 128)
+    placed = windows.to_crop(0, np.array([121.5, 81.5]), 240)
+    np.testing.assert_allclose([columns.mean(), rows.mean()], placed, atol=0.5)
+
+
+@pytest.mark.parametrize("center", [(-500, 50), (800, 50), (0, 0), (299, 199), (150, 5000)])
+def test_a_window_outside_the_picture_still_gives_a_crop(center):
+    windows = Windows(np.array([center], dtype=float), np.array([77.0]))
+    assert windows.cut(0, np.zeros((200, 300, 3), np.uint8), 64).shape == (64, 64, 3)
+
+
+@pytest.mark.parametrize("frames", [1, 40, 900])
+def test_matrices_stay_small_and_keep_the_diagonal_dark(frames):
+    at = np.arange(frames)
+    grey, _ = reduce_matrix(np.abs(at[:, None] - at[None]).astype(np.float32), at)
+    assert len(grey) == min(frames, MATRIX_SIDE)
+    assert np.diag(grey).max(initial=0) <= 2
+
+
+def test_exemplars_stand_for_their_frames_in_the_matrix():
+    grey, top = reduce_matrix(np.array([[0, 4.0], [4.0, 0]]), np.array([0, 0, 1]))
+    np.testing.assert_array_equal(grey == 0, [[1, 1, 0], [1, 1, 0], [0, 0, 1]])
+    assert top == pytest.approx(4.0)
+
+
+def test_every_frame_is_stood_for_once(material):
+    half = material.keyframes.upper
+    assert sum(stands_for(half, frame) for frame in half.frames.tolist()) == 40
+    assert stands_for(half, 1) is None
+
+
+def test_half_body_marks_count_half(material):
+    assert summary.annotation_cost(material.keyframes, 40) == pytest.approx((5 + 4) / 2 / 40)
+
+
+def test_poses_on_a_line_are_ordered_along_it():
+    place = np.array([3.0, -1.0, 7.0, 0.5, 4.0])
+    order = summary.order_by_pose(np.abs(place[:, None] - place[None]))
+    assert (np.diff(place[order]) > 0).all() or (np.diff(place[order]) < 0).all()
+
+
+def test_a_straight_limb_has_pi_and_a_square_one_half_of_it():
+    pose = walk(1)[0]
+    knee, hip, ankle = (LSP14.index(f"left_{name}") for name in ("knee", "hip", "ankle"))
+    column = summary.hinges(LSP14).index(knee)
+    pose[0, hip], pose[0, knee], pose[0, ankle] = (0, 0, 0), (0, 1, 0), (0, 2, 0)
+    assert summary.hinge_angles(pose, LSP14)[0, column] == pytest.approx(np.pi)
+    pose[0, ankle] = (0, 1, 1)
+    assert summary.hinge_angles(pose, LSP14)[0, column] == pytest.approx(np.pi / 2)
+
+
+def test_hinges_are_elbows_and_knees():
+    names = {LSP14.names[joint] for joint in summary.hinges(LSP14)}
+    assert names == {"left_elbow", "right_elbow", "left_knee", "right_knee"}
+
+
+def test_a_planted_foot_has_no_speed(material):
+    points = material.motion.points2d.copy()
+    points[:, LSP14.index("right_ankle")] = (50.0, 60.0)
+    standing = replace(material.motion, points2d=points)
+    assert summary.foot_speed(standing, material.track).max() == 0
+
+
+def test_steady_motion_has_no_acceleration(material):
+    points = np.arange(40.0)[:, None, None] * np.ones((14, 2))
+    found = summary.joint_acceleration(points, material.track, 25.0)
+    np.testing.assert_allclose(found, 0, atol=1e-9)
+
+
+def test_truth_in_another_order_and_unit_is_brought_to_the_motion(material):
+    other = {
+        "points3d": 1000 * material.truth["points3d"][:, ::-1],
+        "points2d": material.truth["points2d"][:, ::-1],
+        "joint_names": np.array(LSP14.names[::-1]),
+    }
+    found = summary.arrange_truth(other, LSP14)
+    np.testing.assert_array_equal(found.points2d, material.truth["points2d"])
+    scaled = summary.scale_truth(material.motion, found.points3d)
+    own = summary.scale_truth(material.motion, material.truth["points3d"])
+    np.testing.assert_allclose(scaled, own)
+    assert np.nanmax(summary.error_per_frame(material.motion, found)) < 0.1
+
+
+def test_joints_that_the_truth_lacks_are_unknown(material):
+    few = {
+        "points3d": material.truth["points3d"][:, :3],
+        "points2d": material.truth["points2d"][:, :3],
+        "joint_names": np.array(LSP14.names[:3]),
+    }
+    assert np.isnan(summary.arrange_truth(few, LSP14).points3d[:, 3:]).all()
+
+
+def test_the_stature_of_a_body_of_average_proportions_is_found(material):
+    pose = np.zeros((40, 14, 3))
+    for (parent, child), length in zip(LSP14.bones, LSP14.lengths, strict=True):
+        pose[:, child] = pose[:, parent] + (0, 1.8 * length, 0)
+    standing = replace(material.motion, points3d=pose)
+    assert summary.stature(standing) == pytest.approx(1.8)
+
+
+def test_views_are_rotations_and_the_first_is_the_camera():
+    for view in VIEWS.values():
+        np.testing.assert_array_equal(view @ view.T, np.eye(3))
+        assert np.linalg.det(view) == pytest.approx(1)
+    np.testing.assert_array_equal(VIEWS["from the camera"], np.eye(3))
+
+
+def test_from_above_the_head_hides_the_body():
+    """What is higher (smaller y) is nearer to a camera above, and farther joints are higher up."""
+    seen = np.array([[0, -2.0, 0], [0, 0, 0], [0, 0, 1.0]]) @ VIEWS["from above"].T
+    assert seen[0, 2] < seen[1, 2]
+    assert seen[2, 1] < seen[1, 1]
+
+
+def test_a_pose_with_unknown_joints_can_be_drawn():
+    pose = walk(1)[0][0]
+    pose[5] = np.nan
+    assert "nan" not in pose_drawing(pose, LSP14, "from above", 1.75)
+    assert "<path" not in pose_drawing(np.full((14, 3), np.nan), LSP14, "from above", 1.75)
+
+
+PROBE = """<script>
+const faults = []; addEventListener("error", (event) => faults.push(event.message));
+addEventListener("securitypolicyviolation", (event) => faults.push(event.blockedURI));
+addEventListener("load", () => {
+  document.querySelectorAll(".chart").forEach((chart) => chart.scrollIntoView());
+  setTimeout(() => {
+    const slider = document.getElementById("frame");
+    slider.value = 7; slider.dispatchEvent(new Event("input"));
+    document.title = JSON.stringify({faults, now: document.getElementById("now").textContent,
+      wide: document.documentElement.scrollWidth - innerWidth,
+      drawn: document.querySelectorAll("canvas").length});
+  }, 1200);
+});
+</script>"""
+
+
+def test_a_browser_opens_the_page_without_faults(page, tmp_path):
+    browser = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chrome")
+    if browser is None:
+        pytest.skip("no chromium on this machine: the page was not opened in a browser")
+    path = tmp_path / "report.html"
+    path.write_text(page.replace("<title>", f"{PROBE}<title>", 1))
+    command = [
+        browser,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--virtual-time-budget=4000",
+        "--window-size=1366,768",
+        "--dump-dom",
+        path.as_uri(),
+    ]
+    try:
+        found = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    except subprocess.TimeoutExpired:
+        pytest.skip("the browser did not answer within two minutes")
+    if found.returncode:
+        pytest.skip(f"the browser could not start: {found.stderr[-300:]}")
+    title = re.search(r"<title>(.*?)</title>", found.stdout).group(1)
+    assert '"faults":[]' in title.replace("&quot;", '"')
+    assert "frame 7" in title and '"drawn":5' in title.replace("&quot;", '"')
+    assert int(re.search(r'wide":(-?\d+)', title.replace("&quot;", '"')).group(1)) <= 0

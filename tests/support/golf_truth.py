@@ -1,0 +1,51 @@
+"""A swing whose every number is known, and what a perfect or a noisy tracker would see of it."""
+
+import numpy as np
+
+from keyrecon.body import LSP14
+from keyrecon.golf.fit.residuals import project
+from keyrecon.golf.records import Matches, Observations
+
+TRACKED = [LSP14.index(f"{s}_{n}") for s in ("right", "left") for n in ("ankle", "knee", "wrist")]
+TRACKED.append(LSP14.index("head_top"))
+
+
+def camera_before(azimuth, distance=5.0, height=1.2):
+    """Rotation and position of the swing axes for a camera; 180 degrees is face-on."""
+    angle = np.radians(azimuth)
+    centre = np.array([distance * np.sin(angle), height, distance * np.cos(angle)])
+    forward = np.array([0, 0.9, 0]) - centre
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0, 1.0, 0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return rotation, -rotation @ centre
+
+
+def even_times(frames, still=10):
+    return np.clip((np.arange(frames) - still) / (frames - 2 * still), 0, 1)
+
+
+def observe(joints, club, camera, noise, seed=0):
+    """Observations of joints and club in camera axes (T, 14, 3) and (T, 2, 3)."""
+    rng = np.random.default_rng(seed)
+    frames = len(joints)
+    seen = np.full((frames, 14, 2), np.nan)
+    pixels = project(joints.reshape(-1, 3), camera)[0].reshape(frames, 14, 2)
+    seen[:, TRACKED] = pixels[:, TRACKED] + rng.normal(0, noise, (frames, len(TRACKED), 2))
+    ends = project(club.reshape(-1, 3), camera)[0].reshape(frames, 2, 2)
+    nothing = tuple(np.zeros((0, 2)) for _ in range(frames))
+    return Observations(
+        camera=camera,
+        joints=seen,
+        spread=np.full((frames, 14), 3.0),
+        club=ends + rng.normal(0, noise, ends.shape),
+        club_spread=np.full(frames, 4.0),
+        club_along=np.full((frames, 2), 16.0),
+        foreground=nothing,
+        away=(),
+        matches=Matches(np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2))),
+        keys=np.arange(4.0),
+        mu=np.zeros(frames),
+        left_handed=False,
+    )

@@ -1,0 +1,269 @@
+"""A person at the annotator's page: a real browser, a real server, and a count of what is done."""
+
+import asyncio
+import json
+import math
+import re
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Thread
+from urllib.request import Request, urlopen
+
+import uvicorn
+
+from keyrecon.annotate.server.routes import make_app
+from keyrecon.annotate.server.session import open_session
+from keyrecon.annotate.store.assistant import Assistant
+from keyrecon.app.annotator import listen, make_door
+from keyrecon.body import LSP14
+from keyrecon.io.workspace import Workspace
+
+CHROMIUM = Path("/usr/bin/chromium")
+SCREEN = {"width": 1366, "height": 768}
+SELECTED = "document.querySelector('.joint.selected')?.dataset.joint"
+SOON = 60_000
+"""How long the page may take for anything, ms."""
+
+
+class Serving:
+    """The server of one project in a thread; may be stopped and started again at its address."""
+
+    def __init__(self, folder, assistant=Assistant(), commands=None):
+        self.folder, self.assistant, self.commands = folder, assistant, commands or {}
+        self.door = None
+        self.start()
+
+    def start(self):
+        listener = listen("127.0.0.1", self.door.port if self.door else 0)
+        self.door = self.door or make_door(listener, "127.0.0.1")
+        self.desk = open_session(Workspace(self.folder), self.assistant, self.commands)
+        config = uvicorn.Config(
+            make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=0
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = Thread(target=asyncio.run, args=(self._server.serve(sockets=[listener]),))
+        self._thread.start()
+
+    def stop(self):
+        self._server.should_exit = True
+        self._thread.join()
+        self.desk.close()
+
+    def ask(self, path):
+        """An answer of the server, as the page would get it."""
+        cookie = f"{self.door.cookie}={self.door.session}"
+        request = Request(f"{self.door.origins[0]}/api/{path}", headers={"Cookie": cookie})
+        with urlopen(request) as answer:
+            return json.load(answer)
+
+
+@contextmanager
+def serving(folder, assistant=Assistant(), commands=None):
+    server = Serving(folder, assistant, commands)
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+@contextmanager
+def browser():
+    """Chromium from the system; nothing is downloaded."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Person:
+    """Somebody at the page, who counts clicks, drags and keys and notes every complaint."""
+
+    def __init__(self, context, address):
+        self.page = context.new_page()
+        self.page.set_default_timeout(SOON)
+        self.clicks = self.drags = self.keys = 0
+        self.complaints = []
+        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
+        self.page.on("console", self._hear)
+        self.page.on("response", self._remember)
+        self.page.goto(address)
+        self.page.wait_for_selector("#saving[data-status]", state="attached")
+
+    def _hear(self, message):
+        if message.type == "error" and not message.text.startswith("Failed to load resource"):
+            self.complaints.append(message.text)
+
+    @property
+    def actions(self):
+        return self.clicks + self.drags + self.keys
+
+    def on_screen(self, place):
+        """Where a point of the picture is in the window."""
+        scale, x, y = map(float, self.page.get_attribute("#picture", "data-view").split())
+        box = self.page.locator("#picture").bounding_box()
+        return box["x"] + scale * place[0] + x, box["y"] + scale * place[1] + y
+
+    def click(self, place):
+        self.page.mouse.click(*self.on_screen(place))
+        self.clicks += 1
+
+    def point_at(self, place):
+        self.page.mouse.move(*self.on_screen(place))
+
+    def drag(self, start, end):
+        self.point_at(start)
+        self.page.mouse.down()
+        x, y = self.on_screen(end)
+        self.page.mouse.move(x + 6, y + 6)
+        self.page.mouse.move(x, y)
+        self.page.mouse.up()
+        self.drags += 1
+
+    def press(self, key):
+        self.page.keyboard.press(key)
+        self.keys += 1
+
+    def text(self, selector):
+        return self.page.inner_text(selector)
+
+    def frame(self):
+        """The keyframe that is open."""
+        found = re.search(r"frame (\d+) of", self.text("#where"))
+        return int(found[1])
+
+    def asked(self):
+        """The joint that is asked for, if any."""
+        return self.page.evaluate(f"{SELECTED} ?? null")
+
+    def await_text(self, selector, pattern):
+        self.page.wait_for_function(
+            "([s, p]) => new RegExp(p).test(document.querySelector(s).innerText)",
+            arg=[selector, pattern],
+        )
+
+    def await_drawn(self):
+        """Until what was done shows: two animation frames."""
+        self.page.evaluate(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
+
+    def await_saved(self):
+        self.await_drawn()
+        self.page.wait_for_selector("#saving[data-status=saved]")
+
+    def open(self, frame):
+        """Go to a keyframe as by its row in the list."""
+        self.page.evaluate("frame => { location.hash = `frame=${frame}`; }", frame)
+        self.await_text("#where", rf"frame {frame} of")
+        self.page.wait_for_selector(f"#picture[data-frame='{frame}']")
+
+    def pose(self):
+        """What the server last told the page of the pose."""
+        self.await_drawn()
+        self.page.wait_for_selector("#space[aria-busy=false]")
+        return self._pose.json()
+
+    def _remember(self, response):
+        if response.url.endswith("/api/pose"):
+            self._pose = response
+
+    def mark_joints(self, place_of):
+        """Click every joint that is asked for where `place_of(joint)` says."""
+        while self.asked():
+            self.mark_one(place_of)
+
+    def mark_one(self, place_of):
+        """Click the joint that is asked for."""
+        joint = self.asked()
+        self.click(place_of(joint))
+        self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
+
+    def settle_depths(self, signs, place_of):
+        """Take the best of the readings offered and turn the limbs that are wrong in it.
+
+        To point at a limb is no action: the key that turns it is.
+        """
+        offered = [reading["nearer"] for reading in self.pose().get("alternatives", [])[:3]]
+        wrong = [[limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered]
+        if not offered:
+            return
+        best = min(range(len(wrong)), key=lambda n: len(wrong[n]))
+        self.press(str(best + 1))
+        for limb in wrong[best]:
+            self.point_at(clearest_place(limb, place_of))
+            self.await_drawn()
+            self.press("f")
+
+    def suggestion(self, frame):
+        """What is suggested for the open joints of a keyframe, once the page shows it."""
+        answer = self.page.evaluate(f"fetch('/api/ghost/{frame}').then((a) => a.json())")
+        open_joints = self.page.evaluate(
+            "[...document.querySelectorAll('.joint[data-joint]:not([hidden]):not(.marked)')]"
+            ".map((row) => row.dataset.joint)"
+        )
+        offered = {name: at for name, at in answer.get("joints", {}).items() if name in open_joints}
+        if offered:
+            self.await_text("#guide-text", "suggestion|Which ends|done")
+        return offered
+
+    def take_suggestion(self):
+        """Accept what is suggested, and wait for what is asked next."""
+        self.press("Enter")
+        self.await_text("#guide-text", "Which ends|done|Click")
+
+    def add_keyframes(self, frames):
+        """Give the project keyframes of one's own, without the page's help."""
+        edits = [
+            {"id": f"own-{n}", "kind": "own", "frame": n, "to": "both", "from": None}
+            for n in frames
+        ]
+        self.page.evaluate(
+            "edits => fetch('/api/edits', {method: 'POST', body: JSON.stringify({edits}),"
+            " headers: {'Content-Type': 'application/json'}})",
+            edits,
+        )
+        self.await_text("#done-count", "of")
+
+    def durations(self, name):
+        """How long what the page measures under a name took each time, ms."""
+        return self.page.evaluate(
+            "name => performance.getEntriesByName(name).map((entry) => entry.duration)", name
+        )
+
+    def scroll_times(self, selector):
+        """Time from picture to picture while a list is scrolled from end to end, ms."""
+        return self.page.evaluate(
+            """async (selector) => {
+              const list = document.querySelector(selector), times = [];
+              const picture = () => new Promise(requestAnimationFrame);
+              let last = await picture();
+              for (let n = 0; n <= 100; n++) {
+                list.scrollTop = (n / 100) * list.scrollHeight;
+                const now = await picture();
+                times.push(now - last);
+                last = now;
+              }
+              return times;
+            }""",
+            selector,
+        )
+
+    def call(self, module, expression):
+        """What an expression on a module of the page gives; the module is called `m`."""
+        return self.page.evaluate(f"import('/page/{module}.js').then((m) => ({expression}))")
+
+
+def clearest_place(limb, place_of):
+    """Where along a limb a person points, so that no joint of another limb is meant."""
+    parent = LSP14.names[LSP14.parents[LSP14.index(limb)]]
+    others = [place_of(name) for name in LSP14.names if name not in (limb, parent)]
+    others = [place for place in others if math.isfinite(place[0])]
+    start, end = place_of(parent), place_of(limb)
+    places = [start + share * (end - start) for share in (0.5, 0.4, 0.6, 0.3, 0.7)]
+    return max(places, key=lambda place: min((far(place, other) for other in others), default=0))
+
+
+def far(one, other):
+    return math.dist(one[:2], other[:2])

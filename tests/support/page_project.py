@@ -1,0 +1,84 @@
+"""A project to be marked in a browser: a short video, keyframes, and a body that is known."""
+
+import time
+
+import numpy as np
+
+from keyrecon.app.project import start
+from keyrecon.body import LSP14
+from keyrecon.io.formats.keyframes import keyframes_to_json
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.synthetic.motion import MotionOptions, play_tennis
+
+FPS, FRAMES, SIZE = 25.0, 100, (640, 360)
+STATURE = 1.78
+"""Metres."""
+PIXELS = 150.0
+"""Pixels per metre."""
+
+
+def read_number(blocks):
+    """The number that the eight blocks of a picture show, from their brightness."""
+    return sum((value > 120) << bit for bit, value in enumerate(blocks))
+
+
+def block(bit):
+    """Centre of the block that shows one bit of the frame number."""
+    return 40 + 80 * bit, 30
+
+
+def write_numbered_video(path):
+    """Pictures whose blocks at the top tell their number."""
+
+    def pictures():
+        for number in range(FRAMES):
+            picture = np.full((SIZE[1], SIZE[0], 3), 90, dtype=np.uint8)
+            for bit in range(8):
+                x, y = block(bit)
+                picture[y - 20 : y + 20, x - 30 : x + 30] = 220 if number >> bit & 1 else 20
+            yield picture
+
+    write_video(path, pictures(), FPS)
+    return path
+
+
+def truth():
+    """Joints of a tennis player in camera axes (metres) and on the picture."""
+    world = play_tennis(MotionOptions(seconds=FRAMES / FPS, fps=FPS, stature=STATURE, seed=3))
+    points3d = (world - world[:, 12:13]) * [1, -1, -1]
+    points2d = points3d[..., :2] * PIXELS + [SIZE[0] / 2, 110]
+    return points3d, points2d
+
+
+def true_signs(points3d, flat=0.06):
+    """Sign of every limb by name; limbs that lie flat (depth below `flat`, m) are left out."""
+    parent, child = LSP14.bones.T
+    depth = points3d[parent, 2] - points3d[child, 2]
+    names = [LSP14.names[c] for c in child]
+    return {n: int(np.sign(d)) for n, d in zip(names, depth, strict=True) if abs(d) > flat}
+
+
+def _half(frames):
+    frames = np.array(frames)
+    nearest = frames[np.abs(np.arange(FRAMES)[:, None] - frames).argmin(axis=1)]
+    return HalfKeyframes(
+        frames, nearest, np.ones(FRAMES, bool), 1.0, 0.1, np.zeros(FRAMES), len(frames)
+    )
+
+
+def make_project(folder, video_file, upper=(10, 40, 70), lower=(10, 55, 70)):
+    """A project with these keyframes."""
+    start(video_file, folder)
+    workspace = Workspace(folder)
+    keyframes = Keyframes(_half(upper), _half(lower), reach=10, alpha=0.95)
+    workspace.keyframes_file.write_text(keyframes_to_json(keyframes))
+    return folder
+
+
+def count_slowly(options, progress):
+    """Work that takes longer than anybody waits."""
+    for _ in progress(range(600), "Counting"):
+        time.sleep(0.1)
+    return "Counted."

@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+from drawn_player import HEIGHT, corners, film, heads, lifts, picks
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.frame_reader import read_small
+from keyrecon.numerics.geometry import warp_points
+from keyrecon.records import CameraPath
+from keyrecon.segmentation.background_model import ForegroundModel, build_background
+from keyrecon.segmentation.color_model import learn_colors, to_lab
+from keyrecon.segmentation.contours import find_edges
+from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.tracking.detection import find_player
+from keyrecon.tracking.scale import standing_height, zoom
+from keyrecon.tracking.tracker import TrackOptions, track_player
+
+COUNT = 40
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["static", "panning"])
+def found(request, tmp_path_factory):
+    """(panning, video, camera, colors, track) of one filmed player."""
+    video = film(tmp_path_factory.mktemp("film") / "player.mp4", COUNT, request.param)
+    camera = estimate_camera_motion(video)
+    colors = learn_colors(video, picks(COUNT, request.param))
+    rough = find_player(video, colors, camera)
+    background = build_background(video, camera, rough)
+    track = track_player(video, rough, camera, background, colors)
+    return request.param, video, camera, colors, track
+
+
+def test_a_camera_on_a_tripod_has_the_identity_for_a_path_and_a_panning_one_its_pan(found):
+    panning, _, camera, _, _ = found
+    if not panning:
+        assert (camera.to_reference == np.eye(3)).all()
+        return
+    there = corners(COUNT, panning)
+    expected = there - there[COUNT // 2]
+    center = np.array([160.0, 90.0])
+    moved = np.array([warp_points(h, center[None])[0] for h in camera.to_reference]) - center
+    assert np.abs(moved - expected).max() < 1.0
+
+
+def test_head_and_feet_are_found_in_every_frame(found):
+    panning, _, _, _, track = found
+    truth = heads(COUNT) - corners(COUNT, panning)
+    assert np.linalg.norm(track.head - truth, axis=1).max() < 0.05 * HEIGHT
+    assert np.linalg.norm(track.mid_feet - truth - (0, HEIGHT), axis=1).max() < 0.06 * HEIGHT
+
+
+def test_neither_a_racket_like_a_shoe_nor_a_lifted_foot_misleads(tmp_path):
+    video = film(tmp_path / "playing.mp4", COUNT, playing=True)
+    camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
+    colors = learn_colors(video, picks(COUNT))
+    rough = find_player(video, colors, camera)
+    track = track_player(video, rough, camera, build_background(video, camera, rough), colors)
+    head = heads(COUNT) - corners(COUNT, False)
+    left = head + np.array([-12, HEIGHT])
+    right = head + np.stack([np.full(COUNT, 12), HEIGHT - lifts(COUNT)], axis=1)
+    for foot in (left, right):
+        off = np.linalg.norm(track.feet - foot[:, None], axis=2).min(axis=1)
+        assert (off < 0.1 * HEIGHT).mean() > 0.97
+
+
+def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
+    _, video, camera, colors, track = found
+    options = TrackOptions(method="paper")
+    background = build_background(video, camera, track)
+    assert track_player(video, track, camera, background, colors, options) is track
+
+
+def test_a_video_too_long_for_its_pictures_to_be_kept_is_read_again(found, monkeypatch):
+    _, video, camera, colors, _ = found
+    kept = find_player(video, colors, camera)
+    monkeypatch.setattr("keyrecon.tracking.detection.MOST_KEPT", 0)
+    again = find_player(video, colors, camera)
+    assert (again.head == kept.head).all()
+    assert (again.feet == kept.feet).all()
+
+
+def test_the_standing_height_is_that_of_the_player(found):
+    assert found[4].height == pytest.approx(HEIGHT, rel=0.06)
+
+
+def test_the_box_holds_head_and_feet(found):
+    track = found[4]
+    for spots in (track.head, track.feet[:, 0], track.feet[:, 1]):
+        assert (spots > track.box[:, :2]).all()
+        assert (spots < track.box[:, 2:]).all()
+
+
+def test_the_player_and_nobody_else_is_foreground(found):
+    panning, video, camera, _, track = found
+    scene = ForegroundModel(build_background(video, camera, track), camera)
+    number = COUNT // 4
+    picture = next(iter(read_small(video, video.width, {number})))
+    likely = scene.foreground(to_lab(picture), number, np.eye(3))
+    x, y = (heads(COUNT) - corners(COUNT, panning))[number].round().astype(int)
+    assert likely[y + 15 : y + 35, x - 6 : x + 6].min() > 0.8
+    assert np.median(np.delete(likely, np.s_[x - 30 : x + 30], axis=1)) < 0.05
+
+
+def test_edges_lie_on_the_outline_of_the_player(found):
+    panning, video, camera, colors, track = found
+    background = build_background(video, camera, track)
+    figures = find_edges(video, track, camera, background, colors)
+    assert len(figures.edges) == COUNT
+    shirt = colors.names.index("shirt")
+    head = (heads(COUNT) - corners(COUNT, panning))[COUNT // 2]
+    edges = figures.edges[COUNT // 2]
+    outline = edges.points[edges.color == shirt] - head
+    assert len(outline) > 20
+    assert np.abs(outline[:, 0]).max() < 14
+    assert outline[:, 1].min() > 4
+    assert outline[:, 1].max() < 43
+    assert np.linalg.norm(edges.tangent, axis=1) == pytest.approx(1)
+    assert (edges.upper | edges.lower).all()
+
+
+def test_zoom_is_the_ratio_of_focal_lengths(found):
+    video = found[1]
+    factor = np.linspace(1, 1.5, 10)
+    center = np.array([video.width / 2, video.height / 2])
+    to_first = np.tile(np.eye(3), (10, 1, 1))
+    to_first[:, 0, 0] = to_first[:, 1, 1] = 1 / factor
+    to_first[:, :2, 2] = center - center / factor[:, None]
+    assert zoom(CameraPath(to_first, np.ones(10)), video) == pytest.approx(factor)
+
+
+def test_a_crouch_does_not_change_the_standing_height():
+    head = np.zeros((200, 2))
+    feet = np.tile([0.0, 100.0], (200, 1))
+    head[80:110, 1] = 30.0
+    assert standing_height(head, feet, np.ones(200), 150) == pytest.approx(100)
+
+
+def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):
+    panning, _, camera, colors, _ = found
+    empty = film(tmp_path / "empty.mp4", COUNT, panning, empty=True)
+    with pytest.raises(KeyreconError, match=r"0 of 21 frames; pick .* again"):
+        find_player(empty, colors, camera)
