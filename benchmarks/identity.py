@@ -1,12 +1,13 @@
 """Whether two versions of keyrecon give the same motions to the digit.
 
-    python benchmarks/identity.py OUT --work FOLDER [--only NAME ...] [--write FILE] [--against FILE]
+    python benchmarks/identity.py OUT [--work FOLDER] [--only NAME ...] [--write FILE]
+        [--against FILE]
 
-Runs the commands of the checkout it lies in (nothing is imported from the package, so that it runs on
-any version) on the demos, on the rendered sequences that `accuracy.py` left in the work folder, and
-on the real videos whose picks, marks or clicks are kept in `annotations/`. Prints one digest for
-each array of each motion.npz; `--write` keeps them, `--against` compares with kept ones and names
-every array that differs, with the largest difference where the motions of the other run are still there.
+Runs the commands of the checkout it lies in (nothing is imported from the package, so that it
+runs on any version) on the demos, on the rendered sequences that `accuracy.py` left in the work
+folder, and on the real videos whose picks, marks or clicks are kept in `annotations/`. Prints one
+digest for each array of each motion.npz; `--write` keeps them, `--against` compares with kept
+ones and names every array that differs.
 """
 
 import argparse
@@ -83,7 +84,12 @@ def mark(keyframes: dict, truth: dict[str, np.ndarray]) -> dict:
         flat = [[x, y, 2] if a else [0, 0, 0] for (x, y), a in zip(joints, asked, strict=True)]
         images.append({"id": number, "file_name": f"frame_{frame:06d}.png", "frame": frame})
         annotations.append(
-            {"id": number, "image_id": number, "category_id": 1, "keypoints": sum(flat, [])}
+            {
+                "id": number,
+                "image_id": number,
+                "category_id": 1,
+                "keypoints": np.ravel(flat).tolist(),
+            }
         )
     category = {"id": 1, "name": "person", "keypoints": names}
     return {"images": images, "annotations": annotations, "categories": [category]}

@@ -5,11 +5,15 @@ C colours. Unknown numbers are NaN. Pixels and axes as in the package docstring.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.body import Skeleton
+
+HalfName = Literal["upper", "lower"]
+"""The two halves of the body, which have keyframes of their own (Section 4.3)."""
 
 
 @dataclass(frozen=True)

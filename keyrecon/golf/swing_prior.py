@@ -47,7 +47,7 @@ NO_CLUB = 0.5
 """Length of the stand-in for the club, player heights."""
 
 
-def fit_swing_prior(  # noqa: PLR0913
+def fit_swing_prior(
     tracks: JointTracks,
     annotations: Annotations,
     model: MotionModel,

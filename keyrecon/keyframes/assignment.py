@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.keyframes.coverage import Neighborhoods
-from keyrecon.keyframes.descriptor_bins import ranges
+from keyrecon.numerics.ragged import ranges
 from keyrecon.records import PoseDistances
 
 

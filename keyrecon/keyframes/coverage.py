@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.keyframes.descriptor_bins import ranges
+from keyrecon.numerics.ragged import ranges
 
 LAZY_BATCH = 64
 """Candidates that lazy evaluation measures together."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Complex64, Float, Float32, Int
 
-from keyrecon.keyframes.edge_distance import CONE, HalfName, align_edges
-from keyrecon.records import Edges, Track
+from keyrecon.keyframes.edge_distance import CONE, align_edges
+from keyrecon.records import Edges, HalfName, Track
 
 STRIP = 512
 """Cells whose neighbours are found together."""
@@ -139,9 +139,3 @@ def _neighborhoods(
         neighbors.append(column[aligned].astype(np.int32))
         counts.append(np.bincount(row[aligned], minlength=len(room)))
     return np.cumsum(np.concatenate(counts)), np.concatenate(neighbors)
-
-
-def ranges(start: Int[np.ndarray, "E"], count: Int[np.ndarray, "E"]) -> Int[np.ndarray, "P"]:
-    """start[0], start[0] + 1, ... (count[0] numbers), then the same of the next, and so on."""
-    before = np.cumsum(count) - count
-    return np.arange(count.sum()) + np.repeat(start - before, count)

@@ -29,12 +29,12 @@ from keyrecon.keyframes.descriptor_bins import (
     DescriptorBins,
     gather_elements,
     group_elements,
-    ranges,
 )
-from keyrecon.keyframes.edge_distance import MATCH_REACH, HalfName
+from keyrecon.keyframes.edge_distance import MATCH_REACH
 from keyrecon.keyframes.exemplars import choose_exemplars, distance_in_band, measure_band
+from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Edges, PoseDistances, Track
+from keyrecon.records import Edges, HalfName, PoseDistances, Track
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
 

@@ -15,14 +15,11 @@ of the correspondences that carry joints.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.records import Edges, Track
-
-HalfName = Literal["upper", "lower"]
+from keyrecon.records import Edges, HalfName, Track
 
 MATCH_REACH = 0.12
 """Farthest match, player heights: about the width of a thigh, so that a limb never matches

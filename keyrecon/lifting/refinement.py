@@ -57,7 +57,7 @@ class RefineOptions:
     """Standard deviation of the low-pass of Fig. 9, frames."""
 
 
-def refine_motion(  # noqa: PLR0913
+def refine_motion(
     start: MotionState,
     observed: PreparedTracks,
     guide: Float[np.ndarray, "T B 3"],

@@ -1,1 +1,1 @@
-"""The mathematics that several stages share: each method once, each with a slow twin in its test."""
+"""The mathematics that several stages share, each method once."""

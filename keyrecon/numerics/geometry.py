@@ -1,12 +1,13 @@
-"""Cameras: perspective for rendering, scaled orthography for reconstruction.
+"""Points, directions and cameras.
 
-Both map points in camera axes (x right, y down, z away) to pixels (x right, y down). Scaled
-orthography, u = s X, is what a distant player looks like and what Taylor's method assumes
-(CVIU 80, 2000); it leaves the depth of the whole body open.
+Two cameras: perspective for rendering, scaled orthography for reconstruction. Both map points in
+camera axes (x right, y down, z away) to pixels (x right, y down). Scaled orthography, u = s X, is
+what a distant player looks like and what Taylor's method assumes (CVIU 80, 2000); it leaves the
+depth of the whole body open.
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 
 def project_perspective(
@@ -43,3 +44,13 @@ def warp_points(
     """Points moved by homographies, one each or one for all."""
     moved = np.einsum("...ij,...j->...i", homography[..., :, :2], points) + homography[..., :, 2]
     return moved[..., :2] / moved[..., 2:]
+
+
+def to_complex(points: Float[np.ndarray, "*n 2"]) -> Complex[np.ndarray, "*n"]:
+    """x + iy"""
+    return points[..., 0] + 1j * points[..., 1]
+
+
+def from_complex(points: Complex[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+    """(x, y)"""
+    return np.stack([points.real, points.imag], axis=-1)

@@ -25,10 +25,9 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.video import Video
-from keyrecon.keyframes.edge_distance import HalfName as HalfName
 from keyrecon.keyframes.edge_distance import align_edges, match_edges
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Annotations, Edges, HalfKeyframes, JointTracks, Survey
+from keyrecon.records import Annotations, Edges, HalfKeyframes, HalfName, JointTracks, Survey
 
 DETAIL = 125
 """Pixels per player height in the pictures compared: one pixel is one step of the grid."""

@@ -40,16 +40,6 @@ class BodyFrame:
         return from_complex(points * self.height[frames] + self.origin[frames])
 
 
-def to_complex(points: Float[np.ndarray, "*n 2"]) -> Complex[np.ndarray, "*n"]:
-    """x + iy"""
-    return points[..., 0] + 1j * points[..., 1]
-
-
-def from_complex(points: Complex[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
-    """(x, y)"""
-    return np.stack([points.real, points.imag], axis=-1)
-
-
 def stabilise_player(track: Track, camera: CameraPath) -> BodyFrame:
     """Player coordinates from head, feet and the camera's motion."""
     middle = (track.head + track.mid_feet) / 2

@@ -17,7 +17,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Complex, Float32, Int
 
-from keyrecon.propagation.body_frame import BodyFrame, to_complex
+from keyrecon.numerics.geometry import to_complex
+from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.records import Edges
 
 BEND = 0.08

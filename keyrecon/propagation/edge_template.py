@@ -18,7 +18,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from keyrecon.propagation.body_frame import BodyFrame, to_complex
+from keyrecon.numerics.geometry import to_complex
+from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.correspondence import list_elements, spread_choice
 from keyrecon.propagation.foot_evidence import FootEvidence
 from keyrecon.propagation.half_body import BodyHalf

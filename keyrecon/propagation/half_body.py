@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.keyframes.edge_distance import HalfName as HalfName
+from keyrecon.records import HalfName
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.video import Video
-from keyrecon.keyframes.edge_distance import HalfName as HalfName
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
@@ -29,7 +28,7 @@ from keyrecon.propagation.edge_template import AnnotatedPoses, make_edge_templat
 from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.half_propagation import FrameEvidence, InitialHypotheses, propagate_half
-from keyrecon.records import Annotations, JointTracks, PoseDistances, Survey
+from keyrecon.records import Annotations, HalfName, JointTracks, PoseDistances, Survey
 
 LEAST_MARKED = 0.5
 """Share of a half's joints that must be marked for a frame to serve as a figure."""

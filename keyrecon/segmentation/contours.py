@@ -15,9 +15,9 @@ from jaxtyping import Bool, Complex, Float, Int, UInt8
 
 from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
-from keyrecon.keyframes.descriptor_bins import ranges
+from keyrecon.numerics.geometry import from_complex
+from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
-from keyrecon.propagation.body_frame import from_complex
 from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
@@ -48,7 +48,7 @@ class EdgeOptions:
     """Edge elements of one frame at most."""
 
 
-def find_edges(  # noqa: PLR0913
+def find_edges(
     video: Video,
     track: Track,
     camera: CameraPath,

@@ -21,10 +21,11 @@ from keyrecon.segmentation.background_model import (
     sample_frames,
 )
 from keyrecon.segmentation.color_model import color_bins, to_lab
-from keyrecon.tracking.foot_pairs import SHOE_RADIUS
 
 Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]
 """Gives the reduced pictures of the frames with the given numbers, in order."""
+SHOE_RADIUS = 0.045
+"""Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
 HEAD_RADIUS = 0.062
 """Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
 STILL_WEIGHT = 0.2

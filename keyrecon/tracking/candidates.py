@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.ndimage import maximum_filter1d
 
-from keyrecon.segmentation.part_evidence import HEAD_RADIUS, Evidence, mean_inside
-from keyrecon.tracking.foot_pairs import SHOE_RADIUS
+from keyrecon.segmentation.part_evidence import HEAD_RADIUS, SHOE_RADIUS, Evidence, mean_inside
 from keyrecon.tracking.radial_symmetry import ellipse, find_peaks, gradient_field, radial_symmetry
 
 RADII = (0.8, 1.0, 1.25)

@@ -7,8 +7,8 @@ one foot hides the other now and then.
 import numpy as np
 from jaxtyping import Float, Int
 
-SHOE_RADIUS = 0.045
-"""Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
+from keyrecon.segmentation.part_evidence import SHOE_RADIUS
+
 ONE_SHOE = 1.8
 """Cost of both feet in one place, found by colour."""
 ONE_PLACE = 2.5

@@ -83,7 +83,7 @@ class TrackOptions:
     """The standing height may change over this time, seconds."""
 
 
-def track_player(  # noqa: PLR0913
+def track_player(
     video: Video,
     rough: Track,
     camera: CameraPath,

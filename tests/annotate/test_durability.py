@@ -27,10 +27,10 @@ EDITING = """
 import itertools, os, sys
 from pathlib import Path
 from annotator_edits import mark, submit
-from keyrecon.annotate.edits import Limits
-from keyrecon.annotate.store import Store
+from keyrecon.annotate.store.edits import Limits
+from keyrecon.annotate.store.store import Store
 from keyrecon.body import LSP14
-from keyrecon.workspace import Workspace
+from keyrecon.io.workspace import Workspace
 
 def say(word):  # in one piece: whoever is killed has said a word or has not
     os.write(1, f"{word}\\n".encode())

@@ -76,7 +76,7 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
     for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", socket.gethostname())):
         with address.listen(host, 0) as listener:
             port = listener.getsockname()[1]
-            door = address.make_door(listener, host)
+            door = address.make_credentials(listener, host)
             assert door.hosts[0] == f"{first}:{port}"
             assert f"localhost:{port}" in door.hosts
             for taken in (port, 99_999):
@@ -95,19 +95,19 @@ def test_only_this_machine_reaches_a_loopback_address(host, ours):
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"port": 80, "session": "guess"}', "null"])
 def test_a_damaged_memory_of_the_address_is_no_memory(tmp_path, text):
     (tmp_path / "annotator.json").write_text(text)
-    assert address.recall(tmp_path / "annotator.json") == address.Memory()
+    assert address.recall(tmp_path / "annotator.json") == address.LastAddress()
 
 
 def test_the_last_address_is_kept_for_oneself_and_used_again_if_free(tmp_path):
     file = tmp_path / "cache" / "annotator.json"
     with address.listen("127.0.0.1", 0) as first:
-        door = address.make_door(first, "127.0.0.1")
+        door = address.make_credentials(first, "127.0.0.1")
         address.remember(file, door)
         memory = address.recall(file)
         with address.listen("127.0.0.1", 0, memory) as second:
             assert second.getsockname()[1] != door.port
     with address.listen("127.0.0.1", 0, memory) as third:
-        again = address.make_door(third, "127.0.0.1", memory)
+        again = address.make_credentials(third, "127.0.0.1", memory)
     assert (again.port, again.session) == (door.port, door.session)
     assert again.token != door.token
     assert file.stat().st_mode & 0o077 == 0

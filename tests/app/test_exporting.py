@@ -4,7 +4,7 @@ import shutil
 
 import av
 import pytest
-from test_motion_files import make_motion
+from small_motion import make_motion
 
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start

@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from test_keyframes import comparison_of, sporting_poses
+from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.keyframes.absence import absent_frames, list_stretches
 from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes

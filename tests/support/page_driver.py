@@ -14,7 +14,7 @@ import uvicorn
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.session import open_session
 from keyrecon.annotate.store.assistant import Assistant
-from keyrecon.app.annotator import listen, make_door
+from keyrecon.app.annotator import listen, make_credentials
 from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
 
@@ -35,7 +35,7 @@ class Serving:
 
     def start(self):
         listener = listen("127.0.0.1", self.door.port if self.door else 0)
-        self.door = self.door or make_door(listener, "127.0.0.1")
+        self.door = self.door or make_credentials(listener, "127.0.0.1")
         self.desk = open_session(Workspace(self.folder), self.assistant, self.commands)
         config = uvicorn.Config(
             make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=0

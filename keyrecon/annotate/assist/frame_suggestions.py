@@ -23,9 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.propagation.propagation import LEAST_MARKED, distances_to
-from keyrecon.records import Annotations, Keyframes, Motion, PoseDistances
-
-HalfName = Literal["upper", "lower"]
+from keyrecon.records import Annotations, HalfName, Keyframes, Motion, PoseDistances
 
 
 @dataclass(frozen=True)

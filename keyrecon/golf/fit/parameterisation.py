@@ -2,7 +2,8 @@
 
 S = [alpha, mu, G] of Eq. 5. Over a few frames mu and G have a value per frame, as printed; over a
 whole swing they are what B-splines add to the current estimate, which keeps their number
-independent of the frame rate. `SplineBasis` holds the two bases; with identities it is the paper's form.
+independent of the frame rate. `SplineBasis` holds the two bases; with identities it is the paper's
+form.
 """
 
 from dataclasses import dataclass, replace

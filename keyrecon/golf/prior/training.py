@@ -127,9 +127,14 @@ def learn_motion(
     components = axes[:kept].reshape(kept, *mean.shape) / weight
     components *= np.sqrt(variance[:kept])[:, None, None]
     return MotionModel(
-        SWING_PRIOR_VERSION, database.centre, mean, components, database.keys, np.cumsum(share)[:kept],
-        provenance,
-    )  # fmt: skip
+        version=SWING_PRIOR_VERSION,
+        centre=database.centre,
+        mean=mean,
+        components=components,
+        keys=database.keys,
+        explained=np.cumsum(share)[:kept],
+        provenance=provenance,
+    )
 
 
 def motion_weights() -> Float[np.ndarray, "D"]:

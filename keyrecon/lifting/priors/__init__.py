@@ -1,1 +1,1 @@
-"""What is known of bodies before a picture is looked at: limits, habits, occlusion, learnt depth."""
+"""What is known of bodies beforehand: limits, habits, occlusion, learnt depth."""

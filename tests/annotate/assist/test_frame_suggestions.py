@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_keyframes import comparison_of, sporting_poses
+from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
 from keyrecon.body import LSP14

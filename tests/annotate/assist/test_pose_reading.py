@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_lifting import BREADTHS, swinging_motion
+from swinging_figure import BREADTHS, swinging_motion
 
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.pose_reading import DIFFERENT, Sighting, read_pose

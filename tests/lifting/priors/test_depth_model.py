@@ -129,7 +129,7 @@ def test_a_model_with_other_terms_is_refused():
 
 
 def test_the_command_learns_from_files_what_run_can_use(tmp_path, monkeypatch, capsys):
-    from test_mocap import bvh_text
+    from bvh_files import bvh_text
 
     out = tmp_path / "mine.npz"
     call = ["keyrecon", "depths", str(tmp_path), "--out", str(out)]
