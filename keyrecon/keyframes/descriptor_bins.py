@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Complex, Complex64, Float, Float32, Int
 
 from keyrecon.keyframes.edge_distance import CONE, align_edges
+from keyrecon.numerics.ragged import ranges
 from keyrecon.records import Edges, HalfName, Track
 
 STRIP = 512
