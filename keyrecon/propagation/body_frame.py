@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.numerics.geometry import warp_points
+from keyrecon.numerics.geometry import from_complex, to_complex, warp_points
 from keyrecon.records import CameraPath, Track
 
 STABILISING_SECONDS = 2.5
