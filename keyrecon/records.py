@@ -33,7 +33,7 @@ class CameraPath:
 
     to_reference: Float[np.ndarray, "T 3 3"]
     """Homography from the pixels of frame t to those of the reference frame."""
-    trust: Float[np.ndarray, "T"]
+    confidence: Float[np.ndarray, "T"]
     """Share of background features that agree with it, 0-1."""
 
 
@@ -49,7 +49,7 @@ class Track:
     """Standing length from head centre to mid-feet, smoothed over time: the unit of distance."""
     box: Float[np.ndarray, "T 4"]
     """x0, y0, x1, y1 around the player and a raised arm; may leave the picture."""
-    trust: Float[np.ndarray, "T"]
+    confidence: Float[np.ndarray, "T"]
     """0-1; 0 where head or feet were not seen and are interpolated."""
 
     @property

@@ -121,7 +121,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     """What was found, and what to do next."""
     found, frames = preparation.keyframes, len(preparation.video)
     folder = quoted(workspace.folder)
-    seen = float((preparation.track.trust > 0).mean())
+    seen = float((preparation.track.confidence > 0).mean())
     halves = [
         f"{name} body: {_counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
         f"frames (beta {half.beta:.4f}; as printed in the paper it would take "

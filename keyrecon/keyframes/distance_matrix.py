@@ -124,12 +124,12 @@ def take_frames(track: Track, frames: Int[np.ndarray, "M"]) -> Track:
 
 
 def measure_clarity(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:
-    """How well each frame could be annotated, 0-1: trust of the track times sharpness.
+    """How well each frame could be annotated, 0-1: confidence of the track times sharpness.
 
     Motion blur dissolves contours: a frame with fewer elements than the median is less sharp.
     """
     count = np.array([len(e.points) for e in edges])
-    return track.trust * np.clip(count / max(1.0, np.median(count)), 0, 1)
+    return track.confidence * np.clip(count / max(1.0, np.median(count)), 0, 1)
 
 
 def measure_matrix(

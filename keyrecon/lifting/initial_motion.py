@@ -115,7 +115,7 @@ def _fit_window(
         blur = np.full(joints.shape[:2], noise)
         shown = foreshorten_bones(joints, blur, lengths, skeleton, figure.model)
         votes = ExemplarPrior(
-            lengths[:, None] * keys, figure.frames, figure.keys.trust, guided, skeleton
+            lengths[:, None] * keys, figure.frames, figure.keys.confidence, guided, skeleton
         )
         signs = track_depth_signs(shown, votes, figure.size.breadths, skeleton, flips)
         start = MotionState(joints[:, skeleton.root], lift_foreshortened(shown, signs.sign))

@@ -32,7 +32,7 @@ class KeyPoses:
     """Unit bone directions."""
     probability: Float[np.ndarray, "K B"]
     """How likely the depth sign of each bone is, 0.5-1."""
-    trust: Float[np.ndarray, "K B"]
+    confidence: Float[np.ndarray, "K B"]
     """0-1: weight of each bone when other frames are compared with this pose."""
     nearer: Int[np.ndarray, "K B"]
     """Signs that a person confirmed, as in `Annotations`."""
@@ -58,9 +58,9 @@ def lift_keyframes(
         signs = choose_depth_signs(shown, annotations.nearer, size.breadths, skeleton, options)
     marked = np.isfinite(annotations.joints[:, skeleton.bones, 0]).all(axis=-1)
     sure = marked | (annotations.nearer != 0)
-    trust = np.where(sure, 1.0, _GUESS * (2 * signs.probability - 1))
+    confidence = np.where(sure, 1.0, _GUESS * (2 * signs.probability - 1))
     return KeyPoses(
-        lift_foreshortened(shown, signs.sign), signs.probability, trust, annotations.nearer
+        lift_foreshortened(shown, signs.sign), signs.probability, confidence, annotations.nearer
     )
 
 

@@ -25,7 +25,7 @@ def headline(material: ReportMaterial) -> str:
             f"upper {keyframes.upper.coverage:.1%}, lower {keyframes.lower.coverage:.1%}, "
             f"asked for {keyframes.alpha:.0%}",
         ),
-        *(_trust_cards(motion) if scores is None else _score_cards(scores)),
+        *(_confidence_cards(motion) if scores is None else _score_cards(scores)),
     ]
     tiles = "".join(
         f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
@@ -68,7 +68,7 @@ def accuracy(scores: Scores) -> str:
     )
 
 
-def _trust_cards(motion: Motion) -> list[tuple[str, str, str]]:
+def _confidence_cards(motion: Motion) -> list[tuple[str, str, str]]:
     sure = float((motion.confidence >= 0.5).mean())
     missing = float(missing_shares(motion).mean())
     return [

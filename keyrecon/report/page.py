@@ -63,7 +63,7 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
     return "".join(
         (
             headline(material),
-            _trust_over_time(material),
+            _confidence_over_time(material),
             sections.story(pictures, material.motion.time),
             sections.keyframe_pictures(material, pictures),
             _occurrence(material),
@@ -91,7 +91,7 @@ def _chart(name: str, figure: go.Figure) -> str:
     return f'<div class="chart" data-chart="{name}" style="min-height:{height}px"></div>{block}'
 
 
-def _trust_over_time(material: ReportMaterial) -> str:
+def _confidence_over_time(material: ReportMaterial) -> str:
     """The error of every frame where the truth is known, else how sure the method was."""
     motion, truth = material.motion, material.true_joints
     if truth is None:
@@ -99,7 +99,7 @@ def _trust_over_time(material: ReportMaterial) -> str:
     else:
         unit = "m" if motion.units == "m" else "body heights"
         values, title = error_per_frame(motion, truth), f"Mean error of all joints, {unit}"
-    return _chart("trust", charts.trust_chart(values, motion.keyframes, title))
+    return _chart("confidence", charts.confidence_chart(values, motion.keyframes, title))
 
 
 def _occurrence(material: ReportMaterial) -> str:

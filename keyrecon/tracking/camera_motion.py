@@ -49,7 +49,7 @@ REST_MOTION = 4
 """Frames looked at together while the camera rests: only the last of them is registered."""
 STATIC_MOTION = 0.25
 """A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
-TRUSTED = 0.35
+MIN_CONFIDENCE = 0.35
 """Share of agreeing corners below which a key picture has nothing to say."""
 
 
@@ -80,7 +80,7 @@ class _Match:
     """How a key picture is found again in a frame."""
 
     model: Float[np.ndarray, "3 3"]
-    trust: float
+    confidence: float
     """Share of agreeing corners."""
     moved: Float[np.ndarray, "m 2"]
     """Corners of the key picture that the model moves noticeably."""
@@ -99,7 +99,7 @@ class _FeatureTracker:
     current: int = 0
 
     def register(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float]:
-        """Homography from this frame to frame 0, and its trust; `guess` is the last frame's."""
+        """Homography to frame 0, and its confidence; `guess` is the last frame's."""
         if not self.keys:
             self.keys.append(self._key(grey, np.eye(3)))
             return np.eye(3), 1.0
@@ -114,7 +114,7 @@ class _FeatureTracker:
         to_start = _chain(key, match)
         if self._leaves(match, grey):
             self.keys.append(self._key(grey, to_start))
-        return to_start, match.trust
+        return to_start, match.confidence
 
     def glance(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
         """The same for a frame a little later; None if the camera has moved since."""
@@ -124,12 +124,12 @@ class _FeatureTracker:
             return None
         to_start = _chain(key, match)
         step = _displacement(np.linalg.inv(guess) @ to_start, grey.shape)
-        return None if step * grey.shape[1] > STATIC_MOTION else (to_start, match.trust)
+        return None if step * grey.shape[1] > STATIC_MOTION else (to_start, match.confidence)
 
     def _leaves(self, match: _Match, grey: Grey) -> bool:
         """Whether this frame shares too little with its key picture."""
         far = _displacement(match.model, grey.shape) > self.options.leave
-        return far or match.trust < TRUSTED
+        return far or match.confidence < MIN_CONFIDENCE
 
     def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> _Key:
         return _Key(grey, _corners(grey, self.forbidden), to_start)
@@ -152,9 +152,9 @@ def _chain(key: _Key, match: _Match) -> Float[np.ndarray, "3 3"]:
 def estimate_camera_motion(
     video: Video, options: CameraMotionOptions = CameraMotionOptions(), progress: Progress = silent
 ) -> CameraPath:
-    """Homographies from every frame to the middle one, and how much to trust them.
+    """Homographies from every frame to the middle one, and their confidence.
 
-    Exactly the identity for a static camera. Trust is low where the view was cut.
+    Exactly the identity for a static camera. Confidence is low where the view was cut.
     """
     width = min(options.width, video.width)
     shape = (round(video.height * width / video.width), width)
@@ -163,18 +163,18 @@ def estimate_camera_motion(
         return progress(read_grey(video, width), "Following the camera", len(video))
 
     follower = _FeatureTracker(options)
-    path, trust = _follow(pictures(), follower, max(1, len(video) // 64))
+    path, confidence = _follow(pictures(), follower, max(1, len(video) // 64))
     if _is_static(path, shape, options):
-        return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
+        return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
     if follower.overlay.share(np.concatenate([k.corners for k in follower.keys])) > FEW:
         follower = _FeatureTracker(options, follower.overlay.mask())
-        path, trust = _follow(pictures(), follower)
+        path, confidence = _follow(pictures(), follower)
         if _is_static(path, shape, options):
-            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), trust)
+            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
     small = shrinking(width / video.width)
     full = np.linalg.inv(small) @ to_reference @ small
-    return CameraPath(full / full[:, 2:, 2:], trust)
+    return CameraPath(full / full[:, 2:, 2:], confidence)
 
 
 def _follow(
@@ -191,7 +191,7 @@ def _follow(
             path += _register(follower, waiting, path)
             waiting = []
     path += _register(follower, waiting, path)
-    return np.array([pose for pose, _ in path]), np.array([trust for _, trust in path])
+    return np.array([pose for pose, _ in path]), np.array([confidence for _, confidence in path])
 
 
 def _register(

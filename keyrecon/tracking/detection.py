@@ -74,7 +74,7 @@ def find_player(
     options: FindOptions = FindOptions(),
     progress: Progress = silent,
 ) -> Track:
-    """Head, feet, standing height, box and trust in every frame, by colour and shape alone.
+    """Head, feet, standing height, box and confidence in every frame, by colour and shape alone.
 
     Raises KeyreconError where no head is found in most frames.
     """
@@ -148,9 +148,9 @@ def _connect(
     frames = round(options.envelope * video.fps)
     standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
     halves = [c / 2 for c in costs]
-    trust = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
-    trust = np.interp(np.arange(len(head)), numbers, trust)
-    return Track(head, feet, standing, player_boxes(head, feet, standing), trust)
+    confidence = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
+    confidence = np.interp(np.arange(len(head)), numbers, confidence)
+    return Track(head, feet, standing, player_boxes(head, feet, standing), confidence)
 
 
 def _pair(

@@ -90,7 +90,7 @@ def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
 def link_head(
     seen: list[Detections], camera: CameraPath, cropping: Cropping, sigma: float
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
-    """The head in the picture of every frame, and its trust; `sigma` is its usual step, px."""
+    """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px."""
     places = [cropping.to_picture(s.heads, t) for t, s in enumerate(seen)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(s.head_strength) for s in seen]
@@ -107,7 +107,7 @@ def link_feet(
     head: Float[np.ndarray, "T 2"],
     gait: FootMotionModel,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Both feet in the picture of every frame, and their trust."""
+    """Both feet in the picture of every frame, and their confidence."""
     places = [cropping.to_picture(s.feet, t) for t, s in enumerate(seen)]
     back = np.linalg.inv(camera.to_reference)
     stable = to_reference_frame(places, camera.to_reference)

@@ -92,7 +92,7 @@ def track_player(
     options: TrackOptions = TrackOptions(),
     progress: Progress = silent,
 ) -> Track:
-    """Head, feet, standing height, box and trust in every frame."""
+    """Head, feet, standing height, box and confidence in every frame."""
     if options.method == "paper":
         return rough
     cropping = Cropping(rough, options.player)
@@ -169,15 +169,15 @@ def _connect(
     """The track that the candidates give; a foot behind the other one costs `behind`."""
     camera, cropping, fps = shot.camera, shot.cropping, shot.fps
     step = float(np.median(cropping.track.height)) / fps
-    head, head_trust = link_head(seen, camera, cropping, options.head_speed * step)
+    head, head_confidence = link_head(seen, camera, cropping, options.head_speed * step)
     stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
     gait = FootMotionModel(options.foot_speed * step, round(MEMORY * fps), behind, stiffness)
-    feet, feet_trust = link_feet(seen, camera, cropping, head, gait)
+    feet, feet_confidence = link_feet(seen, camera, cropping, head, gait)
     frames = round(options.envelope * fps)
     height = standing_height(head, feet.mean(axis=1), shot.magnification, frames)
-    trust = np.sqrt(head_trust * feet_trust)
-    track = Track(head, feet, height, player_boxes(head, feet, height), trust)
-    return replace(track, trust=trust * is_visible(shot.crops, cropping, track))
+    confidence = np.sqrt(head_confidence * feet_confidence)
+    track = Track(head, feet, height, player_boxes(head, feet, height), confidence)
+    return replace(track, confidence=confidence * is_visible(shot.crops, cropping, track))
 
 
 def search_crop(

@@ -30,7 +30,7 @@ def some_frames(clip):
         feet=track.feet[kept],
         height=track.height[kept],
         box=track.box[kept],
-        trust=track.trust[kept],
+        confidence=track.confidence[kept],
     )
 
 
@@ -104,11 +104,11 @@ def test_a_video_without_edges_says_what_would_help(some_frames):
         compare_frames(hidden, track)
 
 
-def test_untrusted_frames_are_not_clear(some_frames):
+def test_frames_of_no_confidence_are_not_clear(some_frames):
     edges, track = some_frames
-    trust = np.ones(len(edges))
-    trust[3] = 0
-    clarity = compare_frames(edges, replace(track, trust=trust)).clarity
+    confidence = np.ones(len(edges))
+    confidence[3] = 0
+    clarity = compare_frames(edges, replace(track, confidence=confidence)).clarity
     assert clarity[3] == 0
     assert clarity[4] > 0.5
 

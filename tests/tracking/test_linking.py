@@ -38,10 +38,10 @@ def see(covered):
 
 
 def test_a_foot_behind_the_other_leg_stays_where_it_stood():
-    feet, trust = see(covered=True)
+    feet, confidence = see(covered=True)
     off = np.linalg.norm(feet[:, :, None] - np.array([LEFT, RIGHT]), axis=3).min(axis=1)
     assert off.max() < 0.02 * TALL
-    assert trust[GONE].max() < trust[:20].min()
+    assert confidence[GONE].max() < confidence[:20].min()
 
 
 def test_a_foot_is_not_remembered_where_the_scene_shows_but_is_behind_the_other_leg():

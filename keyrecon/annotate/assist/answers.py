@@ -229,7 +229,7 @@ def describe_preview(study: ProjectCache, picks: tuple[Pick, ...], frames: tuple
         }
         for frame, head, feet, box in rows
     ]
-    return {"frames": strip_rows, "trust": round(found.trust, 3)}
+    return {"frames": strip_rows, "confidence": round(found.confidence, 3)}
 
 
 def show_part(

@@ -35,7 +35,7 @@ class BodyEstimate:
     frames: Int[np.ndarray, "K"]
     vectors: Float[np.ndarray, "K B 3"]
     """Bone vectors of the annotated frames, body heights."""
-    trust: Float[np.ndarray, "K B"]
+    confidence: Float[np.ndarray, "K B"]
     """0-1: how far the sign of each bone's depth can be believed."""
     skeleton: Skeleton
 
@@ -45,7 +45,9 @@ class BodyEstimate:
         if not len(rows):
             return None
         nowhere, unguided = np.full(len(rows), -1), np.zeros((1, self.vectors.shape[1]))
-        return ExemplarPrior(self.vectors[rows], nowhere, self.trust[rows], unguided, self.skeleton)
+        return ExemplarPrior(
+            self.vectors[rows], nowhere, self.confidence[rows], unguided, self.skeleton
+        )
 
     def sighting(
         self,
@@ -83,8 +85,8 @@ def estimate_body(
     vectors = np.concatenate([shown.flat, (signs.sign * shown.depth)[..., None]], axis=-1)
     known = np.isfinite(joints[:, skeleton.bones, 0]).all(axis=2)
     guessed = GUESSED * (2 * signs.probability - 1)
-    trust = known * np.where(annotations.nearer != 0, 1.0, guessed)
-    return BodyEstimate(size, annotations.frames, vectors, trust, skeleton)
+    confidence = known * np.where(annotations.nearer != 0, 1.0, guessed)
+    return BodyEstimate(size, annotations.frames, vectors, confidence, skeleton)
 
 
 def _measure(annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: float) -> BodySize:

@@ -81,7 +81,7 @@ class PreviewedParts:
     """px; NaN where it was not seen, as with the feet."""
     feet: Float[np.ndarray, "N 2 2"]
     box: Float[np.ndarray, "N 4"]
-    trust: float
+    confidence: float
     """Share of all pictures of the strip on which head and feet were seen, 0-1."""
 
 
@@ -91,14 +91,14 @@ def find_player(
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
     track: Track = find.find_player(strip, colors, camera)
     rows = np.searchsorted(strip.numbers, np.unique(frames))
-    seen = track.trust > 0
+    seen = track.confidence > 0
     unseen = ~seen[rows]
     return PreviewedParts(
         frames=np.unique(frames),
         head=np.where(unseen[:, None], np.nan, track.head[rows]),
         feet=np.where(unseen[:, None, None], np.nan, track.feet[rows]),
         box=track.box[rows],
-        trust=float(seen.mean()),
+        confidence=float(seen.mean()),
     )
 
 

@@ -11,7 +11,7 @@ export function createStrip(model, stills, choose) {
   const { project } = model,
     frames = spread(project.n_frames, FRAMES);
   const found = new Map(); // frame -> {head, feet, box}
-  let trust = null;
+  let confidence = null;
 
   const cells = frames.map((frame) => {
     const canvas = make("canvas"),
@@ -27,7 +27,7 @@ export function createStrip(model, stills, choose) {
       const answer = await api.send("picks/preview", { frames });
       found.clear();
       for (const row of answer.frames ?? []) found.set(row.frame, row);
-      trust = answer.trust ?? null;
+      confidence = answer.confidence ?? null;
       model.changed();
     },
     () => found.clear(),
@@ -57,8 +57,8 @@ export function createStrip(model, stills, choose) {
       for (const foot of row?.feet ?? []) mark(pen, toScreen(view, foot), "#e69f00", 3.5);
     }
     const seen =
-      typeof trust === "number"
-        ? `Head and feet agree on ${Math.round(100 * trust)} % of the strip.`
+      typeof confidence === "number"
+        ? `Head and feet agree on ${Math.round(100 * confidence)} % of the strip.`
         : "";
     setText(byId("strip-note"), seen);
   }

@@ -65,7 +65,7 @@ class PointTrack:
     """px of the pictures given"""
     turns: Float[np.ndarray, "T"]
     """Radians from the first frame."""
-    trust: Float[np.ndarray, "T"]
+    confidence: Float[np.ndarray, "T"]
     """Share of the patch that is not lost, 0-1."""
 
 
@@ -88,7 +88,7 @@ def track_patch(
     model = _Model(seen, np.full(len(seen), 100.0), seen, np.tile([0.4, 0.4, 0.2], (len(seen), 1)))
     rate = 1 / max(2.0, options.memory * fps)
     usual = np.array([options.move * height] * 2 + [options.turn] * 2)
-    poses, trust, speed = [pose], [1.0], np.zeros(4)
+    poses, confidence, speed = [pose], [1.0], np.zeros(4)
     for picture, weight in zip(pictures[1:], weights[1:], strict=True):
         before = pose
         pose = _align(model, (picture, weight), before + speed, usual, options)
@@ -97,9 +97,9 @@ def track_patch(
         model = _learn(model, seen, owners, rate)
         speed = np.array([*(pose - before)[:2], 0.0, 0.0])
         poses.append(pose)
-        trust.append(float((inside * (1 - owners[:, 2])).sum() / max(inside.sum(), 1e-9)))
+        confidence.append(float((inside * (1 - owners[:, 2])).sum() / max(inside.sum(), 1e-9)))
     path = np.array(poses)
-    return PointTrack(path[:, :2], path[:, 2], np.array(trust))
+    return PointTrack(path[:, :2], path[:, 2], np.array(confidence))
 
 
 def _places(pose: Float[np.ndarray, "4"]) -> Float[np.ndarray, "n 2"]:

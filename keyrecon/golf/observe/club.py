@@ -50,7 +50,7 @@ class ClubOptions:
     off_moving: float = 0.2
     """The same for a moving shaft, as a share of its movement from frame to frame: a quadratic
     follows a fast club less well."""
-    trusted: float = 0.08
+    min_confidence: float = 0.08
     """A shaft that counts for less was something else."""
 
 
@@ -80,8 +80,8 @@ def track_club(
     pairs = list(zip(shafts, path.tolist(), strict=True))
     taken = np.array([s.ends[k] if k >= 0 else NOWHERE for s, k in pairs])
     tip = np.array([k >= 0 and bool(s.tip[k]) for s, k in pairs])
-    model, trust = _local_motion(taken, tip, height, fps, options)
-    seen = (path >= 0) & (trust > options.trusted)
+    model, confidence = _local_motion(taken, tip, height, fps, options)
+    seen = (path >= 0) & (confidence > options.min_confidence)
     if seen.sum() < FEWEST:
         raise KeyreconError(
             f"A club was seen in only {seen.sum()} of {len(path)} frames; the video must show a "
@@ -98,15 +98,15 @@ def _local_motion(
     fps: float,
     options: ClubOptions,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Hands and head by a robust quadratic in time around every frame, and trust in each shaft.
+    """Hands and head by a robust quadratic in time around every frame, and each shaft's confidence.
 
     A head end that was seen is only known across the shaft: how far the shaft was seen along its
     line depends on the light.
     """
     frames = np.flatnonzero(np.isfinite(taken[:, 0, 0]))
-    model, trust = np.full_like(taken, np.nan), np.zeros(len(taken))
+    model, confidence = np.full_like(taken, np.nan), np.zeros(len(taken))
     if len(frames) < FEWEST:
-        return model, trust
+        return model, confidence
     for t in range(frames[0], frames[-1] + 1):
         near = _neighbours(frames, t, max(FEWEST, round(2 * options.window * fps) + 1))
         time = (near - t) / max(1, np.abs(near - t).max())
@@ -115,8 +115,8 @@ def _local_motion(
         fitted, weight = _fit_window(taken[near], tip[near], time, off)
         model[t] = fitted
         if t in near:
-            trust[t] = weight[np.searchsorted(near, t)]
-    return model, trust
+            confidence[t] = weight[np.searchsorted(near, t)]
+    return model, confidence
 
 
 def _neighbours(frames: Int[np.ndarray, "n"], t: int, count: int) -> Int[np.ndarray, "m"]:

@@ -70,7 +70,7 @@ def track_joints(
         turn = trail.turns if name == "head_top" else np.zeros(len(trail.turns))
         joints[:, index] = trail.places + _turned(offset, turn)
         own = SPREAD[_kind(name)] + TURNED * np.abs(turn)
-        spread[:, index] = own * foreground.height / np.maximum(trail.trust, 0.1)
+        spread[:, index] = own * foreground.height / np.maximum(trail.confidence, 0.1)
     for name in set(names) - set(tracked):
         index = LSP14.index(name)
         joints[clicks.frame, index] = clicks.place(name)
@@ -125,7 +125,7 @@ def _track_both_ways(
     return PointTrack(
         (np.concatenate([back.places[:0:-1], on.places]) - shift) / shrink,
         np.concatenate([back.turns[:0:-1], on.turns]),
-        np.concatenate([back.trust[:0:-1], on.trust]),
+        np.concatenate([back.confidence[:0:-1], on.confidence]),
     )
 
 

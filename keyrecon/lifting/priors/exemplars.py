@@ -26,7 +26,7 @@ class ExemplarPrior:
     """Bone vectors of the key poses, statures."""
     frames: Int[np.ndarray, "K"]
     """Row of each key pose among the frames; others vote too."""
-    trust: Float[np.ndarray, "K B"]
+    confidence: Float[np.ndarray, "K B"]
     """0-1: how sure the sign of each bone is."""
     guide: Float[np.ndarray, "T B"]
     """Depth of the slerped key poses in each frame, statures."""
@@ -42,8 +42,8 @@ class ExemplarPrior:
         depth = (states * shown.depth[:, None, members])[:, :, None]  # (T, S, 1, g)
         wanted = self.vectors[:, members, 2][alike][:, None]  # (T, 1, n, g)
         spread = options.alike**2 + shown.doubt[:, members] ** 2
-        trust = self.trust[:, members][alike][:, None]
-        off = (trust * (depth - wanted) ** 2 / (2 * spread[:, None, None])).sum(-1)
+        confidence = self.confidence[:, members][alike][:, None]
+        off = (confidence * (depth - wanted) ** 2 / (2 * spread[:, None, None])).sum(-1)
         likelihood = np.exp(-apart[:, None] - off).sum(-1)
         cost = -options.votes * np.log(likelihood + np.exp(-options.reach))
         return cost + self._confirmed(members, shown, options)
@@ -79,7 +79,7 @@ class ExemplarPrior:
         for row, frame in enumerate(self.frames):
             if 0 <= frame < len(cost):
                 wanted = self.vectors[row, bones, 2]
-                wrong = self.trust[row, bones] * (states * wanted < 0)
+                wrong = self.confidence[row, bones] * (states * wanted < 0)
                 deep = np.minimum(np.abs(shown.depth[frame, bones]) / options.alike, 1.0)
                 cost[frame] = options.confirmed * (wrong * deep).sum(-1)
         return cost

@@ -145,7 +145,7 @@ def test_without_a_result_nothing_is_suggested(prepared):
 def test_picks_find_head_and_feet_on_the_frames_asked_for(prepared):
     told = plain(prepared.preview(picks(COUNT), (40, 10)))
     assert [row["frame"] for row in told["frames"]] == [10, 40]
-    assert told["trust"] > 0.9
+    assert told["confidence"] > 0.9
     for row in told["frames"]:
         head = HEADS[row["frame"]]
         assert np.linalg.norm(np.array(row["head"]) - head) < 0.05 * HEIGHT

@@ -43,7 +43,7 @@ def test_what_passes_over_a_patch_is_lost_and_does_not_carry_it_away():
         pictures[t][:, x : x + 9] = (20, 128, 128)
     trail = follow(pictures)
     assert abs(trail.places[-1, 0] - 149) < 1.5
-    assert trail.trust[:6].min() > 0.95
+    assert trail.confidence[:6].min() > 0.95
 
 
 def test_the_scene_around_the_player_does_not_count():
