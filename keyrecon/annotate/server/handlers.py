@@ -21,7 +21,6 @@ import numpy as np
 from msgspec import Meta, Struct
 from starlette.responses import Response
 
-from keyrecon.annotate.server import handlers as moving
 from keyrecon.annotate.server.frame_cache import encode_png
 from keyrecon.annotate.server.session import (
     Session,
@@ -191,7 +190,7 @@ def cancel_job(desk: Session, asked: ApiRequest) -> Json:
 
 def motion(desk: Session, asked: ApiRequest) -> Json:
     """A stretch of the result."""
-    return moving.stretch(desk.workspace.motion_file, asked.query)
+    return motion_stretch(desk.workspace.motion_file, asked.query)
 
 
 def import_file(desk: Session, asked: ApiRequest) -> Json:

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 from annotator import DOOR, HEADERS, ask, call, run_apart
 from annotator_edits import edit, mark, submit
+from small_motion import make_motion
 
 from keyrecon.annotate.server.descriptions import guided_order
 from keyrecon.annotate.server.events import Events
@@ -16,6 +17,7 @@ from keyrecon.annotate.store.cells import by_frame
 from keyrecon.annotate.store.watch import Watch
 from keyrecon.body import LSP14
 from keyrecon.io.formats.keyframes import keyframes_to_json
+from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.records import HalfKeyframes, Keyframes
 
 
@@ -160,6 +162,16 @@ def test_a_frame_that_bears_marks_is_listed_even_if_nobody_asked_for_it(opened, 
     submit(desk.store, mark(20, "neck", [10, 20, 2]), mark(20, "left_hip", [10, 20, 2]))
     rows = {row["frame"]: row for row in ask(desk, "GET", "/api/project").json()["keyframes"]}
     assert (rows[20]["half"], rows[20]["own"], rows[20]["stands_for"]) == ("both", False, 0)
+
+
+def test_the_motion_is_read_in_stretches_once_it_is_made(opened, folder):
+    desk, motion = opened(), make_motion(frames=50)
+    assert ask(desk, "GET", "/api/motion?from=0&to=5").json() == {}
+    write_motion(folder / "motion.npz", motion)
+    answer = ask(desk, "GET", "/api/motion?from=45&to=60").json()
+    assert (answer["from"], answer["to"], len(answer["points3d"])) == (45, 50, 5)
+    assert np.abs(np.array(answer["points2d"]) - motion.points2d[45:]).max() <= 0.05
+    assert ask(desk, "GET", "/api/motion?from=x").status == 400
 
 
 def test_every_open_page_hears_the_news():
