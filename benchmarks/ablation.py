@@ -64,8 +64,7 @@ def carry(case: Case, model: DepthModel) -> Trial:
     tracks = case.store.keep(
         "propagate",
         propagate_joints,
-        prepared.video,
-        prepared.survey,
+        prepared,
         marks,
         options=PropagateOptions(),
         progress=show,

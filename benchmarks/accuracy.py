@@ -23,9 +23,10 @@ from keyrecon.app.console import show
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
+from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, Preparation, as_printed, prepare, reconstruct, with_height
-from keyrecon.records import Annotations, Motion
+from keyrecon.pipeline import Options, as_printed, prepare, with_height
+from keyrecon.records import Annotations, Motion, Preparation
 from keyrecon.report.summary import annotation_cost
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 

@@ -26,7 +26,7 @@ _PUBLIC = {
     "KeyreconError": "keyrecon.errors",
     "open_video": "keyrecon.io.video",
     "prepare": "keyrecon.pipeline",
-    "reconstruct": "keyrecon.pipeline",
+    "reconstruct": "keyrecon.library",
     "Options": "keyrecon.pipeline",
     "Pick": "keyrecon.records",
     "Annotations": "keyrecon.records",

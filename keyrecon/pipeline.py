@@ -1,21 +1,21 @@
 """The recipe: everything up to the person, and everything after.
 
 `prepare` finds the player, draws edge elements, compares all frames and chooses the keyframes
-that a person should annotate. `reconstruct` carries the annotated joints to every frame, lifts
+that a person should annotate. `reconstruct` propagates the annotated joints to every frame, lifts
 them to 3D and refines the motion. Both call their stages through `keep`: by default it just
-runs them; the command line passes one that returns stored results where nothing has changed.
+calls them; the command line passes one that returns stored results where nothing has changed.
+Nothing here reads or writes a file: learnt models come in as values (`Models`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, ParamSpec, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
-from keyrecon.io.formats.model_file import BUILT_IN_DEPTH_MODEL, read_depth_model, read_motion_model
 from keyrecon.io.video import Video
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.selection import (
@@ -31,17 +31,10 @@ from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, pro
 from keyrecon.records import (
     SOURCES,
     Annotations,
-    Background,
-    CameraPath,
-    Colors,
     JointTracks,
-    Keyframes,
     Motion,
     Pick,
-    PlayerContours,
-    PoseDistances,
-    Survey,
-    Track,
+    Preparation,
 )
 from keyrecon.segmentation.background_model import BackgroundOptions, build_background
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
@@ -50,7 +43,38 @@ from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
 from keyrecon.tracking.tracker import TrackOptions, track_player
 
-Keep = Callable[..., Any]
+Inputs = ParamSpec("Inputs")
+Result = TypeVar("Result")
+
+
+@runtime_checkable
+class Keep(Protocol):
+    """Calls a stage, or gives what the same call gave before.
+
+    The name is for those that store results. Arguments and result are typed as the stage's own.
+    """
+
+    def __call__(
+        self,
+        name: str,
+        stage: Callable[Inputs, Result],
+        /,
+        *inputs: Inputs.args,
+        **named: Inputs.kwargs,
+    ) -> Result:
+        """The stage's result for these inputs."""
+        ...
+
+
+def call_stage(
+    name: str,
+    stage: Callable[Inputs, Result],
+    /,
+    *inputs: Inputs.args,
+    **named: Inputs.kwargs,
+) -> Result:
+    """Call a stage; the simplest `Keep`."""
+    return stage(*inputs, **named)
 
 
 @dataclass(frozen=True)
@@ -77,140 +101,172 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Preparation:
-    """Everything known before a person annotates keyframes."""
+class Models:
+    """What was learnt from captures before; None does without."""
 
-    video: Video
-    camera: CameraPath
-    colors: Colors
-    track: Track
-    background: Background
-    figures: PlayerContours
-    comparison: PoseDistances
-    keyframes: Keyframes
-
-    @property
-    def survey(self) -> Survey:
-        """What is needed to carry joints over."""
-        return Survey(self.figures, self.track, self.camera, self.comparison, self.keyframes)
-
-
-def run(
-    name: str,
-    stage: Callable[..., Any],
-    *inputs: object,
-    options: object = None,
-    progress: Progress = silent,
-) -> Any:
-    """Run a stage; the simplest `keep`. The name is for those that store results."""
-    return stage(*inputs, **({} if options is None else {"options": options}), progress=progress)
+    depth: DepthModel | None = None
+    """Helps with depth signs that nobody gave."""
+    swing: MotionModel | None = None
+    """Golf's prior; needed where `Options.prior` asks for it."""
 
 
 def prepare(
     video: Video,
     picks: Sequence[Pick],
     options: Options = Options(),
-    keep: Keep = run,
+    keep: Keep = call_stage,
     progress: Progress = silent,
 ) -> Preparation:
-    """Find the player, compare all frames and choose the keyframes to annotate (Section 4).
+    """Find the player, compare all frames and choose the keyframes to annotate.
 
-    Raises KeyreconError when a pick is off the picture, the player is not found in most frames,
-    or the annotation budget cannot be met.
+    ECCV 2004, Section 4. Raises KeyreconError when a pick is off the picture, the player is not
+    found in most frames, or the annotation budget cannot be met.
     """
-    picks = tuple(picks)
     count_labels(options.keyframes, len(video))  # a person waits minutes for the choice itself
-
-    def make(name: str, stage: Callable[..., Any], *inputs: object) -> Any:
-        stage_options = getattr(options, name)
-        return keep(name, stage, *inputs, options=stage_options, progress=progress)
-
-    camera = make("camera", estimate_camera_motion, video)
-    colors = make("colors", learn_colors, video, picks)
-    rough = make("find", find_player, video, colors, camera)
-    background = make("background", build_background, video, camera, rough)
-    track = make("track", track_player, video, rough, camera, background, colors)
-    figures = make("edges", find_edges, video, track, camera, background, colors)
-    comparison = make("compare", compare_frames, figures.edges, track)
-    keyframes = make("keyframes", choose_keyframes, comparison, video.fps)
-    return Preparation(video, camera, colors, track, background, figures, comparison, keyframes)
+    camera = keep(
+        "camera", estimate_camera_motion, video, options=options.camera, progress=progress
+    )
+    colors = keep(
+        "colors", learn_colors, video, tuple(picks), options=options.colors, progress=progress
+    )
+    detected = keep(
+        "find", find_player, video, colors, camera, options=options.find, progress=progress
+    )
+    background = keep(
+        "background",
+        build_background,
+        video,
+        camera,
+        detected,
+        options=options.background,
+        progress=progress,
+    )
+    track = keep(
+        "track",
+        track_player,
+        video,
+        detected,
+        camera,
+        background,
+        colors,
+        options=options.track,
+        progress=progress,
+    )
+    contours = keep(
+        "edges",
+        find_edges,
+        video,
+        track,
+        camera,
+        background,
+        colors,
+        options=options.edges,
+        progress=progress,
+    )
+    distances = keep(
+        "compare",
+        compare_frames,
+        contours.edges,
+        track,
+        options=options.compare,
+        progress=progress,
+    )
+    keyframes = keep(
+        "keyframes",
+        choose_keyframes,
+        distances,
+        video.fps,
+        options=options.keyframes,
+        progress=progress,
+    )
+    return Preparation(video, camera, colors, track, background, contours, distances, keyframes)
 
 
 def reconstruct(
     preparation: Preparation,
     annotations: Annotations,
+    models: Models,
     options: Options = Options(),
-    keep: Keep = run,
+    keep: Keep = call_stage,
     progress: Progress = silent,
 ) -> Motion:
-    """Carry the annotated joints to every frame and recover the 3D motion (Sections 5 and 6).
+    """Propagate the annotated joints to every frame and recover the 3D motion.
 
-    Lengths are in metres where `options.lift.height` is given, else in body heights. Raises
-    KeyreconError when keyframes are not annotated.
+    ECCV 2004, Sections 5 and 6. Lengths are in metres where `options.lift.height` is given, else
+    in body heights. Raises KeyreconError when keyframes are not annotated.
     """
-    model = _depth_model(options)  # a wrong file is told of before minutes are spent
-    preparation = _with_annotated(preparation, annotations, options, progress)
-    video, keyframes = preparation.video, preparation.keyframes
+    preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
+    video, height = preparation.video, preparation.track.height
     tracks = keep(
         "propagate",
         propagate_joints,
-        video,
-        preparation.survey,
+        preparation,
         annotations,
         options=options.propagate,
         progress=progress,
     )
-    height, expected = preparation.track.height, None
-    if options.prior == "golf":
-        pictures = height, (video.width, video.height)
-        known = (tracks, annotations, read_motion_model(), pictures, video.time)
-        expected = keep("swing", fit_swing_prior, *known, options=options.swing, progress=progress)
-    inputs = (tracks, annotations, keyframes, height, video.fps, expected, model)
-    lifted = keep("lift", lift_motion, *inputs, options=options.lift, progress=progress)
-    return assemble_motion(preparation, annotations, (tracks, lifted), options.lift.height)
-
-
-def _depth_model(options: Options) -> DepthModel | None:
-    """The depth model that was asked for."""
-    if options.depths == "none":
-        return None
-    return read_depth_model(
-        BUILT_IN_DEPTH_MODEL if options.depths == "built-in" else Path(options.depths)
+    expected = None
+    if options.prior == "golf" and models.swing is not None:
+        expected = keep(
+            "swing",
+            fit_swing_prior,
+            tracks,
+            annotations,
+            models.swing,
+            (height, (video.width, video.height)),
+            video.time,
+            options=options.swing,
+            progress=progress,
+        )
+    lifted = keep(
+        "lift",
+        lift_motion,
+        tracks,
+        annotations,
+        preparation.keyframes,
+        height,
+        video.fps,
+        expected,
+        models.depth,
+        options=options.lift,
+        progress=progress,
     )
+    return assemble_motion(video, annotations, tracks, lifted, options.lift.height)
 
 
-def _with_annotated(
+def _with_annotated_keyframes(
     preparation: Preparation, annotations: Annotations, options: Options, progress: Progress
 ) -> Preparation:
     """The keyframes that were annotated, where these are not just the ones asked for."""
     asked, lower = preparation.keyframes, annotations.skeleton.is_lower
     marked = np.isfinite(annotations.joints).all(axis=2)
-    served = [marked[:, half].mean(axis=1) >= LEAST_MARKED for half in (~lower, lower)]
-    frames = tuple(annotations.frames[rows] for rows in served)
-    if not all(len(f) for f in frames):
-        name = "upper" if not len(frames[0]) else "lower"
-        raise KeyreconError(f"No frame has most joints of the {name} body annotated.")
-    if np.array_equal(frames[0], asked.upper.frames) and np.array_equal(
-        frames[1], asked.lower.frames
+    of_upper, of_lower = (
+        annotations.frames[marked[:, half].mean(axis=1) >= LEAST_MARKED] for half in (~lower, lower)
+    )
+    for name, frames in (("upper", of_upper), ("lower", of_lower)):
+        if not len(frames):
+            raise KeyreconError(f"No frame has most joints of the {name} body annotated.")
+    if np.array_equal(of_upper, asked.upper.frames) and np.array_equal(
+        of_lower, asked.lower.frames
     ):
         return preparation
     adopted = adopt_keyframes(
-        preparation.comparison, asked, frames, options.keyframes, progress=progress
+        preparation.pose_distances, asked, (of_upper, of_lower), options.keyframes, progress
     )
     return replace(preparation, keyframes=adopted)
 
 
 def assemble_motion(
-    preparation: Preparation,
+    video: Video,
     annotations: Annotations,
-    found: tuple[JointTracks, LiftResult],
+    tracks: JointTracks,
+    lifted: LiftResult,
     height: float | None,
 ) -> Motion:
     """The result with the evidence behind each joint, in metres where a height was given."""
-    tracks, lifted = found
-    video, carried = preparation.video, np.isfinite(tracks.joints).all(axis=2)
-    source = np.where(carried, SOURCES.index("propagated"), SOURCES.index("interpolated"))
-    source[carried & lifted.rejected] = SOURCES.index("refined")
+    propagated = np.isfinite(tracks.joints).all(axis=2)
+    source = np.where(propagated, SOURCES.index("propagated"), SOURCES.index("interpolated"))
+    source[propagated & lifted.rejected] = SOURCES.index("refined")
     marked = np.isfinite(annotations.joints).all(axis=2)
     source[annotations.frames] = np.where(
         marked, SOURCES.index("annotated"), source[annotations.frames]
@@ -235,6 +291,7 @@ def as_printed(options: Options = Options()) -> Options:
     return replace(
         options,
         find=replace(options.find, pace=EVERY_FRAME),
+        compare=replace(options.compare, largest="observed"),
         track=replace(options.track, method="paper"),
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),

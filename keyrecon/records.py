@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.body import Skeleton
+from keyrecon.io.video import Video
 
 HalfName = Literal["upper", "lower"]
 """The two halves of the body, which have keyframes of their own (Section 4.3)."""
@@ -180,13 +181,16 @@ class Keyframes:
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """What was seen of the player before anything was annotated."""
+class Preparation:
+    """Everything known before a person annotates keyframes."""
 
-    figures: PlayerContours
-    track: Track
+    video: Video
     camera: CameraPath
-    comparison: PoseDistances
+    colors: Colors
+    track: Track
+    background: Background
+    contours: PlayerContours
+    pose_distances: PoseDistances
     keyframes: Keyframes
 
 

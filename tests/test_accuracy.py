@@ -34,7 +34,7 @@ def carried(tmp_path_factory):
     prepared = prepare(open_video(folder / "video.mp4"), read_picks(folder / "picks.json"), options)
     known = truth["points2d"], truth["points3d"], truth["visible"]
     marks = mark_from_truth(prepared.keyframes, *known, MarkOptions(1.0))
-    return prepared, marks, propagate_joints(prepared.video, prepared.survey, marks), truth
+    return prepared, marks, propagate_joints(prepared, marks), truth
 
 
 def lift(carried, marks):

@@ -24,10 +24,11 @@ from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, Preparation, prepare, reconstruct, with_height
+from keyrecon.pipeline import Options, prepare, with_height
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Keyframes, Motion, Pick
+from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.report.summary import annotation_cost
@@ -143,7 +144,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
 
 def _describe_absence(preparation: Preparation) -> list[str]:
     """Stretches in which no keyframes are asked for."""
-    clarity, reach = preparation.comparison.clarity, preparation.keyframes.reach
+    clarity, reach = preparation.pose_distances.clarity, preparation.keyframes.reach
     stretches = list_stretches(absent_frames(clarity, reach))
     if not stretches:
         return []
@@ -237,7 +238,7 @@ def run(
     material = ReportMaterial(
         video=preparation.video,
         track=preparation.track,
-        comparison=preparation.comparison,
+        pose_distances=preparation.pose_distances,
         keyframes=preparation.keyframes,
         annotations=annotations,
         motion=motion,

@@ -8,17 +8,17 @@ Results of earlier stages count by their own hashes, so that nothing large is ha
 import hashlib
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
-from pathlib import Path
-from typing import Any
+from enum import Enum
+from pathlib import Path, PosixPath
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.io.video import Video
-from keyrecon.progress import Progress, silent
 
 PACKAGE = Path(__file__).parent.parent
 SHARED_CODE = (
@@ -33,8 +33,14 @@ SHARED_CODE = (
 """Modules whose change makes the results of every stage anew."""
 KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""
+PLAIN_TYPES = (bool, int, float, complex, str, bytes, type(None), Path, PosixPath)
+"""Values whose text tells all of them; anything else would collide or never be found again."""
 STALE_SECONDS = 3600.0
 """Half-written results older than this were left by a process that was killed."""
+
+
+Inputs = ParamSpec("Inputs")
+Result = TypeVar("Result")
 
 
 class StageStore:
@@ -51,19 +57,18 @@ class StageStore:
     def keep(
         self,
         name: str,
-        stage: Callable[..., Any],
-        *inputs: object,
-        options: object = None,
-        progress: Progress = silent,
-    ) -> Any:
+        stage: Callable[Inputs, Result],
+        /,
+        *inputs: Inputs.args,
+        **named: Inputs.kwargs,
+    ) -> Result:
         """The result of a stage: stored if the same inputs and options made it, else made."""
-        key, path = self._place(name, stage, inputs, options)
+        key, path = self._place(name, stage, inputs, named)
         if path.is_file() and not self.force:
             result = load_record(path)
         else:
             started = time.perf_counter()
-            arguments = {} if options is None else {"options": options}
-            result = stage(*inputs, **arguments, progress=progress)
+            result = stage(*inputs, **named)
             self.seconds[name] = time.perf_counter() - started
             self._forget(name)
             save_record(path, result)
@@ -73,13 +78,13 @@ class StageStore:
     def recall(
         self,
         name: str,
-        stage: Callable[..., Any],
-        *inputs: object,
-        options: object = None,
-        progress: Progress = silent,
-    ) -> Any:
+        stage: Callable[Inputs, Result],
+        /,
+        *inputs: Inputs.args,
+        **named: Inputs.kwargs,
+    ) -> Result:
         """The stored result of a stage, as `keep` would find it; KeyreconError if there is none."""
-        key, path = self._place(name, stage, inputs, options)
+        key, path = self._place(name, stage, inputs, named)
         if not path.is_file():
             raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
         result = load_record(path)
@@ -87,10 +92,15 @@ class StageStore:
         return result
 
     def _place(
-        self, name: str, stage: Callable[..., Any], inputs: tuple, options: object
+        self,
+        name: str,
+        stage: Callable[..., object],
+        inputs: tuple[object, ...],
+        named: Mapping[str, object],
     ) -> tuple[str, Path]:
-        """What tells this result from others, and its file."""
-        key = self._key((_code_of(stage), name, options, *inputs))
+        """What tells this result from others, and its file. How progress is shown changes none."""
+        told = tuple(item for item in sorted(named.items()) if item[0] != "progress")
+        key = self._key((_code_of(stage), name, told, *inputs))
         return key, self.folder / f"{name}-{key}.npz"
 
     def _forget(self, name: str) -> None:
@@ -125,8 +135,10 @@ class StageStore:
             digest.update(f"tuple{len(value)}".encode())
             for part in value:
                 self._digest(part, digest)
-        else:
+        elif isinstance(value, Enum) or type(value) in PLAIN_TYPES:
             digest.update(repr(value).encode())
+        else:
+            raise TypeError(f"a stage was given a {type(value).__name__}, which has no digest")
 
 
 def _code_of(stage: Callable[..., Any]) -> str:

@@ -74,7 +74,7 @@ class KeyframeOptions:
 class HalfDistances:
     """What is known of one half of the body, and what is asked of its keyframes."""
 
-    comparison: PoseDistances
+    pose_distances: PoseDistances
     matched: Float[np.ndarray, "M M"]
     smoothed: Float[np.ndarray, "M M"]
     """D of method='coverage'."""
@@ -93,8 +93,8 @@ class HalfDistances:
 
     def goal(self, beta: float) -> CoverageGoal:
         """What keyframes with `beta` represent, and have to."""
-        hoods = find_neighborhoods(self.distances(beta), self.comparison, self.detour, beta)
-        clarity = self.comparison.clarity[self.comparison.frames]
+        hoods = find_neighborhoods(self.distances(beta), self.pose_distances, self.detour, beta)
+        clarity = self.pose_distances.clarity[self.pose_distances.frames]
         return CoverageGoal(hoods, self.reach, self.uncovered, clarity)
 
 
@@ -160,7 +160,7 @@ def _half(
     step = comparison.step[index]
     same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
     return HalfDistances(
-        comparison=comparison,
+        pose_distances=comparison,
         matched=matched,
         smoothed=smooth_distances(matched, same_pose, options.form),
         first_beta=max(same_pose, LEAST_BETA),
@@ -186,7 +186,7 @@ def _choose_half(
     goal = half.goal(beta)
     if half.options.method == "coverage":
         chosen = _center(half, goal, chosen, most if searched else 0, also)
-    return _record(half, goal, beta, half.comparison.frames[np.sort(chosen)])
+    return _record(half, goal, beta, half.pose_distances.frames[np.sort(chosen)])
 
 
 def _choose(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
@@ -247,8 +247,8 @@ def _center(
     that is annotated for the other half anyway costs the person one frame less to look at,
     which is worth half a percent of the distance.
     """
-    unclear = 2 - goal.clarity - 0.005 * np.isin(half.comparison.frames, also)
-    members = np.bincount(half.comparison.row, minlength=len(goal.clarity))
+    unclear = 2 - goal.clarity - 0.005 * np.isin(half.pose_distances.frames, also)
+    members = np.bincount(half.pose_distances.row, minlength=len(goal.clarity))
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
     weight = members.astype(distance.dtype)
     chosen = add_closest(chosen, most, distance, weight)
@@ -260,7 +260,7 @@ def _center(
 def _record(
     half: HalfDistances, goal: CoverageGoal, beta: float, keyframes: Int[np.ndarray, "K"]
 ) -> HalfKeyframes:
-    comparison, detour = half.comparison, half.detour
+    comparison, detour = half.pose_distances, half.detour
     nearest, distance = assign_frames(half.distances(beta), comparison, detour, keyframes)
     represented = represent_frames(goal.hoods, comparison, detour[keyframes] < beta, keyframes)
     printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))

@@ -27,7 +27,7 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.io.video import Video
 from keyrecon.keyframes.edge_distance import align_edges, match_edges
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Annotations, Edges, HalfKeyframes, HalfName, JointTracks, Survey
+from keyrecon.records import Annotations, Edges, HalfKeyframes, HalfName, JointTracks, Preparation
 
 DETAIL = 125
 """Pixels per player height in the pictures compared: one pixel is one step of the grid."""
@@ -206,63 +206,66 @@ class TransferModel:
 
 
 def transfer_joints(
-    video: Video, survey: Survey, annotations: Annotations, progress: Progress = silent
+    preparation: Preparation, annotations: Annotations, progress: Progress = silent
 ) -> JointTracks:
     """Joints from the assigned keyframe of each half; NaN where missing.
 
     Confidence falls with the pose distance to the keyframe and with the share of elements around
     the joint that find no match.
     """
-    models = _gather_models(video, survey, annotations)
-    shape = (len(survey.track.height), len(annotations.skeleton.names))
+    models = _gather_models(preparation, annotations)
+    shape = (len(preparation.track.height), len(annotations.skeleton.names))
     joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
     source = np.zeros(shape, dtype=np.int64)
     bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
-    frames = progress(_sceneries(video, survey), "carrying joints", shape[0])
+    frames = progress(_sceneries(preparation), "carrying joints", shape[0])
     for t, scenery in enumerate(frames):
         for name, members in (("upper", ~is_lower), ("lower", is_lower)):
-            keyframes = getattr(survey.keyframes, name)
+            keyframes = getattr(preparation.keyframes, name)
             source[t, members] = keyframes.nearest[t]
             model = models.get((name, int(keyframes.nearest[t])))
             if model is None:
                 continue
-            edges = align_edges(survey.figures.edges[t], survey.track, t, name)
+            edges = align_edges(preparation.contours.edges[t], preparation.track, t, name)
             sought, share = _shift_joints(model, edges, bool(keyframes.represented[t]))
-            found = refine_joints(model.scenery, scenery, sought, bones, _anchor(survey, t, name))
+            found = refine_joints(
+                model.scenery, scenery, sought, bones, _anchor(preparation, t, name)
+            )
             joints[t, members] = found[members]
             likeness = np.exp(-keyframes.distance[t] / keyframes.beta)
             confidence[t, members] = np.where(np.isnan(found[:, 0]), 0, share * likeness)[members]
     return JointTracks(joints, confidence, source)
 
 
-def _anchor(survey: Survey, frame: int, name: HalfName) -> Float[np.ndarray, "2"]:
+def _anchor(preparation: Preparation, frame: int, name: HalfName) -> Float[np.ndarray, "2"]:
     """Where aligned coordinates have their origin, px."""
-    return (survey.track.head if name == "upper" else survey.track.mid_feet)[frame]
+    return (preparation.track.head if name == "upper" else preparation.track.mid_feet)[frame]
 
 
-def _sceneries(video: Video, survey: Survey) -> Iterator[PatchSource]:
+def _sceneries(preparation: Preparation) -> Iterator[PatchSource]:
     """Grey pictures of all frames in one size of the player."""
-    width = PatchSource.width_for(video, survey.track.height)
+    video = preparation.video
+    width = PatchSource.width_for(video, preparation.track.height)
     for t, picture in enumerate(video.frames(width=width)):
-        yield crop_patches(picture, video.width, float(survey.track.height[t]))
+        yield crop_patches(picture, video.width, float(preparation.track.height[t]))
 
 
 def _gather_models(
-    video: Video, survey: Survey, annotations: Annotations
+    preparation: Preparation, annotations: Annotations
 ) -> dict[tuple[HalfName, int], TransferModel]:
     """Annotated keyframes by half and frame number."""
-    models = {}
-    width = PatchSource.width_for(video, survey.track.height)
+    models, video = {}, preparation.video
+    width = PatchSource.width_for(video, preparation.track.height)
     for row, frame in enumerate(annotations.frames.tolist()):
-        height = float(survey.track.height[frame])
+        height = float(preparation.track.height[frame])
         scenery = crop_patches(video.frame(frame, width), video.width, height)
         seen = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
         for name in ("upper", "lower"):
-            half: HalfKeyframes = getattr(survey.keyframes, name)
+            half: HalfKeyframes = getattr(preparation.keyframes, name)
             if frame not in half.frames:
                 continue
-            origin = _anchor(survey, frame, name)
-            edges = align_edges(survey.figures.edges[frame], survey.track, frame, name)
+            origin = _anchor(preparation, frame, name)
+            edges = align_edges(preparation.contours.edges[frame], preparation.track, frame, name)
             members = annotations.skeleton.is_lower == (name == "lower")
             joints = np.where(members[:, None], (seen - origin) / height, np.nan)
             models[name, frame] = TransferModel(edges, joints, scenery.around(origin))

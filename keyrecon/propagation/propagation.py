@@ -19,7 +19,6 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.io.video import Video
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
@@ -28,7 +27,7 @@ from keyrecon.propagation.edge_template import AnnotatedPoses, make_edge_templat
 from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.half_propagation import FrameEvidence, InitialHypotheses, propagate_half
-from keyrecon.records import Annotations, HalfName, JointTracks, PoseDistances, Survey
+from keyrecon.records import Annotations, HalfName, JointTracks, PoseDistances, Preparation
 
 LEAST_MARKED = 0.5
 """Share of a half's joints that must be marked for a frame to serve as a figure."""
@@ -50,8 +49,7 @@ class PropagateOptions:
 
 
 def propagate_joints(
-    video: Video,
-    survey: Survey,
+    preparation: Preparation,
     annotations: Annotations,
     options: PropagateOptions = PropagateOptions(),
     progress: Progress = silent,
@@ -63,9 +61,9 @@ def propagate_joints(
     """
     _require_marks(annotations)
     if options.method == "paper":
-        carried = transfer_joints(video, survey, annotations, progress)
+        carried = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, carried)
-    return _fuse(video, survey, annotations, options, progress)
+    return _fuse(preparation, annotations, options, progress)
 
 
 def _require_marks(annotations: Annotations) -> None:
@@ -79,16 +77,15 @@ def _require_marks(annotations: Annotations) -> None:
 
 
 def _fuse(
-    video: Video,
-    survey: Survey,
+    preparation: Preparation,
     annotations: Annotations,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
     """Both halves of the body over the whole video."""
-    window = stabilise_player(survey.track, survey.camera)
-    edges = survey.figures.edges
-    scene = FrameEvidence(index_elements(edges, window), video.fps)
+    window = stabilise_player(preparation.track, preparation.camera)
+    edges = preparation.contours.edges
+    scene = FrameEvidence(index_elements(edges, window), preparation.video.fps)
     count, every = len(edges), np.arange(len(edges))
     joints = np.full((count, len(annotations.skeleton.names)), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
@@ -98,12 +95,12 @@ def _fuse(
         poses = gather_poses(annotations, window, half, settled)
         puppets = make_edge_templates(edges, window, poses, options.elements)
         if half.name == "lower":
-            tracked = window.from_pixels(survey.track.feet, every[:, None])
+            tracked = window.from_pixels(preparation.track.feet, every[:, None])
             puppets = replace(
                 puppets, feet=learn_foot_offsets(half, poses.frames, poses.joints, tracked)
             )
-        distance = distances_to(survey.comparison, half.name, poses.frames)
-        anchor = survey.track.head if half.name == "upper" else survey.track.mid_feet
+        distance = distances_to(preparation.pose_distances, half.name, poses.frames)
+        anchor = preparation.track.head if half.name == "upper" else preparation.track.mid_feet
         at = window.from_pixels(anchor, every)
         start = InitialHypotheses(at[:, None] - at[poses.frames], distance, settled)
         own = half.joints[half.own]

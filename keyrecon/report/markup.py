@@ -24,7 +24,7 @@ class ReportMaterial:
 
     video: Video
     track: Track
-    comparison: PoseDistances
+    pose_distances: PoseDistances
     keyframes: Keyframes
     annotations: Annotations
     motion: Motion

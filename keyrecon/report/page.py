@@ -111,7 +111,7 @@ def _occurrence(material: ReportMaterial) -> str:
             "as peaks and troughs. Diamonds are the keyframes themselves, rings are frames "
             "farther than β from every keyframe. Press a chart to go to a frame."
         ),
-        _chart("occurrence", charts.keyframe_chart(material.keyframes, material.comparison)),
+        _chart("occurrence", charts.keyframe_chart(material.keyframes, material.pose_distances)),
     )
 
 

@@ -66,7 +66,7 @@ def stands_for(half: HalfKeyframes, frame: int) -> int | None:
 
 def matrices(material: ReportMaterial) -> str:
     """Pose distance of every two frames, as pictures with a readout."""
-    keyframes, comparison = material.keyframes, material.comparison
+    keyframes, comparison = material.keyframes, material.pose_distances
     halves = (
         ("Upper body", keyframes.upper, comparison.upper),
         ("Lower body", keyframes.lower, comparison.lower),

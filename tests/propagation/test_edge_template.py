@@ -23,13 +23,13 @@ from keyrecon.propagation.trajectory_smoothing import couple_frames, solve_bande
 LOWER, UPPER = split_body(LSP14)
 
 
-def puppets_of(survey, truth, frames, half):
+def puppets_of(preparation, truth, frames, half):
     """Puppets of the truth on some frames, and the index of all elements."""
-    window = stabilise_player(survey.track, survey.camera)
+    window = stabilise_player(preparation.track, preparation.camera)
     rows = np.array(frames)
     joints = window.from_pixels(truth[rows][:, half.joints], rows[:, None])
     poses = AnnotatedPoses(half, rows, joints, np.ones(joints.shape, bool))
-    edges = survey.figures.edges
+    edges = preparation.contours.edges
     return make_edge_templates(edges, window, poses, 400), index_elements(edges, window), window
 
 
@@ -43,10 +43,10 @@ def test_the_halves_share_out_all_joints_and_mirror_each_other():
 
 
 def test_elements_ride_on_the_bone_they_outline():
-    survey, truth = scene([standing()], (0,))
-    window = stabilise_player(survey.track, survey.camera)
+    preparation, truth = scene([standing()], (0,))
+    window = stabilise_player(preparation.track, preparation.camera)
     pose = window.from_pixels(truth[0][UPPER.joints], 0)
-    riders = assign_to_bones(survey.figures.edges[0], window, 0, pose, UPPER)
+    riders = assign_to_bones(preparation.contours.edges[0], window, 0, pose, UPPER)
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
     forearm = np.isin(UPPER.joints[UPPER.bones[riders.bone, 1]], wrists)
     assert forearm[riders.color == 2].mean() > 0.9
@@ -55,8 +55,8 @@ def test_elements_ride_on_the_bone_they_outline():
 
 
 def test_a_puppet_in_its_own_pose_lies_on_its_own_elements():
-    survey, truth = scene([standing()], (0,))
-    puppets, index, _ = puppets_of(survey, truth, (0,), UPPER)
+    preparation, truth = scene([standing()], (0,))
+    puppets, index, _ = puppets_of(preparation, truth, (0,), UPPER)
     every = np.zeros(1, int)
     figures = FittedFigures(every, every, puppets.poses.joints)
     posed = pose_templates(puppets, every, puppets.poses.joints)
@@ -68,8 +68,8 @@ def test_a_puppet_in_its_own_pose_lies_on_its_own_elements():
 
 
 def test_matches_have_the_same_colour_and_direction():
-    survey, truth = scene([standing()], (0,))
-    puppets, index, _ = puppets_of(survey, truth, (0,), LOWER)
+    preparation, truth = scene([standing()], (0,))
+    puppets, index, _ = puppets_of(preparation, truth, (0,), LOWER)
     every = np.zeros(1, int)
     posed = pose_templates(puppets, every, puppets.poses.joints + 0.03j)
     row, found = match_elements(index, every, posed, 0.06)
@@ -80,8 +80,8 @@ def test_matches_have_the_same_colour_and_direction():
 
 def test_a_fit_turns_a_limb_back_onto_its_edges():
     bent = turned(standing(), "left_elbow", ("left_wrist",), -0.35)
-    survey, truth = scene([standing(), bent], (0,))
-    puppets, index, window = puppets_of(survey, truth, (0,), UPPER)
+    preparation, truth = scene([standing(), bent], (0,))
+    puppets, index, window = puppets_of(preparation, truth, (0,), UPPER)
     one = np.ones(1, int)
     found = register_templates(
         puppets, index, FittedFigures(one, one - 1, puppets.poses.joints)
@@ -92,8 +92,8 @@ def test_a_fit_turns_a_limb_back_onto_its_edges():
 
 def test_an_arm_elsewhere_leaves_edges_unexplained():
     bent = turned(standing(), "left_shoulder", ("left_elbow", "left_wrist"), -1.2)
-    survey, truth = scene([standing(), bent], (0,))
-    puppets, index, _ = puppets_of(survey, truth, (0, 1), UPPER)
+    preparation, truth = scene([standing(), bent], (0,))
+    puppets, index, _ = puppets_of(preparation, truth, (0, 1), UPPER)
     first = np.zeros(2, int)
     far = find_unexplained_edges(puppets, index, FittedFigures(first, first, puppets.poses.joints))
     left = far.min(axis=1).sum(axis=1)
@@ -149,8 +149,8 @@ def test_the_chain_equals_dense_least_squares():
 
 
 def test_the_window_follows_a_panning_camera():
-    survey, truth = scene([standing()] * 9, (0,), origin=(600 + 30.0 * np.arange(9))[:, None])
-    window = stabilise_player(survey.track, survey.camera)
+    preparation, truth = scene([standing()] * 9, (0,), origin=(600 + 30.0 * np.arange(9))[:, None])
+    window = stabilise_player(preparation.track, preparation.camera)
     back = window.to_pixels(window.from_pixels(truth, np.arange(9)[:, None]), np.arange(9)[:, None])
     np.testing.assert_allclose(back, truth)
 

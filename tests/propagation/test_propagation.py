@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from capsule_player import hide, marks, pictures, scene, standing, turned
+from capsule_player import hide, marks, scene, standing, turned
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
@@ -18,14 +18,13 @@ def bending(angles=BEND):
     return [turned(standing(), "right_elbow", RIGHT_ARM, angle) for angle in angles]
 
 
-def carry(survey, annotations, options=PropagateOptions()):
-    video = pictures(len(survey.track.height))
-    return propagate_joints(video, survey, annotations, options)
+def carry(preparation, annotations, options=PropagateOptions()):
+    return propagate_joints(preparation, annotations, options)
 
 
 def test_annotated_frames_keep_their_marks_exactly():
-    survey, truth = scene(bending(), (2, 9))
-    found = carry(survey, marks(truth, (2, 9)))
+    preparation, truth = scene(bending(), (2, 9))
+    found = carry(preparation, marks(truth, (2, 9)))
     np.testing.assert_array_equal(found.joints[[2, 9]], truth[[2, 9]])
     assert (found.confidence[[2, 9]] == 1).all()
     assert (found.keyframe[[2, 9]] == [[2], [9]]).all()
@@ -34,20 +33,20 @@ def test_annotated_frames_keep_their_marks_exactly():
 @pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])
 def test_joints_move_and_grow_with_the_figure(options):
     steps = np.arange(12)
-    survey, truth = scene(
+    preparation, truth = scene(
         [standing()] * 12, (4,), 180 + 5 * steps, np.stack([500 + 8 * steps, 200 + steps], axis=1)
     )
-    found = carry(survey, marks(truth, (4,)), options)
-    away = np.linalg.norm(found.joints - truth, axis=-1) / survey.track.height[:, None]
+    found = carry(preparation, marks(truth, (4,)), options)
+    away = np.linalg.norm(found.joints - truth, axis=-1) / preparation.track.height[:, None]
     assert np.median(away) < 0.01
     assert away.max() < (0.03 if options.method == "fused" else 0.08)
 
 
 def test_a_limb_that_turns_is_followed():
-    survey, truth = scene(bending(), (0,))
-    found = carry(survey, marks(truth, (0,)))
+    preparation, truth = scene(bending(), (0,))
+    found = carry(preparation, marks(truth, (0,)))
     wrist = LSP14.index("right_wrist")
-    away = np.linalg.norm(found.joints - truth, axis=-1)[:, wrist] / survey.track.height
+    away = np.linalg.norm(found.joints - truth, axis=-1)[:, wrist] / preparation.track.height
     # 0.6 rad move the wrist by a tenth of the player's height
     assert away.max() < 0.025
 
@@ -63,52 +62,54 @@ def test_a_crossing_limb_keeps_its_side():
         )
         for angle in swing
     ]
-    survey, truth = scene(poses, (0, 30))
-    found = carry(survey, marks(truth, (0, 30)))
+    preparation, truth = scene(poses, (0, 30))
+    found = carry(preparation, marks(truth, (0, 30)))
     legs = [LSP14.index(n) for n in ("right_knee", "left_knee", "right_ankle", "left_ankle")]
-    away = np.linalg.norm(found.joints - truth, axis=-1)[:, legs] / survey.track.height[:, None]
+    away = (
+        np.linalg.norm(found.joints - truth, axis=-1)[:, legs] / preparation.track.height[:, None]
+    )
     assert (away < 0.06).mean() > 0.95
 
 
 def test_a_hidden_joint_is_missing_the_papers_way_only():
-    survey, truth = scene(bending(), (2, 9))
+    preparation, truth = scene(bending(), (2, 9))
     annotations = hide(marks(truth, (2, 9)), "left_wrist")
     wrist = LSP14.index("left_wrist")
-    as_printed = carry(survey, annotations, PAPER)
+    as_printed = carry(preparation, annotations, PAPER)
     assert np.isnan(as_printed.joints[:, wrist]).all()
     assert (as_printed.confidence[:, wrist] == 0).all()
-    assert np.isfinite(carry(survey, annotations).joints).all()
+    assert np.isfinite(carry(preparation, annotations).joints).all()
 
 
 @pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])
 def test_confidence_falls_with_pose_distance(options):
-    survey, truth = scene(bending(np.linspace(0, 1.2, 13)), (0,))
-    confidence = carry(survey, marks(truth, (0,)), options).confidence.mean(axis=1)
+    preparation, truth = scene(bending(np.linspace(0, 1.2, 13)), (0,))
+    confidence = carry(preparation, marks(truth, (0,)), options).confidence.mean(axis=1)
     assert confidence[1:4].mean() > confidence[-3:].mean()
 
 
 def test_a_joint_that_is_marked_nowhere_is_named():
-    survey, truth = scene(bending(), (2, 9))
+    preparation, truth = scene(bending(), (2, 9))
     annotations = marks(truth, (2, 9))
     annotations.joints[:, LSP14.index("left_knee")] = np.nan
     with pytest.raises(KeyreconError, match="left_knee"):
-        carry(survey, annotations)
+        carry(preparation, annotations)
 
 
 def test_a_joint_left_out_on_one_frame_comes_from_another():
-    survey, truth = scene(bending(), (2, 9))
+    preparation, truth = scene(bending(), (2, 9))
     annotations = marks(truth, (2, 9))
     annotations.joints[1, LSP14.index("left_wrist")] = np.nan
-    found = carry(survey, annotations)
-    away = np.linalg.norm(found.joints - truth, axis=-1) / survey.track.height[:, None]
+    found = carry(preparation, annotations)
+    away = np.linalg.norm(found.joints - truth, axis=-1) / preparation.track.height[:, None]
     assert away.max() < 0.03
 
 
 def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
-    survey, truth = scene(bending(), (2, 9))
+    preparation, truth = scene(bending(), (2, 9))
     annotations = marks(truth, (2, 9))
     hidden = [LSP14.index(n) for n in ("neck", "head_top", "left_elbow", "left_wrist")]
     annotations.joints[1, hidden] = np.nan
-    found = carry(survey, annotations)
-    away = np.linalg.norm(found.joints - truth, axis=-1) / survey.track.height[:, None]
+    found = carry(preparation, annotations)
+    away = np.linalg.norm(found.joints - truth, axis=-1) / preparation.track.height[:, None]
     assert away.max() < 0.03

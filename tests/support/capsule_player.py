@@ -10,12 +10,14 @@ from keyrecon.io.video import Video
 from keyrecon.keyframes.distance_matrix import compare_frames
 from keyrecon.records import (
     Annotations,
+    Background,
     CameraPath,
+    Colors,
     Edges,
     HalfKeyframes,
     Keyframes,
     PlayerContours,
-    Survey,
+    Preparation,
     Track,
 )
 
@@ -89,7 +91,7 @@ def outline(pose, scale, origin):
 
 
 def scene(poses, keyframes, scale=180.0, origin=(600.0, 200.0)):
-    """(survey, truth (T, 14, 2) px) of poses; scale and origin may differ from frame to frame."""
+    """(preparation, truth (T, 14, 2) px) of poses; scale and origin may differ by frame."""
     count = len(poses)
     scale = np.broadcast_to(scale, count).astype(float)
     origin = np.broadcast_to(origin, (count, 2)).astype(float)
@@ -102,7 +104,20 @@ def scene(poses, keyframes, scale=180.0, origin=(600.0, 200.0)):
     halves = [_assign(getattr(comparison, name), keyframes) for name in ("upper", "lower")]
     camera = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
     figures = PlayerContours(edges, np.zeros((count, 1, 1), np.uint8), origin, np.ones(count))
-    return Survey(figures, track, camera, comparison, Keyframes(*halves, 10, 0.95)), truth
+    colors = Colors((), np.zeros((0, 8)), np.zeros(8), 1.0)
+    scenery = np.zeros((1, 1), np.uint8)
+    background = Background(np.dstack([scenery] * 3), scenery + 1.0, scenery > 0, np.eye(3))
+    prepared = Preparation(
+        pictures(count),
+        camera,
+        colors,
+        track,
+        background,
+        figures,
+        comparison,
+        Keyframes(*halves, 10, 0.95),
+    )
+    return prepared, truth
 
 
 def _assign(distance, keyframes):

@@ -45,7 +45,7 @@ def describe_keyframes(study: ProjectCache, own: dict[int, str]) -> Json:
     preparation = study.preparation()
     if preparation is None:
         return {}
-    reasons = explain_keyframes(preparation.comparison, preparation.keyframes, own)
+    reasons = explain_keyframes(preparation.pose_distances, preparation.keyframes, own)
     boxes = preparation.track.box
     frames = {
         frame: {
@@ -211,7 +211,7 @@ def describe_suggestions(
     preparation, motion = study.preparation(), study.motion()
     if preparation is None or motion is None:
         return []
-    found = suggest_frames(preparation.comparison, motion, annotations, taken)
+    found = suggest_frames(preparation.pose_distances, motion, annotations, taken)
     return [{**asdict(one), "gain": round(one.gain, 4)} for one in found]
 
 

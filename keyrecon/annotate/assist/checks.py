@@ -35,7 +35,7 @@ from keyrecon.lifting.limb_lengths import BodySize, LengthOptions
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import fit_similar
 from keyrecon.propagation.propagation import LEAST_MARKED
-from keyrecon.records import Annotations, Survey
+from keyrecon.records import Annotations, Preparation
 
 MOST = 5
 """Other figures that each frame is fitted with."""
@@ -57,11 +57,11 @@ class Neighbours:
     """Share of the figure that finds no edges, 0-1; NaN where there is no such figure."""
 
 
-def find_neighbours(survey: Survey, annotations: Annotations) -> tuple[Neighbours, ...]:
+def find_neighbours(preparation: Preparation, annotations: Annotations) -> tuple[Neighbours, ...]:
     """Both halves of the body, as far as two frames of a half are marked."""
-    scene = scene_of(survey, annotations)
+    scene = scene_of(preparation, annotations)
     lower, upper = split_body(annotations.skeleton)
-    joints = np.full((len(survey.track.head), len(annotations.skeleton.names)), np.nan + 0j)
+    joints = np.full((len(preparation.track.head), len(annotations.skeleton.names)), np.nan + 0j)
     marks = scene.from_pixels(annotations.joints, annotations.frames)
     joints[annotations.frames] = marks
     found = []

@@ -46,7 +46,7 @@ from keyrecon.propagation.trajectory_smoothing import (
     SEARCH_RADII,
     SmoothingInput,
 )
-from keyrecon.records import Annotations, Survey
+from keyrecon.records import Annotations, Preparation
 
 OPTIONS = PropagateOptions()
 HIPS = 0.45
@@ -57,7 +57,7 @@ HIPS = 0.45
 class SuggestionScene:
     """A video whose player was found, and the annotated frames to learn from."""
 
-    survey: Survey
+    preparation: Preparation
     window: BodyFrame
     sources: Annotations
 
@@ -72,9 +72,11 @@ class SuggestionScene:
         return self.window.from_pixels(points, np.arange(len(points)))
 
 
-def scene_of(survey: Survey, sources: Annotations) -> SuggestionScene:
-    """The scene of a survey."""
-    return SuggestionScene(survey, stabilise_player(survey.track, survey.camera), sources)
+def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
+    """The scene of a preparation."""
+    return SuggestionScene(
+        preparation, stabilise_player(preparation.track, preparation.camera), sources
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +101,12 @@ def prepare_fitting(
     frames: Int[np.ndarray, "N"],
 ) -> Fitting:
     """Dress the annotated figures of a half; `joints` has what the other half gives to it."""
-    survey, window = scene.survey, scene.window
+    preparation, window = scene.preparation, scene.window
     poses = gather_poses(scene.sources, window, half, joints[:, half.joints[half.given]])
-    edges = tuple(survey.figures.edges[t] for t in frames)
+    edges = tuple(preparation.contours.edges[t] for t in frames)
     index = index_elements(edges, _some(window, frames))
-    distance = distances_to(survey.comparison, half.name, poses.frames)[frames]
-    at = scene.at(survey.track.head if half.name == "upper" else survey.track.mid_feet)
+    distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
+    at = scene.at(preparation.track.head if half.name == "upper" else preparation.track.mid_feet)
     shift = at[frames][:, None] - at[poses.frames]
     return Fitting(_dress(scene, poses, frames), index, distance, shift, poses.frames)
 
@@ -117,7 +119,7 @@ def _dress(
     scene: SuggestionScene, poses: AnnotatedPoses, frames: Int[np.ndarray, "N"]
 ) -> EdgeTemplates:
     """Annotated figures, and what is looked at in the frames that are asked for."""
-    edges, half, window = scene.survey.figures.edges, poses.half, scene.window
+    edges, half, window = scene.preparation.contours.edges, poses.half, scene.window
     known = replace(poses, frames=np.arange(len(poses.frames)))
     outlines = tuple(edges[t] for t in poses.frames)
     puppets = make_edge_templates(outlines, _some(window, poses.frames), known, OPTIONS.elements)
@@ -125,7 +127,7 @@ def _dress(
     puppets = replace(puppets, listed=list_elements(wanted, half.name, OPTIONS.elements))
     if half.name == "upper":
         return puppets
-    tracked = window.from_pixels(scene.survey.track.feet, np.arange(len(edges))[:, None])
+    tracked = window.from_pixels(scene.preparation.track.feet, np.arange(len(edges))[:, None])
     feet = learn_foot_offsets(half, poses.frames, poses.joints, tracked)
     return replace(puppets, feet=replace(feet, points=feet.points[frames]))
 
@@ -141,7 +143,7 @@ def marked_figures(annotations: Annotations, half: BodyHalf) -> Int[np.ndarray, 
 
 def stand_in(scene: SuggestionScene, joints: Complex[np.ndarray, "T J"], upper: BodyHalf) -> None:
     """Fill in what the lower body gives to the upper one where nothing better is known."""
-    track = scene.survey.track
+    track = scene.preparation.track
     hips = scene.at(track.head + HIPS * (track.mid_feet - track.head))[:, None]
     given = upper.joints[upper.given]
     joints[:, given] = np.where(np.isnan(joints[:, given]), hips, joints[:, given])
@@ -179,28 +181,28 @@ class PoseSuggestion:
     """Annotated frame that each joint comes from, -1 for none."""
 
 
-def choose_sources(survey: Survey, annotations: Annotations, frame: int) -> Annotations:
+def choose_sources(preparation: Preparation, annotations: Annotations, frame: int) -> Annotations:
     """The other annotated frames that look most like `frame`: all that its ghost depends on."""
     others = take_rows(annotations, annotations.frames != frame)
     near = []
     for half in split_body(annotations.skeleton):
         figures = marked_figures(others, half)
-        distance = distances_to(survey.comparison, half.name, figures)[frame]
+        distance = distances_to(preparation.pose_distances, half.name, figures)[frame]
         near.append(figures[np.argsort(distance, kind="stable")[:MOST]])
     return take_rows(others, np.isin(others.frames, np.concatenate(near)))
 
 
 def suggest_joints(
-    survey: Survey,
+    preparation: Preparation,
     sources: Annotations,
     frame: int,
     held: Float[np.ndarray, "J 2"] | None = None,
 ) -> PoseSuggestion:
     """Joints of `frame` from annotated frames; what is marked there already is `held`, px."""
     skeleton = sources.skeleton
-    scene = scene_of(survey, sources)
+    scene = scene_of(preparation, sources)
     lower, upper = split_body(skeleton)
-    joints = np.full((len(survey.track.head), len(skeleton.names)), np.nan + 0j)
+    joints = np.full((len(preparation.track.head), len(skeleton.names)), np.nan + 0j)
     joints[sources.frames] = scene.from_pixels(sources.joints, sources.frames)
     if held is not None:
         joints[frame] = scene.window.from_pixels(held, frame)

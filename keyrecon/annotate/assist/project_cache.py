@@ -27,8 +27,8 @@ from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options, Preparation, prepare
-from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick
+from keyrecon.pipeline import Options, prepare
+from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick, Preparation
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 
@@ -84,14 +84,14 @@ class ProjectCache:
         preparation = self.preparation()
         if preparation is None:
             return None
-        sources = choose_sources(preparation.survey, annotations, frame)
+        sources = choose_sources(preparation, annotations, frame)
         if not len(sources.frames):
             return None
         held = _marks_of(annotations, frame)
         key = _digest(sources.frames, sources.joints, held)
         known = self._ghosts.get(frame)
         if known is None or known[0] != key:
-            known = key, suggest_joints(preparation.survey, sources, frame, held)
+            known = key, suggest_joints(preparation, sources, frame, held)
             self._ghosts[frame] = known
         return known[1]
 
@@ -107,7 +107,7 @@ class ProjectCache:
         if preparation is None:
             return ()
         if self._looks is None or self._looks[0] != key:
-            self._looks = key, find_neighbours(preparation.survey, annotations)
+            self._looks = key, find_neighbours(preparation, annotations)
         return self._looks[1]
 
     def knowledge(self, annotations: Annotations, wait: bool = False) -> BodyEstimate | None:

@@ -25,13 +25,13 @@ def stretching():
 
 @pytest.fixture(scope="module")
 def careful():
-    survey, truth = scene(stretching(), (0, 6))
-    return survey, marks(truth, range(12))
+    preparation, truth = scene(stretching(), (0, 6))
+    return preparation, marks(truth, range(12))
 
 
-def checked(survey, annotations):
-    knowledge = estimate_body(annotations, {}, survey.track.height, 50.0)
-    return find_checks(annotations, knowledge.size, find_neighbours(survey, annotations))
+def checked(preparation, annotations):
+    knowledge = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    return find_checks(annotations, knowledge.size, find_neighbours(preparation, annotations))
 
 
 def changed(annotations, **places):
@@ -47,50 +47,50 @@ def place(annotations, name):
 
 
 def test_true_marks_raise_no_suspicion(careful):
-    survey, annotations = careful
-    assert [c for c in checked(survey, annotations) if c.suspicion > 0.5] == []
+    preparation, annotations = careful
+    assert [c for c in checked(preparation, annotations) if c.suspicion > 0.5] == []
 
 
 def test_swapped_legs_come_first_and_only_once(careful):
-    survey, annotations = careful
+    preparation, annotations = careful
     sides = [(f"left_{part}", f"right_{part}") for part in LEGS]
     swapped = {a: place(annotations, b) for pair in sides for a, b in (pair, pair[::-1])}
-    first, *rest = checked(survey, changed(annotations, **swapped))
+    first, *rest = checked(preparation, changed(annotations, **swapped))
     assert (first.kind, first.frame) == ("crossed", ROW)
     assert "legs" in first.text
     assert not [c for c in rest if c.frame == ROW and c.suspicion > 0.5]
 
 
 def test_a_joint_that_is_elsewhere_is_told_by_the_other_frames(careful):
-    survey, annotations = careful
+    preparation, annotations = careful
     knee, ankle = place(annotations, "left_knee"), place(annotations, "left_ankle")
-    first = checked(survey, changed(annotations, left_ankle=knee + 0.2 * (ankle - knee)))[0]
+    first = checked(preparation, changed(annotations, left_ankle=knee + 0.2 * (ankle - knee)))[0]
     assert (first.kind, first.frame, first.joint) == ("far", ROW, "left_ankle")
     assert "left ankle" in first.text
 
 
 def test_a_forearm_twice_as_long_as_it_can_be_is_told(careful):
-    survey, annotations = careful
+    preparation, annotations = careful
     elbow, wrist = place(annotations, "right_elbow"), place(annotations, "right_wrist")
     moved = changed(annotations, right_wrist=elbow + 2.2 * (wrist - elbow))
-    knowledge = estimate_body(moved, {}, survey.track.height, 50.0)
+    knowledge = estimate_body(moved, {}, preparation.track.height, 50.0)
     first = find_checks(moved, knowledge.size, ())[0]
     assert (first.kind, first.frame, first.joint) == ("long", ROW, "right_wrist")
 
 
 def test_joints_left_out_are_told_together_unless_the_person_said_so(careful):
-    survey, annotations = careful
+    preparation, annotations = careful
     gone = changed(annotations, left_wrist=np.nan, left_elbow=np.nan)
-    first = checked(survey, gone)[0]
+    first = checked(preparation, gone)[0]
     assert (first.kind, first.frame) == ("missing", ROW)
     assert {"left_wrist", "left_elbow"} == set(first.joints)
     absent = ((ROW, "left_elbow"), (ROW, "left_wrist"))
-    assert "missing" not in {c.kind for c in checked(survey, replace(gone, absent=absent))}
+    assert "missing" not in {c.kind for c in checked(preparation, replace(gone, absent=absent))}
 
 
 def test_a_half_that_nobody_began_lacks_nothing(careful):
-    survey, annotations = careful
+    preparation, annotations = careful
     joints = annotations.joints.copy()
     joints[ROW, LSP14.is_lower] = np.nan
-    found = checked(survey, replace(annotations, joints=joints))
+    found = checked(preparation, replace(annotations, joints=joints))
     assert "missing" not in {c.kind for c in found}

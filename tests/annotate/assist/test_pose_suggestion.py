@@ -32,14 +32,14 @@ def game():
 
 
 def away(game, ghost, frame):
-    survey, truth = game
-    return np.linalg.norm(ghost.joints - truth[frame], axis=1) / survey.track.height[frame]
+    preparation, truth = game
+    return np.linalg.norm(ghost.joints - truth[frame], axis=1) / preparation.track.height[frame]
 
 
 def foresee(game, frames, frame):
-    survey, truth = game
-    sources = choose_sources(survey, marks(truth, frames), frame)
-    return suggest_joints(survey, sources, frame)
+    preparation, truth = game
+    sources = choose_sources(preparation, marks(truth, frames), frame)
+    return suggest_joints(preparation, sources, frame)
 
 
 def test_a_pose_between_annotated_ones_is_foreseen(game):
@@ -58,48 +58,48 @@ def test_the_more_is_annotated_the_better_the_ghosts(game):
 
 
 def test_a_half_that_nobody_marked_has_no_ghost(game):
-    survey, truth = game
+    preparation, truth = game
     annotations = marks(truth, (0, 6))
     joints = np.where(LSP14.is_lower[:, None], np.nan, annotations.joints)
-    ghost = suggest_joints(survey, replace(annotations, joints=joints), 8)
+    ghost = suggest_joints(preparation, replace(annotations, joints=joints), 8)
     assert np.isnan(ghost.joints[LSP14.is_lower]).all()
     assert np.isfinite(ghost.joints[~LSP14.is_lower]).all()
     assert (ghost.source[LSP14.is_lower] == -1).all()
 
 
 def test_a_half_of_which_a_joint_was_never_marked_has_no_ghost_yet(game):
-    survey, truth = game
+    preparation, truth = game
     annotations = marks(truth, (0, 6))
     annotations.joints[:, LSP14.index("left_elbow")] = np.nan
-    ghost = suggest_joints(survey, annotations, 8)
+    ghost = suggest_joints(preparation, annotations, 8)
     assert np.isnan(ghost.joints[~LSP14.is_lower]).all()
     assert np.isfinite(ghost.joints[LSP14.is_lower]).all()
 
 
 def test_a_frame_is_never_foreseen_from_its_own_marks(game):
-    survey, truth = game
-    sources = choose_sources(survey, marks(truth, (0, 6, 12)), 6)
+    preparation, truth = game
+    sources = choose_sources(preparation, marks(truth, (0, 6, 12)), 6)
     assert sources.frames.tolist() == [0, 12]
 
 
 def test_what_is_marked_on_the_frame_already_stays_where_it_is(game):
-    survey, truth = game
+    preparation, truth = game
     wrist = LSP14.index("right_wrist")
     held = np.full((14, 2), np.nan)
     held[wrist] = truth[10, wrist] + [9.0, -7.0]
-    sources = choose_sources(survey, marks(truth, (0, 6, 12)), 10)
-    ghost = suggest_joints(survey, sources, 10, held)
+    sources = choose_sources(preparation, marks(truth, (0, 6, 12)), 10)
+    ghost = suggest_joints(preparation, sources, 10, held)
     np.testing.assert_allclose(ghost.joints[wrist], held[wrist], atol=0.1)
 
 
 def test_true_marks_agree_with_one_another_and_a_moved_one_does_not(game):
-    survey, truth = game
+    preparation, truth = game
     annotations = marks(truth, range(0, COUNT, 2))
     wrist = LSP14.index("right_wrist")
     joints = annotations.joints.copy()
-    joints[4, wrist] += 0.15 * survey.track.height[8]
+    joints[4, wrist] += 0.15 * preparation.track.height[8]
     for moved in (annotations, replace(annotations, joints=joints)):
-        _, upper = find_neighbours(survey, moved)
+        _, upper = find_neighbours(preparation, moved)
         place = upper.members.tolist().index(wrist)
         nearest = np.diagonal(upper.away, axis1=2, axis2=3)[:, :, place].min(axis=1)
         assert (np.delete(nearest, 4) < 0.05).all()
@@ -107,13 +107,13 @@ def test_true_marks_agree_with_one_another_and_a_moved_one_does_not(game):
 
 
 def test_a_frame_is_compared_with_others_only(game):
-    survey, truth = game
-    for look in find_neighbours(survey, marks(truth, (0, 4, 8, 12))):
+    preparation, truth = game
+    for look in find_neighbours(preparation, marks(truth, (0, 4, 8, 12))):
         assert look.sources.shape == (4, 3)
         assert not (look.sources == np.arange(4)[:, None]).any()
 
 
 def test_one_annotated_frame_has_nothing_to_be_compared_with(game):
-    survey, truth = game
+    preparation, truth = game
     annotations = marks(truth, (0, 4))
-    assert find_neighbours(survey, take_rows(annotations, annotations.frames == 0)) == ()
+    assert find_neighbours(preparation, take_rows(annotations, annotations.frames == 0)) == ()

@@ -1,0 +1,43 @@
+"""keyrecon as a library: the recipe with the learnt models that its options name.
+
+`pipeline` itself reads no files; here the depth model and the swing prior are read first, so that a
+wrong file is told of before minutes are spent.
+"""
+
+from pathlib import Path
+
+from keyrecon import pipeline
+from keyrecon.io.formats.model_file import (
+    BUILT_IN_DEPTH_MODEL,
+    read_depth_model,
+    read_motion_model,
+)
+from keyrecon.pipeline import Keep, Models, Options, call_stage
+from keyrecon.progress import Progress, silent
+from keyrecon.records import Annotations, Motion, Preparation
+
+
+def reconstruct(
+    preparation: Preparation,
+    annotations: Annotations,
+    options: Options = Options(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+) -> Motion:
+    """Propagate the annotated joints to every frame and recover the 3D motion.
+
+    ECCV 2004, Sections 5 and 6. Lengths are in metres where `options.lift.height` is given, else
+    in body heights. Raises KeyreconError when keyframes are not annotated, or a model that the
+    options name cannot be read.
+    """
+    models = read_models(options)
+    return pipeline.reconstruct(preparation, annotations, models, options, keep, progress)
+
+
+def read_models(options: Options) -> Models:
+    """The depth model and the swing prior that the options ask for."""
+    depth = None
+    if options.depths != "none":
+        built_in = options.depths == "built-in"
+        depth = read_depth_model(BUILT_IN_DEPTH_MODEL if built_in else Path(options.depths))
+    return Models(depth, read_motion_model() if options.prior == "golf" else None)
