@@ -104,7 +104,7 @@ def test_a_proposed_command_can_be_pasted_whatever_the_folder_is_called(
         ("start = 'x'", ("video.start cannot be 'x'",)),
         ("end = true", ("video.end cannot be True",)),
         ("video = 3", ("project.toml cannot be read",)),
-        ("[options]\nlift = 3", ("options.lift cannot be 3",)),
+        ("[options]\nlift = 3", ("options.lift must be a table; found 3",)),
         ("[options.lift]\nheigth = 2.0", ("options.lift.heigth", "does not exist")),
         ("[", ("project.toml cannot be read",)),
     ],

@@ -16,7 +16,6 @@ import os
 import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, explain, quoted
 from keyrecon.io.durable import hold_lock, make_folder, write_durably
 from keyrecon.io.formats.picks import read_picks, write_picks
+from keyrecon.io.option_tables import Record, changed_options, nested_tables, with_changes
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, fingerprint_file, open_video
 from keyrecon.records import Pick
@@ -209,15 +209,15 @@ class Workspace:
         number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
         write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
 
-    def options(self, told: Any, defaults: Any) -> Any:
-        """Options that this project has set, and on top of them what `told` has set otherwise."""
-        kept = _apply(defaults, self.project.get("options", {}), "options")
-        return _apply(kept, _nested(_differences(told, defaults)), "options")
+    def options(self, given: Record, defaults: Record) -> Record:
+        """Options that this project has set, and on top of them what `given` sets otherwise."""
+        kept = with_changes(defaults, self.project.get("options", {}))
+        return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
-    def remember(self, options: Any, defaults: Any) -> None:
+    def remember(self, options: object, defaults: object) -> None:
         """Write the options that differ from the defaults into project.toml."""
         text = self.project_file.read_text().split(OPTIONS_TABLE)[0]
-        changed = _differences(options, defaults)
+        changed = changed_options(options, defaults)
         if changed:
             text += OPTIONS_TABLE + "".join(f"{n} = {json.dumps(v)}\n" for n, v in changed.items())
         if text != self.project_file.read_text():
@@ -238,47 +238,3 @@ def _check_video(told: Any) -> None:
 def _relative(path: Path, folder: Path) -> str:
     """`path` as seen from `folder`, with forward slashes."""
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-
-
-def _differences(options: Any, defaults: Any, prefix: str = "") -> dict[str, Any]:
-    changed = {}
-    for field in fields(options):
-        value, default = getattr(options, field.name), getattr(defaults, field.name)
-        if is_dataclass(value):
-            changed |= _differences(value, default, f"{prefix}{field.name}.")
-        elif value != default and value is not None:
-            changed[prefix + field.name] = value
-    return changed
-
-
-def _nested(changes: dict[str, Any]) -> dict[str, Any]:
-    """Tables within tables from names with dots, as TOML reads them."""
-    tables: dict[str, Any] = {}
-    for name, value in changes.items():
-        *path, last = name.split(".")
-        table = tables
-        for part in path:
-            table = table.setdefault(part, {})
-        table[last] = value
-    return tables
-
-
-def _apply(options: Any, changes: dict, where: str) -> Any:
-    """Set fields of nested option records from nested tables of project.toml."""
-    known = {field.name for field in fields(options)}
-    new = {}
-    for name, value in changes.items():
-        if name not in known:
-            raise KeyreconError(
-                f"project.toml sets {where}.{name}, which does not exist; "
-                f"{where} has {', '.join(sorted(known))}."
-            )
-        old = getattr(options, name)
-        same = isinstance(value, str) == isinstance(old, str)
-        if not same or isinstance(value, dict) != is_dataclass(old):
-            raise KeyreconError(f"project.toml: {where}.{name} cannot be {value!r}.")
-        if is_dataclass(old):
-            new[name] = _apply(old, value, f"{where}.{name}")
-        else:
-            new[name] = tuple(value) if isinstance(value, list) else value
-    return replace(options, **new)

@@ -113,3 +113,27 @@ def test_a_height_that_nobody_has_is_not_remembered(project, height):
     with pytest.raises(KeyreconError, match="height in metres"):
         settings(project, Options(), height)
     assert settings(Workspace(project.folder), Options()) == Options()
+
+
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ('track.method = "papr"', r"options.track.method cannot be 'papr'; it is one of 'filters'"),
+        ('keyframes.form = "median"', "options.keyframes.form cannot be 'median'; it is one of"),
+        ("keyframes.budget = true", "options.keyframes.budget cannot be True; it is a number"),
+        ("propagate.rounds = 2.7", "options.propagate.rounds cannot be 2.7; it is a whole number"),
+        ("keyframes = 5", "options.keyframes must be a table; found 5"),
+        ("keyframes.budgte = 0.02", "options.keyframes.budgte, which does not exist"),
+    ],
+)
+def test_options_in_the_project_file_are_held_against_their_types(bare, line, wanted):
+    file = bare / "project.toml"
+    file.write_text(f"{file.read_text()}\n[options]\n{line}\n")
+    with pytest.raises(KeyreconError, match=wanted):
+        Workspace(bare).options(Options(), Options())
+
+
+def test_whole_numbers_serve_where_numbers_are_wanted(bare):
+    file = bare / "project.toml"
+    file.write_text(f"{file.read_text()}\n[options]\nlift.height = 2\n")
+    assert Workspace(bare).options(Options(), Options()).lift.height == 2

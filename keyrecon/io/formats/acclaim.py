@@ -8,6 +8,7 @@ that ends there; the figure's unit is the file's own (CMU: metres = value * 0.02
 CMU's files do not carry a frame rate; the database was recorded at 120 Hz, with a few trials at 60.
 """
 
+import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,11 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.rigs import CapturedFigure
 
 CMU_RATE = 120.0
-"""Frames per second of the CMU database."""
+"""Frames per second of the CMU database's captures; the format itself has no place for a rate, so
+this is assumed, with a warning, where no comment of the file tells it."""
+RATE_WORDS = ("framerate", "frame-rate", "fps", "samples-per-second")
+"""Words of comments and keyword lines under which exporters note the rate."""
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -52,13 +57,19 @@ def read_acclaim(path: Path) -> CapturedFigure:
     skeleton = find_asf(path)
     try:
         order, degrees, bones = _read_asf(skeleton.read_text(errors="replace"))
-        frames = _read_amc(path.read_text(errors="replace"))
-        return _place_bones(order, degrees, bones, frames)
+        text = path.read_text(errors="replace")
+        fps = _noted_rate(text)
+        figure = _place_bones(order, degrees, bones, _read_amc(text), fps or CMU_RATE)
     except (OSError, ValueError, KeyError, IndexError) as fault:
         raise KeyreconError(
             f"{path} with {skeleton.name} is not a whole ASF/AMC pair ({fault}); "
             "download both again."
         ) from fault
+    if fps is None:
+        logger.warning(
+            "%s does not say its rate; taken as %g frames per second, CMU's.", path, CMU_RATE
+        )
+    return figure
 
 
 def _read_asf(text: str) -> tuple[list[str], bool, list[_Bone]]:
@@ -100,6 +111,15 @@ def _make_bone(name: str, parent: str, values: dict[str, list[str]]) -> _Bone:
     return _Bone(name, parent, (x, y, z), (a, b, c), values["axis"][3].lower(), freedoms)
 
 
+def _noted_rate(text: str) -> float | None:
+    """Frames per second as a comment (# or :) of the file notes it; None where none does."""
+    for line in text.splitlines():
+        words = line.lstrip("#: ").lower().replace("=", " ").replace(":", " ").split()
+        if line[:1] in ("#", ":") and len(words) > 1 and words[0] in RATE_WORDS:
+            return float(words[1])
+    return None
+
+
 def _read_amc(text: str) -> dict[str, np.ndarray]:
     """Values of every bone over all frames, (T, number of its freedoms)."""
     values: dict[str, list[list[float]]] = {}
@@ -120,7 +140,7 @@ def _read_amc(text: str) -> dict[str, np.ndarray]:
 
 
 def _place_bones(
-    order: list[str], degrees: bool, bones: list[_Bone], frames: dict[str, np.ndarray]
+    order: list[str], degrees: bool, bones: list[_Bone], frames: dict[str, np.ndarray], fps: float
 ) -> CapturedFigure:
     root = frames["root"]
     count = len(root)
@@ -137,7 +157,7 @@ def _place_bones(
         rotations[:, i] = rotations[:, above] @ turn
         positions[:, i] = positions[:, above] + rotations[:, i] @ np.array(bone.end)
     parents = (-1, *(names.index(bone.parent) for bone in bones))
-    return CapturedFigure(tuple(names), parents, positions, rotations, CMU_RATE)
+    return CapturedFigure(tuple(names), parents, positions, rotations, fps)
 
 
 def _turn(bone: _Bone, frames: dict[str, np.ndarray], degrees: bool) -> Rotation:

@@ -192,6 +192,17 @@ def test_acclaim_bones_turn_about_their_own_axes(tmp_path):
     assert np.allclose(figure.positions[1], [[0, 0, 0], [-2, 0, 0], [-5, 0, 0]])
 
 
+@pytest.mark.parametrize(
+    ("note", "fps"), [("# fps 60\n", 60), (":FRAMERATE = 50\n", 50), ("", 120)]
+)
+def test_the_rate_of_an_acclaim_file_is_read_or_its_assumption_told(tmp_path, caplog, note, fps):
+    (tmp_path / "7.asf").write_text(ASF)
+    amc = tmp_path / "7_01.amc"
+    amc.write_text(f"{note}:DEGREES\n1\nroot 1 2 3 0 0 0\nthigh 90 0 0\nshank 90\n")
+    assert read_acclaim(amc).fps == fps
+    assert ("7_01.amc does not say its rate" in caplog.text) == (not note)
+
+
 def test_acclaim_faults_are_named(tmp_path):
     amc = tmp_path / "7_01.amc"
     amc.write_text("1\nroot 0 0 0 0 0 0\n")
@@ -225,7 +236,12 @@ def test_a_file_that_is_no_c3d_is_refused(tmp_path):
 def captures():
     if not MOCAP.is_dir():
         return []
-    return sorted(p for p in MOCAP.rglob("*") if p.suffix in (".bvh", ".amc", ".c3d"))
+    files = sorted(p for p in MOCAP.rglob("*") if p.suffix in (".bvh", ".amc", ".c3d"))
+    return [p for p in files if p.name != CUT_SHORT]
+
+
+CUT_SHORT = "jsguevara_Derecha_17seg.bvh"
+"""This one's header and frames disagree by one; it is refused in a line."""
 
 
 @pytest.mark.skipif(not captures(), reason="no motion capture in ../shared/data/mocap")

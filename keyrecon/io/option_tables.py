@@ -1,0 +1,83 @@
+"""Option records as the `[options]` table of project.toml, and back, checked by their types.
+
+Only what differs from the defaults is kept. What a person typed into the file is held against the
+type of the option: a name that does not exist, a word that is not among the choices or a truth value
+where a number belongs is told in one line with what is allowed.
+"""
+
+import types
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from keyrecon.errors import KeyreconError
+
+Record = TypeVar("Record")
+NUMBERS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+
+
+def changed_options(options: object, defaults: object, prefix: str = "") -> dict[str, Any]:
+    """Dotted names and values of the options that differ from the defaults."""
+    changed: dict[str, Any] = {}
+    for field in fields(options):  # type: ignore[arg-type]
+        value, default = getattr(options, field.name), getattr(defaults, field.name)
+        if is_dataclass(value):
+            changed |= changed_options(value, default, f"{prefix}{field.name}.")
+        elif value != default and value is not None:
+            changed[prefix + field.name] = value
+    return changed
+
+
+def nested_tables(changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables within tables from names with dots, as TOML reads them."""
+    tables: dict[str, Any] = {}
+    for name, value in changes.items():
+        *path, last = name.split(".")
+        table = tables
+        for part in path:
+            table = table.setdefault(part, {})
+        table[last] = value
+    return tables
+
+
+def with_changes(options: Record, changes: object, where: str = "options") -> Record:
+    """Options with the fields of nested tables set; KeyreconError names key, value and choice."""
+    if not isinstance(changes, dict):
+        raise KeyreconError(f"project.toml: {where} must be a table; found {changes!r}.")
+    known = {field.name for field in fields(options)}  # type: ignore[arg-type]
+    allowed = get_type_hints(type(options))
+    new: dict[str, Any] = {}
+    for name, value in changes.items():
+        if name not in known:
+            raise KeyreconError(
+                f"project.toml sets {where}.{name}, which does not exist; "
+                f"{where} has {', '.join(sorted(known))}."
+            )
+        current = getattr(options, name)
+        if is_dataclass(current):
+            new[name] = with_changes(current, value, f"{where}.{name}")
+        else:
+            new[name] = _checked(value, allowed[name], f"{where}.{name}")
+    return replace(options, **new)  # type: ignore[type-var]
+
+
+def _checked(value: object, allowed: Any, where: str) -> Any:
+    try:
+        return msgspec.convert(value, type=allowed)
+    except msgspec.ValidationError as fault:
+        raise KeyreconError(
+            f"project.toml: {where} cannot be {value!r}; it is {_describe(allowed)}."
+        ) from fault
+
+
+def _describe(allowed: Any) -> str:
+    """A type in words."""
+    origin, parts = get_origin(allowed), get_args(allowed)
+    if origin is Literal:
+        return "one of " + ", ".join(f"'{choice}'" for choice in parts)
+    if origin in (Union, types.UnionType):
+        return " or ".join(_describe(part) for part in parts if part is not type(None))
+    if origin is tuple:
+        return f"a list, each {_describe(parts[0])}"
+    return NUMBERS.get(allowed, f"a {getattr(allowed, '__name__', allowed)}")
