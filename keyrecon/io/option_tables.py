@@ -1,8 +1,8 @@
 """Option records as the `[options]` table of project.toml, and back, checked by their types.
 
 Only what differs from the defaults is kept. What a person typed into the file is held against the
-type of the option: a name that does not exist, a word that is not among the choices or a truth value
-where a number belongs is told in one line with what is allowed.
+type of the option: a name that does not exist, a word that is not among the choices or a truth
+value where a number belongs is named in one line with what is allowed.
 """
 
 import types
