@@ -9,6 +9,8 @@ plane, which a first-order one would take for a bounce. The key poses vote, wher
 alike in the picture, for the depths that the person confirmed there.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -32,6 +34,7 @@ from keyrecon.lifting.priors.anatomy import (
 )
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.priors.occlusion import hidden_cost
+from keyrecon.numerics.viterbi import find_cheapest_path
 
 _USUAL_SPREAD = 0.4
 """How far depths are from the usual, in lengths of the bone: root mean square over players whose
@@ -142,27 +145,25 @@ def second_order_path(
     doubt: Float[np.ndarray, "T g"],
     options: DepthSignOptions,
 ) -> Int[np.ndarray, "T"]:
-    """Cheapest sequence of states; jumps in the second difference of depth cost (Viterbi).
+    """Cheapest sequence of states; jumps in the second difference of depth cost.
 
     `depth` is |dz| of a group of bones, whose sign vectors are the states.
     """
     frames, states = cost.shape
     if frames < 3:
         return cost.argmin(axis=1)
-    total = cost[0][:, None] + cost[1][None]
-    back = np.zeros((frames, states, states), dtype=np.int8 if states < 128 else np.int64)
-    for first in range(2, frames, _CHUNK):
-        last = min(first + _CHUNK, frames)
-        jumps = _jumps(depth[first - 2 : last], doubt[first - 1 : last - 1], options)
-        for t, jump in enumerate(jumps, first):
-            through = total[:, :, None] + jump
-            back[t] = through.argmin(axis=0)
-            total = through.min(axis=0) + cost[t][None]
-    path = np.zeros(frames, dtype=np.int64)
-    path[-2], path[-1] = np.unravel_index(total.argmin(), total.shape)
-    for t in range(frames - 1, 1, -1):
-        path[t - 2] = back[t, path[t - 1], path[t]]
-    return path
+
+    @lru_cache(maxsize=1)
+    def jumps_of(chunk: int) -> Float[np.ndarray, "n S S S"]:
+        first = chunk * _CHUNK
+        last = min(first + _CHUNK, frames - 2)
+        return _jumps(depth[first : last + 2], doubt[first + 1 : last + 1], options)
+
+    def transition(before: int, _: int) -> Float[np.ndarray, "S S S"]:
+        return jumps_of(before // _CHUNK)[before % _CHUNK]
+
+    pairs = np.broadcast_to(cost[2:, None], (frames - 2, states, states))
+    return find_cheapest_path([cost[0][:, None] + cost[1], *pairs], transition)
 
 
 def _jumps(

@@ -1,106 +1,144 @@
-"""The cheapest path through states that are sometimes missing, by dynamic programming (Viterbi).
+"""The cheapest path through a lattice of states, exactly, by dynamic programming (Viterbi, 1967).
 
-A path pays for each state it takes, for moving from one to the next, and for frames it skips: an
-edge may join frames up to `gap` apart and pays `miss` for each frame between them. Paths start and
-end anywhere at `miss` per frame left out. The minimum over all such paths is exact.
+A frame has any number of states. A path pays for each state that it takes and for each transition,
+and the minimum over all paths is exact; of equally cheap ones it is that with the lowest indices.
+Two extensions serve all users:
 
-The most consistent path through candidates that are sometimes missing (Section 4.1).
+Skips. An edge may join frames up to `max_gap` apart and pays `skip_cost` for each frame between
+them; a path may also start late and end early at that price. Without a skip cost every frame
+takes a state.
 
-States of a frame are candidates (one point each, or an unordered pair of feet). A path pays for
-each state it takes, for movement, and for frames it skips: an edge may join frames up to `gap`
-apart and costs
-
-    |p(t) - p(t - g)|^2 / (2 g sigma^2), at most `jump`,   plus (g - 1) miss,
-
-so that a player who was lost is remembered where they were last seen. Paths start and end
-anywhere at `miss` per frame left out. Positions are given in stabilised coordinates, where a
-camera's own motion is already undone. `keyrecon/paths.py` finds the cheapest path exactly.
+Histories. The costs of a frame may have an axis for each of the last n frames, oldest first: a
+state is then a history, and a transition drops its oldest entry and appends one. A second-order
+chain, whose transitions look at three frames, is a chain of pairs. So are two chains a, b whose
+states are chosen together: (a1, b1) -> (b1, a2) -> (a2, b2), which minimises over one at a time.
 """
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt
 
-SkipTransitions = Callable[[int, int], np.ndarray]
-"""(before, t) -> cost of the way from every state of one frame to every state of a later one; none
-below zero."""
+Transition = Callable[[int, int], np.ndarray]
+"""(before, t) -> cost of the way from every state of one frame to every state of a later one, none
+below zero. Its axes are those of the earlier frame and a last one for the state appended; an axis
+that it does not depend on may have length 1."""
 
 
 def find_cheapest_path(
-    costs: Sequence[Float[np.ndarray, "_"]], moving: SkipTransitions, gap: int, miss: float
+    unary: Sequence[Float[np.ndarray, "..."]],
+    transition: Transition,
+    max_gap: int = 1,
+    skip_cost: float = np.inf,
 ) -> Int[np.ndarray, "T"]:
-    """State taken in each frame, -1 where none; their number differs from frame to frame."""
-    total: list[np.ndarray] = []
-    came: list[np.ndarray] = []
-    for t, own in enumerate(costs):
-        best = np.full(len(own), t * miss)
-        source = np.full((len(own), 2), -1)
-        for g in range(1, min(gap, t) + 1):
-            before = t - g
-            if not len(own) or not len(total[before]):
-                continue
-            if total[before].min() + (g - 1) * miss >= best.max():
-                continue  # no gap this long can be cheaper
-            through = total[before][:, None] + moving(before, t) + (g - 1) * miss
-            last = through.argmin(axis=0)
-            cost = through[last, np.arange(len(own))]
-            better = cost < best
-            best = np.where(better, cost, best)
-            source[better] = np.stack([np.full(len(last), before), last], axis=1)[better]
-        total.append(best + own)
-        came.append(source)
-    return _trace_back(total, came, miss)
+    """State taken in each frame, -1 where none.
 
-
-def _trace_back(
-    total: list[np.ndarray], came: list[np.ndarray], miss: float
-) -> Int[np.ndarray, "T"]:
-    """Follow the cheapest path back from its end."""
-    path = np.full(len(total), -1)
-    ends = [
-        (cost.min() + (len(total) - 1 - t) * miss, t) for t, cost in enumerate(total) if len(cost)
-    ]
-    if not ends or min(ends)[0] >= len(total) * miss:
-        return path
-    t = min(ends)[1]
-    state = int(total[t].argmin())
-    while t >= 0:
-        path[t] = state
-        t, state = came[t][state]
+    With histories of n frames the first cost array stands for n frames, so that the path has
+    n - 1 states more than there are arrays. Skips need histories of one frame.
+    """
+    frames, order = len(unary), max((cost.ndim for cost in unary), default=1)
+    if order > 1 and max_gap > 1:
+        raise ValueError("only a first-order path can skip frames")
+    path = np.full(frames + order - 1, -1)
+    recent: deque[np.ndarray] = deque(maxlen=max_gap)
+    back: list[_Predecessors] = []
+    cheapest, end = _times(frames, skip_cost), None
+    for t, cost in enumerate(unary):
+        arrival, predecessors = _arrive(cost.shape, recent, transition, t, skip_cost)
+        total = arrival + cost
+        recent.appendleft(total)
+        back.append(predecessors)
+        ended = total.min(initial=np.inf) + _times(frames - 1 - t, skip_cost)
+        if ended < cheapest:
+            cheapest, end = ended, (t, np.unravel_index(total.argmin(), total.shape))
+    while end is not None:
+        t, state = end
+        path[t : t + order] = state
+        end = back[t].of(t, state)
     return path
+
+
+@dataclass(frozen=True, eq=False)
+class _Predecessors:
+    """Where the cheapest path to each state of a frame comes from."""
+
+    step: UInt[np.ndarray, "*S"]
+    """Frames back; 0 where the path starts here."""
+    oldest: UInt[np.ndarray, "*S"]
+    """The entry that the predecessor's history has and this one lacks."""
+
+    def of(self, t: int, state: tuple[np.intp, ...]) -> tuple[int, tuple[np.intp, ...]] | None:
+        """Frame and state before this one, None where the path starts."""
+        step = int(self.step[state])
+        return (t - step, (np.intp(self.oldest[state]), *state[:-1])) if step else None
+
+
+def _arrive(
+    shape: tuple[int, ...],
+    recent: Sequence[np.ndarray],
+    transition: Transition,
+    t: int,
+    skip_cost: float,
+) -> tuple[Float[np.ndarray, "*S"], _Predecessors]:
+    """Cheapest way to each state of frame t; `recent` has the totals of the frames before it."""
+    best = np.full(shape, _times(t, skip_cost))
+    step = np.zeros(shape, np.min_scalar_type(recent.maxlen))
+    oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r in recent), default=0)))
+    for gap, before in zip(count(1), recent):
+        skipped = _times(gap - 1, skip_cost)
+        if not best.size or not before.size or before.min() + skipped >= best.max():
+            continue  # no gap this long can be cheaper
+        through = before[..., None] + transition(t - gap, t)
+        if skipped:
+            through += skipped
+        last = through.argmin(axis=0)
+        cost = through.min(axis=0)
+        better = cost < best
+        best = np.where(better, cost, best)
+        step[better] = gap
+        oldest[better] = last[better]
+    return best, _Predecessors(step, oldest)
+
+
+def _times(frames: int, cost: float) -> float:
+    """Cost of some frames, nothing for none even where one costs infinitely much."""
+    return frames * cost if frames else 0.0
 
 
 @dataclass(frozen=True)
 class TransitionModel:
-    """How a path may move; all lengths in the unit of the positions."""
+    """How points may move; all lengths in the unit of the positions."""
 
     sigma: float
     """Usual movement from one frame to the next."""
-    jump: float = 8.0
+    max_cost: float = 8.0
     """Greatest cost of a movement: beyond it a jump is a jump."""
-    miss: float = 4.0
+    skip_cost: float = 4.0
     """Cost of a frame without a state."""
-    gap: int = 25
+    max_gap: int = 25
     """Longest gap that is bridged, frames."""
 
 
-def cheapest_path(
-    costs: Sequence[Float[np.ndarray, "_"]],
+def find_cheapest_track(
+    unary: Sequence[Float[np.ndarray, "_"]],
     points: Sequence[Float[np.ndarray, "_ p 2"]],
-    motion: TransitionModel,
+    model: TransitionModel,
 ) -> Int[np.ndarray, "T"]:
-    """State taken in each frame, -1 where none; m differs from frame to frame.
+    """The most consistent track through candidate points that are sometimes missing (Section 4.1).
 
-    Two points per state are an unordered pair: the cheaper assignment counts.
+    Frames g apart are joined at |p(t) - p(t - g)|^2 / (2 g sigma^2), at most `max_cost`, beside
+    the price of what lies between: a player who was lost is remembered where last observed.
+    Two points per candidate are an unordered pair: the cheaper assignment counts.
     """
 
-    def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
-        usual = 2 * (t - before) * motion.sigma**2
-        return np.minimum(_movement(points[before], points[t]) / usual, motion.jump)
+    def transition(before: int, t: int) -> Float[np.ndarray, "l m"]:
+        usual = 2 * (t - before) * model.sigma**2
+        return np.minimum(_movement(points[before], points[t]) / usual, model.max_cost)
 
-    return find_cheapest_path(costs, moving, motion.gap, motion.miss)
+    return find_cheapest_path(unary, transition, model.max_gap, model.skip_cost)
 
 
 def _movement(

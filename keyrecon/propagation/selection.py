@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from keyrecon.numerics.viterbi import find_cheapest_path
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.foot_evidence import foot_costs
 from keyrecon.propagation.half_body import BodyHalf
@@ -114,35 +115,25 @@ def _unexplained(
 
 def choose_one(states: LimbStates) -> Int[np.ndarray, "T"]:
     """Cheapest path of one limb."""
-    total, back = states.cost[0], []
-    for t in range(1, len(states.cost)):
-        sums = total[:, None] + states.steps(t)
-        back.append(sums.argmin(axis=0))
-        total = sums.min(axis=0) + states.cost[t]
-    path = [int(total.argmin())]
-    for came_from in reversed(back):
-        path.append(int(came_from[path[-1]]))
-    return np.array(path[::-1])
+    return find_cheapest_path(list(states.cost), lambda _, t: states.steps(t))
 
 
 def choose_two(
     one: LimbStates, other: LimbStates, clash: Float[np.ndarray, "T S S"]
 ) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "T"]]:
-    """Cheapest paths of both sides together; `clash` is the cost of pairs of states."""
-    total = one.cost[0][:, None] + other.cost[0] + clash[0]
-    back = []
-    for t in range(1, len(one.cost)):
-        first = one.steps(t)[:, :, None] + total[:, None, :]
-        from_one, total = first.argmin(axis=0), first.min(axis=0)
-        second = total[:, :, None] + other.steps(t)[None]
-        from_other, total = second.argmin(axis=1), second.min(axis=1)
-        total = total + one.cost[t][:, None] + other.cost[t] + clash[t]
-        back.append((from_one, from_other))
-    a, b = np.unravel_index(total.argmin(), total.shape)
-    path = [(a, b)]
-    for from_one, from_other in reversed(back):
-        b_before = from_other[a, b]
-        a, b = from_one[a, b_before], b_before
-        path.append((a, b))
-    paths = np.array(path[::-1])
-    return paths[:, 0], paths[:, 1]
+    """Cheapest paths of both sides together; `clash` is the cost of pairs of states.
+
+    The sides advance in turn, (a1, b1) -> (b1, a2) -> (a2, b2): see `find_cheapest_path`.
+    """
+    both = one.cost[:, :, None] + other.cost[:, None] + clash
+    between = np.zeros(both.shape[:0:-1])
+    unary = [both[0]]
+    for cost in both[1:]:
+        unary += [between, cost]
+
+    def transition(_: int, turn: int) -> Float[np.ndarray, "S 1 S"]:
+        side = one if turn % 2 else other
+        return side.steps((turn + 1) // 2)[:, None]
+
+    path = find_cheapest_path(unary, transition)
+    return path[::2], path[1::2]

@@ -21,7 +21,7 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.errors import KeyreconError
 from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
-from keyrecon.numerics.viterbi import TransitionModel, cheapest_path
+from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
@@ -134,15 +134,15 @@ def _connect(
     step = height / video.fps * float(np.median(np.diff(numbers))) if len(numbers) > 1 else height
     head_cost = _costs([c.head_score for c in found])
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in found], searched)]
-    chosen = cheapest_path(head_cost, stable, TransitionModel(options.head_speed * step))
+    chosen = find_cheapest_track(head_cost, stable, TransitionModel(options.head_speed * step))
     if (chosen >= 0).mean() < LEAST_FOUND:
         raise _lost(chosen, numbers)
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
     pairs, costs = _pair(found, head[numbers], height)
     stable = to_reference_frame([c.feet for c in found], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
-    taken = cheapest_path(
-        costs, stable, TransitionModel(options.foot_speed * step, gap=12, miss=7.0)
+    taken = find_cheapest_track(
+        costs, stable, TransitionModel(options.foot_speed * step, max_gap=12, skip_cost=7.0)
     )
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from keyrecon.numerics.geometry import warp_points
-from keyrecon.numerics.viterbi import TransitionModel, cheapest_path
+from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
 from keyrecon.tracking.foot_pairs import foot_pairs, foot_pose_prior
@@ -94,7 +94,7 @@ def link_head(
     places = [cropping.to_picture(s.heads, t) for t, s in enumerate(seen)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(s.head_strength) for s in seen]
-    chosen = cheapest_path(costs, stable, TransitionModel(sigma))
+    chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
     back = np.linalg.inv(camera.to_reference)
     head = fill_gaps(taken_states(stable, chosen), np.arange(len(seen)), back)[:, 0]
     return head, state_confidence(costs, chosen)
@@ -121,7 +121,9 @@ def link_feet(
         both = _pair(in_picture, own, gait.behind, body)
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
     costs, places = [p.cost for p in pairs], [p.places for p in pairs]
-    taken = cheapest_path(costs, places, TransitionModel(gait.step, gap=12, miss=7.0))
+    taken = find_cheapest_track(
+        costs, places, TransitionModel(gait.step, max_gap=12, skip_cost=7.0)
+    )
     each = taken_states([p.each for p in pairs], taken)
     smooth = smooth_pairs(taken_states(places, taken), each, gait.stiffness)
     return warp_points(back[:, None], smooth), state_confidence([c / 2 for c in costs], taken)
