@@ -28,7 +28,7 @@ from keyrecon.segmentation.background_model import BackgroundOptions, reduced_wi
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
 from keyrecon.segmentation.part_evidence import Reader, first_scene, weigh_evidence
 from keyrecon.tracking.candidates import PartCandidates, search_frame
-from keyrecon.tracking.foot_pairs import foot_pairs, pair_costs
+from keyrecon.tracking.foot_pairs import COLOR_PRIOR, foot_pairs, foot_pose_cost
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.smoothing import (
     fill_gaps,
@@ -161,7 +161,8 @@ def _pair(
     pairs, costs = [], []
     for t, candidates in enumerate(found):
         every = foot_pairs(len(candidates.feet))
-        cost = pair_costs(foot_cost[t], every, candidates.feet, head[t], height)
+        posture = foot_pose_cost(candidates.feet[every], head[t], height, COLOR_PRIOR)
+        cost = foot_cost[t][every].sum(axis=1) + posture
         best = np.argsort(cost)[:PAIRS]
         pairs.append(every[best])
         costs.append(cost[best])

@@ -4,18 +4,64 @@ Feet are alike, so a state of their path is an unordered pair; one candidate may
 one foot hides the other now and then.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.segmentation.part_evidence import SHOE_RADIUS
 
-ONE_SHOE = 1.8
-"""Cost of both feet in one place, found by colour."""
-ONE_PLACE = 2.5
-"""Cost of two candidates in one place where filters found them: they may be one shoe."""
-RAISED = 0.2
-"""Foot that is lifted this far costs as much as one deviation, player heights: a racket is there
-more often."""
+
+@dataclass(frozen=True)
+class FootPosePrior:
+    """Where two feet usually are, player heights; what is beyond costs its square, nats.
+
+    Chosen on rendered sequences; see benchmarks/sensitivity.py.
+    """
+
+    same_place: float
+    """Cost of two candidates in one place: one shoe taken for both explains less of the picture."""
+    min_below_head: float
+    """Mid-feet are farther below the head than this,"""
+    max_below_head: float
+    """and less than this."""
+    max_apart: float
+    """Distance of the feet in a wide lunge."""
+    spread: float
+    """Deviation of what is beyond these."""
+    foot_below_head: float
+    """A foot that is less far below the head than this is lifted."""
+    lift_spread: float
+    """Deviation of a lifted foot: a racket or a knee is at its height more often."""
+    max_uneven: float = np.inf
+    """Difference in height of the two feet beyond which one is lifted."""
+    max_aside: float = 0.5
+    """Distance of mid-feet from the vertical line through the head."""
+    max_cost: float = 12.0
+    """A posture costs at most this: a rare one outweighs no clear candidate."""
+
+
+COLOR_PRIOR = FootPosePrior(
+    same_place=1.8,
+    min_below_head=0.8,
+    max_below_head=1.1,
+    max_apart=0.8,
+    spread=0.12,
+    foot_below_head=0.82,
+    lift_spread=0.1,
+    max_uneven=0.1,
+)
+"""For candidates detected by colour and shape, which lines and rackets have too: strict."""
+FILTER_PRIOR = FootPosePrior(
+    same_place=2.5,
+    min_below_head=0.7,
+    max_below_head=1.15,
+    max_apart=0.85,
+    spread=0.1,
+    foot_below_head=0.8,
+    lift_spread=0.2,
+)
+"""For candidates of filters that know the player's feet; two in one place are often one shoe."""
 
 
 def foot_pairs(count: int) -> Int[np.ndarray, "s 2"]:
@@ -24,40 +70,26 @@ def foot_pairs(count: int) -> Int[np.ndarray, "s 2"]:
     return np.stack([first, second], axis=1)
 
 
-def pair_costs(
-    cost: Float[np.ndarray, "n"],
-    pairs: Int[np.ndarray, "s 2"],
-    feet: Float[np.ndarray, "n 2"],
+def foot_pose_cost(
+    both: Float[np.ndarray, "s 2 2"],
     head: Float[np.ndarray, "2"],
     height: float,
+    prior: FootPosePrior,
 ) -> Float[np.ndarray, "s"]:
-    """Cost of two feet together: their own, and their place below the head."""
-    if not len(pairs):
-        return np.zeros(0)
-    both = feet[pairs]
-    middle = both.mean(axis=1) - head
-    short = np.maximum(0, 0.8 * height - middle[:, 1]) + np.maximum(0, middle[:, 1] - 1.1 * height)
-    aside = np.maximum(0, np.abs(middle[:, 0]) - 0.5 * height)
-    apart = np.maximum(0, np.linalg.norm(both[:, 0] - both[:, 1], axis=1) - 0.8 * height)
-    off = (short**2 + aside**2 + apart**2) / (2 * (0.12 * height) ** 2)
-    # One shoe taken for both feet explains less of the picture than two shoes.
-    near = np.exp(-(((both[:, 0] - both[:, 1]) / (1.2 * SHOE_RADIUS * height)) ** 2).sum(axis=1))
-    # A foot may be lifted, yet a racket or a knee is at its height more often.
-    lifted = np.maximum(0, 0.82 * height - (both[..., 1] - head[1]))
-    uneven = np.maximum(0, np.abs(both[:, 0, 1] - both[:, 1, 1]) - 0.1 * height)
-    off += ((lifted**2).sum(axis=1) + uneven**2) / (2 * (0.1 * height) ** 2)
-    return cost[pairs].sum(axis=1) + ONE_SHOE * near + np.minimum(off, 12.0)
-
-
-def foot_pose_prior(
-    both: Float[np.ndarray, "s 2 2"], head: Float[np.ndarray, "2"], height: float
-) -> Float[np.ndarray, "s"]:
-    """Cost of where two sure feet are below the head and beside one another."""
+    """Cost of where pairs of feet are below the head and beside one another, nats."""
     middle = (both.mean(axis=1) - head) / height
     apart = np.linalg.norm(both[:, 0] - both[:, 1], axis=1) / height
-    off = np.maximum(0, 0.7 - middle[:, 1]) ** 2 + np.maximum(0, middle[:, 1] - 1.15) ** 2
-    off += np.maximum(0, np.abs(middle[:, 0]) - 0.5) ** 2 + np.maximum(0, apart - 0.85) ** 2
-    near = np.exp(-((apart / (1.2 * SHOE_RADIUS)) ** 2))
-    lifted = np.maximum(0, 0.8 - (both[..., 1] - head[1]) / height)
-    raised = (lifted**2).sum(axis=1) / (2 * RAISED**2)
-    return ONE_PLACE * near + np.minimum(off / (2 * 0.1**2) + raised, 12.0)
+    below = middle[:, 1]
+    off = _beyond(prior.min_below_head - below) + _beyond(below - prior.max_below_head)
+    off += _beyond(np.abs(middle[:, 0]) - prior.max_aside) + _beyond(apart - prior.max_apart)
+    same = np.exp(-((apart / (1.2 * SHOE_RADIUS)) ** 2))
+    each = (both[..., 1] - head[1]) / height
+    lifted = _beyond(prior.foot_below_head - each).sum(axis=1)
+    lifted += _beyond(np.abs(each[:, 0] - each[:, 1]) - prior.max_uneven)
+    cost = off / (2 * prior.spread**2) + lifted / (2 * prior.lift_spread**2)
+    return prior.same_place * same + np.minimum(cost, prior.max_cost)
+
+
+def _beyond(excess: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Square of what is above zero."""
+    return np.maximum(0, excess) ** 2

@@ -16,7 +16,7 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
-from keyrecon.tracking.foot_pairs import foot_pairs, foot_pose_prior
+from keyrecon.tracking.foot_pairs import FILTER_PRIOR, foot_pairs, foot_pose_cost
 from keyrecon.tracking.smoothing import (
     fill_gaps,
     smooth_pairs,
@@ -145,7 +145,7 @@ def _pair(
     alone = every[:, 0] == every[:, 1]
     both[alone, 1, 1] -= FARTHER_UP * height
     each[alone, 1] = behind
-    total = each.sum(axis=1) + foot_pose_prior(both, head, height)
+    total = each.sum(axis=1) + foot_pose_cost(both, head, height, FILTER_PRIOR)
     best = np.argsort(total)[:PAIRS]
     return FootPairs(both[best], each[best], total[best])
 
