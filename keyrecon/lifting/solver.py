@@ -12,10 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import solveh_banded
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.bone_directions import pose_from_directions
+from keyrecon.numerics.banded_least_squares import (
+    apply_bands,
+    band_from_blocks,
+    second_difference_bands,
+    solve_banded,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +117,9 @@ def _step(
     hessian, gradient = _gather(lines, basis)
     frames, size = gradient.shape
     weights = np.concatenate([[smoothness.root] * 2, np.repeat(smoothness.bones, 2)])
-    bands = _second_difference_bands(frames)
+    bands = second_difference_bands(frames)
     flat = np.concatenate([state.root, state.directions.reshape(frames, -1)], axis=1)
-    pull = _apply_bands(bands, flat)
+    pull = apply_bands(bands, flat)
     gradient[:, :2] += smoothness.root * pull[:, :2]
     bend = np.einsum("tbik,tbi->tbk", basis, pull[:, 2:].reshape(state.directions.shape))
     gradient[:, 2:] += (smoothness.bones[:, None] * bend).reshape(frames, -1)
@@ -122,9 +127,7 @@ def _step(
     hessian[:, diagonal, diagonal] *= 1 + damping
     hessian[:, diagonal, diagonal] += bands[0][:, None] * weights + 1e-9
     banded = _banded(hessian, basis, bands, smoothness)
-    return -solveh_banded(banded, gradient.ravel(), lower=True, check_finite=False).reshape(
-        frames, size
-    )
+    return -solve_banded(banded, gradient.ravel()).reshape(frames, size)
 
 
 def _gather(
@@ -147,45 +150,23 @@ def _gather(
     return hessian, gradient
 
 
-def _second_difference_bands(frames: int) -> tuple[Float[np.ndarray, "T"], ...]:
-    """Main, first and second diagonal of D'D for the second difference D."""
-    bands = np.zeros((3, frames))
-    for first in range(3):
-        for second in range(first, 3):
-            stencil = (1.0, -2.0, 1.0)
-            bands[second - first, first : frames - 2 + first] += stencil[first] * stencil[second]
-    return tuple(bands)
-
-
-def _apply_bands(
-    bands: tuple[Float[np.ndarray, "T"], ...], values: Float[np.ndarray, "T n"]
-) -> Float[np.ndarray, "T n"]:
-    result = bands[0][:, None] * values
-    for offset in (1, 2):
-        band = bands[offset][:-offset, None]
-        result[:-offset] += band * values[offset:]
-        result[offset:] += band * values[:-offset]
-    return result
-
-
 def _banded(
     hessian: Float[np.ndarray, "T D D"],
     basis: Float[np.ndarray, "T B 3 2"],
-    bands: tuple[Float[np.ndarray, "T"], ...],
+    bands: Float[np.ndarray, "3 T"],
     smoothness: Smoothness,
 ) -> Float[np.ndarray, "w n"]:
     """The normal matrix in scipy's lower banded form; unknowns ordered frame by frame."""
     frames, size, _ = hessian.shape
-    banded = np.zeros((2 * size + 2, frames, size))
-    for column in range(size):
-        banded[: size - column, :, column] = hessian[:, column:, column].T
+    # a bone is coupled with itself alone: nothing lies farther off than two frames and one
+    banded = band_from_blocks([hessian.swapaxes(1, 2)], 2 * size + 2).reshape(-1, frames, size)
     for offset in (1, 2):
         band = bands[offset][:-offset]
         banded[offset * size, :-offset, :2] += smoothness.root * band[:, None]
-        meet = np.einsum("tbik,tbil->tbkl", basis[:-offset], basis[offset:])  # (T-k, B, 2, 2)
-        meet *= band[:, None, None, None] * smoothness.bones[:, None, None]
+        product = np.einsum("tbik,tbil->tbkl", basis[:-offset], basis[offset:])  # (T-k, B, 2, 2)
+        product *= band[:, None, None, None] * smoothness.bones[:, None, None]
         for here in range(2):
             for there in range(2):
                 row = offset * size + there - here
-                banded[row, :-offset, 2 + here :: 2] += meet[:, :, here, there]
+                banded[row, :-offset, 2 + here :: 2] += product[:, :, here, there]
     return banded.reshape(2 * size + 2, frames * size)

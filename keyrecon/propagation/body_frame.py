@@ -1,4 +1,4 @@
-"""Player coordinates: every frame seen from the player, in player heights.
+"""Player coordinates: every frame relative to the player, in player heights.
 
 The origin of a frame is the midpoint of head and feet, smoothed over time after the camera's own
 motion is taken out, so that what moves in these coordinates is the body and neither the camera
@@ -14,13 +14,15 @@ from jaxtyping import Complex, Float, Int
 from keyrecon.numerics.geometry import from_complex, to_complex, warp_points
 from keyrecon.records import CameraPath, Track
 
-STABILISING_SECONDS = 2.5
-"""Spread of the smoothing of the origin, frames: short against a step, long against jitter."""
+SMOOTHING_SECONDS = 0.05
+"""Standard deviation of the smoothing of the origin: short against a step of 0.3 s and more, long
+against the tracker's jitter from frame to frame. Chosen on rendered sequences; see
+benchmarks/sensitivity.py."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyFrame:
-    """Where the player's own coordinates lie in every frame."""
+    """Where the player's coordinate system lies in every frame."""
 
     origin: Complex[np.ndarray, "T"]
     """px"""
@@ -40,19 +42,19 @@ class BodyFrame:
         return from_complex(points * self.height[frames] + self.origin[frames])
 
 
-def stabilise_player(track: Track, camera: CameraPath) -> BodyFrame:
+def stabilise_player(track: Track, camera: CameraPath, fps: float) -> BodyFrame:
     """Player coordinates from head, feet and the camera's motion."""
     middle = (track.head + track.mid_feet) / 2
-    reach = int(np.ceil(2.5 * STABILISING_SECONDS))
+    sigma = SMOOTHING_SECONDS * fps
+    half_width = int(np.ceil(2.5 * sigma))
     last = len(middle) - 1
     now = np.arange(len(middle))
-    back = np.linalg.inv(camera.to_reference)
+    from_reference = np.linalg.inv(camera.to_reference)
     total, weights = np.zeros_like(middle), np.zeros(len(middle))
-    for lag in range(-reach, reach + 1):
-        # mirrored, so that the mean stays at the frame itself at both ends of the video
+    for lag in range(-half_width, half_width + 1):
         other = np.clip(now + lag, 0, last)
-        there = back @ camera.to_reference[other]
-        weight = np.exp(-0.5 * (lag / STABILISING_SECONDS) ** 2) * (other == now + lag)
-        total += weight[:, None] * warp_points(there, middle[other])
+        between = from_reference @ camera.to_reference[other]
+        weight = np.exp(-0.5 * (lag / sigma) ** 2) * (other == now + lag)
+        total += weight[:, None] * warp_points(between, middle[other])
         weights += weight
     return BodyFrame(to_complex(total / weights[:, None]), track.height.astype(float))

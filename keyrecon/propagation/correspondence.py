@@ -1,10 +1,11 @@
-"""Which edge element of a frame an element of a figure corresponds to.
+"""Which edge element of a frame corresponds to which element of a template.
 
 The nearest one of the same colour in place and direction together: the chord between two unit
-tangents, times `BEND`, counts like a distance. Elements that differ by 45 degrees are so far
-apart already that they only match when they lie close, and opposite ones never do, which is the
-paper's rule (Section 4.1) with a soft edge. Colour is a further axis on which different values are
-out of reach. A frame has a few hundred elements at most, so the distances of all pairs,
+tangents, times `TANGENT_SCALE`, counts like a distance. Elements that differ by 45 degrees are so
+far apart already that they only match when they lie close, and opposite ones never do, which is
+the paper's rule (Section 4.1) with a soft edge. Colour is a further axis on which different values
+are out of range. A frame has a few hundred elements at most, so the distances of all pairs of
+descriptors,
 
     |a - b|^2 = |a|^2 + (-2 a, 1) . (b, |b|^2),
 
@@ -21,19 +22,20 @@ from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.records import Edges
 
-BEND = 0.08
-"""Player heights that a chord of length one counts for."""
-APART = 0.25
-"""Spacing of colours on their axis: more than any reach, and little, for the sake of precision."""
-NOWHERE = 1e3
-"""Square of the distance of what only fills up an array."""
-CACHE = 1 << 18
+TANGENT_SCALE = 0.08
+"""Player heights that a chord of length one between tangents counts for. Chosen on rendered
+sequences; see benchmarks/sensitivity.py."""
+COLOR_SPACING = 0.25
+"""Spacing of colours on their axis: more than any search radius, and little, for precision."""
+PADDING_DISTANCE = 1e3
+"""Squared distance of what only fills up an array."""
+CACHED_DISTANCES = 1 << 18
 """Distances in work at a time: they stay in the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
 class ElementIndex:
-    """Edge elements of all frames, ready to be looked up."""
+    """Edge elements of all frames, ready to be matched."""
 
     points: Complex[np.ndarray, "N"]
     """Player coordinates."""
@@ -41,64 +43,66 @@ class ElementIndex:
     color: Int[np.ndarray, "N"]
     first: Int[np.ndarray, "T"]
     """Row of each frame's first element."""
-    offered: Float32[np.ndarray, "T 6 F"]
+    descriptors: Float32[np.ndarray, "T 6 F"]
     """Each frame's elements side by side, (b, |b|^2)."""
 
 
-def index_elements(edges: tuple[Edges, ...], window: BodyFrame) -> ElementIndex:
+def index_elements(edges: tuple[Edges, ...], body_frame: BodyFrame) -> ElementIndex:
     """Put the elements of all frames into player coordinates, frame by frame."""
     count = np.array([len(e.points) for e in edges])
     frame = np.repeat(np.arange(len(edges)), count)
-    points = window.from_pixels(np.concatenate([e.points for e in edges]), frame)
+    points = body_frame.from_pixels(np.concatenate([e.points for e in edges]), frame)
     tangent = to_complex(np.concatenate([e.tangent for e in edges]))
     color = np.concatenate([e.color for e in edges])
     first = np.cumsum(count) - count
-    offered = np.zeros((len(edges), 6, max(1, count.max(initial=0))), np.float32)
-    offered[:, 5] = NOWHERE
-    offered[frame, :, np.arange(len(frame)) - first[frame]] = _offer(_lift(points, tangent, color))
-    return ElementIndex(points, tangent, color, first, offered)
+    descriptors = np.zeros((len(edges), 6, max(1, count.max(initial=0))), np.float32)
+    descriptors[:, 5] = PADDING_DISTANCE
+    place = np.arange(len(frame)) - first[frame]
+    descriptors[frame, :, place] = _with_norms(_describe(points, tangent, color))
+    return ElementIndex(points, tangent, color, first, descriptors)
 
 
-def _lift(
+def _describe(
     points: Complex[np.ndarray, "*n"],
     tangent: Complex[np.ndarray, "*n"],
     color: Int[np.ndarray, "*n"],
 ) -> Float32[np.ndarray, "*n 5"]:
     """Coordinates in which distance tells how well elements correspond."""
-    lifted = np.empty((*points.shape, 5), np.float32)
-    lifted[..., 0], lifted[..., 1] = points.real, points.imag
-    lifted[..., 2], lifted[..., 3] = BEND * tangent.real, BEND * tangent.imag
-    lifted[..., 4] = APART * color
-    return lifted
+    descriptor = np.empty((*points.shape, 5), np.float32)
+    descriptor[..., 0], descriptor[..., 1] = points.real, points.imag
+    descriptor[..., 2] = TANGENT_SCALE * tangent.real
+    descriptor[..., 3] = TANGENT_SCALE * tangent.imag
+    descriptor[..., 4] = COLOR_SPACING * color
+    return descriptor
 
 
-def _offer(lifted: Float32[np.ndarray, "*n 5"]) -> Float32[np.ndarray, "*n 6"]:
+def _with_norms(descriptor: Float32[np.ndarray, "*n 5"]) -> Float32[np.ndarray, "*n 6"]:
     """(b, |b|^2)"""
-    return np.concatenate([lifted, np.square(lifted).sum(axis=-1, keepdims=True)], axis=-1)
+    return np.concatenate([descriptor, np.square(descriptor).sum(axis=-1, keepdims=True)], axis=-1)
 
 
 def _find_nearest(
-    wanted: Float32[np.ndarray, "P Q 5"], offered: Float32[np.ndarray, "P 6 F"], reach: float
+    queries: Float32[np.ndarray, "P Q 5"], descriptors: Float32[np.ndarray, "P 6 F"], radius: float
 ) -> tuple[Int[np.ndarray, "P Q"], Bool[np.ndarray, "P Q"]]:
-    """(position among the offered elements, whether it lies within `reach`)."""
-    both = np.empty((*wanted.shape[:2], 6), np.float32)
-    both[..., :5], both[..., 5] = -2 * wanted, 1
-    nearest, least = np.empty(both.shape[:2], int), np.empty(both.shape[:2], np.float32)
-    step = max(1, CACHE // (wanted.shape[1] * offered.shape[2]))
-    apart = np.empty((step, wanted.shape[1], offered.shape[2]), np.float32)
-    figure, element = np.ogrid[:step, : wanted.shape[1]]
-    for at in range(0, len(wanted), step):
+    """(position of the nearest descriptor, whether it lies within `radius`)."""
+    factors = np.empty((*queries.shape[:2], 6), np.float32)
+    factors[..., :5], factors[..., 5] = -2 * queries, 1
+    nearest, least = np.empty(factors.shape[:2], int), np.empty(factors.shape[:2], np.float32)
+    step = max(1, CACHED_DISTANCES // (queries.shape[1] * descriptors.shape[2]))
+    distance = np.empty((step, queries.shape[1], descriptors.shape[2]), np.float32)
+    row, element = np.ogrid[:step, : queries.shape[1]]
+    for at in range(0, len(queries), step):
         part = slice(at, at + step)
-        count = len(both[part])
-        np.matmul(both[part], offered[part], out=apart[:count])
-        apart[:count].argmin(axis=2, out=nearest[part])
-        least[part] = apart[figure[:count], element, nearest[part]]
-    return nearest, least + np.square(wanted).sum(axis=2) < reach**2
+        count = len(factors[part])
+        np.matmul(factors[part], descriptors[part], out=distance[:count])
+        distance[:count].argmin(axis=2, out=nearest[part])
+        least[part] = distance[row[:count], element, nearest[part]]
+    return nearest, least + np.square(queries).sum(axis=2) < radius**2
 
 
 @runtime_checkable
-class Placed(Protocol):
-    """Elements of P figures: where they are, where they point, what colour they have."""
+class PlacedElements(Protocol):
+    """Elements of P posed templates: position, direction and colour."""
 
     points: Complex[np.ndarray, "P E"]
     tangent: Complex[np.ndarray, "P E"]
@@ -107,55 +111,62 @@ class Placed(Protocol):
 
 
 def match_elements(
-    index: ElementIndex, frames: Int[np.ndarray, "P"], placed: Placed, reach: float
+    index: ElementIndex, frames: Int[np.ndarray, "P"], placed: PlacedElements, radius: float
 ) -> tuple[Int[np.ndarray, "P E"], Bool[np.ndarray, "P E"]]:
-    """(row of the index, whether there is one within `reach` player heights)."""
-    wanted = _lift(placed.points, placed.tangent, placed.color)
-    slot, found = _find_nearest(wanted, index.offered[frames], reach)
-    return np.where(found, index.first[frames][:, None] + slot, 0), found
+    """(row of the index, whether there is one within `radius` player heights)."""
+    queries = _describe(placed.points, placed.tangent, placed.color)
+    place, matched = _find_nearest(queries, index.descriptors[frames], radius)
+    return np.where(matched, index.first[frames][:, None] + place, 0), matched
 
 
-def match_back(
-    index: ElementIndex, listed: Int[np.ndarray, "P F"], placed: Placed, reach: float
-) -> tuple[Int[np.ndarray, "P F"], Bool[np.ndarray, "P F"]]:
-    """For each of the frame's elements, the figure's element it belongs to, likewise."""
-    hit, found = match_parts(index, listed, placed, np.zeros(placed.color.shape, int), 1, reach)
-    return hit[:, 0], found[:, 0]
-
-
-def match_parts(
+def match_frame_elements(
     index: ElementIndex,
-    listed: Int[np.ndarray, "P F"],
-    placed: Placed,
+    frame_elements: Int[np.ndarray, "P F"],
+    placed: PlacedElements,
+    radius: float,
+) -> tuple[Int[np.ndarray, "P F"], Bool[np.ndarray, "P F"]]:
+    """For each of the frame's elements, the template's element it corresponds to, likewise."""
+    one_part = np.zeros(placed.color.shape, int)
+    nearest, matched = match_frame_to_parts(index, frame_elements, placed, one_part, 1, radius)
+    return nearest[:, 0], matched[:, 0]
+
+
+def match_frame_to_parts(
+    index: ElementIndex,
+    frame_elements: Int[np.ndarray, "P F"],
+    placed: PlacedElements,
     part: Int[np.ndarray, "P E"],
     parts: int,
-    reach: float,
+    radius: float,
 ) -> tuple[Int[np.ndarray, "P N F"], Bool[np.ndarray, "P N F"]]:
-    """For each of the frame's elements, the element it belongs to in each part of the figure."""
-    wanted = _lift(index.points[listed], index.tangent[listed], index.color[listed])
-    offered = _offer(_lift(placed.points, placed.tangent, placed.color)).transpose(0, 2, 1)
-    hits = np.zeros((len(listed), parts, listed.shape[1]), int)
-    found = np.zeros(hits.shape, bool)
+    """For each of the frame's elements, its counterpart in each part of the body."""
+    queries = _describe(
+        index.points[frame_elements], index.tangent[frame_elements], index.color[frame_elements]
+    )
+    descriptors = _with_norms(_describe(placed.points, placed.tangent, placed.color))
+    descriptors = descriptors.transpose(0, 2, 1)
+    nearest = np.zeros((len(frame_elements), parts, frame_elements.shape[1]), int)
+    matched = np.zeros(nearest.shape, bool)
     for number in range(parts):
-        others = offered.copy()
-        others[:, 5] += NOWHERE * (part != number)
-        hits[:, number], found[:, number] = _find_nearest(wanted, others, reach)
-    found &= (listed >= 0)[:, None]
-    return np.where(found, hits, 0), found
+        of_part = descriptors.copy()
+        of_part[:, 5] += PADDING_DISTANCE * (part != number)
+        nearest[:, number], matched[:, number] = _find_nearest(queries, of_part, radius)
+    matched &= (frame_elements >= 0)[:, None]
+    return np.where(matched, nearest, 0), matched
 
 
-def spread_choice(count: int, most: int) -> Int[np.ndarray, "N"]:
+def choose_evenly(count: int, most: int) -> Int[np.ndarray, "N"]:
     """At most `most` of `count` numbers, evenly spread."""
     return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(int)
 
 
-def list_elements(edges: tuple[Edges, ...], name: str, most: int) -> Int[np.ndarray, "T F"]:
+def list_half_elements(edges: tuple[Edges, ...], name: str, most: int) -> Int[np.ndarray, "T F"]:
     """Rows of the index of each frame's upper or lower elements, at most `most`; -1 pads."""
     rows = np.full((len(edges), most), -1)
     first = 0
     for t, e in enumerate(edges):
         inside = first + np.flatnonzero(getattr(e, name))
-        inside = inside[spread_choice(len(inside), most)]
+        inside = inside[choose_evenly(len(inside), most)]
         rows[t, : len(inside)] = inside
         first += len(e.points)
     return rows

@@ -1,16 +1,16 @@
-"""Which bone an edge element outlines, and what the outline of a bone looks like on average.
-
-Puppets: the edge elements of annotated frames, each riding on a bone.
+"""Edge templates: the edge elements of annotated frames, each attached to a bone.
 
 An element belongs to the bone it outlines: the near bone that lies on its left, where the
 element's region is (a skin contour across the chest belongs to the arm in front of it, not to the
-torso), and that runs along it. Seen from the bone from a to b it sits at a share of the length and
-at an offset that stays as wide when the bone is foreshortened,
+torso), and that runs along it. In the coordinates of the bone from a to b it sits at a share of the
+length and at an offset that stays as wide when the bone is foreshortened,
 
     e = a + along (b - a) + offset (b - a) / |b - a|,        all complex,
 
 so its place is linear in the joints once the bone's direction is known. That turns "bring the
-annotated figure onto this frame's edges" into small linear least squares.
+annotated template onto this frame's edges" into small linear least squares. What most annotated
+frames have at each place of a bone makes the average outline, which stands in for what a single
+template lacks.
 """
 
 from dataclasses import dataclass, fields
@@ -20,36 +20,38 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
-from keyrecon.propagation.correspondence import list_elements, spread_choice
+from keyrecon.propagation.correspondence import choose_evenly, list_half_elements
 from keyrecon.propagation.foot_evidence import FootEvidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.records import Edges
 
-WIDEST = 0.16
+MAX_OUTLINE_OFFSET = 0.16
 """Farthest an outline lies from its bone, player heights: the side of a loose shirt."""
-ALONG_COST = 0.05
-"""An element square to a bone counts as this much farther away, player heights."""
-FACING = 0.35
-"""Cosine between an element's left and the way to its bone, at least."""
-PLACES = 8
-"""Places along a bone at which its average outline has an element, on either side."""
-END_PITCH = 0.025
-"""Spacing of such places past the end of a bone (hand, foot, crown), player heights."""
-USUAL = 0.25
-"""Share of the annotated figures that must show an element for the average to have it."""
+ANGLE_WEIGHT = 0.05
+"""An element square to a bone counts as this much farther away, player heights. Chosen on
+rendered sequences; see benchmarks/sensitivity.py."""
+MIN_FACING_COSINE = 0.35
+"""Cosine between an element's left and the way to its bone, at least: they may
+differ by 70 degrees. Chosen on rendered sequences; see benchmarks/sensitivity.py."""
+BONE_BINS = 8
+"""Bins along a bone in which its average outline has an element, on either side."""
+END_BIN_LENGTH = 0.025
+"""Length of such bins past the end of a bone (hand, foot, crown), player heights."""
+MIN_OUTLINE_SHARE = 0.25
+"""Share of the annotated frames that must have an element for the average outline to have it."""
 
 
 @dataclass(frozen=True, eq=False)
 class TemplateElements:
-    """Edge elements as their bones see them."""
+    """Edge elements in the coordinates of their bones."""
 
     bone: Int[np.ndarray, "*n"]
     along: Float[np.ndarray, "*n"]
     """0 at the parent end, 1 at the child end."""
     offset: Complex[np.ndarray, "*n"]
     """Real part past an end, imaginary part to the side; player heights."""
-    turn: Complex[np.ndarray, "*n"]
-    """Direction of the tangent."""
+    bone_tangent: Complex[np.ndarray, "*n"]
+    """Direction of the tangent relative to the bone."""
     color: Int[np.ndarray, "*n"]
     """-1 for padding."""
     weight: Float[np.ndarray, "*n"]
@@ -67,10 +69,10 @@ def join_elements(parts: list[TemplateElements]) -> TemplateElements:
 
 
 def assign_to_bones(
-    edges: Edges, window: BodyFrame, frame: int, pose: Complex[np.ndarray, "J"], half: BodyHalf
+    edges: Edges, body_frame: BodyFrame, frame: int, pose: Complex[np.ndarray, "J"], half: BodyHalf
 ) -> TemplateElements:
-    """The elements of a frame that outline a bone; none ride on bones with an unknown end."""
-    point = window.from_pixels(edges.points, frame)[:, None]
+    """The elements of a frame that outline a bone; none belong to bones with an unknown end."""
+    point = body_frame.from_pixels(edges.points, frame)[:, None]
     tangent = to_complex(edges.tangent)[:, None]
     known = np.isfinite(pose)[half.bones].all(axis=1)
     ends = np.nan_to_num(pose)[half.bones]
@@ -82,10 +84,10 @@ def assign_to_bones(
     offset = local - on_bone
     distance = np.abs(offset)
     # left of the tangent on a picture whose y points down is -i times it
-    way = -offset * axis / np.maximum(distance, 1e-9)
-    facing = (way * np.conj(-1j * tangent)).real
-    cost = distance + ALONG_COST * np.abs((tangent * np.conj(axis)).imag)
-    cost[~((facing > FACING) & (distance < WIDEST) & known)] = np.inf
+    to_bone = -offset * axis / np.maximum(distance, 1e-9)
+    facing = (to_bone * np.conj(-1j * tangent)).real
+    cost = distance + ANGLE_WEIGHT * np.abs((tangent * np.conj(axis)).imag)
+    cost[~((facing > MIN_FACING_COSINE) & (distance < MAX_OUTLINE_OFFSET) & known)] = np.inf
     best = cost.argmin(axis=1)
     rows = np.flatnonzero(np.isfinite(cost[np.arange(len(best)), best]))
     best = best[rows]
@@ -95,63 +97,65 @@ def assign_to_bones(
         offset[rows, best],
         tangent[rows, 0] * np.conj(axis[best]),
         edges.color[rows],
-        1 / (1 + (2 * distance[rows, best] / WIDEST) ** 2),
+        1 / (1 + (2 * distance[rows, best] / MAX_OUTLINE_OFFSET) ** 2),
     )
 
 
-def average_outline(seated: list[TemplateElements], half: BodyHalf) -> TemplateElements:
-    """What most annotated figures show at each place of a bone, both sides of the body together."""
-    riders = join_elements(seated)
-    figure = np.repeat(np.arange(len(seated)), [len(one.bone) for one in seated])
-    pair = np.minimum(riders.bone, half.bone_mirror[riders.bone])
-    places = np.column_stack([pair, _place(riders), np.sign(riders.offset.imag), riders.color])
-    places, group = np.unique(places, axis=0, return_inverse=True)
+def average_outline(frames: list[TemplateElements], half: BodyHalf) -> TemplateElements:
+    """What most annotated frames have in each bin of a bone, both sides of the body together."""
+    elements = join_elements(frames)
+    frame = np.repeat(np.arange(len(frames)), [len(one.bone) for one in frames])
+    pair = np.minimum(elements.bone, half.bone_mirror[elements.bone])
+    bins = np.column_stack(
+        [pair, _bin_along_bone(elements), np.sign(elements.offset.imag), elements.color]
+    )
+    bins, group = np.unique(bins, axis=0, return_inverse=True)
     group = group.ravel()
-    found = []
-    for place, (bone, *_) in enumerate(places.astype(int)):
-        members = np.flatnonzero(group == place)
+    outline = []
+    for number, (bone, *_) in enumerate(bins.astype(int)):
+        members = np.flatnonzero(group == number)
         bones = {int(bone), int(half.bone_mirror[bone])}
-        shown = len(np.unique(figure[members] * len(half.bones) + riders.bone[members]))
-        share = shown / (len(seated) * len(bones))
-        if share >= USUAL:
-            found += [_average(riders.take(members), b, share) for b in bones]
-    return join_elements(found) if found else riders.take(np.zeros(0, int))
+        occupied = len(np.unique(frame[members] * len(half.bones) + elements.bone[members]))
+        share = occupied / (len(frames) * len(bones))
+        if share >= MIN_OUTLINE_SHARE:
+            outline += [_average(elements.take(members), b, share) for b in bones]
+    return join_elements(outline) if outline else elements.take(np.zeros(0, int))
 
 
-def _place(riders: TemplateElements) -> Int[np.ndarray, "N"]:
+def _bin_along_bone(elements: TemplateElements) -> Int[np.ndarray, "N"]:
     """Number of the stretch along the bone, or past one of its ends."""
-    past = riders.offset.real
-    along = np.minimum((riders.along * PLACES).astype(int), PLACES - 1)
-    end = np.sign(past).astype(int) * (PLACES + (np.abs(past) / END_PITCH).astype(int))
-    return np.where(np.abs(past) > 0.4 * END_PITCH, end, along)
+    past = elements.offset.real
+    along = np.minimum((elements.along * BONE_BINS).astype(int), BONE_BINS - 1)
+    end = np.sign(past).astype(int) * (BONE_BINS + (np.abs(past) / END_BIN_LENGTH).astype(int))
+    return np.where(np.abs(past) > 0.4 * END_BIN_LENGTH, end, along)
 
 
-def _average(riders: TemplateElements, bone: int, share: float) -> TemplateElements:
+def _average(elements: TemplateElements, bone: int, share: float) -> TemplateElements:
     """One element for many."""
-    turn = riders.turn.mean()
-    offset = np.median(riders.offset.real) + 1j * np.median(riders.offset.imag)
+    tangent = elements.bone_tangent.mean()
+    offset = np.median(elements.offset.real) + 1j * np.median(elements.offset.imag)
     return TemplateElements(
         np.array([bone]),
-        np.median(riders.along, keepdims=True),
+        np.median(elements.along, keepdims=True),
         np.array([offset]),
-        np.array([turn / max(abs(turn), 1e-9)]),
-        riders.color[:1],
+        np.array([tangent / max(abs(tangent), 1e-9)]),
+        elements.color[:1],
         # directions that disagree make a poor average
-        np.array([share * abs(turn) * np.median(riders.weight)]),
+        np.array([share * abs(tangent) * np.median(elements.weight)]),
     )
 
 
 def complete_template(
-    riders: TemplateElements, average: TemplateElements, n_bones: int
+    elements: TemplateElements, average: TemplateElements, n_bones: int
 ) -> TemplateElements:
-    """Bones that a figure shows less than half of get the average outline too, at half weight."""
-    own = np.bincount(riders.bone, riders.weight, n_bones)
-    usual = np.bincount(average.bone, average.weight, n_bones)
-    lent = average.take(np.flatnonzero((own < usual / 2)[average.bone]))
-    lent = TemplateElements(
-        *(getattr(lent, f.name) for f in fields(TemplateElements)[:-1]), lent.weight / 2
+    """Bones of which less than half is outlined get the average outline too, at half weight."""
+    present = np.bincount(elements.bone, elements.weight, n_bones)
+    expected = np.bincount(average.bone, average.weight, n_bones)
+    added = average.take(np.flatnonzero((present < expected / 2)[average.bone]))
+    added = TemplateElements(
+        *(getattr(added, f.name) for f in fields(TemplateElements)[:-1]), added.weight / 2
     )
-    return join_elements([riders, lent])
+    return join_elements([elements, added])
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,20 +166,20 @@ class AnnotatedPoses:
     frames: Int[np.ndarray, "K"]
     joints: Complex[np.ndarray, "K J"]
     known: Bool[np.ndarray, "K J"]
-    """False where a joint was not marked and stands where it usually does."""
+    """False where a joint was not marked and stands where it does on the median."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeTemplates:
-    """Annotated figures of one half of the body and, as the last row, their average outline."""
+    """Templates of one half of the body: one per annotated frame, the average outline last."""
 
     poses: AnnotatedPoses
-    riders: TemplateElements
+    elements: TemplateElements
     """Arrays of K + 1 rows and E elements."""
-    share: Float[np.ndarray, "N E J"]
-    """Share of every joint in the place of every element; N = K + 1."""
-    listed: Int[np.ndarray, "T F"]
-    """The half's own elements in every frame (rows of the index), -1 for none."""
+    joint_weights: Float[np.ndarray, "N E J"]
+    """Weight of every joint in the position of every element; N = K + 1."""
+    frame_elements: Int[np.ndarray, "T F"]
+    """The half's elements in every frame (rows of the index), -1 for none."""
     feet: FootEvidence | None = None
     """For the lower body."""
 
@@ -187,49 +191,51 @@ class EdgeTemplates:
     @property
     def average(self) -> int:
         """Row of the average outline."""
-        return len(self.riders.bone) - 1
+        return len(self.elements.bone) - 1
 
 
 def make_edge_templates(
-    edges: tuple[Edges, ...], window: BodyFrame, poses: AnnotatedPoses, most: int
+    edges: tuple[Edges, ...], body_frame: BodyFrame, poses: AnnotatedPoses, most: int
 ) -> EdgeTemplates:
-    """Seat the elements of annotated frames on their bones, at most `most` each."""
-    half, seated = poses.half, []
+    """Templates of the annotated frames, of at most `most` elements each."""
+    half, outlines = poses.half, []
     for frame, pose, known in zip(poses.frames, poses.joints, poses.known, strict=True):
         marked = np.where(known, pose, np.nan)
-        riders = assign_to_bones(edges[frame], window, int(frame), marked, half)
-        seated.append(riders.take(spread_choice(len(riders.bone), most)))
-    average = average_outline(seated, half)
-    seated = [complete_template(riders, average, len(half.bones)) for riders in seated]
-    return _pad([*seated, average], poses, list_elements(edges, half.name, most))
+        elements = assign_to_bones(edges[frame], body_frame, int(frame), marked, half)
+        outlines.append(elements.take(choose_evenly(len(elements.bone), most)))
+    average = average_outline(outlines, half)
+    outlines = [complete_template(elements, average, len(half.bones)) for elements in outlines]
+    return _pad([*outlines, average], poses, list_half_elements(edges, half.name, most))
 
 
 def _pad(
-    figures: list[TemplateElements], poses: AnnotatedPoses, listed: Int[np.ndarray, "T F"]
+    outlines: list[TemplateElements],
+    poses: AnnotatedPoses,
+    frame_elements: Int[np.ndarray, "T F"],
 ) -> EdgeTemplates:
     """One array per property, filled up with elements that weigh and match nothing."""
-    half, room = poses.half, max(1, *(len(riders.bone) for riders in figures))
+    half, width = poses.half, max(1, *(len(elements.bone) for elements in outlines))
     columns = {}
     for column in fields(TemplateElements):
-        first = getattr(figures[0], column.name)
-        columns[column.name] = np.full((len(figures), room), column.name == "color", first.dtype)
+        first = getattr(outlines[0], column.name)
+        columns[column.name] = np.full((len(outlines), width), column.name == "color", first.dtype)
         columns[column.name] *= -1
-        for row, riders in enumerate(figures):
-            columns[column.name][row, : len(riders.bone)] = getattr(riders, column.name)
-    riders = TemplateElements(**columns)
-    share = np.zeros((*riders.bone.shape, len(half.joints)), np.float32)
-    rows, places = np.indices(riders.bone.shape)
-    share[rows, places, half.bones[riders.bone, 0]] = 1 - riders.along
-    share[rows, places, half.bones[riders.bone, 1]] += riders.along
-    return EdgeTemplates(poses, riders, share, listed)
+        for row, elements in enumerate(outlines):
+            columns[column.name][row, : len(elements.bone)] = getattr(elements, column.name)
+    elements = TemplateElements(**columns)
+    weights = np.zeros((*elements.bone.shape, len(half.joints)), np.float32)
+    rows, places = np.indices(elements.bone.shape)
+    weights[rows, places, half.bones[elements.bone, 0]] = 1 - elements.along
+    weights[rows, places, half.bones[elements.bone, 1]] += elements.along
+    return EdgeTemplates(poses, elements, weights, frame_elements)
 
 
 @dataclass(frozen=True, eq=False)
 class PosedTemplates:
-    """Puppets in poses: element e of figure p lies at share[p, e] @ joints[p] + free[p, e]."""
+    """Templates in poses: element e of p lies at joint_weights[p, e] @ joints[p] + offset[p, e]."""
 
-    share: Float[np.ndarray, "P E J"]
-    free: Complex[np.ndarray, "P E"]
+    joint_weights: Float[np.ndarray, "P E J"]
+    offset: Complex[np.ndarray, "P E"]
     points: Complex[np.ndarray, "P E"]
     tangent: Complex[np.ndarray, "P E"]
     color: Int[np.ndarray, "P E"]
@@ -237,18 +243,20 @@ class PosedTemplates:
 
 
 def pose_templates(
-    puppets: EdgeTemplates,
-    which: Int[np.ndarray, "P"],
+    templates: EdgeTemplates,
+    rows: Int[np.ndarray, "P"],
     joints: Complex[np.ndarray, "P J"],
-    every: int = 1,
+    stride: int = 1,
 ) -> PosedTemplates:
-    """Each n-th element of puppets `which` with their joints at `joints`."""
-    riders = puppets.riders.take(np.s_[which, ::every])
-    share = puppets.share[which, ::every]
-    axis = np.take_along_axis(bone_axes(puppets.half, joints), riders.bone, axis=1)
-    free = riders.offset * axis
-    points = (share @ joints[..., None])[..., 0] + free
-    return PosedTemplates(share, free, points, riders.turn * axis, riders.color, riders.weight)
+    """Each n-th element of the templates in `rows` with their joints at `joints`."""
+    elements = templates.elements.take(np.s_[rows, ::stride])
+    weights = templates.joint_weights[rows, ::stride]
+    axis = np.take_along_axis(bone_axes(templates.half, joints), elements.bone, axis=1)
+    offset = elements.offset * axis
+    points = (weights @ joints[..., None])[..., 0] + offset
+    return PosedTemplates(
+        weights, offset, points, elements.bone_tangent * axis, elements.color, elements.weight
+    )
 
 
 def bone_axes(half: BodyHalf, joints: Complex[np.ndarray, "P J"]) -> Complex[np.ndarray, "P B"]:

@@ -1,8 +1,9 @@
 """Tracked feet as further evidence of where the legs end.
 
 On clay or grass the outline of a bare leg is often lost while the tracker still holds the shoes. It
-does not know left from right, so each foot speaks to the ankle that it fits better, and one that
-fits neither says nothing. How ankles lie beside tracked feet is learnt from the annotated frames.
+does not know left from right, so each foot counts for the ankle that it fits better, and one that
+fits neither counts for nothing. How ankles lie beside tracked feet is learnt from the annotated
+frames.
 """
 
 from dataclasses import dataclass
@@ -11,12 +12,14 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.normal_equations import NormalEquations, add_joint_observations
+from keyrecon.propagation.normal_equations import NormalEquations, joint_equations
 
-FOOT_REACH = 0.08
-"""A foot farther from where the ankle is taken to be counts for little, player heights."""
-LEAST_SPREAD = 0.03
-"""Error of a tracked foot at least, player heights."""
+FOOT_MATCH_DISTANCE = 0.08
+"""A foot farther from where the ankle is estimated counts for little, player heights.
+Chosen on rendered sequences; see benchmarks/sensitivity.py."""
+MIN_FOOT_SPREAD = 0.03
+"""Error of a tracked foot at least, player heights. Chosen on rendered sequences; see
+benchmarks/sensitivity.py."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class FootEvidence:
     points: Complex[np.ndarray, "T 2"]
     """Player coordinates."""
     spread: float
-    """Usual error, player heights."""
+    """Median error, player heights."""
 
 
 def learn_foot_offsets(
@@ -39,20 +42,20 @@ def learn_foot_offsets(
 ) -> FootEvidence:
     """Tracked feet, moved to where the ankles are on annotated frames."""
     ends = np.array([max(side, key=lambda j: half.depth[j]) for side in half.sides])
-    gap = joints[:, ends] - _in_order(tracked[frames], joints[:, ends])
+    gap = joints[:, ends] - _order_feet(tracked[frames], joints[:, ends])
     shift = np.median(gap.real) + 1j * np.median(gap.imag)
     spread = float(np.median(np.abs(gap - shift)))
-    return FootEvidence(ends, tracked + shift, max(spread, LEAST_SPREAD))
+    return FootEvidence(ends, tracked + shift, max(spread, MIN_FOOT_SPREAD))
 
 
-def _in_order(
+def _order_feet(
     feet: Complex[np.ndarray, "P 2"], ends: Complex[np.ndarray, "P 2"]
 ) -> Complex[np.ndarray, "P 2"]:
     """Feet in the order of the leg ends that they fit better."""
-    kept, crossed = (
-        np.minimum(np.abs(f - ends), FOOT_REACH).sum(axis=1) for f in (feet, feet[:, ::-1])
+    direct, crossed = (
+        np.minimum(np.abs(f - ends), FOOT_MATCH_DISTANCE).sum(axis=1) for f in (feet, feet[:, ::-1])
     )
-    return np.where((kept <= crossed)[:, None], feet, feet[:, ::-1])
+    return np.where((direct <= crossed)[:, None], feet, feet[:, ::-1])
 
 
 def foot_equations(
@@ -60,17 +63,17 @@ def foot_equations(
 ) -> NormalEquations:
     """Observations of the ends of the legs."""
     target, weight = np.zeros(joints.shape, complex), np.zeros(joints.shape)
-    target[:, feet.ends] = _in_order(feet.points[frames], joints[:, feet.ends])
-    away = np.abs(target[:, feet.ends] - joints[:, feet.ends])
-    weight[:, feet.ends] = 1 / (feet.spread * (1 + (away / FOOT_REACH) ** 2)) ** 2
-    return add_joint_observations(target, weight)
+    target[:, feet.ends] = _order_feet(feet.points[frames], joints[:, feet.ends])
+    distance = np.abs(target[:, feet.ends] - joints[:, feet.ends])
+    weight[:, feet.ends] = 1 / (feet.spread * (1 + (distance / FOOT_MATCH_DISTANCE) ** 2)) ** 2
+    return joint_equations(target, weight)
 
 
 def foot_costs(
     feet: FootEvidence, joints: Complex[np.ndarray, "T S J"]
 ) -> Float[np.ndarray, "T S J"]:
     """How far each leg ends from the nearer tracked foot, 0-1; 0 for other joints."""
-    miss = np.zeros(joints.shape)
-    apart = np.abs(joints[:, :, feet.ends, None] - feet.points[:, None, None])
-    miss[:, :, feet.ends] = np.minimum(apart.min(axis=3) / FOOT_REACH, 1)
-    return miss
+    cost = np.zeros(joints.shape)
+    distance = np.abs(joints[:, :, feet.ends, None] - feet.points[:, None, None])
+    cost[:, :, feet.ends] = np.minimum(distance.min(axis=3) / FOOT_MATCH_DISTANCE, 1)
+    return cost

@@ -1,8 +1,8 @@
-"""Linear least squares over joints, many figures at once.
+"""Linear least squares over joints, many poses at once.
 
-Every observation is a row that says where a fixed mixture of joints should be, with a 2x2 weight:
+Every observation is a row that says where a weighted sum of joints should be, with a 2x2 weight:
 strong along a normal and weak along the contour for an edge element, strong along the bone and
-weaker across it for a limb's shape. Unknowns of one figure are x of all joints, then y.
+weaker across it for a limb's shape. Unknowns of one pose are x of all joints, then y.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ DAMPING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Normal equations of P figures: `matrix` x = `right`."""
+    """Normal equations of P poses: `matrix` x = `right`."""
 
     matrix: Float[np.ndarray, "P N N"]
     right: Float[np.ndarray, "P N"]
@@ -37,29 +37,29 @@ def joints_from_unknowns(unknowns: Float[np.ndarray, "P N"]) -> Complex[np.ndarr
     return unknowns[:, :half] + 1j * unknowns[:, half:]
 
 
-def add_observations(
-    mixture: Float[np.ndarray, "P R J"],
+def point_equations(
+    joint_weights: Float[np.ndarray, "P R J"],
     target: Complex[np.ndarray, "P R"],
     axis: Complex[np.ndarray, "P R"],
     along: Float[np.ndarray, "P R"],
     across: Float[np.ndarray, "P R"],
 ) -> NormalEquations:
-    """Rows mixture @ joints = target, weighted `along` the unit `axis` and `across` it."""
+    """Rows joint_weights @ joints = target, weighted `along` the unit `axis` and `across` it."""
     cosine, sine = axis.real, axis.imag
     xx = along * cosine**2 + across * sine**2
     yy = along * sine**2 + across * cosine**2
     xy = (along - across) * cosine * sine
-    flipped = mixture.transpose(0, 2, 1)
-    block_xx = flipped @ (xx[..., None] * mixture)
-    block_xy = flipped @ (xy[..., None] * mixture)
-    block_yy = flipped @ (yy[..., None] * mixture)
+    transposed = joint_weights.transpose(0, 2, 1)
+    block_xx = transposed @ (xx[..., None] * joint_weights)
+    block_xy = transposed @ (xy[..., None] * joint_weights)
+    block_yy = transposed @ (yy[..., None] * joint_weights)
     matrix = np.block([[block_xx, block_xy], [block_xy, block_yy]])
-    pull_x = (flipped @ (xx * target.real + xy * target.imag)[..., None])[..., 0]
-    pull_y = (flipped @ (xy * target.real + yy * target.imag)[..., None])[..., 0]
-    return NormalEquations(matrix, np.concatenate([pull_x, pull_y], axis=1))
+    right_x = (transposed @ (xx * target.real + xy * target.imag)[..., None])[..., 0]
+    right_y = (transposed @ (xy * target.real + yy * target.imag)[..., None])[..., 0]
+    return NormalEquations(matrix, np.concatenate([right_x, right_y], axis=1))
 
 
-def add_joint_observations(
+def joint_equations(
     target: Complex[np.ndarray, "P J"], weight: Float[np.ndarray, "P J"]
 ) -> NormalEquations:
     """Joints themselves, weighted alike in all directions."""

@@ -2,50 +2,90 @@
 
 `method="paper"` is the paper's: the keyframe assigned to a frame is laid over it, each joint moves
 with the edge elements around it, and appearance and apparent limb lengths refine the result
-(`transfer.py`). The default goes further with the same edges and annotations. For each half of
-the body, the lower first, it
+(`keyrecon.paper.joint_transfer`). The default goes further with the same edges and annotations.
+For each half of the body, the lower first, it
 
-1. brings several annotated figures onto every frame, limbs turning as they must, and carries the
-   annotated figures through time from both sides (`candidates.py`);
-2. chooses among these proposals by the cheapest path through time (`choose.py`);
-3. settles all frames in one least squares over edges, bone shape and smooth motion, in which the
-   annotated frames are held (`settle.py`).
+1. fits the edge templates of several annotated frames to every frame, limbs turning as they must,
+   and tracks annotated poses through time from both sides (`hypotheses`);
+2. chooses among these hypotheses by the cheapest path through time (`selection`);
+3. smooths all trajectories in one least squares over edges, bone shape and acceleration, in which
+   the annotated frames are fixed (`trajectory_smoothing`).
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
-from keyrecon.propagation.correspondence import index_elements
-from keyrecon.propagation.edge_template import AnnotatedPoses, make_edge_templates
+from keyrecon.propagation.correspondence import ElementIndex, index_elements
+from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates, make_edge_templates
 from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
-from keyrecon.propagation.half_propagation import FrameEvidence, InitialHypotheses, propagate_half
+from keyrecon.propagation.hypotheses import (
+    fit_similar,
+    join_hypotheses,
+    propose_limbs,
+    track_from_keyframes,
+)
+from keyrecon.propagation.registration import TemplateFits
+from keyrecon.propagation.scoring import score_templates
+from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.trajectory_smoothing import (
+    HYPOTHESIS_SPREAD,
+    ChosenHypotheses,
+    smooth_trajectories,
+)
 from keyrecon.records import Annotations, HalfName, JointTracks, PoseDistances, Preparation
 
 LEAST_MARKED = 0.5
-"""Share of a half's joints that must be marked for a frame to serve as a figure."""
+"""Share of a half's joints that must be marked for a frame to serve as a template."""
+LIMB_HYPOTHESES = 3
+"""Limbs of other annotated frames that are fitted on each side of a frame: as many as there may be
+places for one."""
 
 
 @dataclass(frozen=True)
 class PropagateOptions:
-    """How joints are carried to the frames that nobody annotated."""
+    """How joints are propagated to the frames that nobody annotated."""
 
     method: Literal["fused", "paper"] = "fused"
     """'paper': from the assigned keyframe alone; joints hidden there are missing. 'fused': from
     several keyframes and both neighbours in time; every joint gets a place and a confidence."""
     similar: int = 3
-    """Keyframes brought onto each frame; more take longer."""
+    """Keyframes fitted to each frame; more take longer."""
     elements: int = 96
     """Edge elements per frame and half of the body at most; more take longer."""
     rounds: int = 3
     """Times that edges are matched anew in the final least squares."""
+
+
+@dataclass(frozen=True, eq=False)
+class HalfStart:
+    """What is known of one half of the body before it is propagated."""
+
+    shift: Complex[np.ndarray, "T K"]
+    """From an annotated pose to the same pose in another frame, by head or feet."""
+    distance: Float[np.ndarray, "T K"]
+    """Pose distance of every frame to the annotated ones, player heights."""
+    fixed: Complex[np.ndarray, "T G"]
+    """Joints that the other half has estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class PropagatedHalf:
+    """One half of the body in every frame."""
+
+    joints: Complex[np.ndarray, "T J"]
+    confidence: Float[np.ndarray, "T J"]
+    template: Int[np.ndarray, "T J"]
+    """Row of the annotated frame that each joint comes from."""
 
 
 def propagate_joints(
@@ -59,79 +99,120 @@ def propagate_joints(
     Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when a
     joint is marked nowhere.
     """
-    _require_marks(annotations)
+    marked = np.isfinite(annotations.joints).all(axis=2)
+    _require_marks(annotations.skeleton, marked)
     if options.method == "paper":
-        carried = transfer_joints(preparation, annotations, progress)
-        return _with_marks(annotations, annotations.visible, carried)
-    return _fuse(preparation, annotations, options, progress)
+        tracks = transfer_joints(preparation, annotations, progress)
+        return _with_marks(annotations, annotations.visible, tracks)
+    tracks = _propagate_fused(preparation, annotations, options, progress)
+    return _with_marks(annotations, marked, tracks)
 
 
-def _require_marks(annotations: Annotations) -> None:
-    marked = np.isfinite(annotations.joints).all(axis=2).any(axis=0)
-    if not marked.all():
-        names = [annotations.skeleton.names[j] for j in np.flatnonzero(~marked)]
+def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
+    missing = np.flatnonzero(~marked.any(axis=0))
+    if len(missing):
+        names = ", ".join(skeleton.names[joint] for joint in missing)
         raise KeyreconError(
-            f"No annotated frame has {', '.join(names)}; mark each joint on at least one keyframe, "
+            f"No annotated frame has {names}; mark each joint on at least one keyframe, "
             "where it is hidden by the best guess."
         )
 
 
-def _fuse(
+def _propagate_fused(
     preparation: Preparation,
     annotations: Annotations,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
     """Both halves of the body over the whole video."""
-    window = stabilise_player(preparation.track, preparation.camera)
-    edges = preparation.contours.edges
-    scene = FrameEvidence(index_elements(edges, window), preparation.video.fps)
-    count, every = len(edges), np.arange(len(edges))
-    joints = np.full((count, len(annotations.skeleton.names)), np.nan + 0j)
+    track, edges, fps = preparation.track, preparation.contours.edges, preparation.video.fps
+    body_frame = stabilise_player(track, preparation.camera, fps)
+    index = index_elements(edges, body_frame)
+    count, frames = len(edges), np.arange(len(edges))
+    joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
     for half in progress(halves, "carrying joints", len(halves)):
-        settled = joints[:, half.joints[half.given]]
-        poses = gather_poses(annotations, window, half, settled)
-        puppets = make_edge_templates(edges, window, poses, options.elements)
+        fixed = joints[:, half.joints[half.fixed]]
+        poses = gather_poses(annotations, body_frame, half, fixed)
+        templates = make_edge_templates(edges, body_frame, poses, options.elements)
         if half.name == "lower":
-            tracked = window.from_pixels(preparation.track.feet, every[:, None])
-            puppets = replace(
-                puppets, feet=learn_foot_offsets(half, poses.frames, poses.joints, tracked)
+            tracked = body_frame.from_pixels(track.feet, frames[:, None])
+            templates = replace(
+                templates, feet=learn_foot_offsets(half, poses.frames, poses.joints, tracked)
             )
         distance = distances_to(preparation.pose_distances, half.name, poses.frames)
-        anchor = preparation.track.head if half.name == "upper" else preparation.track.mid_feet
-        at = window.from_pixels(anchor, every)
-        start = InitialHypotheses(at[:, None] - at[poses.frames], distance, settled)
-        own = half.joints[half.own]
-        followed = propagate_half(puppets, scene, start, options.similar, options.rounds)
-        joints[:, own] = followed.joints[:, half.own]
-        confidence[:, own] = followed.confidence[:, half.own]
-        source[:, own] = poses.frames[followed.which[:, half.own]]
-    tracks = JointTracks(window.to_pixels(joints, every[:, None]), confidence, source)
-    return _with_marks(annotations, np.isfinite(annotations.joints).all(axis=2), tracks)
+        anchor = track.head if half.name == "upper" else track.mid_feet
+        at = body_frame.from_pixels(anchor, frames)
+        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed)
+        result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
+        free = half.joints[half.free]
+        joints[:, free] = result.joints[:, half.free]
+        confidence[:, free] = result.confidence[:, half.free]
+        source[:, free] = poses.frames[result.template[:, half.free]]
+    return JointTracks(body_frame.to_pixels(joints, frames[:, None]), confidence, source)
+
+
+def propagate_half(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    fps: float,
+    start: HalfStart,
+    similar: int,
+    rounds: int,
+) -> PropagatedHalf:
+    """Joints of one half in all frames from `similar` templates each: hypotheses, choice, fit."""
+    fitted = fit_similar(templates, index, start.distance, start.shift, similar)
+    nearest = fitted.template[:, 0]
+    with ThreadPoolExecutor(1) as beside:
+        tracked = beside.submit(track_from_keyframes, templates, index, nearest, fps)
+        limbs = propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)
+    hypotheses = join_hypotheses(fitted, limbs, tracked.result())
+    limbs_chosen = choose_limbs(templates, hypotheses, fps)
+    limbs_chosen.joints[:, templates.half.fixed] = start.fixed
+    chosen = ChosenHypotheses(limbs_chosen.joints, nearest)
+    joints = smooth_trajectories(templates, index, chosen, fps, rounds)
+    confidence = joint_confidence(templates, index, chosen, joints)
+    return PropagatedHalf(joints, confidence, limbs_chosen.template)
+
+
+def joint_confidence(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    chosen: ChosenHypotheses,
+    joints: Complex[np.ndarray, "T J"],
+) -> Float[np.ndarray, "T J"]:
+    """Confidence 0-1: share of the outline matched around a joint, less where the chosen
+    hypothesis lay elsewhere."""
+    frames = np.arange(len(joints))
+    fits = TemplateFits(frames, np.full(len(frames), templates.average), joints)
+    score = 1 - score_templates(templates, index, fits)
+    ends = np.zeros((len(templates.half.bones), joints.shape[1]))
+    ends[np.arange(len(ends))[:, None], templates.half.bones] = 1
+    around = score @ ends / np.maximum(ends.sum(axis=0), 1)
+    return around * np.exp(-0.5 * (np.abs(joints - chosen.joints) / HYPOTHESIS_SPREAD) ** 2)
 
 
 def gather_poses(
     annotations: Annotations,
-    window: BodyFrame,
+    body_frame: BodyFrame,
     half: BodyHalf,
-    settled: Complex[np.ndarray, "T G"],
+    fixed: Complex[np.ndarray, "T G"],
 ) -> AnnotatedPoses:
-    """Annotated figures of one half: every frame on which at least half of its joints are marked.
+    """Annotated poses of one half: every frame on which at least half of its joints are marked.
 
-    A joint that is not marked there stands as it usually does beside its parent.
+    A joint that is not marked there stands at its median place beside its parent.
     """
-    marks = window.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
+    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
     known = np.isfinite(marks)
-    rows = np.flatnonzero(known[:, half.own].mean(axis=1) >= LEAST_MARKED)
+    rows = np.flatnonzero(known[:, half.free].mean(axis=1) >= LEAST_MARKED)
     frames, poses, known = annotations.frames[rows], marks[rows], known[rows]
-    poses[:, half.given], known[:, half.given] = settled[frames], True
+    poses[:, half.fixed], known[:, half.fixed] = fixed[frames], True
     # from the joints that are there outwards, back for parents that are not, and out from these
     for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
-        usual = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
+        bone = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
         missing = np.isnan(poses[:, child])
-        poses[missing, child] = poses[missing, parent] + usual
+        poses[missing, child] = poses[missing, parent] + bone
     if not np.isfinite(poses).all() or not rows.size:
         raise KeyreconError(
             f"Too few joints of the {half.name} body are marked to carry them to other "
@@ -141,15 +222,15 @@ def gather_poses(
 
 
 def distances_to(
-    comparison: PoseDistances, name: HalfName, frames: Int[np.ndarray, "K"]
+    distances: PoseDistances, name: HalfName, frames: Int[np.ndarray, "K"]
 ) -> Float[np.ndarray, "T K"]:
     """Pose distance of every frame to a few, player heights; by way of their exemplars."""
-    table = comparison.upper if name == "upper" else comparison.lower
-    detour = comparison.detour[0 if name == "upper" else 1]
-    apart = table[comparison.row[:, None], comparison.row[frames]]
-    apart = apart + detour[:, None] + detour[frames]
-    apart[frames, np.arange(len(frames))] = 0
-    return apart
+    table = distances.upper if name == "upper" else distances.lower
+    detour = distances.detour[0 if name == "upper" else 1]
+    result = table[distances.row[:, None], distances.row[frames]]
+    result = result + detour[:, None] + detour[frames]
+    result[frames, np.arange(len(frames))] = 0
+    return result
 
 
 def _with_marks(

@@ -17,9 +17,13 @@ what moves at the frequency f where places are sure.
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.linalg import solveh_banded
 
 from keyrecon.errors import KeyreconError
+from keyrecon.numerics.banded_least_squares import (
+    second_difference_bands,
+    solve_banded,
+    upper_form,
+)
 from keyrecon.numerics.geometry import warp_points
 
 
@@ -122,10 +126,6 @@ def smooth_path(
     if count < 3:
         return places
     sure = np.maximum(weight, LEAST_WEIGHT)
-    bend = np.zeros((3, count))  # upper bands of D^T D, D the second difference
-    for first, second in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)):
-        product = (1, -2, 1)[first] * (1, -2, 1)[second]
-        bend[2 - (second - first), second : second + count - 2] += product
-    bands = stiffness * bend
-    bands[2] += sure
-    return solveh_banded(bands, sure[:, None] * places)
+    bands = stiffness * second_difference_bands(count)
+    bands[0] += sure
+    return solve_banded(upper_form(bands), sure[:, None] * places, lower=False)

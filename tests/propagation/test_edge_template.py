@@ -1,4 +1,4 @@
-"""Outlines that ride on bones, their correspondence, and least squares over them."""
+"""Edge templates, their correspondence, and least squares over joints."""
 
 import numpy as np
 from capsule_player import scene, standing, turned
@@ -14,64 +14,68 @@ from keyrecon.propagation.edge_template import (
 )
 from keyrecon.propagation.foot_evidence import foot_equations, learn_foot_offsets
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.normal_equations import add_joint_observations, add_observations
-from keyrecon.propagation.registration import FittedFigures, register_templates
+from keyrecon.propagation.normal_equations import joint_equations, point_equations
+from keyrecon.propagation.registration import TemplateFits, register_templates
 from keyrecon.propagation.scoring import find_unexplained_edges, score_templates
 from keyrecon.propagation.selection import LimbStates, choose_two
-from keyrecon.propagation.trajectory_smoothing import couple_frames, solve_banded_chain
+from keyrecon.propagation.trajectory_smoothing import solve_smooth
 
 LOWER, UPPER = split_body(LSP14)
 
 
-def puppets_of(preparation, truth, frames, half):
-    """Puppets of the truth on some frames, and the index of all elements."""
-    window = stabilise_player(preparation.track, preparation.camera)
+def templates_of(preparation, truth, frames, half):
+    """Templates of the truth on some frames, the index of all elements, player coordinates."""
+    body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
     rows = np.array(frames)
-    joints = window.from_pixels(truth[rows][:, half.joints], rows[:, None])
+    joints = body_frame.from_pixels(truth[rows][:, half.joints], rows[:, None])
     poses = AnnotatedPoses(half, rows, joints, np.ones(joints.shape, bool))
     edges = preparation.contours.edges
-    return make_edge_templates(edges, window, poses, 400), index_elements(edges, window), window
+    return (
+        make_edge_templates(edges, body_frame, poses, 400),
+        index_elements(edges, body_frame),
+        body_frame,
+    )
 
 
 def test_the_halves_share_out_all_joints_and_mirror_each_other():
-    own = [half.joints[half.own] for half in (LOWER, UPPER)]
-    assert sorted(np.concatenate(own)) == list(range(14))
+    free = [half.joints[half.free] for half in (LOWER, UPPER)]
+    assert sorted(np.concatenate(free)) == list(range(14))
     for half in (LOWER, UPPER):
         one, other = (half.joints[list(side)] for side in half.sides)
         np.testing.assert_array_equal(LSP14.mirror[one], other)
         assert (half.bone_mirror[half.bone_mirror] == np.arange(len(half.bones))).all()
 
 
-def test_elements_ride_on_the_bone_they_outline():
+def test_elements_belong_to_the_bone_they_outline():
     preparation, truth = scene([standing()], (0,))
-    window = stabilise_player(preparation.track, preparation.camera)
-    pose = window.from_pixels(truth[0][UPPER.joints], 0)
-    riders = assign_to_bones(preparation.contours.edges[0], window, 0, pose, UPPER)
+    body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
+    pose = body_frame.from_pixels(truth[0][UPPER.joints], 0)
+    elements = assign_to_bones(preparation.contours.edges[0], body_frame, 0, pose, UPPER)
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
-    forearm = np.isin(UPPER.joints[UPPER.bones[riders.bone, 1]], wrists)
-    assert forearm[riders.color == 2].mean() > 0.9
-    widths = np.abs(riders.offset[forearm & (riders.color == 2)])
+    forearm = np.isin(UPPER.joints[UPPER.bones[elements.bone, 1]], wrists)
+    assert forearm[elements.color == 2].mean() > 0.9
+    widths = np.abs(elements.offset[forearm & (elements.color == 2)])
     np.testing.assert_allclose(np.median(widths), 0.025 / 0.98, rtol=0.05)
 
 
-def test_a_puppet_in_its_own_pose_lies_on_its_own_elements():
+def test_a_template_in_its_own_pose_lies_on_its_own_elements():
     preparation, truth = scene([standing()], (0,))
-    puppets, index, _ = puppets_of(preparation, truth, (0,), UPPER)
+    templates, index, _ = templates_of(preparation, truth, (0,), UPPER)
     every = np.zeros(1, int)
-    figures = FittedFigures(every, every, puppets.poses.joints)
-    posed = pose_templates(puppets, every, puppets.poses.joints)
+    fits = TemplateFits(every, every, templates.poses.joints)
+    posed = pose_templates(templates, every, templates.poses.joints)
     row, found = match_elements(index, every, posed, 0.05)
     own = posed.color >= 0
     assert found[own].mean() > 0.9
     assert np.abs(index.points[row] - posed.points)[found].max() < 0.02
-    assert score_templates(puppets, index, figures).max() < 0.35
+    assert score_templates(templates, index, fits).max() < 0.35
 
 
 def test_matches_have_the_same_colour_and_direction():
     preparation, truth = scene([standing()], (0,))
-    puppets, index, _ = puppets_of(preparation, truth, (0,), LOWER)
+    templates, index, _ = templates_of(preparation, truth, (0,), LOWER)
     every = np.zeros(1, int)
-    posed = pose_templates(puppets, every, puppets.poses.joints + 0.03j)
+    posed = pose_templates(templates, every, templates.poses.joints + 0.03j)
     row, found = match_elements(index, every, posed, 0.06)
     assert (index.color[row] == posed.color)[found].all()
     turn = np.abs(np.angle(index.tangent[row] / posed.tangent))[found]
@@ -81,27 +85,29 @@ def test_matches_have_the_same_colour_and_direction():
 def test_a_fit_turns_a_limb_back_onto_its_edges():
     bent = turned(standing(), "left_elbow", ("left_wrist",), -0.35)
     preparation, truth = scene([standing(), bent], (0,))
-    puppets, index, window = puppets_of(preparation, truth, (0,), UPPER)
+    templates, index, body_frame = templates_of(preparation, truth, (0,), UPPER)
     one = np.ones(1, int)
     found = register_templates(
-        puppets, index, FittedFigures(one, one - 1, puppets.poses.joints)
+        templates, index, TemplateFits(one, one - 1, templates.poses.joints)
     ).joints
-    away = np.abs(found[0] - window.from_pixels(truth[1][UPPER.joints], 1))
-    assert away[UPPER.own].max() < 0.02
+    away = np.abs(found[0] - body_frame.from_pixels(truth[1][UPPER.joints], 1))
+    assert away[UPPER.free].max() < 0.02
 
 
 def test_an_arm_elsewhere_leaves_edges_unexplained():
     bent = turned(standing(), "left_shoulder", ("left_elbow", "left_wrist"), -1.2)
     preparation, truth = scene([standing(), bent], (0,))
-    puppets, index, _ = puppets_of(preparation, truth, (0, 1), UPPER)
+    templates, index, _ = templates_of(preparation, truth, (0, 1), UPPER)
     first = np.zeros(2, int)
-    far = find_unexplained_edges(puppets, index, FittedFigures(first, first, puppets.poses.joints))
+    far = find_unexplained_edges(
+        templates, index, TemplateFits(first, first, templates.poses.joints)
+    )
     left = far.min(axis=1).sum(axis=1)
     assert left[0] < 0.5 * left[1]
 
 
 def test_sides_are_chosen_for_continuity():
-    # two limbs cross; each proposal names them the wrong way round half of the time
+    # two limbs cross; each hypothesis names them the wrong way round half of the time
     path = np.linspace(-1, 1, 21)
     one, other = path + 0.3j, -path - 0.3j
     swapped = np.arange(21) % 2 == 1
@@ -124,7 +130,7 @@ def test_weighted_rows_are_least_squares():
     target = rng.normal(size=(1, 9)) + 1j * rng.normal(size=(1, 9))
     axis = np.exp(1j * rng.uniform(0, 6, (1, 9)))
     along, across = rng.uniform(0.1, 2, (2, 1, 9))
-    found = add_observations(mixture, target, axis, along, across).solve()[0]
+    found = point_equations(mixture, target, axis, along, across).solve()[0]
     rows, right = [], []
     for m, q, n, strong, weak in zip(
         mixture[0], target[0], axis[0], along[0], across[0], strict=True
@@ -136,26 +142,28 @@ def test_weighted_rows_are_least_squares():
     np.testing.assert_allclose(found, slow[:3] + 1j * slow[3:], atol=1e-6)
 
 
-def test_the_chain_equals_dense_least_squares():
+def test_smoothing_equals_dense_least_squares():
     rng = np.random.default_rng(2)
     target = rng.normal(size=(7, 2)) + 1j * rng.normal(size=(7, 2))
-    weight, calm = rng.uniform(0.5, 2, (7, 2)), np.array([0.5, 2.0])
-    found = solve_banded_chain(couple_frames(add_joint_observations(target, weight), calm))
+    weight, spread = rng.uniform(0.5, 2, (7, 2)), np.array([0.5, 2.0])
+    found = solve_smooth(joint_equations(target, weight), spread)
     second = np.diff(np.eye(7), 2, axis=0)
     for joint in range(2):
-        matrix = np.diag(weight[:, joint]) + second.T @ second / calm[joint] ** 2
+        matrix = np.diag(weight[:, joint]) + second.T @ second / spread[joint] ** 2
         slow = np.linalg.solve(matrix, weight[:, joint] * target[:, joint])
         np.testing.assert_allclose(found[:, joint], slow, atol=1e-6)
 
 
-def test_the_window_follows_a_panning_camera():
+def test_player_coordinates_follow_a_panning_camera():
     preparation, truth = scene([standing()] * 9, (0,), origin=(600 + 30.0 * np.arange(9))[:, None])
-    window = stabilise_player(preparation.track, preparation.camera)
-    back = window.to_pixels(window.from_pixels(truth, np.arange(9)[:, None]), np.arange(9)[:, None])
+    body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
+    back = body_frame.to_pixels(
+        body_frame.from_pixels(truth, np.arange(9)[:, None]), np.arange(9)[:, None]
+    )
     np.testing.assert_allclose(back, truth)
 
 
-def test_each_foot_speaks_to_the_leg_it_fits():
+def test_each_foot_counts_for_the_leg_it_fits():
     ankles = np.array([[-0.2 + 1j, 0.2 + 1j], [0.1 + 1j, -0.1 + 1j]])
     joints = np.zeros((2, 6), complex)
     ends = np.array([max(side, key=lambda j: LOWER.depth[j]) for side in LOWER.sides])

@@ -67,7 +67,7 @@ def find_neighbours(preparation: Preparation, annotations: Annotations) -> tuple
     found = []
     for half in (lower, upper):
         frames = marked_figures(annotations, half)
-        own = half.joints[half.own]
+        own = half.joints[half.free]
         if len(frames) > 1:
             beyond = np.setdiff1d(marked_figures(annotations, upper), frames)
             asked = np.concatenate([frames, beyond]) if half is lower else frames
@@ -75,16 +75,16 @@ def find_neighbours(preparation: Preparation, annotations: Annotations) -> tuple
             fitting.distance[np.arange(len(frames)), np.arange(len(frames))] = np.inf
             most = min(MOST, len(frames) - 1)
             fitted = fit_similar(
-                fitting.puppets, fitting.index, fitting.distance, fitting.shift, most
+                fitting.templates, fitting.index, fitting.distance, fitting.shift, most
             )
-            places = fitted.joints[:, :, half.own]
-            misfit = fitted.misfit.mean(axis=2)
+            places = fitted.joints[:, :, half.free]
+            misfit = fitted.residual.mean(axis=2)
             best = misfit.argmin(axis=1)[len(frames) :]
             joints[beyond[:, None], own] = places[np.arange(len(frames), len(asked)), best]
             known = joints[frames][:, own]
             away = np.abs(known[:, None, :, None] - places[: len(frames), :, None])
             found.append(
-                Neighbours(own, frames, fitted.which[: len(frames)], away, misfit[: len(frames)])
+                Neighbours(own, frames, fitted.template[: len(frames)], away, misfit[: len(frames)])
             )
         if half is lower:
             stand_in(scene, joints, upper)

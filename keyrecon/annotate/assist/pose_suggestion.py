@@ -19,32 +19,33 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
-from keyrecon.propagation.correspondence import ElementIndex, index_elements, list_elements
+from keyrecon.propagation.correspondence import ElementIndex, index_elements, list_half_elements
 from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates, make_edge_templates
 from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
-from keyrecon.propagation.half_propagation import BORROWED, joint_confidence
 from keyrecon.propagation.hypotheses import (
     PoseHypotheses,
     fit_similar,
     join_hypotheses,
     propose_limbs,
 )
-from keyrecon.propagation.normal_equations import add_joint_observations
+from keyrecon.propagation.normal_equations import joint_equations
 from keyrecon.propagation.propagation import (
     LEAST_MARKED,
+    LIMB_HYPOTHESES,
     PropagateOptions,
     distances_to,
     gather_poses,
+    joint_confidence,
 )
-from keyrecon.propagation.registration import FittedFigures, RegistrationStep, register_templates
-from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.registration import RegistrationStep, TemplateFits, register_templates
+from keyrecon.propagation.selection import ChosenLimbs, choose_limbs
 from keyrecon.propagation.trajectory_smoothing import (
-    DATA_WEIGHT,
-    HELD,
-    LOOSE,
+    FIXED_WEIGHT,
+    HYPOTHESIS_SPREAD,
     SEARCH_RADII,
-    SmoothingInput,
+    SHAPE_PRIOR,
+    ChosenHypotheses,
 )
 from keyrecon.records import Annotations, Preparation
 
@@ -58,24 +59,26 @@ class SuggestionScene:
     """A video whose player was found, and the annotated frames to learn from."""
 
     preparation: Preparation
-    window: BodyFrame
+    body_frame: BodyFrame
     sources: Annotations
 
     def from_pixels(
         self, points: Float[np.ndarray, "K J 2"], frames: Int[np.ndarray, "K"]
     ) -> Complex[np.ndarray, "K J"]:
         """Joints of some frames in player coordinates."""
-        return self.window.from_pixels(points, frames[:, None])
+        return self.body_frame.from_pixels(points, frames[:, None])
 
     def at(self, points: Float[np.ndarray, "T 2"]) -> Complex[np.ndarray, "T"]:
         """A point of every frame in player coordinates."""
-        return self.window.from_pixels(points, np.arange(len(points)))
+        return self.body_frame.from_pixels(points, np.arange(len(points)))
 
 
 def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
     """The scene of a preparation."""
     return SuggestionScene(
-        preparation, stabilise_player(preparation.track, preparation.camera), sources
+        preparation,
+        stabilise_player(preparation.track, preparation.camera, preparation.video.fps),
+        sources,
     )
 
 
@@ -83,8 +86,8 @@ def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
 class Fitting:
     """Figures of K annotated frames, to be fitted to N frames."""
 
-    puppets: EdgeTemplates
-    """Rows of `listed` and `feet` are the N frames."""
+    templates: EdgeTemplates
+    """Rows of `frame_elements` and `feet` are the N frames."""
     index: ElementIndex
     distance: Float[np.ndarray, "N K"]
     """Pose distance, player heights."""
@@ -92,6 +95,7 @@ class Fitting:
     """From each figure to the same figure in each frame, by head or feet."""
     sources: Int[np.ndarray, "K"]
     """Frame numbers."""
+    fps: float
 
 
 def prepare_fitting(
@@ -101,42 +105,48 @@ def prepare_fitting(
     frames: Int[np.ndarray, "N"],
 ) -> Fitting:
     """Dress the annotated figures of a half; `joints` has what the other half gives to it."""
-    preparation, window = scene.preparation, scene.window
-    poses = gather_poses(scene.sources, window, half, joints[:, half.joints[half.given]])
+    preparation, body_frame = scene.preparation, scene.body_frame
+    poses = gather_poses(scene.sources, body_frame, half, joints[:, half.joints[half.fixed]])
     edges = tuple(preparation.contours.edges[t] for t in frames)
-    index = index_elements(edges, _some(window, frames))
+    index = index_elements(edges, _some(body_frame, frames))
     distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
     at = scene.at(preparation.track.head if half.name == "upper" else preparation.track.mid_feet)
     shift = at[frames][:, None] - at[poses.frames]
-    return Fitting(_dress(scene, poses, frames), index, distance, shift, poses.frames)
+    templates = _dress(scene, poses, frames)
+    fps = preparation.video.fps
+    return Fitting(templates, index, distance, shift, poses.frames, fps)
 
 
-def _some(window: BodyFrame, frames: Int[np.ndarray, "N"]) -> BodyFrame:
-    return BodyFrame(window.origin[frames], window.height[frames])
+def _some(body_frame: BodyFrame, frames: Int[np.ndarray, "N"]) -> BodyFrame:
+    return BodyFrame(body_frame.origin[frames], body_frame.height[frames])
 
 
 def _dress(
     scene: SuggestionScene, poses: AnnotatedPoses, frames: Int[np.ndarray, "N"]
 ) -> EdgeTemplates:
     """Annotated figures, and what is looked at in the frames that are asked for."""
-    edges, half, window = scene.preparation.contours.edges, poses.half, scene.window
+    edges, half, body_frame = scene.preparation.contours.edges, poses.half, scene.body_frame
     known = replace(poses, frames=np.arange(len(poses.frames)))
     outlines = tuple(edges[t] for t in poses.frames)
-    puppets = make_edge_templates(outlines, _some(window, poses.frames), known, OPTIONS.elements)
+    templates = make_edge_templates(
+        outlines, _some(body_frame, poses.frames), known, OPTIONS.elements
+    )
     wanted = tuple(edges[t] for t in frames)
-    puppets = replace(puppets, listed=list_elements(wanted, half.name, OPTIONS.elements))
+    templates = replace(
+        templates, frame_elements=list_half_elements(wanted, half.name, OPTIONS.elements)
+    )
     if half.name == "upper":
-        return puppets
-    tracked = window.from_pixels(scene.preparation.track.feet, np.arange(len(edges))[:, None])
+        return templates
+    tracked = body_frame.from_pixels(scene.preparation.track.feet, np.arange(len(edges))[:, None])
     feet = learn_foot_offsets(half, poses.frames, poses.joints, tracked)
-    return replace(puppets, feet=replace(feet, points=feet.points[frames]))
+    return replace(templates, feet=replace(feet, points=feet.points[frames]))
 
 
 def marked_figures(annotations: Annotations, half: BodyHalf) -> Int[np.ndarray, "K"]:
     """Frames that serve as figures of one half of the body; none until each bone is seen once."""
     marked = np.isfinite(annotations.joints[:, half.joints, 0])
-    served = marked[:, half.own].mean(axis=1) >= LEAST_MARKED
-    bones = half.bones[~half.given[half.bones].any(axis=1)]
+    served = marked[:, half.free].mean(axis=1) >= LEAST_MARKED
+    bones = half.bones[~half.fixed[half.bones].any(axis=1)]
     whole = marked[served][:, bones].all(axis=2).any(axis=0).all()
     return annotations.frames[served & whole]
 
@@ -145,7 +155,7 @@ def stand_in(scene: SuggestionScene, joints: Complex[np.ndarray, "T J"], upper: 
     """Fill in what the lower body gives to the upper one where nothing better is known."""
     track = scene.preparation.track
     hips = scene.at(track.head + HIPS * (track.mid_feet - track.head))[:, None]
-    given = upper.joints[upper.given]
+    given = upper.joints[upper.fixed]
     joints[:, given] = np.where(np.isnan(joints[:, given]), hips, joints[:, given])
 
 
@@ -160,11 +170,14 @@ def take_rows(annotations: Annotations, rows: Bool[np.ndarray, "K"]) -> Annotati
     )
 
 
-SETTLING = tuple(RegistrationStep(reach, LOOSE.length, LOOSE.swing) for reach in SEARCH_RADII)
-"""Last fit of the chosen figure, as `settle` does it for all frames at once."""
+SETTLING = tuple(
+    RegistrationStep(radius, SHAPE_PRIOR.length_spread, SHAPE_PRIOR.transverse_spread)
+    for radius in SEARCH_RADII
+)
+"""Last fit of the chosen figure, as trajectory smoothing does it for all frames at once."""
 MOST = 10
 """Annotated figures looked at for each half; with more a ghost gets slower and no better."""
-_PULL = 1 / DATA_WEIGHT**2
+_PULL = 1 / HYPOTHESIS_SPREAD**2
 """Weight of the chosen proposal in the last fit."""
 _PER_FIGURE = [field for field in fields(AnnotatedPoses) if field.name != "half"]
 
@@ -205,11 +218,11 @@ def suggest_joints(
     joints = np.full((len(preparation.track.head), len(skeleton.names)), np.nan + 0j)
     joints[sources.frames] = scene.from_pixels(sources.joints, sources.frames)
     if held is not None:
-        joints[frame] = scene.window.from_pixels(held, frame)
+        joints[frame] = scene.body_frame.from_pixels(held, frame)
     confidence, source = np.zeros(joints.shape[1]), np.full(joints.shape[1], -1)
     beyond = np.setdiff1d(marked_figures(sources, upper), marked_figures(sources, lower))
     for half, frames in ((lower, np.array([frame, *beyond])), (upper, np.array([frame]))):
-        own = half.joints[half.own]
+        own = half.joints[half.free]
         if len(marked_figures(sources, half)):
             fitting = prepare_fitting(scene, half, joints, frames)
             found, sure, come_from = _suggest_half(fitting, joints[frames][:, half.joints])
@@ -217,7 +230,7 @@ def suggest_joints(
             confidence[own], source[own] = sure[0], come_from[0]
         if half is lower:
             stand_in(scene, joints, upper)
-    pixels = scene.window.to_pixels(joints[frame], frame)
+    pixels = scene.body_frame.to_pixels(joints[frame], frame)
     return PoseSuggestion(np.where(source[:, None] < 0, np.nan, pixels), confidence, source)
 
 
@@ -225,35 +238,41 @@ def _suggest_half(
     fitting: Fitting, known: Complex[np.ndarray, "N J"]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(own joints, confidence, source frame) of one half; `known` joints stay."""
-    puppets, index = fitting.puppets, fitting.index
-    fitted = fit_similar(puppets, index, fitting.distance, fitting.shift, OPTIONS.similar)
-    candidates = join_hypotheses(fitted, propose_limbs(puppets, index, fitted, BORROWED))
-    chosen, which = _choose(puppets, candidates)
-    chosen = np.where(np.isfinite(known), known, chosen)
-    weight = np.where(np.isfinite(known), HELD, _PULL)
-    similar = fitted.which[:, 0]
-    start = FittedFigures(np.arange(len(known)), similar, chosen)
+    templates, index = fitting.templates, fitting.index
+    fitted = fit_similar(templates, index, fitting.distance, fitting.shift, OPTIONS.similar)
+    hypotheses = join_hypotheses(fitted, propose_limbs(templates, index, fitted, LIMB_HYPOTHESES))
+    limbs = _choose(templates, hypotheses, fitting.fps)
+    chosen = np.where(np.isfinite(known), known, limbs.joints)
+    weight = np.where(np.isfinite(known), FIXED_WEIGHT, _PULL)
+    similar = fitted.template[:, 0]
+    start = TemplateFits(np.arange(len(known)), similar, chosen)
     settled = register_templates(
-        puppets, index, start, SETTLING, add_joint_observations(chosen, weight)
+        templates, index, start, SETTLING, joint_equations(chosen, weight)
     ).joints
-    confidence = joint_confidence(puppets, index, SmoothingInput(chosen, similar), settled)
-    own = puppets.half.own
-    return settled[:, own], confidence[:, own], fitting.sources[which[:, own]]
+    confidence = joint_confidence(templates, index, ChosenHypotheses(chosen, similar), settled)
+    own = templates.half.free
+    return settled[:, own], confidence[:, own], fitting.sources[limbs.template[:, own]]
 
 
-def _choose(
-    puppets: EdgeTemplates, candidates: PoseHypotheses
-) -> tuple[Complex[np.ndarray, "N J"], Int[np.ndarray, "N J"]]:
-    """The best proposals, each frame by itself: (joints, figure that they come from)."""
+def _choose(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
+    """The best hypotheses, each frame by itself."""
     nobody = replace(
-        puppets.poses, **{f.name: getattr(puppets.poses, f.name)[:0] for f in _PER_FIGURE}
+        templates.poses, **{f.name: getattr(templates.poses, f.name)[:0] for f in _PER_FIGURE}
     )
-    found = []
-    for n in range(len(candidates.which)):
+    chosen = []
+    for n in range(len(hypotheses.template)):
         one = PoseHypotheses(
-            *(getattr(candidates, f.name)[n : n + 1] for f in fields(PoseHypotheses))
+            *(getattr(hypotheses, f.name)[n : n + 1] for f in fields(PoseHypotheses))
         )
-        feet = puppets.feet and replace(puppets.feet, points=puppets.feet.points[n : n + 1])
-        alone = replace(puppets, poses=nobody, listed=puppets.listed[n : n + 1], feet=feet)
-        found.append(choose_limbs(alone, one))
-    return tuple(np.concatenate(part) for part in zip(*found, strict=True))
+        feet = templates.feet and replace(templates.feet, points=templates.feet.points[n : n + 1])
+        alone = replace(
+            templates,
+            poses=nobody,
+            frame_elements=templates.frame_elements[n : n + 1],
+            feet=feet,
+        )
+        chosen.append(choose_limbs(alone, one, fps))
+    return ChosenLimbs(
+        np.concatenate([one.joints for one in chosen]),
+        np.concatenate([one.template for one in chosen]),
+    )
