@@ -43,18 +43,30 @@ class BodyFrame:
 
 
 def stabilise_player(track: Track, camera: CameraPath, fps: float) -> BodyFrame:
-    """Player coordinates from head, feet and the camera's motion."""
+    """Player coordinates from head, feet and the camera's motion.
+
+    Beyond the ends of the video the path is continued by its point reflection in the end, so that
+    the smoothed origin of a player who moves on lies on the path there too.
+    """
     middle = (track.head + track.mid_feet) / 2
     sigma = SMOOTHING_SECONDS * fps
     half_width = int(np.ceil(2.5 * sigma))
     last = len(middle) - 1
     now = np.arange(len(middle))
     from_reference = np.linalg.inv(camera.to_reference)
-    total, weights = np.zeros_like(middle), np.zeros(len(middle))
+
+    def observed(frames: Int[np.ndarray, "T"]) -> Float[np.ndarray, "T 2"]:
+        """The player at other frames, in the picture of each frame."""
+        return warp_points(from_reference @ camera.to_reference[frames], middle[frames])
+
+    total, weights = np.zeros_like(middle), 0.0
     for lag in range(-half_width, half_width + 1):
-        other = np.clip(now + lag, 0, last)
-        between = from_reference @ camera.to_reference[other]
-        weight = np.exp(-0.5 * (lag / sigma) ** 2) * (other == now + lag)
-        total += weight[:, None] * warp_points(between, middle[other])
+        other = now + lag
+        end = np.clip(other, 0, last)
+        reflected = np.clip(2 * end - other, 0, last)
+        beyond = (other != end)[:, None]
+        point = np.where(beyond, 2 * observed(end) - observed(reflected), observed(end))
+        weight = np.exp(-0.5 * (lag / sigma) ** 2)
+        total += weight * point
         weights += weight
-    return BodyFrame(to_complex(total / weights[:, None]), track.height.astype(float))
+    return BodyFrame(to_complex(total / weights), track.height.astype(float))
