@@ -21,6 +21,7 @@ from keyrecon.golf.observe.club import Club
 from keyrecon.golf.observe.swing_events import TimingOptions, find_key_frames, interpolate_times
 from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import Camera, Matches, MotionModel, Observations, SwingMarks
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, JointTracks
 
@@ -118,12 +119,8 @@ def _stand_in(joints: Float[np.ndarray, "T 14 2"], height: float) -> Club:
         for name in ("wrist", "elbow")
     )
     hands, middle = np.nanmean(wrists, axis=1), np.nanmean(elbows, axis=1)
-    ends = np.stack([hands, hands + NO_CLUB * height * _unit(hands - middle)], axis=1)
+    ends = np.stack([hands, hands + NO_CLUB * height * unit_vectors(hands - middle, 1e-9)], axis=1)
     known = np.isfinite(ends).all(axis=(1, 2))
     frames = np.arange(len(ends))
     filled = [np.interp(frames, frames[known], c[known]) for c in ends.reshape(len(ends), 4).T]
     return Club(np.stack(filled, axis=1).reshape(-1, 2, 2), known, known)
-
-
-def _unit(vectors: Float[np.ndarray, "T 2"]) -> Float[np.ndarray, "T 2"]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)

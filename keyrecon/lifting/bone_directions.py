@@ -43,12 +43,6 @@ def bone_vectors(
     return points[:, skeleton.bones[:, 1]] - points[:, skeleton.bones[:, 0]]
 
 
-def unit(vectors: Float[np.ndarray, "*n D"]) -> Float[np.ndarray, "*n D"]:
-    """Vectors of length one; a zero vector stays zero."""
-    norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(norms > 0, norms, 1.0)
-
-
 def breadths(skeleton: Skeleton) -> tuple[tuple[int, int, float], ...]:
     """Pairs of joints that the trunk holds at a constant distance: (left, right, statures).
 

@@ -34,6 +34,7 @@ from keyrecon.lifting.priors.anatomy import (
 )
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.priors.occlusion import hidden_cost
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
 _USUAL_SPREAD = 0.4
@@ -223,7 +224,7 @@ def _limit_costs(
     limbs = []
     for limb in anatomy.limbs:
         bones = _candidates(limb.bones, shown)[:, None]
-        bones = bones / np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
+        bones = unit_vectors(bones, 1e-9)
         axes = hips if limb.kind == "leg" else shoulders
         limbs.append(_limb_cost(limb, bones, axes[:, :, None], up[:, :, None]))
     return trunk, limbs

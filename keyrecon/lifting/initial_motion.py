@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import unit
 from keyrecon.lifting.depth_evidence import DepthSignOptions, at_rate
 from keyrecon.lifting.depth_signs import track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
@@ -23,6 +22,7 @@ from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.refinement import RefineOptions, refine_motion
 from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import KeyPoses, foreshorten_bones, lift_foreshortened
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 
 WINDOW, OVERLAP = 2000, 100
@@ -78,7 +78,7 @@ def estimate_initial_motion(
         )
         root[part] += weight[:, None] * solved.root
         directions[part] += weight[:, None, None] * solved.directions
-    return MotionState(root, unit(directions))
+    return MotionState(root, unit_vectors(directions))
 
 
 def _windows(frames: int) -> Iterator[tuple[int, int, Float[np.ndarray, "n"]]]:

@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.bone_directions import pose_from_directions
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import HalfKeyframes, Keyframes
 
 
@@ -135,7 +136,7 @@ def slerp(
     opposite = angle > np.radians(170)
     if opposite.any():
         result = np.where(opposite, _through_image(first, second, part), result)
-    return result / np.linalg.norm(result, axis=-1, keepdims=True)
+    return unit_vectors(result)
 
 
 def _through_image(

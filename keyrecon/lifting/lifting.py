@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions, unit
+from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import DepthSignOptions
 from keyrecon.lifting.initial_motion import (
     InitialFigure,
@@ -34,7 +34,7 @@ from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.lifting.refinement import RefineOptions, descend_motion
 from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import lift_keyframes
-from keyrecon.numerics.geometry import project_orthographic
+from keyrecon.numerics.geometry import project_orthographic, unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, JointTracks, Keyframes
 
@@ -164,7 +164,7 @@ def _find_outliers(
 def _directions(
     points: Float[np.ndarray, "T J 3"], skeleton: Skeleton
 ) -> Float[np.ndarray, "T B 3"]:
-    return unit(bone_vectors(points, skeleton))
+    return unit_vectors(bone_vectors(points, skeleton))
 
 
 def _place(

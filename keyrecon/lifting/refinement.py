@@ -15,11 +15,12 @@ from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
-from keyrecon.lifting.bone_directions import ancestry, bone_vectors, breadths, unit
+from keyrecon.lifting.bone_directions import ancestry, bone_vectors, breadths
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks
 from keyrecon.lifting.priors.anatomy import TILT, anatomy_of
 from keyrecon.lifting.solver import MotionState, Smoothness, solve
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 
 _UPRIGHT_FROM = 0.3
@@ -94,7 +95,7 @@ def descend_motion(
         points, observed.joints, (lengths, low_pass(options.sigma)), options.step, options.descents
     )
     valid = lengths(fitted)
-    return MotionState(valid[:, root, :2], unit(bone_vectors(valid, skeleton)))
+    return MotionState(valid[:, root, :2], unit_vectors(bone_vectors(valid, skeleton)))
 
 
 def _trunk_terms(size: BodySize, skeleton: Skeleton, options: RefineOptions) -> list[terms.Term]:

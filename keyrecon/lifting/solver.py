@@ -21,6 +21,7 @@ from keyrecon.numerics.banded_least_squares import (
     second_difference_bands,
     solve_banded,
 )
+from keyrecon.numerics.geometry import unit_vectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +90,14 @@ def solve(
 def tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3 2"]:
     """Two unit vectors at right angles to every direction."""
     helper = np.eye(3)[np.abs(directions).argmin(axis=-1)]
-    first = np.cross(directions, helper)
-    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    first = unit_vectors(np.cross(directions, helper))
     return np.stack([first, np.cross(directions, first)], axis=-1)
 
 
 def _move(state: MotionState, step: Float[np.ndarray, "T D"]) -> MotionState:
     turn = step[:, 2:].reshape(len(step), -1, 2)
     moved = state.directions + np.einsum("tbik,tbk->tbi", tangents(state.directions), turn)
-    return MotionState(
-        state.root + step[:, :2], moved / np.linalg.norm(moved, axis=-1, keepdims=True)
-    )
+    return MotionState(state.root + step[:, :2], unit_vectors(moved))
 
 
 def _cost(state: MotionState, lines: Sequence[Linear], smoothness: Smoothness) -> float:

@@ -11,13 +11,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import bone_vectors, unit
+from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSignOptions, DepthSigns, ForeshortenedBones
 from keyrecon.lifting.depth_signs import choose_depth_signs
 from keyrecon.lifting.foreshortening import depth_doubt, depth_share
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks
 from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Annotations
 
 _GUESS = 0.3
@@ -83,7 +84,7 @@ def foreshorten_bones(
     shown = np.where(missing, 0.87, np.linalg.norm(vectors, axis=-1) / lengths)
     blur = np.where(missing, 0.8, blur)
     share = depth_share(shown, blur)
-    flat = np.sqrt(1 - share**2)[..., None] * unit(np.nan_to_num(vectors))
+    flat = np.sqrt(1 - share**2)[..., None] * unit_vectors(np.nan_to_num(vectors))
     doubt = lengths * depth_doubt(shown, blur)
     usual = expected_depth(model, vectors, lengths, skeleton)
     return ForeshortenedBones(lengths[:, None] * flat, lengths * share, doubt, usual)
@@ -93,4 +94,4 @@ def lift_foreshortened(
     shown: ForeshortenedBones, sign: Int[np.ndarray, "T B"]
 ) -> Float[np.ndarray, "T B 3"]:
     """Unit bone directions of the given depth signs."""
-    return unit(np.concatenate([shown.flat, (sign * shown.depth)[..., None]], axis=-1))
+    return unit_vectors(np.concatenate([shown.flat, (sign * shown.depth)[..., None]], axis=-1))

@@ -28,6 +28,16 @@ def project_orthographic(
     return scale[:, None, None] * points[..., :2]
 
 
+def unit_vectors(
+    vectors: Float[np.ndarray, "*n D"], min_length: float = 1e-30
+) -> Float[np.ndarray, "*n D"]:
+    """Vectors of length one; those below `min_length` are divided by it, so that zero stays zero.
+
+    With a `min_length` of zero a zero vector becomes NaN.
+    """
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), min_length)
+
+
 def look_at(
     center: Float[np.ndarray, "3"], target: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3 3"]:

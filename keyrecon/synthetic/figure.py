@@ -11,12 +11,14 @@ instants at once.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import LSP14
+from keyrecon.numerics.geometry import unit_vectors
 
 UP = np.array([0.0, 1.0, 0.0])
 STATURE = 1.75
@@ -25,6 +27,9 @@ ANKLE_HEIGHT = 0.085
 """Metres from the sole to the ankle joint at that stature."""
 FOOT_LENGTH = 0.17
 """Metres from the ankle to the toes along the floor at that stature."""
+
+unit = partial(unit_vectors, min_length=1e-9)
+"""Directions of bones and normals, whose rounding errors are far below a nanometre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +52,6 @@ class Pointers:
 def joint(points: Float[np.ndarray, "*t J 3"], name: str) -> Float[np.ndarray, "*t 3"]:
     """One joint by name."""
     return points[..., LSP14.index(name), :]
-
-
-def unit(vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Vectors made of length 1."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def estimate_stature(points: Float[np.ndarray, "T 14 3"]) -> float:

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from keyrecon.numerics.geometry import unit_vectors
+
 
 @dataclass(frozen=True, eq=False)
 class Solids:
@@ -129,8 +131,7 @@ def _bases(
     axis: Float[np.ndarray, "P 3"], side: Float[np.ndarray, "P 3"]
 ) -> Float[np.ndarray, "P 3 3"]:
     """Rows: side made square to the axis, across both, axis."""
-    across = np.cross(axis, side)
-    across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+    across = unit_vectors(np.cross(axis, side), 1e-9)
     return np.stack([np.cross(across, axis), across, axis], axis=1)
 
 
@@ -278,6 +279,5 @@ def _normals(
     local = np.einsum("nij,nj->ni", to_local, offset)
     axial = local[:, 2].copy()
     local[:, 2] -= along[rows, columns] * forms.length.astype(np.float32)[which]
-    normal = np.einsum("nij,ni->nj", to_local, local)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
+    normal = unit_vectors(np.einsum("nij,ni->nj", to_local, local), 1e-6)
     return normal, np.stack([axial, local[:, 0]], axis=1)

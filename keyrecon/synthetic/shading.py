@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int
 
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.synthetic.figure import PARTS
 from keyrecon.synthetic.looks import Rgb
 from keyrecon.synthetic.raster import FAR, Surface
@@ -90,7 +91,7 @@ def paint_surface(
     normal = normal + 0.34 * tilt[:, None] * np.stack(
         [tiles.folds[0][u, v], tiles.folds[1][u, v], np.zeros_like(tilt)], axis=1
     )
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit_vectors(normal, 0.0)
     shade = _light(normal, light, _GLOSS[part])
     shade *= (1 + _GRAIN[part] * tiles.grain[u, v])[:, None]
     shade *= _occlusion(surface)[rows, columns][:, None]

@@ -9,7 +9,7 @@ from swinging_figure import BREADTHS, standing_directions, swinging_motion, turn
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions, unit
+from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import (
     DepthSignOptions,
     ForeshortenedBones,
@@ -21,6 +21,7 @@ from keyrecon.lifting.lifting import LiftOptions, lift_motion
 from keyrecon.lifting.limb_lengths import estimate_lengths
 from keyrecon.lifting.priors import anatomy
 from keyrecon.lifting.taylor import foreshorten_bones, lift_foreshortened
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
 
 SCALE = 400.0
@@ -62,7 +63,7 @@ def aligned_error(points, truth):
 
 
 def test_a_projected_pose_with_known_signs_comes_back():
-    directions = unit(np.random.default_rng(1).normal(size=(40, 13, 3)))
+    directions = unit_vectors(np.random.default_rng(1).normal(size=(40, 13, 3)))
     truth = pose_from_directions(directions, LSP14.lengths, LSP14)
     shown = foreshorten_bones(truth[..., :2], np.full((40, 14), 1e-4), LSP14.lengths, LSP14)
     sign = np.where(directions[..., 2] > 0, 1, -1)
@@ -91,7 +92,7 @@ def price_of_body(vectors):
     corners = [f"{side}_{name}" for name in ("hip", "shoulder") for side in ("right", "left")]
     trunk = vectors[:, [bone[name] for name in corners]]
     hips, shoulders, up = anatomy.trunk_axes(trunk)
-    directions = unit(vectors)
+    directions = unit_vectors(vectors)
     cost = anatomy.trunk_cost(trunk, BREADTHS)
     cost += anatomy.head_cost(shoulders, up, directions[:, bone["head_top"]])
     for side, sign in (("right", 1), ("left", -1)):
@@ -105,14 +106,14 @@ def price_of_body(vectors):
 
 def test_a_hanging_arm_bends_its_forearm_forward_rather_than_back():
     right, up, forward = (sign * np.eye(3)[[axis]] for axis, sign in ((0, 1), (1, -1), (2, 1)))
-    forwards, backwards = unit(-up + forward), unit(-up - forward)
+    forwards, backwards = unit_vectors(-up + forward), unit_vectors(-up - forward)
     usual = anatomy.arm_cost(right, up, -up, forwards, 1)
     assert (usual < anatomy.arm_cost(right, up, -up, backwards, 1) - 1).all()
 
 
 def test_left_and_right_limbs_cost_the_same_in_the_mirror():
     rng = np.random.default_rng(5)
-    upper, lower = unit(rng.normal(size=(2, 20, 3)))
+    upper, lower = unit_vectors(rng.normal(size=(2, 20, 3)))
     right, up, flip = np.eye(3)[0], -np.eye(3)[1], np.array([-1.0, 1.0, 1.0])
     for price in (anatomy.arm_cost, anatomy.leg_cost):
         here = price(right, up, upper, lower, 1)
@@ -123,7 +124,8 @@ def test_left_and_right_limbs_cost_the_same_in_the_mirror():
 def test_a_trunk_that_leans_forward_is_likelier_than_its_mirror_image():
     right, down = np.eye(3)[[0]], np.eye(3)[[1]]
     toward_camera = np.array([[0.0, 0.0, -1.0]])
-    ahead, back = unit(-down + 0.3 * toward_camera), unit(-down - 0.3 * toward_camera)
+    ahead = unit_vectors(-down + 0.3 * toward_camera)
+    back = unit_vectors(-down - 0.3 * toward_camera)
     assert (anatomy.lean_cost(-right, ahead) < anatomy.lean_cost(-right, back)).all()
 
 
@@ -148,7 +150,7 @@ def bare(flat, depth):
 
 def test_signs_are_the_cheapest_of_all_sign_vectors():
     rng = np.random.default_rng(3)
-    directions = unit(standing_directions() + 0.4 * rng.normal(size=(3, 13, 3)))
+    directions = unit_vectors(standing_directions() + 0.4 * rng.normal(size=(3, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
     depth = np.abs(LSP14.lengths * directions[..., 2])
     shown = bare(flat, depth)
@@ -188,7 +190,7 @@ def test_knees_bend_backwards_whichever_way_the_figure_faces():
     lifted = standing_directions()
     names = [LSP14.names[c] for _, c in LSP14.bones]
     shanks = [names.index(f"{side}_ankle") for side in ("right", "left")]
-    lifted[shanks] = unit(np.array([0.0, 0.8, 0.6]))
+    lifted[shanks] = unit_vectors(np.array([0.0, 0.8, 0.6]))
     for yaw in (0.4, -0.5, 2.6):
         directions = turned(lifted, yaw)[None]
         flat = LSP14.lengths[:, None] * directions[..., :2]
@@ -206,7 +208,7 @@ def test_what_is_usual_tells_apart_what_looks_the_same():
     blind, told = [], []
     for side in (1, -1):
         directions = standing_directions()[None]
-        directions[:, arms] = unit(np.array([0.1, 0.6, 0.8 * side]))
+        directions[:, arms] = unit_vectors(np.array([0.1, 0.6, 0.8 * side]))
         flat, dz = LSP14.lengths[:, None] * directions[..., :2], LSP14.lengths * directions[..., 2]
         shown = bare(flat, np.abs(dz))
         blind.append(choose_depth_signs(shown, nobody, BREADTHS, LSP14).sign[0, arms])
@@ -219,7 +221,7 @@ def test_what_is_usual_tells_apart_what_looks_the_same():
 
 def test_confirmed_signs_are_kept():
     rng = np.random.default_rng(7)
-    directions = unit(standing_directions() + 0.3 * rng.normal(size=(5, 13, 3)))
+    directions = unit_vectors(standing_directions() + 0.3 * rng.normal(size=(5, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
     shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
     nearer = rng.choice([-1, 1], (5, 13))

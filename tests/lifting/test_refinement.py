@@ -5,11 +5,12 @@ import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.lifting import terms
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions, unit
+from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.foreshortening import depth_share, log_density
 from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
 from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.records import HalfKeyframes
 
@@ -21,7 +22,7 @@ def smooth_state(frames=60, seed=0):
     rng = np.random.default_rng(seed)
     time = np.linspace(0, 1, frames)[:, None, None]
     ends = rng.normal(size=(3, 13, 3))
-    directions = unit(ends[0] + 0.5 * time * ends[1] + 0.3 * np.sin(5 * time) * ends[2])
+    directions = unit_vectors(ends[0] + 0.5 * time * ends[1] + 0.3 * np.sin(5 * time) * ends[2])
     return MotionState(0.2 * time[:, 0] * rng.normal(size=2), directions)
 
 
@@ -46,7 +47,7 @@ def half_keyframes(nearest, represented):
 
 def test_slerp_keeps_unit_length_and_returns_its_ends():
     rng = np.random.default_rng(1)
-    a, b = unit(rng.normal(size=(50, 3))), unit(rng.normal(size=(50, 3)))
+    a, b = unit_vectors(rng.normal(size=(50, 3))), unit_vectors(rng.normal(size=(50, 3)))
     for share in (0.0, 0.3, 1.0):
         between = slerp(a, b, np.full(50, share))
         np.testing.assert_allclose(np.linalg.norm(between, axis=-1), 1.0)
@@ -55,7 +56,7 @@ def test_slerp_keeps_unit_length_and_returns_its_ends():
 
 
 def test_slerp_moves_at_constant_speed():
-    a, b = np.array([[1.0, 0, 0]]), unit(np.array([[0.2, 1.0, 0.5]]))
+    a, b = np.array([[1.0, 0, 0]]), unit_vectors(np.array([[0.2, 1.0, 0.5]]))
     whole = np.arccos((a * b).sum())
     third = slerp(a, b, np.array([1 / 3]))
     assert np.arccos((a * third).sum()) == pytest.approx(whole / 3)
@@ -68,7 +69,7 @@ def test_opposite_directions_turn_through_the_image_plane():
 
 
 def test_directions_are_held_outside_the_control_frames():
-    poses = unit(np.random.default_rng(0).normal(size=(2, 1, 3)))
+    poses = unit_vectors(np.random.default_rng(0).normal(size=(2, 1, 3)))
     carried = slerp_between(poses, np.array([3, 6]), 10)
     np.testing.assert_allclose(carried[:4], np.repeat(poses[:1], 4, axis=0))
     np.testing.assert_allclose(carried[6:], np.repeat(poses[1:], 4, axis=0))
@@ -165,7 +166,7 @@ def test_the_solver_returns_to_the_truth_from_a_disturbed_start():
     observed = positions(truth)[..., :2]
     deep = np.sign(truth.directions[..., 2:]) * 0.2
     start = MotionState(
-        truth.root + 0.02, unit(truth.directions + [0.05, -0.05, 0] + deep * [0, 0, 1])
+        truth.root + 0.02, unit_vectors(truth.directions + [0.05, -0.05, 0] + deep * [0, 0, 1])
     )
     term = terms.reprojection(known(observed, 0.005), LENGTHS, LSP14)
     smoothness = Smoothness(1e2, 1e2 * LENGTHS**2)
@@ -229,8 +230,8 @@ def test_long_shown_lengths_are_likelier_than_short_ones_up_to_the_full_length()
 
 def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
     share = LENGTHS / LENGTHS.sum()
-    leaning = np.tile(unit(np.array([0.0, -1.0, 0.3])), (5, 13, 1))
-    upright = np.tile(unit(np.array([0.0, -1.0, -0.1])), (5, 13, 1))
+    leaning = np.tile(unit_vectors(np.array([0.0, -1.0, 0.3])), (5, 13, 1))
+    upright = np.tile(unit_vectors(np.array([0.0, -1.0, -0.1])), (5, 13, 1))
     term = terms.balance(share, 0.1, 0.05)
     assert np.abs(term(MotionState(np.zeros((5, 2)), upright)).residual).max() < 1e-9
     solved = solve(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from keyrecon.body import HIP_BREADTH, LSP14, SHOULDER_BREADTH
-from keyrecon.lifting.bone_directions import unit
+from keyrecon.numerics.geometry import unit_vectors
 
 BREADTHS = np.array([HIP_BREADTH, SHOULDER_BREADTH])
 
@@ -20,7 +20,7 @@ def standing_directions():
     down = {"knee": (0, 1, -0.25), "ankle": (0, 1, 0.25), "elbow": (0, 1, 0.2)}
     down["wrist"] = (0, 0.6, -0.8)
     rows = [named.get(LSP14.names[c]) or down[LSP14.names[c].split("_")[1]] for _, c in LSP14.bones]
-    return unit(np.array(rows, dtype=float))
+    return unit_vectors(np.array(rows, dtype=float))
 
 
 def turned(directions, yaw):
@@ -38,4 +38,4 @@ def swinging_motion(frames=240, seed=0):
     swing = np.stack([wave[..., 0], np.zeros_like(wave[..., 0]), wave[..., 1]], axis=-1)
     swing[:, :4] *= 0.2
     base = np.stack([turned(standing_directions(), 0.9 * np.sin(1.1 * t)) for t in time])
-    return unit(base + swing)
+    return unit_vectors(base + swing)

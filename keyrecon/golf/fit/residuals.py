@@ -38,6 +38,7 @@ from keyrecon.golf.records import (
     RootPose,
     SwingMarks,
 )
+from keyrecon.numerics.geometry import unit_vectors
 
 # segment, start and end (x, along, z in statures; along: share of the segment), radii in statures
 _TRUNK = (
@@ -127,8 +128,7 @@ def club_residuals(observations: Observations, body: Body, pose: RootPose) -> Re
     points = find_club(body, pose)[frame].reshape(-1, 3)
     seen = observations.club[frame]
     pixels, slope = project(points, observations.camera)
-    along = seen[:, 1] - seen[:, 0]
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    along = unit_vectors(seen[:, 1] - seen[:, 0], 1e-9)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     axes = np.repeat(np.stack([across, along], axis=1), 2, axis=0)
     spreads = np.repeat(observations.club_spread[frame], 2), observations.club_along[frame].ravel()
@@ -200,7 +200,7 @@ def foreground_residuals(
     across = _reject(point, ways[rows])
     return Residuals(
         distance[rows, nearest], frame, capsules.segment[nearest], point,
-        across / np.linalg.norm(across, axis=1, keepdims=True), np.arange(len(rows)),
+        unit_vectors(across, 0.0), np.arange(len(rows)),
     )  # fmt: skip
 
 
@@ -252,7 +252,7 @@ def sight_lines(pixels: Float[np.ndarray, "n 2"], camera: Camera) -> Rows:
     ways = np.concatenate(
         [(pixels - camera.principal) / camera.focal, np.ones((len(pixels), 1))], axis=1
     )
-    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    return unit_vectors(ways)
 
 
 def pass_capsules(

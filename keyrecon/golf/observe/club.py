@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
 NOWHERE = np.full((2, 2), np.nan)
@@ -132,8 +133,7 @@ def _fit_window(
 ) -> tuple[Float[np.ndarray, "2 2"], Float[np.ndarray, "n"]]:
     """Ends at time 0 and the weight of each shaft, by iteratively reweighted least squares."""
     basis = np.stack([np.ones_like(time), time, time**2], axis=1)
-    unit = ends[:, 1] - ends[:, 0]
-    unit = unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-9)
+    unit = unit_vectors(ends[:, 1] - ends[:, 0], 1e-9)
     across = np.eye(2) - unit[:, :, None] * unit[:, None, :]
     along = np.stack([np.where(tip, 1.0, ALONG), np.full(len(tip), ALONG)], axis=1)
     metric = across[:, None] + along[..., None, None] * (np.eye(2) - across)[:, None]

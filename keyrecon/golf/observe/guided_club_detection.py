@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
 PLACES = 32
@@ -201,8 +202,7 @@ def _contrast(
     share = np.linspace(*SHAFT, PLACES)
     points = ends[:, None, 0] + share[:, None] * (ends[:, None, 1] - ends[:, None, 0])
     way = ends[:, 1] - ends[:, 0]
-    across = np.stack([-way[:, 1], way[:, 0]], axis=1)
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    across = unit_vectors(np.stack([-way[:, 1], way[:, 0]], axis=1), 1e-9)
     blur = SHUTTER / 2 * (sight.swept[0] + share * (sight.swept[1] - sight.swept[0]))
     widths = [np.full(PLACES, w) for w in options.widths]
     widths += [options.widths[0] + share * blur for share in BLURS]

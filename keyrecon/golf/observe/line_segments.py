@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from skimage.transform import probabilistic_hough_line
 
 from keyrecon.golf.observe.foreground import Foreground
+from keyrecon.numerics.geometry import unit_vectors
 
 PARALLEL = np.deg2rad(6.0)
 """Two sides of a bar differ by no more."""
@@ -167,8 +168,7 @@ def _pair(
     length = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
     unit = (sides[:, 1] - sides[:, 0]) / length[:, None]
     i, j = np.nonzero(np.triu(unit @ unit.T < -np.cos(PARALLEL), 1))
-    axis = unit[i] * length[i, None] - unit[j] * length[j, None]
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    axis = unit_vectors(unit[i] * length[i, None] - unit[j] * length[j, None], 0.0)
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
     middle = sides.mean(axis=1)
     gap = np.einsum("nk,nk->n", middle[j] - middle[i], normal)

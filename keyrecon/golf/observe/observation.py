@@ -29,6 +29,7 @@ from keyrecon.golf.observe.swing_events import TimingOptions, find_key_frames, i
 from keyrecon.golf.records import Camera, Matches, Observations
 from keyrecon.io.frame_reader import read_small, side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.segmentation.color_model import to_lab
 
@@ -147,8 +148,7 @@ def _describe_club(
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T 2"]]:
     """Ends of the club where it was seen, and their deviations along the shaft, px."""
     ends = np.where(club.seen[:, None, None], club.ends, np.nan)
-    unit = ends[:, 1] - ends[:, 0]
-    unit = unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-9)
+    unit = unit_vectors(ends[:, 1] - ends[:, 0], 1e-9)
     ends[:, 0] -= INTO_HANDS * height * unit
     border = 0.02 * height
     inside = ((ends[:, 1] > border) & (ends[:, 1] < np.array(size) - border)).all(axis=1)

@@ -30,6 +30,7 @@ from keyrecon.golf.prior.skeleton import (
     turns_from_swing,
 )
 from keyrecon.golf.records import Body, Posture, Swing, SwingState
+from keyrecon.numerics.geometry import unit_vectors
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 
@@ -94,7 +95,7 @@ def _swing_axes(
 def _hold_club(joints: Float[np.ndarray, "T 14 3"]) -> Float[np.ndarray, "T 2 3"]:
     """A club straight on from the left forearm."""
     wrist, elbow = (joints[:, LSP14.index(f"left_{n}")] for n in ("wrist", "elbow"))
-    way = (wrist - elbow) / np.linalg.norm(wrist - elbow, axis=1, keepdims=True)
+    way = unit_vectors(wrist - elbow, 0.0)
     grip = wrist + GRIP * _stature(joints) * way
     return np.stack([grip, grip + CLUB_LENGTH * way], axis=1)
 
@@ -103,8 +104,7 @@ def _set_wrist(swing: Swing) -> Swing:
     """The swing with the club turned in the left hand as `WRIST` says."""
     forearm = chain_turns(turns_from_swing(swing)[0])[:, NAMES.index("left_forearm")]
     time = np.interp(np.arange(len(forearm)), swing.keys, WRIST_KEYS)
-    way = PchipInterpolator(*zip(*WRIST, strict=True))(time)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    way = unit_vectors(PchipInterpolator(*zip(*WRIST, strict=True))(time))
     grip = swing.club[:, 0]
     head = grip + CLUB_LENGTH * np.einsum("tij,tj->ti", forearm, way)
     return Swing(
@@ -192,7 +192,6 @@ def _reach(joints: np.ndarray, names: tuple[str, str, str], target: Points) -> N
     distance = np.clip(distance, FOLDED * (upper + lower), STRAIGHT * (upper + lower))
     along = (upper**2 - lower**2 + distance**2) / (2 * distance)
     out = np.sqrt(np.maximum(upper**2 - along**2, 0))
-    side = bend - np.sum(bend * way, axis=1, keepdims=True) * way
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+    side = unit_vectors(bend - np.sum(bend * way, axis=1, keepdims=True) * way, 1e-9)
     joints[:, middle] = joints[:, root] + along * way + out * side
     joints[:, end] = joints[:, root] + distance * way

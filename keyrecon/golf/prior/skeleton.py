@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
 from keyrecon.golf.records import Body, Swing
+from keyrecon.numerics.geometry import unit_vectors
 
 AHEAD_AND_DOWN = (0.0, -0.7071067811865476, -0.7071067811865476)
 
@@ -136,27 +137,23 @@ def _bone_directions(swing: Swing) -> dict[str, Vectors]:
 
 def _axes(across: Vectors, up: Vectors, along_second: bool) -> Float[np.ndarray, "T 3 3"]:
     """Axes x, y, z as columns from two lines; one is kept, the other made square to it."""
-    back = _unit(np.cross(across, up))
+    back = unit_vectors(np.cross(across, up), 1e-12)
     if along_second:
-        y = _unit(up)
+        y = unit_vectors(up, 1e-12)
         x = np.cross(y, back)
     else:
-        x = _unit(across)
+        x = unit_vectors(across, 1e-12)
         y = np.cross(back, x)
     return np.stack([x, y, back], axis=2)
 
 
 def shortest_turn(rest: Float[np.ndarray, "3"], to: Vectors) -> Float[np.ndarray, "n 3 3"]:
     """The rotation without twist that brings `rest` to the directions `to`."""
-    way = _unit(to)
+    way = unit_vectors(to, 1e-12)
     axis = np.cross(rest, way)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
     angle = np.arctan2(sine[:, 0], way @ rest)
     return Rotation.from_rotvec(axis / np.maximum(sine, 1e-12) * angle[:, None]).as_matrix()
-
-
-def _unit(vectors: Vectors) -> Vectors:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def chain_turns(turns: Float[np.ndarray, "T P 3 3"]) -> Float[np.ndarray, "T P 3 3"]:

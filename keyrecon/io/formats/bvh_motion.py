@@ -27,6 +27,7 @@ from scipy.spatial.transform import Rotation
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import at_constant_rate
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 
 Points = Float[np.ndarray, "T 3"]
@@ -149,32 +150,28 @@ def _hinge(upper: Points, lower: Points, parent: Turns, rest: Float[np.ndarray, 
 
     Interpolated in the parent's axes; `rest` stands in there if the limb is never bent.
     """
-    turn = np.cross(_unit(upper), _unit(lower))
+    turn = np.cross(unit_vectors(upper, 1e-12), unit_vectors(lower, 1e-12))
     local = np.einsum("tji,tj->ti", parent, turn)
     bent = np.flatnonzero(np.linalg.norm(turn, axis=1) > STRAIGHT)
     if not len(bent):
         return parent @ rest
     frames = np.arange(len(turn))
-    known = _unit(local[bent])
+    known = unit_vectors(local[bent], 1e-12)
     filled = np.stack([np.interp(frames, bent, known[:, k]) for k in range(3)], axis=1)
     return np.einsum("tij,tj->ti", parent, filled)
 
 
 def _frame(x: Points, y: Points, fixed: str) -> Turns:
     """Axes with x and y as given, exactly for the `fixed` one; any where both coincide."""
-    x, y = _unit(x), _unit(y)
+    x, y = unit_vectors(x, 1e-12), unit_vectors(y, 1e-12)
     z = np.cross(x, y)
     # Parallel x and y leave the roll open: take an axis that is not parallel to them.
     open_roll = np.linalg.norm(z, axis=1) < 1e-6
     spare = np.eye(3)[np.abs(x[open_roll]).argmin(axis=1)]
     z[open_roll] = np.cross(x[open_roll], spare)
-    z = _unit(z)
+    z = unit_vectors(z, 1e-12)
     columns = (x, np.cross(z, x), z) if fixed == "x" else (np.cross(y, z), y, z)
     return np.stack(columns, axis=2)
-
-
-def _unit(vectors: Points) -> Points:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def _length(vectors: Points) -> float:

@@ -26,6 +26,7 @@ minutes at 50 fps); millimetres, as such programs expect, or body heights.
 import io
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import at_constant_rate
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 
 Points = Float[np.ndarray, "T 3"]
@@ -54,6 +56,9 @@ CLUB_MARKERS = "WEP"
 
 HEAD_BAND_TO_CROWN = 0.09
 """Height of the crown above a head band at the forehead, metres."""
+
+_direction = partial(unit_vectors, min_length=0.0)
+"""Directions between markers; NaN, unknown, where two markers are in one place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +147,7 @@ def _joint_centres(m: dict[str, Points]) -> Float[np.ndarray, "T 14 3"]:
         inward = axis * np.sign(np.sum(axis * (centres[f"{other}_hip"] - hip)))
         centres[f"{side}_knee"] = knee + HALF_WIDTHS["knee"] * inward
         centres[f"{side}_ankle"] = m[letter + "ANK"] + HALF_WIDTHS["ankle"] * inward
-        shoulder = m[letter + "SHO"] + 0.17 * breadth * _unit(hips - neck)
+        shoulder = m[letter + "SHO"] + 0.17 * breadth * _direction(hips - neck)
         wrist = (m[letter + "WRA"] + m[letter + "WRB"]) / 2
         elbow, axis = _hinge(shoulder, m[letter + "UPA"], m[letter + "ELB"], wrist)
         # Flexion turns the forearm forwards and up, so that upper arm x forearm points to the
@@ -152,7 +157,7 @@ def _joint_centres(m: dict[str, Points]) -> Float[np.ndarray, "T 14 3"]:
             -1 if side == "right" else 1
         )
     band = (m["LFHD"] + m["RFHD"] + m["LBHD"] + m["RBHD"]) / 4
-    up = _unit(np.cross(m["RFHD"] - m["LBHD"], m["LFHD"] - m["RBHD"]))
+    up = _direction(np.cross(m["RFHD"] - m["LBHD"], m["LFHD"] - m["RBHD"]))
     centres["neck"], centres["head_top"] = neck, band + HEAD_BAND_TO_CROWN * up
     return np.stack([centres[name] for name in LSP14.names], axis=1)
 
@@ -166,7 +171,7 @@ def _find_club(
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
     hands = joints[:, wrists].mean(axis=1)
     far = sorted(shaft, key=lambda marker: np.linalg.norm(marker - hands, axis=1).mean())
-    way = _unit(far[-1] - far[0])
+    way = _direction(far[-1] - far[0])
     beside = far[0] + way * np.sum(way * (hands - far[0]), axis=1, keepdims=True)
     return np.stack([beside, far[-1]], axis=1)
 
@@ -174,8 +179,8 @@ def _find_club(
 def _hips(m: dict[str, Points]) -> tuple[Points, Points]:
     """Right and left hip centre by Harrington's regression (his Table 2, in metres)."""
     front, back = (m["RASI"] + m["LASI"]) / 2, (m["RPSI"] + m["LPSI"]) / 2
-    across = _unit(m["RASI"] - m["LASI"])
-    up = _unit(np.cross(across, front - back))
+    across = _direction(m["RASI"] - m["LASI"])
+    up = _direction(np.cross(across, front - back))
     forward = np.cross(up, across)
     width = np.median(np.linalg.norm(m["RASI"] - m["LASI"], axis=1))
     depth = np.median(np.linalg.norm(front - back, axis=1))
@@ -186,17 +191,13 @@ def _hips(m: dict[str, Points]) -> tuple[Points, Points]:
 
 def _hinge(upper: Points, side: Points, marker: Points, lower: Points) -> tuple[Points, Points]:
     """The marker, and the joint's axis held fixed in the segment of upper, side and marker."""
-    along = _unit(marker - upper)
+    along = _direction(marker - upper)
     across = np.cross(along, side - upper)
-    frame = np.stack([along, _unit(across), np.cross(along, _unit(across))], axis=2)
-    turn = np.cross(along, _unit(lower - marker))
+    frame = np.stack([along, _direction(across), np.cross(along, _direction(across))], axis=2)
+    turn = np.cross(along, _direction(lower - marker))
     # |turn| is the sine of flexion and its direction the axis: their product weighs by sin^2.
     local = np.einsum("tij,ti,t->j", frame, turn, np.linalg.norm(turn, axis=1))
     return marker, frame @ (local / np.linalg.norm(local))
-
-
-def _unit(vectors: Points) -> Points:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def write_c3d(path: Path, motion: Motion) -> None:

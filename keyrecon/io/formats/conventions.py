@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.errors import KeyreconError
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 
 UNEVEN = 0.1
@@ -50,8 +51,7 @@ def at_constant_rate(motion: Motion) -> Float[np.ndarray, "N J 3"]:
     for parent, child in motion.skeleton.bones:
         bone = points[:, child] - points[:, parent]
         length = np.interp(even, time, np.linalg.norm(bone, axis=1))
-        direction = _interpolate(even, time, bone)
-        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-12)
+        direction = unit_vectors(_interpolate(even, time, bone), 1e-12)
         resampled[:, child] = resampled[:, parent] + length[:, None] * direction
     return resampled
 

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import unit
 from keyrecon.lifting.priors.posture import posture_cost
+from keyrecon.numerics.geometry import unit_vectors
 
 CAP = 8.0
 """Largest cost of one broken limit, nats."""
@@ -89,9 +89,9 @@ def trunk_axes(
 
     Corners relative to the neck, in the order of `Anatomy.trunk`.
     """
-    hips = unit(corners[..., 0, :] - corners[..., 1, :])
-    shoulders = unit(corners[..., 2, :] - corners[..., 3, :])
-    up = unit(-(corners[..., 0, :] + corners[..., 1, :]))
+    hips = unit_vectors(corners[..., 0, :] - corners[..., 1, :])
+    shoulders = unit_vectors(corners[..., 2, :] - corners[..., 3, :])
+    up = unit_vectors(-(corners[..., 0, :] + corners[..., 1, :]))
     return hips, shoulders, up
 
 
@@ -107,14 +107,14 @@ def trunk_cost(
     cost += hinge(np.cos(np.radians(50)) - (hips * shoulders).sum(-1), 0.3)
     for axis in (hips, shoulders):
         cost += hinge(np.abs((axis * up).sum(-1)) - 0.5, 0.2)
-    return cost + lean_cost(unit(hips + shoulders), up)
+    return cost + lean_cost(unit_vectors(hips + shoulders), up)
 
 
 def lean_cost(
     across: Float[np.ndarray, "*n 3"], up: Float[np.ndarray, "*n 3"]
 ) -> Float[np.ndarray, "*n"]:
     """People at work lean forward a little, and rarely back or to the side."""
-    right = unit(across - (across * UPRIGHT).sum(-1, keepdims=True) * UPRIGHT)
+    right = unit_vectors(across - (across * UPRIGHT).sum(-1, keepdims=True) * UPRIGHT)
     forward = np.cross(UPRIGHT, right)
     ahead = ((up * forward).sum(-1) - _LEAN_FORWARD) / _LEAN_SPREAD
     aside = (up * right).sum(-1) / _LEAN_ASIDE
@@ -153,7 +153,7 @@ def _square_axes(
     across: Float[np.ndarray, "*#n 3"], up: Float[np.ndarray, "*#n 3"], side: int
 ) -> tuple[Float[np.ndarray, "*#n 3"], ...]:
     """Outward on one side, up, forward; at right angles."""
-    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
+    right = unit_vectors(across - (across * up).sum(-1, keepdims=True) * up)
     return side * right, up, np.cross(up, right)
 
 

@@ -27,7 +27,8 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors, unit
+from keyrecon.lifting.bone_directions import bone_vectors
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 
 DEPTH_MODEL_VERSION = 1
@@ -156,7 +157,7 @@ def train_depth_model(
             "both must be above 0."
         )
     rng = np.random.default_rng(options.seed)
-    poses = [unit(bone_vectors(joints, LSP14)).astype(np.float32) for joints in captures]
+    poses = [unit_vectors(bone_vectors(joints, LSP14)).astype(np.float32) for joints in captures]
     batches = -(-options.poses // _BATCH)
     normal, answer = np.zeros((TERMS, TERMS)), np.zeros((TERMS, len(LSP14.bones)))
     for _ in progress(range(batches), "Learning depths", batches):
