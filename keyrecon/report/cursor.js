@@ -1,113 +1,117 @@
-// The page's one cursor, a frame number that everything follows, and what moves it.
-"use strict";
-const report = (() => {
-  const byId = (id) => document.getElementById(id);
-  const read = (id) => JSON.parse(byId(id).textContent);
-  const data = read("motion-data");
-  const followers = []; // called with the frame number whenever it changes
-  const restyled = []; // called when the colour scheme changes
+// The page's one cursor, a frame number that everything shows, and what moves it.
+export const byId = (id) => document.getElementById(id);
+export const read = (id) => JSON.parse(byId(id).textContent);
+export const data = read("motion-data");
+export const followers = []; // called with the frame number whenever it changes
+export const restyled = []; // called when the colour scheme changes
 
-  // An array packed as 16-bit steps; unknown numbers become NaN.
-  function unpack(packed) {
-    if (!packed) return null;
-    const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
-    const whole = new Int16Array(bytes.buffer);
-    const values = Float32Array.from(whole, (n) => (n === -32768 ? NaN : n * packed.step));
-    return { values, shape: packed.shape };
-  }
-  const time = unpack(data.time).values, count = time.length;
+// An array packed as 16-bit steps; unknown numbers become NaN.
+export function unpack(packed) {
+  if (!packed) return null;
+  const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
+  const whole = new Int16Array(bytes.buffer);
+  const values = Float32Array.from(whole, (n) => (n === -32768 ? NaN : n * packed.step));
+  return { values, shape: packed.shape };
+}
+const time = unpack(data.time).values;
+export const count = time.length;
 
-  function color(name) {
-    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  }
+const slider = byId("frame"),
+  play = byId("play"),
+  output = byId("now"),
+  speed = byId("speed"),
+  clip = byId("clip");
+slider.max = count - 1;
+let now = 0,
+  playing = false,
+  started = 0,
+  from = 0;
+export const frame = () => now;
 
-  const slider = byId("frame"), play = byId("play"), output = byId("now"), speed = byId("speed");
-  const clip = byId("clip");
-  slider.max = count - 1;
-  let now = 0, playing = false, started = 0, from = 0;
+function startClock() {
+  from = now;
+  started = performance.now();
+}
 
-  function startClock() {
-    from = now;
-    started = performance.now();
-  }
-
-  function show(frame, seek = true) {
-    now = Math.max(0, Math.min(count - 1, Math.round(frame)));
-    slider.value = now;
-    output.textContent = `frame ${now}, ${time[now].toFixed(2)} s`;
-    if (seek) {
-      if (clip.readyState) clip.currentTime = (now + 0.5) / data.fps;
-      startClock();
-    }
-    followers.forEach((follow) => follow(now));
-  }
-
-  // The small video leads where the browser plays it, else a clock does.
-  function step() {
-    if (!playing) return;
-    const led = clip.readyState > 2 && !clip.paused;
-    const frame = led ? Math.floor(clip.currentTime * data.fps + 1e-3)
-      : from + ((performance.now() - started) / 1000) * data.fps * Number(speed.value);
-    if (frame >= count - 1 || clip.ended) {
-      show(count - 1, false);
-      setPlaying(false);
-      return;
-    }
-    if (Math.floor(frame) !== now) show(Math.floor(frame), false);
-    requestAnimationFrame(step);
-  }
-
-  function setPlaying(wanted) {
-    playing = wanted;
-    play.textContent = playing ? "❚❚" : "▶";
-    play.setAttribute("aria-label", playing ? "Pause" : "Play");
-    if (!playing) {
-      clip.pause();
-      show(now);
-      return;
-    }
-    show(now >= count - 1 ? 0 : now);
-    clip.playbackRate = Number(speed.value);
-    clip.play().catch(() => {}); // without the video the clock goes on
-    requestAnimationFrame(step);
-  }
-
-  play.addEventListener("click", () => setPlaying(!playing));
-  slider.addEventListener("input", () => {
-    if (playing) setPlaying(false);
-    show(Number(slider.value));
-  });
-  speed.addEventListener("change", () => {
-    clip.playbackRate = Number(speed.value);
+export function show(number, seek = true) {
+  now = Math.max(0, Math.min(count - 1, Math.round(number)));
+  slider.value = now;
+  output.textContent = `frame ${now}, ${time[now].toFixed(2)} s`;
+  if (seek) {
+    if (clip.readyState) clip.currentTime = (now + 0.5) / data.fps;
     startClock();
-  });
-  clip.addEventListener("loadedmetadata", () => show(now));
-  document.addEventListener("keydown", (event) => {
-    const busy = event.target.closest("select, input, button, summary, dialog[open]");
-    if ((busy && event.target !== slider) || event.ctrlKey || event.metaKey || event.altKey) return;
-    const steps = { ArrowLeft: -1, ArrowRight: 1 };
-    if (event.key === " ") setPlaying(!playing);
-    else if (event.key in steps) show(now + steps[event.key] * (event.shiftKey ? 10 : 1));
-    else return;
-    event.preventDefault();
-  });
+  }
+  followers.forEach((draw) => draw(now));
+}
 
-  const large = byId("large");
-  document.querySelectorAll(".still").forEach((still) => still.addEventListener("click", () => {
-    show(Number(still.dataset.frame));
-    const image = still.querySelector("img");
-    if (!image) return;
-    large.querySelector("img").src = image.src;
-    large.querySelector("img").alt = image.alt;
-    large.querySelector("p").textContent = image.alt;
-    large.showModal();
-  }));
-  large.addEventListener("click", () => large.close());
-  document.querySelectorAll("[data-copy]").forEach((image) => { image.src = byId(image.dataset.copy).src; });
+// The small video leads where the browser plays it, else a clock does.
+function step() {
+  if (!playing) return;
+  const led = clip.readyState > 2 && !clip.paused;
+  const due = led
+    ? Math.floor(clip.currentTime * data.fps + 1e-3)
+    : from + ((performance.now() - started) / 1000) * data.fps * Number(speed.value);
+  if (due >= count - 1 || clip.ended) {
+    show(count - 1, false);
+    setPlaying(false);
+    return;
+  }
+  if (Math.floor(due) !== now) show(Math.floor(due), false);
+  requestAnimationFrame(step);
+}
 
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    restyled.forEach((restyle) => restyle());
-  });
-  addEventListener("DOMContentLoaded", () => show(0));
-  return { byId, read, data, followers, restyled, unpack, color, count, show, frame: () => now };
-})();
+function setPlaying(wanted) {
+  playing = wanted;
+  play.textContent = playing ? "❚❚" : "▶";
+  play.setAttribute("aria-label", playing ? "Pause" : "Play");
+  if (!playing) {
+    clip.pause();
+    show(now);
+    return;
+  }
+  show(now >= count - 1 ? 0 : now);
+  clip.playbackRate = Number(speed.value);
+  clip.play().catch(() => {}); // without the video the clock goes on
+  requestAnimationFrame(step);
+}
+
+play.addEventListener("click", () => setPlaying(!playing));
+slider.addEventListener("input", () => {
+  if (playing) setPlaying(false);
+  show(Number(slider.value));
+});
+speed.addEventListener("change", () => {
+  clip.playbackRate = Number(speed.value);
+  startClock();
+});
+clip.addEventListener("loadedmetadata", () => show(now));
+document.addEventListener("keydown", (event) => {
+  const busy = event.target.closest("select, input, button, summary, dialog[open]");
+  if ((busy && event.target !== slider) || event.ctrlKey || event.metaKey || event.altKey) return;
+  const steps = { ArrowLeft: -1, ArrowRight: 1 };
+  if (event.key === " ") setPlaying(!playing);
+  else if (event.key in steps) show(now + steps[event.key] * (event.shiftKey ? 10 : 1));
+  else return;
+  event.preventDefault();
+});
+
+const large = byId("large");
+function enlarge(card) {
+  show(Number(card.dataset.frame));
+  const image = card.querySelector("img");
+  if (!image) return;
+  large.querySelector("img").src = image.src;
+  large.querySelector("img").alt = image.alt;
+  large.querySelector("p").textContent = image.alt;
+  large.showModal();
+}
+for (const card of document.querySelectorAll(".still"))
+  card.addEventListener("click", () => enlarge(card));
+large.addEventListener("click", () => large.close());
+for (const image of document.querySelectorAll("[data-copy]"))
+  image.src = byId(image.dataset.copy).src;
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  restyled.forEach((restyle) => restyle());
+});
+addEventListener("DOMContentLoaded", () => show(0));

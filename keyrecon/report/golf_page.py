@@ -23,6 +23,7 @@ from keyrecon.report.golf_measures import SwingMeasures, measure_swing
 from keyrecon.report.golf_pictures import key_pictures, overlay_strip, path_picture
 from keyrecon.report.markup import data_block, note, number, section, text
 from keyrecon.report.page import POLICY
+from keyrecon.report.scripts import bundle_scripts
 
 KEY_NAMES = ("Beginning", "Top", "Hit", "Finish")
 MOST_ALPHAS = 12
@@ -112,14 +113,14 @@ def write_golf_report(
 
 
 def _page(title: str, body: str) -> str:
-    own = files("keyrecon.report")
-    scripts = (get_plotlyjs(), (own / "golf.js").read_text("utf-8"))
+    style = (files("keyrecon.report") / "report.css").read_text("utf-8")
+    scripts = (get_plotlyjs(), bundle_scripts("golf"))
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{text(title)}: keyrecon swing report</title>"
-        f"<style>{(own / 'report.css').read_text('utf-8')}</style></head><body><main>{body}</main>"
+        f"<style>{style}</style></head><body><main>{body}</main>"
         f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>"
     )
 

@@ -20,14 +20,14 @@ from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_ou
 from keyrecon.report.headline import headline
 from keyrecon.report.markup import ReportMaterial, data_block, note, pack, section, text, to_json
 from keyrecon.report.pictures import Pictures, cut_pictures
+from keyrecon.report.scripts import bundle_scripts
 from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth, stature
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; media-src data: blob:"
 )
-SCRIPTS = ("cursor.js", "charts.js", "matrices.js", "figure.js")
-"""In the order in which they build on one another."""
+SCRIPTS = ("charts", "matrices", "figure")
 VIEW_COUNT = 12
 """Frames shown from elsewhere; the paper shows every 50th of 36 s."""
 
@@ -43,9 +43,8 @@ def write_report(path: Path, material: ReportMaterial, progress: Progress = sile
 def build_page(material: ReportMaterial, pictures: Pictures) -> str:
     """The whole page as text."""
     title = text(material.video.path.name)
-    own = files("keyrecon.report")
-    style = (own / "report.css").read_text("utf-8")
-    scripts = (get_plotlyjs(), *((own / name).read_text("utf-8") for name in SCRIPTS))
+    style = (files("keyrecon.report") / "report.css").read_text("utf-8")
+    scripts = (get_plotlyjs(), bundle_scripts(*SCRIPTS))
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
@@ -140,8 +139,8 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
             ("Free", 35, 18),
         )
     )
-    ghost = (
-        '<label><input type="checkbox" id="ghost" checked> truth in grey</label>'
+    truth_switch = (
+        '<label><input type="checkbox" id="show-truth" checked> truth in grey</label>'
         if has_truth
         else ""
     )
@@ -156,7 +155,7 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
         'aria-label="Turnable 3D figure"></canvas></div>'
         f'<video id="clip" src="{pictures.clip}" muted playsinline preload="auto" '
         'aria-label="The player with the reconstructed pose"></video></div>'
-        f'<div class="views-bar">{views}{ghost}</div>',
+        f'<div class="views-bar">{views}{truth_switch}</div>',
     )
 
 

@@ -99,7 +99,7 @@ def test_pictures_are_cut_for_the_strip_and_for_every_keyframe(material, picture
 def test_without_truth_the_report_tells_confidence_and_no_accuracy(material, pictures, page):
     blind = build_page(replace(material, truth=None), pictures)
     assert "PA-MPJPE" in page and "PA-MPJPE" not in blind
-    assert "Confidence" in blind and 'id="ghost"' not in blind
+    assert "Confidence" in blind and 'id="show-truth"' not in blind
 
 
 def test_the_file_is_written_whole(material, tmp_path):

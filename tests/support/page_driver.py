@@ -130,7 +130,7 @@ class Person:
 
     def frame(self):
         """The keyframe that is open."""
-        found = re.search(r"frame (\d+) of", self.text("#where"))
+        found = re.search(r"frame (\d+) of", self.text("#position"))
         return int(found[1])
 
     def asked(self):
@@ -156,13 +156,13 @@ class Person:
     def open(self, frame):
         """Go to a keyframe as by its row in the list."""
         self.page.evaluate("frame => { location.hash = `frame=${frame}`; }", frame)
-        self.await_text("#where", rf"frame {frame} of")
+        self.await_text("#position", rf"frame {frame} of")
         self.page.wait_for_selector(f"#picture[data-frame='{frame}']")
 
     def pose(self):
         """What the server last told the page of the pose."""
         self.await_drawn()
-        self.page.wait_for_selector("#space[aria-busy=false]")
+        self.page.wait_for_selector("#pose-canvas[aria-busy=false]")
         return self._pose.json()
 
     def _remember(self, response):
@@ -198,20 +198,20 @@ class Person:
 
     def suggestion(self, frame):
         """What is suggested for the open joints of a keyframe, once the page shows it."""
-        answer = self.page.evaluate(f"fetch('/api/ghost/{frame}').then((a) => a.json())")
+        answer = self.page.evaluate(f"fetch('/api/suggestion/{frame}').then((a) => a.json())")
         open_joints = self.page.evaluate(
             "[...document.querySelectorAll('.joint[data-joint]:not([hidden]):not(.marked)')]"
             ".map((row) => row.dataset.joint)"
         )
         offered = {name: at for name, at in answer.get("joints", {}).items() if name in open_joints}
         if offered:
-            self.await_text("#guide-text", "suggestion|Which ends|done")
+            self.await_text("#prompt-text", "suggestion|Which ends|done")
         return offered
 
     def take_suggestion(self):
         """Accept what is suggested, and wait for what is asked next."""
         self.press("Enter")
-        self.await_text("#guide-text", "Which ends|done|Click")
+        self.await_text("#prompt-text", "Which ends|done|Click")
 
     def add_keyframes(self, frames):
         """Give the project keyframes of one's own, without the page's help."""
@@ -252,7 +252,7 @@ class Person:
 
     def call(self, module, expression):
         """What an expression on a module of the page gives; the module is called `m`."""
-        return self.page.evaluate(f"import('/page/{module}.js').then((m) => ({expression}))")
+        return self.page.evaluate(f"import('/annotate/page/{module}.js').then((m) => ({expression}))")
 
 
 def clearest_place(limb, place_of):

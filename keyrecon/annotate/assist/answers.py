@@ -132,7 +132,7 @@ def _limbs(skeleton: Skeleton, sighting: Sighting, reading: PoseReading) -> Json
     return {
         names[b]: {
             "sign": int(reading.nearer[b]),
-            "sure": round(float(reading.sure[b]), 3),
+            "certainty": round(float(reading.sure[b]), 3),
             "given": bool(sighting.nearer[b] != 0),
         }
         for b in np.flatnonzero(np.isfinite(reading.stretch))

@@ -1,77 +1,72 @@
-// Wires the page together: one model, the parts that draw it, and the keys.
-import { createActions } from "./actions.js";
-import { keyframeCommands } from "./commands.js";
-import { byId, color } from "./dom.js";
-import { createDepth } from "./depth.js";
-import { createFiles } from "./files.js";
-import { createFrame } from "./frame.js";
-import { around } from "./geometry.js";
-import { createJobs } from "./jobs.js";
-import { createJoints } from "./joints.js";
-import { belongsTo, meaning } from "./keys.js";
-import { createLists } from "./lists.js";
-import { createModel } from "./model.js";
-import { createMotion } from "./motion.js";
-import { createPick } from "./pick.js";
-import { createPrompt } from "./prompt.js";
-import { createScrub } from "./scrub.js";
-import { createStage, SMALL } from "./stage.js";
-import { marksOf } from "./state.js";
-import { createStills } from "./stills.js";
-import { createViewer } from "./viewer.js";
+// Wires the page together: one model, what a person can do, the views, and the keys.
+import { cssColor } from "./draw/canvas.js";
+import { enclosing } from "./draw/geometry.js";
+import { createViewer } from "./draw/viewer.js";
+import { createActions } from "./state/actions.js";
+import { createFrameCache } from "./state/caches.js";
+import { createModel } from "./state/model.js";
+import { createDepth } from "./views/depth.js";
+import { byId } from "./views/dom.js";
+import { createFiles } from "./views/files.js";
+import { createJoints } from "./views/joints.js";
+import { belongsTo, interpret, keyframeCommands } from "./views/keyboard.js";
+import { SMALL_WIDTH, createKeyframePicture } from "./views/keyframe.js";
+import { createLists } from "./views/lists.js";
+import { createMotion } from "./views/motion.js";
+import { createPick } from "./views/pick.js";
+import { createPrompt, createScrub } from "./views/prompt.js";
+import { createShell } from "./views/shell.js";
 
 const VIEWS = ["pick", "keyframes", "motion"];
 
 const model = await createModel();
-const { doing } = model;
-const stills = createStills(model.project, model.changed, model.tell);
+const { ui } = model;
+const frames = createFrameCache(model.project, model.redraw, model.notify);
 const viewer = createViewer({
   root: byId("picture"),
   project: model.project,
-  stills,
-  changed: model.changed,
+  frames,
+  redraw: model.redraw,
 });
-const actions = createActions(model);
-const marks = Object.fromEntries(
-  ["left", "right", "middle"].map((side) => [side, color(`mark-${side}`)]),
+const actions = createActions(model, { middle: viewer.middle, opened });
+const colors = Object.fromEntries(
+  ["left", "right", "middle"].map((side) => [side, cssColor(`mark-${side}`)]),
 );
-const stage = createStage(model, actions, viewer, marks);
-const depth = createDepth(model, stage.placed);
+const picture = createKeyframePicture(model, { actions, viewer, colors });
 const lists = createLists(model, actions);
-const jobs = createJobs(model);
-const frame = createFrame(model, go);
-const parts = [
-  depth,
+const shell = createShell(model, go);
+const panels = [
+  createDepth(model),
   createPrompt(model, actions),
   createScrub(model, actions),
   lists,
   createJoints(model, actions),
 ];
-const pick = createPick(model, { stills, jobs, frame });
-const motion = createMotion(model, { stills, jobs, frame, actions });
+const pick = createPick(model, { frames, shell });
+const motion = createMotion(model, { frames, shell, actions, colors });
 createFiles(model);
-model.middle = viewer.middle;
 
-let opening = null;
-model.opened = (number) => {
-  opening = { frame: number, at: performance.now() };
-  const places = Object.values(marksOf(model.state, number)).filter(([, , seen]) => seen);
-  viewer.frameBox(around(model.keyframe()?.box, places));
-  history.replaceState(null, "", `#frame=${number}`);
-  depth.askGhost(number);
-  lookAhead();
-};
+let opening = null; // {frame, at}: a keyframe that is not drawn yet, to measure how long it takes
+
+function opened(frame) {
+  opening = { frame, at: performance.now() };
+  const places = Object.values(model.marks(frame)).filter(([, , v]) => v);
+  viewer.frameBox(enclosing(model.keyframe()?.box, places));
+  history.replaceState(null, "", `#frame=${frame}`);
+  model.poses.requestSuggestion(frame);
+  prefetchAround();
+}
 
 // The next and previous keyframes first, then a second around this one.
-function lookAhead() {
-  const frames = model.keyframes().map((keyframe) => keyframe.frame),
-    at = frames.indexOf(doing.frame);
-  const near = [1, -1, 2].map((by) => frames[at + by]).filter((number) => number !== undefined);
-  const reach = Math.round(model.project.fps),
+function prefetchAround() {
+  const numbers = model.keyframes().map(({ frame }) => frame),
+    at = numbers.indexOf(ui.frame);
+  const near = [1, -1, 2].map((by) => numbers[at + by]).filter((number) => number !== undefined);
+  const second = Math.round(model.project.fps),
     beside = [];
-  for (let by = 1; by <= reach; by++)
-    beside.push([doing.frame + by, SMALL], [doing.frame - by, SMALL]);
-  stills.wish([...near.map((number) => [number]), ...beside]);
+  for (let by = 1; by <= second; by++)
+    beside.push([ui.frame + by, SMALL_WIDTH], [ui.frame - by, SMALL_WIDTH]);
+  frames.prefetch([...near.map((number) => [number]), ...beside]);
 }
 
 // The keyframe that the address names, so that a place can be returned to.
@@ -81,32 +76,31 @@ function addressed() {
 }
 
 function drawKeyframes() {
-  if (doing.frame === null && model.keyframes().length) {
+  if (ui.frame === null && model.keyframes().length) {
     const all = model.keyframes();
-    actions.open(addressed() ?? (all.find((keyframe) => !model.done(keyframe)) ?? all[0]).frame);
+    actions.open(addressed() ?? (all.find((keyframe) => !model.isDone(keyframe)) ?? all[0]).frame);
     return;
   }
-  for (const part of parts) part.draw();
-  if (doing.frame === null) return;
-  const sharp = stage.draw();
-  if (sharp && opening?.frame === doing.frame) {
+  for (const panel of panels) panel.draw();
+  if (ui.frame === null) return;
+  const drawn = picture.draw();
+  if (drawn && opening?.frame === ui.frame) {
     performance.measure("keyframe", { start: opening.at, end: performance.now() });
     opening = null;
   }
 }
 
 model.onDraw(() => {
-  if (doing.view === null) return;
-  frame.draw();
-  jobs.draw();
-  if (doing.view === "keyframes") drawKeyframes();
-  if (doing.view === "pick") pick.draw();
-  if (doing.view === "motion") motion.draw();
+  if (ui.view === null) return;
+  shell.draw();
+  if (ui.view === "keyframes") drawKeyframes();
+  if (ui.view === "pick") pick.draw();
+  if (ui.view === "motion") motion.draw();
 });
 
 function go(view) {
-  actions.keepHeld();
-  model.do({ view });
+  actions.dropDragged();
+  model.update({ view });
   if (view === "pick") pick.opened();
 }
 
@@ -114,30 +108,30 @@ const commands = {
   any: {
     undo: actions.undo,
     redo: actions.redo,
-    help: frame.help,
-    page: ({ place }) => go(VIEWS[place]),
+    help: shell.help,
+    page: ({ index }) => go(VIEWS[index]),
   },
   keyframes: keyframeCommands(model, { actions, viewer, lists }),
   pick: pick.commands,
   motion: motion.commands,
 };
 
-function obey(act, key) {
-  Promise.resolve(act(key)).catch((fault) =>
-    model.tell(fault.message || "The server does not answer."),
+function execute(command, key) {
+  Promise.resolve(command(key)).catch((fault) =>
+    model.notify(fault.message || "The server does not answer."),
   );
 }
 
 document.addEventListener("keydown", (event) => {
   if (document.querySelector("dialog[open]") && event.key !== "?") return;
-  const key = meaning(event, doing.view);
+  const key = interpret(event, ui.view);
   if (!key || belongsTo(event.target, event.key)) return;
   event.preventDefault();
-  obey(commands[doing.view][key.action] ?? commands.any[key.action], key);
+  execute(commands[ui.view][key.action] ?? commands.any[key.action], key);
 });
 document.addEventListener(
   "keyup",
-  ({ key }) => key.toLowerCase() === "h" && model.do({ hidden: false }),
+  ({ key }) => key.toLowerCase() === "h" && model.update({ hidden: false }),
 );
 // A button pressed with the mouse does not keep the keys to itself.
 document.addEventListener(
@@ -145,20 +139,20 @@ document.addEventListener(
   ({ detail, target }) => detail && target.closest("button")?.blur(),
 );
 
-function pressing(selector, act) {
+function onPress(selector, command) {
   document.querySelectorAll(selector).forEach((button, n) => {
-    button.addEventListener("click", () => obey(() => act(button, n)));
+    button.addEventListener("click", () => execute(() => command(button, n)));
   });
 }
-pressing("[data-swap]", (button) => commands.keyframes[button.dataset.swap]());
-pressing("#readings button", (_, n) => actions.reading(n));
-pressing("#undo", actions.undo);
-pressing("#redo", actions.redo);
+onPress("[data-swap]", (button) => commands.keyframes[button.dataset.swap]());
+onPress("#alternatives button", (_, n) => actions.confirmAlternative(n));
+onPress("#undo", actions.undo);
+onPress("#redo", actions.redo);
 addEventListener("hashchange", () => addressed() !== null && actions.open(addressed()));
-addEventListener("pagehide", actions.keepHeld);
+addEventListener("pagehide", actions.dropDragged);
 
 await model.readState();
 model.listen();
-jobs.refresh();
-lists.ask();
+shell.refreshJobs();
+lists.refresh();
 go(model.keyframes().length ? "keyframes" : "pick");

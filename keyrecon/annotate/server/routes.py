@@ -27,7 +27,10 @@ from keyrecon.annotate.store.edits import EditList
 from keyrecon.annotate.store.journal import NotSaved
 from keyrecon.errors import KeyreconError
 
-PAGE = Path(__file__).parent.parent / "page"
+PACKAGE = Path(__file__).parents[2]
+PAGE = PACKAGE / "annotate" / "page"
+SHARED = (PACKAGE / "report" / "colors.js", PACKAGE / "report" / "figure3d.js")
+"""Scripts that the page shares with the report."""
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 
 
@@ -50,10 +53,10 @@ ROUTES = (
     ApiRoute("POST", "/api/edits", handlers.edits, EditList),
     ApiRoute("POST", "/api/undo", handlers.undo, handlers.HistoryRequest),
     ApiRoute("POST", "/api/redo", handlers.redo, handlers.HistoryRequest),
-    ApiRoute("GET", "/api/ghost/{frame:int}", handlers.pose_suggestion, alone=True),
+    ApiRoute("GET", "/api/suggestion/{frame:int}", handlers.pose_suggestion, alone=True),
     ApiRoute("POST", "/api/pose", handlers.pose, handlers.PoseRequest, alone=True),
     ApiRoute("GET", "/api/checks", handlers.checks, alone=True),
-    ApiRoute("GET", "/api/next", handlers.suggestions, alone=True),
+    ApiRoute("GET", "/api/next_frames", handlers.suggestions, alone=True),
     ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.StripRequest, alone=True),
     ApiRoute("GET", "/api/backprojection/{frame:int}", handlers.backprojection, alone=True),
     ApiRoute("GET", "/api/jobs", handlers.jobs),
@@ -67,9 +70,8 @@ ROUTES = (
 
 def make_app(desk: Session, door: Credentials) -> ASGIApp:
     """The application behind its guard."""
-    page = read_page(PAGE)
     app = Starlette(
-        routes=make_routes(desk, page),
+        routes=make_routes(desk, read_page()),
         exception_handlers={
             NotSaved: lambda _, fault: _error(507, str(fault)),
             KeyreconError: lambda _, fault: _error(400, str(fault)),
@@ -81,14 +83,8 @@ def make_app(desk: Session, door: Credentials) -> ASGIApp:
     return SecurityMiddleware(app, door)
 
 
-def make_routes(desk: Session, page: dict[str, Response]) -> list[Route]:
+def make_routes(desk: Session, files: dict[str, Response]) -> list[Route]:
     """All routes there are."""
-
-    async def index(request: Request) -> Response:
-        return _page_file(page, "index.html")
-
-    async def part(request: Request) -> Response:
-        return _page_file(page, request.path_params["name"])
 
     async def events(request: Request) -> Response:
         first = {"revision": desk.store.state.revision}
@@ -98,24 +94,33 @@ def make_routes(desk: Session, page: dict[str, Response]) -> list[Route]:
         return await _still(desk, request)
 
     return [
-        Route("/", index, methods=["GET"]),
-        Route("/page/{name}", part, methods=["GET"]),
+        *(Route(path, _static(answer), methods=["GET"]) for path, answer in files.items()),
         Route("/api/events", events, methods=["GET"]),
-        Route("/api/still/{frame:int}", still, methods=["GET"]),
+        Route("/api/frame/{frame:int}", still, methods=["GET"]),
         *(Route(way.path, _endpoint(desk, way), methods=[way.method]) for way in ROUTES),
     ]
 
 
-def read_page(folder: Path) -> dict[str, Response]:
-    """The files of the page by name; no other file is ever served."""
-    found = (path for path in sorted(folder.iterdir()) if path.suffix in TYPES)
-    return {path.name: Response(path.read_bytes(), media_type=TYPES[path.suffix]) for path in found}
+def read_page() -> dict[str, Response]:
+    """The page's files by the path of their address, which is that in the package.
+
+    Each has a route of its own, and there is no other way to a file.
+    """
+    found = [path for path in sorted(PAGE.rglob("*")) if path.suffix in TYPES]
+    files = {
+        f"/{path.relative_to(PACKAGE).as_posix()}": Response(
+            path.read_bytes(), media_type=TYPES[path.suffix]
+        )
+        for path in (*found, *SHARED)
+    }
+    return {"/": files.pop("/annotate/page/index.html"), **files}
 
 
-def _page_file(page: dict[str, Response], name: str) -> Response:
-    if name not in page:
-        raise HTTPException(404, "There is no such page.")
-    return page[name]
+def _static(answer: Response) -> Callable[[Request], Any]:
+    async def endpoint(request: Request) -> Response:
+        return answer
+
+    return endpoint
 
 
 def _endpoint(desk: Session, way: ApiRoute) -> Callable[[Request], Any]:

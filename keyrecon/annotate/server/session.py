@@ -82,7 +82,7 @@ def describe_project(desk: Session) -> Json:
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),
             "motion": desk.workspace.motion_file.is_file(),
-            "help": bool(known),
+            "assistant": bool(known),
         },
     }
 

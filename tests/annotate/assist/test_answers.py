@@ -97,7 +97,7 @@ def test_a_pose_follows_the_marks_and_keeps_the_signs_that_were_given(prepared):
     told = plain(prepared.pose(annotated(5, 20), 35, marked(35), {"left_wrist": 1}))
     assert set(told["points3d"]) == set(LSP14.names)
     assert told["foreseen"] == []
-    assert told["limbs"]["left_wrist"] == {"sign": 1, "sure": 1.0, "given": True}
+    assert told["limbs"]["left_wrist"] == {"sign": 1, "certainty": 1.0, "given": True}
     assert told["alternatives"][0]["points3d"] == told["points3d"]
     assert all(other["nearer"]["left_wrist"] == 1 for other in told["alternatives"])
 

@@ -143,7 +143,7 @@ def test_two_pages_see_each_other_and_overwrite_nothing(person, context, folder)
     for one in (person, other):
         one.open(10)
     person.click(place_of(10, "head_top"))
-    other.await_text(".joint[data-joint=head_top] .seen", "visible")
+    other.await_text(".joint[data-joint=head_top] .visibility", "visible")
     before = marks_on_file(folder).joints[0, LSP14.index("head_top")]
     context.route("**/api/events", lambda route: route.abort())
     other.page.reload()
@@ -169,12 +169,12 @@ def test_undo_takes_the_last_edit_back_after_a_reload(person, folder):
     person.page.reload()
     person.open(10)
     person.press("Control+z")
-    person.await_text(".joint[data-joint=neck] .seen", "^$")
+    person.await_text(".joint[data-joint=neck] .visibility", "^$")
     marks = marks_on_file(folder).joints[0]
     assert np.isnan(marks[LSP14.index("neck")]).all()
     assert np.isfinite(marks[LSP14.index("head_top")]).all()
     person.press("Control+y")
-    person.await_text(".joint[data-joint=neck] .seen", "visible")
+    person.await_text(".joint[data-joint=neck] .visibility", "visible")
 
 
 def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
@@ -188,7 +188,7 @@ def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
     for _ in range(3):
         person.press("ArrowRight")
     person.press("v")
-    person.await_text(f".joint[data-joint={joint}] .seen", "hidden")
+    person.await_text(f".joint[data-joint={joint}] .visibility", "hidden")
     person.await_saved()
     marks = marks_on_file(folder)
     moved = marks.joints[0, LSP14.index(joint)]
@@ -235,7 +235,7 @@ def test_a_suggestion_costs_one_action_and_one_more_per_joint_that_is_off(contex
     with serving(folder, ghost_assistant(wrong)) as server:
         person = Person(context, server.door.address)
         person.open(10)
-        person.await_text("#guide-text", "suggestion for 14 joints")
+        person.await_text("#prompt-text", "suggestion for 14 joints")
         for joint, error in wrong.items():
             person.drag(place_of(10, joint) + error, place_of(10, joint))
         person.press("Enter")
@@ -249,11 +249,11 @@ def test_a_suggestion_costs_one_action_and_one_more_per_joint_that_is_off(contex
 
 def test_a_list_of_five_hundred_keyframes_makes_few_rows(person):
     rows = person.call(
-        "list",
+        "views/lists",
         """(() => {
           const root = document.querySelector("#frame-list").cloneNode();
           document.querySelector("#frame-list").replaceWith(root);
-          const list = m.createList(root, {
+          const list = m.createVirtualList(root, {
             height: 44, fill: (row, item) => { row.textContent = item; }, choose() {},
           });
           list.show(Array.from({ length: 500 }, (_, n) => `row ${n}`), 499);
@@ -264,36 +264,8 @@ def test_a_list_of_five_hundred_keyframes_makes_few_rows(person):
     assert "row 499" in rows
 
 
-def test_zooming_keeps_what_is_under_the_pointer(person):
-    there, back = person.call(
-        "geometry",
-        """(() => {
-          const view = { scale: 1.5, x: 40, y: -20 }, pointer = [300, 200];
-          const nearer = m.zoomAt(view, pointer, 2.5, [0.1, 20]);
-          return [m.toPicture(view, pointer), m.toPicture(nearer, pointer)];
-        })()""",
-    )
-    assert there == pytest.approx(back)
-
-
-def test_swapping_sides_twice_changes_nothing(person):
-    before, after = person.call(
-        "state",
-        """import("/page/edits.js").then((edits) => {
-          const marks = { left_knee: [1, 2, 2], right_knee: [3, 4, 1], neck: [5, 6, 2] };
-          const state = { ...m.emptyState(), marks: { 7: marks }, nearer: { 7: { left_knee: 1 } } };
-          const pairs = [["left_knee", "right_knee"]];
-          const swapped = (from) => m.apply(from, edits.swapSides(from, 7, pairs));
-          const [once, twice] = [swapped(state), swapped(swapped(state))];
-          return [[state.marks, state.nearer, [3, 4, 1], -1], [twice.marks, twice.nearer,
-            once.marks[7].left_knee, once.nearer[7].right_knee === 1 ? -1 : 0]];
-        })""",
-    )
-    assert before == after
-
-
 def test_no_key_of_any_page_fails(person):
-    pages = person.call("keys", "m.KEYS")
+    pages = person.call("views/keyboard", "m.KEYS")
     for number, page in enumerate(("pick", "keyframes", "motion"), start=1):
         person.press(f"Alt+{number}")
         for keys, _, action in pages[page]:
@@ -342,9 +314,9 @@ def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, fol
         person = Person(context, server.door.address)
         person.open(70)
         person.mark_joints(partial(place_of, 70))
-        person.await_text("#guide-text", "Which ends are nearer")
+        person.await_text("#prompt-text", "Which ends are nearer")
         person.settle_depths(truth, partial(place_of, 70))
-        person.await_text("#guide-text", "done|Next|All keyframes")
+        person.await_text("#prompt-text", "done|Next|All keyframes")
         person.await_saved()
         context.close()
     marks = marks_on_file(folder)
@@ -372,7 +344,7 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
 
 
 def test_a_page_that_can_tell_nothing_of_the_body_says_why(person):
-    person.await_text("#space-empty", "stored results are missing.* Make the motion")
+    person.await_text("#pose-empty", "stored results are missing.* Make the motion")
 
 
 def test_edits_made_without_the_server_can_be_taken_back(person, folder):

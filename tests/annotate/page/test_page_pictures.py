@@ -55,20 +55,3 @@ def test_a_frame_that_cannot_be_shown_is_told_once(tmp_path, video, visit, monke
         monkeypatch.setattr(type(server.desk.stills.video), "frames", broken)
         person = visit(server)
         person.await_text("#notice-text", "cannot be decoded; the file is damaged there")
-
-
-def test_a_keyframe_opens_on_all_that_is_marked_there(tmp_path, video, visit):
-    with serving(make_project(tmp_path / "p", video)) as server:
-        person = visit(server)
-        asked = "m.around([10, 20, 30, 40], [[5, 30, 2], [20, 60, 1]])"
-        assert person.call("geometry", asked) == [5, 20, 30, 60]
-        assert person.call("geometry", "m.around(undefined, [[5, 30, 2]])") is None
-
-
-def test_a_video_of_few_frames_has_each_in_the_strip_once(tmp_path, video, visit):
-    with serving(make_project(tmp_path / "p", video)) as server:
-        person = visit(server)
-        for count in (1, 2, 6, 7, 12):
-            frames = person.call("parts", f"m.spread({count}, 7)")
-            assert len({*frames}) == len(frames) == min(count, 7)
-            assert {*frames} <= {*range(count)}

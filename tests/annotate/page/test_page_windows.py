@@ -10,14 +10,14 @@ pytestmark = pytest.mark.skipif(
 WINDOWS = ((1920, 1080), (1366, 768), (1100, 500), (1024, 768), (768, 1024), (600, 900), (390, 800))
 PARTS = (
     "header button, main button:not(.joints *, .picks *), main input, main canvas[role], "
-    ".guide p, .list, .joints, output"
+    ".prompt p, .list, .joints, output"
 )
 OVERLAPS = """
 (selector) => {
   const parts = [...document.querySelectorAll(selector)]
     .filter((part) => part.checkVisibility() && !(part.matches("p, output") && !part.innerText))
     .map((part) => ({ part, box: part.getBoundingClientRect() }));
-  const own = (part) => part.closest(".viewer, .space, .strip") ?? part;
+  const own = (part) => part.closest(".viewer, .figure, .strip") ?? part;
   const name = ({ part }) => part.id || part.innerText || part.ariaLabel || part.className;
   const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1
     || a.bottom <= b.top + 1 || b.bottom <= a.top + 1;
@@ -26,8 +26,8 @@ OVERLAPS = """
   const found = [];
   for (const [n, one] of parts.entries()) {
     if (one.box.left < -1 || one.box.right > innerWidth + 1) found.push(`${name(one)} is cut`);
-    const guide = one.part.closest(".guide")?.getBoundingClientRect();
-    if (guide && one.box.bottom > guide.bottom + 1) found.push(`${name(one)} is cut below`);
+    const prompt = one.part.closest(".prompt")?.getBoundingClientRect();
+    if (prompt && one.box.bottom > prompt.bottom + 1) found.push(`${name(one)} is cut below`);
     for (const other of parts.slice(n + 1))
       if (clash(one, other)) found.push(`${name(one)} lies over ${name(other)}`);
   }

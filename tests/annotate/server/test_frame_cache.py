@@ -12,7 +12,7 @@ from keyrecon import KeyreconError
 
 def still_of(desk, frame):
     """The number that the still of a frame shows, stood as it is stored."""
-    answer = ask(desk, "GET", f"/api/still/{frame}")
+    answer = ask(desk, "GET", f"/api/frame/{frame}")
     picture = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
     return int(read_number(np.rot90(picture, -desk.stills.video.turns)))
 
@@ -87,7 +87,7 @@ def test_stills_may_be_kept_by_the_browser_only_under_the_name_of_this_video(ope
     desk = opened()
     name = ask(desk, "GET", "/api/project").json()["version"]
     for query, kept in (("", False), ("?v=other", False), (f"?v={name}", True)):
-        control = ask(desk, "GET", f"/api/still/3{query}").headers["cache-control"]
+        control = ask(desk, "GET", f"/api/frame/3{query}").headers["cache-control"]
         assert ("immutable" in control) == kept
         assert ("no-store" in control) != kept
 
@@ -115,5 +115,5 @@ def test_a_still_that_cannot_be_made_says_why(opened, monkeypatch):
         raise KeyreconError("frame 7 cannot be decoded")
 
     monkeypatch.setattr(type(desk.stills.video), "frames", broken)
-    answer = ask(desk, "GET", "/api/still/7")
+    answer = ask(desk, "GET", "/api/frame/7")
     assert (answer.status, answer.json()) == (400, {"error": "frame 7 cannot be decoded"})

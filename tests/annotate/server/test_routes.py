@@ -85,9 +85,9 @@ def test_what_is_not_saved_is_answered_so_and_accepted_when_it_is_sent_again(ope
 
 def test_without_an_assistant_its_questions_have_empty_answers(opened):
     desk = opened()
-    assert ask(desk, "GET", "/api/ghost/3").json() == {}
+    assert ask(desk, "GET", "/api/suggestion/3").json() == {}
     assert ask(desk, "GET", "/api/checks").json() == []
-    assert ask(desk, "GET", "/api/next").json() == []
+    assert ask(desk, "GET", "/api/next_frames").json() == []
     assert ask(desk, "POST", "/api/picks/preview", {"frames": [1]}).json() == {}
     assert ask(desk, "GET", "/api/backprojection/3").status == 204
 
@@ -108,7 +108,7 @@ def test_the_assistant_hears_what_is_marked_and_taken(opened, folder):
     submit(desk.store, mark(3, "neck", [1, 2, 2]), mark(3, "left_hip", [0, 0, 0]))
     submit(desk.store, edit("own", frame=20, to="both"))
     assert ask(desk, "GET", "/api/checks").json() == [{"frame": 3, "suspicion": None}]
-    ask(desk, "GET", "/api/next")
+    ask(desk, "GET", "/api/next_frames")
     assert heard == {"marks": [3], "absent": ((3, "left_hip"),), "taken": {10, 20}}
 
 

@@ -41,15 +41,15 @@ def desk(tmp_path_factory, write_numbered):
 @pytest.fixture(scope="module")
 def routes(desk):
     """(method, address) of every route, from the table itself."""
-    filled = {"{name}": "index.html", "{frame:int}": "3", "{job:int}": "1", "{format}": "coco"}
+    filled = {"{frame:int}": "3", "{job:int}": "1", "{format}": "coco"}
     table = []
-    for route in server.make_routes(desk, server.read_page(server.PAGE)):
+    for route in server.make_routes(desk, server.read_page()):
         path = route.path
         for gap, value in filled.items():
             path = path.replace(gap, value)
         assert "{" not in path
         table += [(method, path) for method in route.methods if method != "HEAD"]
-    assert len(table) > 20
+    assert len(table) > 40
     return table
 
 
@@ -120,21 +120,29 @@ def test_other_methods_are_refused(ask, routes):
 @pytest.mark.parametrize(
     "path",
     [
-        "/page/../server.py",
-        "/page/..%2fserver.py",
-        "/page/%2e%2e/server.py",
-        "/page//etc/passwd",
-        "/page/%2fetc%2fpasswd",
-        "/page/index.html%00.js",
-        "/page/",
-        "/api/still/../../project.toml",
-        "/api/still/..%2f..%2fproject.toml",
-        "/api/still/-1",
-        "/api/still/20",
-        "/api/still/99999999999999999999",
-        "/api/still/3?width=-5",
-        "/api/still/3?width=1e9",
-        "/api/still/3?width=%D9%A3",
+        "/annotate/page/../server/routes.py",
+        "/annotate/page/..%2fserver%2froutes.py",
+        "/annotate/page/%2e%2e/server/routes.py",
+        "/annotate/page/draw/../../server/routes.py",
+        "/annotate/page/draw/..%2f..%2fserver%2froutes.py",
+        "/annotate/server/routes.py",
+        "/annotate/page//etc/passwd",
+        "/annotate/page/%2fetc%2fpasswd",
+        "/annotate/page/main.js%00.js",
+        "/annotate/page/",
+        "/annotate/page/draw",
+        "/annotate/page/draw/",
+        "/report/page.py",
+        "/report/cursor.js",
+        "/page/main.js",
+        "/api/frame/../../project.toml",
+        "/api/frame/..%2f..%2fproject.toml",
+        "/api/frame/-1",
+        "/api/frame/20",
+        "/api/frame/99999999999999999999",
+        "/api/frame/3?width=-5",
+        "/api/frame/3?width=1e9",
+        "/api/frame/3?width=%D9%A3",
         "/api/export/..%2fannotations.json",
         "/project.toml",
         "/static/annotations.json",

@@ -1,0 +1,121 @@
+// A picture on a canvas that is zoomed at the pointer and panned by dragging, with an overlay on top.
+// Used wherever frames are shown; what a click means is the caller's business.
+import { prepareCanvas } from "./canvas.js";
+import { clampToCanvas, enlarged, fit, pan, toPicture, toScreen, zoomAt } from "./geometry.js";
+
+const CLICK_SLOP = 4; // px a pressed pointer may move and still be a click
+const MAX_SCALE = 16; // screen pixels per picture pixel
+const ZOOM_PER_PIXEL = 0.0016; // of the wheel, as an exponent
+const PIXELS_PER_LINE = 30; // where a wheel counts in lines, as in Firefox
+const SURROUNDINGS = 0.12; // share of a box's size shown around it
+
+export function createViewer({ root, project, frames, redraw }) {
+  const [below, above] = root.querySelectorAll("canvas");
+  const picture = [project.width, project.height];
+  let view = null,
+    box = null,
+    drawn = null; // what is on the canvas
+
+  const size = () => [above.clientWidth, above.clientHeight];
+  const whole = () => fit([0, 0, ...picture], size());
+  const near = () => (box ? fit(enlarged(box, SURROUNDINGS, picture), size(), 12) : whole());
+
+  function setView(next) {
+    view = clampToCanvas(next, size(), picture);
+    root.dataset.view = [view.scale, view.x, view.y].map((value) => value.toFixed(4)).join(" ");
+    drawn = null;
+    redraw();
+  }
+
+  // Draws a frame, or the small one until the sharp one is here; true when something was drawn.
+  function drawPicture(frame, widths = [undefined]) {
+    if (!view) setView(near());
+    const image = widths.map((width) => frames.get(frame, width)).find(Boolean);
+    const label = `${frame}/${image?.width}/${size()}/${root.dataset.view}`;
+    if (!image || drawn === label) return Boolean(image);
+    const [pen] = prepareCanvas(below);
+    pen.imageSmoothingQuality = "medium";
+    pen.drawImage(image, view.x, view.y, view.scale * picture[0], view.scale * picture[1]);
+    drawn = label;
+    root.dataset.frame = frame;
+    return true;
+  }
+
+  function zoom(at, factor) {
+    setView(zoomAt(view, at, factor, [whole().scale * 0.8, MAX_SCALE]));
+  }
+
+  above.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const unit = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? PIXELS_PER_LINE : 1;
+      zoom([event.offsetX, event.offsetY], Math.exp(-event.deltaY * unit * ZOOM_PER_PIXEL));
+    },
+    { passive: false },
+  );
+  new ResizeObserver(() => view && setView(near())).observe(root);
+
+  // grab(at) -> what is dragged, or null to pan; drag(grabbed, at), drop(grabbed, at), click(at, event).
+  function listen({ grab, drag, drop, click, hover }) {
+    let press = null;
+    const at = (event) => [event.offsetX, event.offsetY];
+    above.addEventListener("pointerdown", (event) => {
+      above.setPointerCapture(event.pointerId);
+      press = {
+        start: at(event),
+        last: at(event),
+        moved: false,
+        grabbed: event.button === 0 ? grab(at(event)) : null,
+      };
+    });
+    above.addEventListener("pointermove", (event) => {
+      const now = at(event);
+      if (!press) return hover(now);
+      const [dx, dy] = [now[0] - press.last[0], now[1] - press.last[1]];
+      press.moved ||= Math.hypot(now[0] - press.start[0], now[1] - press.start[1]) > CLICK_SLOP;
+      if (!press.moved) return undefined;
+      press.last = now;
+      return press.grabbed ? drag(press.grabbed, toPicture(view, now)) : setView(pan(view, [dx, dy]));
+    });
+    above.addEventListener("pointerup", (event) => {
+      const done = press;
+      press = null;
+      if (!done) return;
+      if (done.moved && done.grabbed) drop(done.grabbed, toPicture(view, at(event)));
+      else if (!done.moved && event.button === 0) click(at(event), event);
+    });
+    above.addEventListener("pointercancel", () => {
+      press = null;
+    });
+    above.addEventListener("pointerleave", () => press || hover(null));
+    above.addEventListener("contextmenu", (event) => event.preventDefault());
+  }
+
+  return {
+    listen,
+    drawPicture,
+    zoom,
+    overlay: () => prepareCanvas(above),
+    toScreen: (place) => toScreen(view, place),
+    toPicture: (at) => toPicture(view, at),
+    middle: () =>
+      toPicture(
+        view,
+        size().map((extent) => extent / 2),
+      ),
+    scale: () => view.scale,
+    // Shows the surroundings of a box, or the whole picture.
+    frameBox(next) {
+      box = next ?? null;
+      view = null; // made when it is drawn: a hidden canvas has no size
+      redraw();
+    },
+    toggleZoom() {
+      setView(Math.abs(view.scale - near().scale) < 1e-6 ? whole() : near());
+    },
+    cursor(name) {
+      if (above.style.cursor !== name) above.style.cursor = name;
+    },
+  };
+}

@@ -1,0 +1,300 @@
+// What a person can do on a keyframe; keys, buttons and the pointer all end here.
+import {
+  nextVisibility,
+  placeJoint,
+  placeJoints,
+  setLock,
+  setNearer,
+  setOwnKeyframe,
+  swapSides,
+} from "./edits.js";
+import {
+  nextOpen,
+  nextStep,
+  nextUnmarked,
+  placedLimbs,
+  requiredJoints,
+  suggestedJoints,
+} from "./workflow.js";
+
+const NUDGE_MS = 350; // after the last step of the arrow keys, until it is taken as meant
+
+// `middle()` is the middle of the picture as it is shown, `opened(frame)` is called when a keyframe is.
+export function createActions(model, { middle, opened }) {
+  const { ui } = model,
+    placing = createPlacing(model, middle),
+    navigation = createNavigation(model, placing, opened);
+  const { offKeyframe, ready, dropDragged, selectNext, joints } = placing;
+
+  // What a key means: the joint under the pointer, else the selected one.
+  const joint = () => ui.hovered?.joint ?? ui.joint;
+  // The limb under the pointer, else the one that ends in that joint.
+  const limb = () => ui.hovered?.limb ?? joint();
+
+  function visibility(name = joint()) {
+    if (!ready() || !name) return;
+    const mark = model.marks()[name];
+    model.edit(placeJoint(model.state, ui.frame, name, nextVisibility(mark)));
+    if (!mark) selectNext(name);
+  }
+
+  function clear() {
+    const name = joint();
+    if (!ready() || !model.marks()[name]) return;
+    model.edit(placeJoint(model.state, ui.frame, name, null));
+    model.update({ joint: name });
+  }
+
+  function swap(pairs) {
+    if (ready()) model.edit(swapSides(model.state, ui.frame, pairs));
+  }
+
+  function accept() {
+    if (!ready()) return;
+    const places = Object.entries(
+      suggestedJoints(joints(), model.marks(), model.poses.suggestion()),
+    );
+    if (!places.length) return;
+    const to = Object.fromEntries(places.map(([name, [x, y]]) => [name, [x, y, 2]]));
+    model.edit(placeJoints(model.state, ui.frame, to));
+    selectNext(null);
+  }
+
+  function setDepth(name, sign) {
+    const known = model.project.limbs.some((one) => one.name === name);
+    if (ready() && known && (model.nearer()[name] ?? null) !== sign) {
+      model.edit(setNearer(model.state, ui.frame, { [name]: sign }));
+    }
+  }
+
+  function flip(name = limb()) {
+    const sign = model.nearer()[name] ?? model.poses.current()?.limbs?.[name]?.sign;
+    if (sign) setDepth(name, -sign);
+  }
+
+  // The depth signs of the n-th alternative become the person's; without one, those that are drawn. A
+  // pose that is still being computed is waited for, so that no limb is left out.
+  async function confirmDepths(n = null) {
+    if (!ready()) return;
+    const { frame } = ui,
+      pose = await model.poses.latest();
+    const alternative = n === null ? null : pose?.alternatives?.[n]?.nearer;
+    if (ui.frame !== frame || (n !== null && !alternative)) return;
+    const to = {};
+    for (const { name } of placedLimbs(model.project.limbs, model.marks())) {
+      const sign = alternative?.[name] ?? pose?.limbs?.[name]?.sign;
+      if (sign && model.nearer()[name] !== sign) to[name] = sign;
+    }
+    if (Object.keys(to).length) model.edit(setNearer(model.state, frame, to));
+  }
+
+  function automaticDepths() {
+    const given = Object.keys(model.nearer());
+    if (!ready() || !given.length) return;
+    model.edit(
+      setNearer(model.state, ui.frame, Object.fromEntries(given.map((name) => [name, null]))),
+    );
+  }
+
+  function lock() {
+    if (model.keyframe()) model.edit(setLock(model.state, ui.frame, !model.state.locked[ui.frame]));
+  }
+
+  const next = () =>
+    nextStep({
+      project: model.project,
+      half: model.keyframe()?.half,
+      marks: model.marks(),
+      nearer: model.nearer(),
+      suggestion: model.poses.suggestion(),
+      pose: model.poses.current(),
+      joint: ui.joint,
+    });
+
+  const steps = {
+    accept,
+    depth: () => confirmDepths(),
+    next: navigation.nextKeyframe,
+    place() {},
+  };
+
+  function primary() {
+    if (ui.dragged?.floating) return placing.placeFloating();
+    if (offKeyframe()) return navigation.scrub(0);
+    dropDragged();
+    return steps[next().do]();
+  }
+
+  return {
+    ...placing,
+    ...navigation,
+    visibility,
+    clear,
+    swap,
+    accept,
+    setDepth,
+    flip,
+    automaticDepths,
+    lock,
+    next,
+    primary,
+    confirmAlternative: (n) => confirmDepths(n),
+    automaticDepth: () => setDepth(limb(), null),
+  };
+}
+
+// Placing joints: dragged by the pointer, moved by the arrow keys, or floating over a first place.
+function createPlacing(model, middle) {
+  const { ui } = model;
+  let nudgeTimer = null;
+
+  const joints = () => requiredJoints(model.project, model.keyframe()?.half);
+
+  // Frames beside the keyframe are context only: nothing is changed there.
+  const offKeyframe = () => ui.offset !== 0 || ui.frame === null;
+
+  // What is being dragged is dropped before anything else is changed.
+  function ready() {
+    dropDragged();
+    return !offKeyframe();
+  }
+
+  // After a joint was marked the next unmarked one is asked for.
+  const selectNext = (joint) =>
+    model.update({ joint: nextUnmarked(joints(), model.marks(), joint) });
+
+  function place(joint, at, v = 2) {
+    if (offKeyframe() || !joint) return;
+    const fresh = !model.marks()[joint];
+    model.edit(placeJoint(model.state, ui.frame, joint, [...at, v]));
+    if (fresh) selectNext(joint);
+    else model.update({ joint });
+  }
+
+  // A joint on its way is held until the arrow keys rest, so that one undo takes all steps back.
+  function nudge(dx, dy) {
+    const { joint } = ui,
+      mark = model.marks()[joint];
+    if (offKeyframe() || !joint) return;
+    const start =
+      ui.dragged?.joint === joint
+        ? ui.dragged.at
+        : (mark ?? model.poses.suggestion()?.joints?.[joint] ?? middle());
+    model.update({ dragged: { joint, at: [start[0] + dx, start[1] + dy], floating: !mark } });
+    clearTimeout(nudgeTimer);
+    if (mark) nudgeTimer = setTimeout(dropDragged, NUDGE_MS);
+  }
+
+  const replace = (joint, at) => place(joint, at, model.marks()[joint]?.[2] || 2);
+
+  // Ends a drag where the joint is; one that floats is not placed.
+  function dropDragged() {
+    clearTimeout(nudgeTimer);
+    const { dragged } = ui;
+    ui.dragged = null;
+    if (dragged && !dragged.floating) replace(dragged.joint, dragged.at);
+  }
+
+  function drag(joint, at) {
+    if (ui.dragged?.joint !== joint) dropDragged();
+    clearTimeout(nudgeTimer);
+    model.update({ joint, dragged: { joint, at } });
+  }
+
+  function drop(joint, at) {
+    ui.dragged = null;
+    replace(joint, at);
+  }
+
+  function placeFloating() {
+    const { dragged } = ui;
+    if (!dragged?.floating) return;
+    ui.dragged = null;
+    place(dragged.joint, dragged.at);
+  }
+
+  function select(joint) {
+    dropDragged();
+    model.update({ joint });
+  }
+
+  return {
+    joints,
+    offKeyframe,
+    ready,
+    selectNext,
+    place,
+    nudge,
+    dropDragged,
+    drag,
+    drop,
+    placeFloating,
+    select,
+  };
+}
+
+// From keyframe to keyframe, from joint to joint, a second around a keyframe, and back and forth by
+// undo and redo.
+function createNavigation(model, placing, opened) {
+  const { ui } = model;
+
+  function open(frame, also = {}) {
+    placing.dropDragged();
+    model.update({ view: "keyframes", frame, offset: 0, hovered: null, joint: null, ...also });
+    if (!ui.joint) placing.selectNext(null);
+    opened(frame);
+  }
+
+  function stepKeyframe(by) {
+    const frames = model.keyframes().map(({ frame }) => frame),
+      at = frames.indexOf(ui.frame);
+    const next = frames[Math.max(0, Math.min(frames.length - 1, at + by))];
+    if (next !== undefined && next !== ui.frame) open(next);
+  }
+
+  function stepJoint(by) {
+    const all = placing.joints(),
+      at = all.indexOf(ui.joint);
+    placing.select(all[(at + by + all.length) % all.length] ?? all[0]);
+  }
+
+  function nextKeyframe() {
+    const frame = nextOpen(model.keyframes(), ui.frame, model.isDone);
+    if (frame === null) model.update({ view: "motion" });
+    else open(frame);
+  }
+
+  // Shows a frame beside the keyframe.
+  function scrub(offset) {
+    placing.dropDragged();
+    const second = Math.round(model.project.fps),
+      last = model.project.n_frames - 1 - ui.frame;
+    model.update({ offset: Math.max(-second, -ui.frame, Math.min(second, last, offset)) });
+  }
+
+  function addKeyframe(frame, half) {
+    if (model.state.own[frame] !== half) model.edit(setOwnKeyframe(model.state, frame, half));
+    open(frame);
+  }
+
+  // Goes to where an undo or redo changed something.
+  async function step(turn) {
+    placing.dropDragged();
+    const edit = await turn();
+    const part = edit?.kind === "group" ? edit.edits[0] : edit;
+    const elsewhere = part?.frame !== undefined && part.frame !== ui.frame;
+    if (elsewhere && model.keyframes().some(({ frame }) => frame === part.frame)) open(part.frame);
+    if (part?.kind === "mark" && part.frame === ui.frame) model.update({ joint: part.joint });
+  }
+
+  return {
+    open,
+    stepKeyframe,
+    stepJoint,
+    nextKeyframe,
+    scrub,
+    addKeyframe,
+    undo: () => step(model.undo),
+    redo: () => step(model.redo),
+  };
+}

@@ -1,0 +1,126 @@
+// What is fetched from the server ahead of being drawn: frames as pictures, and the motion.
+import * as api from "./api.js";
+
+const CACHE_BYTES = 260e6; // of decoded pictures
+// Requests at a time: a browser opens six connections to a server, and edits must never wait for
+// pictures.
+const PREFETCH_REQUESTS = 2;
+const URGENT_REQUESTS = 3;
+const MAX_URGENT = 16; // pictures that were to be drawn and are not here yet
+const CHUNK = 250; // frames of the motion asked for at a time
+
+// Exact frames as pictures, kept ready to draw while there is room. `ready` is called for each picture,
+// `failed` with the reason where a frame has none: once, it would fail again.
+export function createFrameCache(project, ready, failed) {
+  const kept = new Map(); // key -> picture, oldest use first
+  const loading = new Set(),
+    broken = new Set();
+  let prefetched = [],
+    urgent = [],
+    bytes = 0;
+
+  const key = (frame, width) => `${frame}/${width ?? 0}`;
+
+  function address(frame, width) {
+    const parts = new URLSearchParams();
+    if (width) parts.set("width", width);
+    parts.set("v", project.version);
+    return `/api/frame/${frame}?${parts}`;
+  }
+
+  async function fetchOne(frame, width) {
+    const response = await fetch(address(frame, width), { credentials: "same-origin" });
+    if (response.ok) return createImageBitmap(await response.blob());
+    if (response.status === 400) {
+      broken.add(key(frame, width));
+      failed((await response.json()).error);
+    }
+    throw new Error(`frame ${frame}: ${response.status}`);
+  }
+
+  function keep(name, picture) {
+    kept.set(name, picture);
+    bytes += picture.width * picture.height * 4;
+    for (const [oldest, old] of kept) {
+      if (bytes <= CACHE_BYTES || oldest === name) break;
+      bytes -= old.width * old.height * 4;
+      kept.delete(oldest);
+      old.close();
+    }
+  }
+
+  function load(frame, width) {
+    const name = key(frame, width);
+    if (kept.has(name) || loading.has(name) || broken.has(name)) return;
+    loading.add(name);
+    fetchOne(frame, width)
+      .then((picture) => {
+        keep(name, picture);
+        ready(frame);
+      })
+      .catch(() => {}) // asked for again when it is to be drawn again
+      .finally(() => {
+        loading.delete(name);
+        loadMore();
+      });
+  }
+
+  // What is to be drawn now comes first, the newest request before older ones.
+  function loadMore() {
+    while (urgent.length && loading.size < URGENT_REQUESTS) load(...urgent.pop());
+    while (prefetched.length && loading.size < PREFETCH_REQUESTS) load(...prefetched.shift());
+  }
+
+  return {
+    // The picture if it is here; asks for it before all others if not.
+    get(frame, width) {
+      const name = key(frame, width),
+        picture = kept.get(name);
+      if (!picture) {
+        const others = urgent.filter((one) => key(...one) !== name);
+        urgent = [...others, [frame, width]].slice(-MAX_URGENT);
+        loadMore();
+        return null;
+      }
+      kept.delete(name);
+      kept.set(name, picture);
+      return picture;
+    },
+    has: (frame, width) => kept.has(key(frame, width)),
+    // What is likely to be drawn next, in order; replaces what was to be prefetched before.
+    prefetch(list) {
+      prefetched = list.filter(([frame]) => frame >= 0 && frame < project.n_frames);
+      loadMore();
+    },
+  };
+}
+
+export function createMotionCache(project, arrived) {
+  let chunks = new Map(); // number -> answer, null while it is on its way
+
+  async function load(number) {
+    const current = chunks;
+    current.set(number, null);
+    const from = number * CHUNK,
+      to = Math.min(project.n_frames, from + CHUNK);
+    const answer = await api.read(`motion?from=${from}&to=${to}`).catch(() => null);
+    if (answer?.points3d) current.set(number, answer);
+    else current.delete(number); // loaded again when it is needed again
+    arrived();
+  }
+
+  return {
+    // {joint: point} of a frame, kind "points2d" or "points3d"; null while it is not known.
+    points(frame, kind) {
+      const number = Math.floor(frame / CHUNK);
+      if (!chunks.has(number)) load(number);
+      const row = chunks.get(number)?.[kind][frame - number * CHUNK];
+      if (!row) return null;
+      const named = row.map((point, joint) => [project.joints[joint], point]);
+      return Object.fromEntries(named.filter(([, point]) => point && point[0] !== null));
+    },
+    forget() {
+      chunks = new Map();
+    },
+  };
+}

@@ -1,0 +1,205 @@
+// What all views show: the project, the marks, and what the person is doing (`ui`). Changing anything
+// asks every view to draw itself once, in the next picture on the screen.
+import * as api from "./api.js";
+import {
+  apply,
+  cellsOf,
+  editFromChange,
+  emptyState,
+  inverse,
+  marksOf,
+  nearerOf,
+  newId,
+  rebased,
+} from "./edits.js";
+import { createOutbox, pendingEdits } from "./outbox.js";
+import { createPoses } from "./poses.js";
+import { allKeyframes, isDone, sidesOf } from "./workflow.js";
+
+const NOTICE_MS = 10000; // that a notice is shown
+const IDLE_MS = 800; // without an edit, after which what is computed from edits is asked for anew
+
+export async function createModel() {
+  const model = {
+    project: await api.read("project"),
+    state: emptyState(),
+    // offset: frames from the keyframe; hovered: {joint} or {limb}; dragged: {joint, at, floating}
+    ui: { view: null, frame: null, offset: 0, joint: null, hovered: null, dragged: null },
+    saving: { status: "saved", waiting: 0 },
+    notice: null,
+    jobs: new Map(),
+  };
+  const drawers = [],
+    idleListeners = [],
+    projectListeners = [],
+    sent = new Set(),
+    takenBack = new Set();
+  let drawing = false,
+    idleTimer = null,
+    noticeTimer = null;
+
+  // A hidden page gets no animation frames; it is drawn when it is shown.
+  model.redraw = () => {
+    if (drawing) return;
+    drawing = true;
+    requestAnimationFrame(() => {
+      drawing = false;
+      for (const draw of drawers) draw();
+    });
+  };
+  model.onDraw = (draw) => drawers.push(draw);
+  // Called when edits have come to rest and are on disk.
+  model.onIdle = (react) => idleListeners.push(react);
+  function edited() {
+    clearTimeout(idleTimer);
+    idleTimer = setTimeout(() => idleListeners.forEach((react) => react()), IDLE_MS);
+  }
+
+  model.onProject = (react) => projectListeners.push(react);
+  model.readProject = async () => {
+    model.project = await api.read("project");
+    projectListeners.forEach((react) => react());
+    model.redraw();
+  };
+  model.sides = sidesOf(model.project);
+
+  const outbox = createOutbox({
+    send: (edits) => api.send("edits", { edits }),
+    pending: pendingEdits(localStorage, model.project.id),
+    status(status, waiting, why) {
+      model.saving = { status, waiting, why };
+      model.redraw();
+    },
+    delivered,
+    rejected(edit, message) {
+      model.notify(`One edit was refused: ${message}`);
+      model.readState();
+    },
+  });
+
+  model.readState = async () => {
+    const fresh = await api.read("state");
+    model.state = outbox.waiting().reduce(apply, { ...emptyState(), ...fresh });
+    model.redraw();
+  };
+
+  model.edit = (edit) => {
+    if (!edit) return;
+    sent.add(edit.id);
+    model.state = apply(model.state, edit);
+    outbox.add(edit);
+    model.redraw();
+  };
+
+  function delivered({ revision, results, undo, redo }, batch) {
+    model.state = {
+      ...model.state,
+      revision,
+      undo: undo ?? model.state.undo + batch.length,
+      redo: redo ?? 0,
+    };
+    const failed = results
+      .map((result, n) => ({ ...result, edit: batch[n] }))
+      .filter(({ ok }) => !ok);
+    if (failed.length) yieldTo(failed);
+    edited();
+  }
+
+  // Somebody else was faster, or the server does not take it: its version stays, ours is one click away.
+  async function yieldTo(failed) {
+    await model.readState();
+    const { edit, error } = failed.at(-1);
+    if (error) model.notify(`Not taken: ${error}`);
+    else {
+      model.notify("Another page changed the same place; its version was kept.", {
+        text: "Use mine",
+        act: () => model.edit(rebased(model.state, edit)),
+      });
+    }
+  }
+
+  model.notify = (text, offer = null) => {
+    model.notice = { text, offer };
+    clearTimeout(noticeTimer);
+    if (text && !offer) noticeTimer = setTimeout(model.notify, NOTICE_MS, null);
+    model.redraw();
+  };
+
+  // Changes that the server reports; those of cells that an edit of ours still waits for are left to
+  // the answer to that edit.
+  function merge({ revision, undo, redo }, changes) {
+    const ours = new Set(outbox.waiting().flatMap(cellsOf));
+    const free = changes
+      .map(editFromChange)
+      .filter((edit) => !cellsOf(edit).some((cell) => ours.has(cell)));
+    const counts = undo === undefined ? {} : { undo, redo };
+    model.state = { ...free.reduce(apply, model.state), revision, ...counts };
+    model.redraw();
+    edited();
+  }
+
+  function takeBack(edit) {
+    const back = inverse(edit);
+    takenBack.add(edit.id).add(back.id);
+    model.edit(back);
+    return edit;
+  }
+
+  // Undo belongs to the server, so that it survives a restart; while it is gone, edits that wait for it
+  // are taken back here.
+  async function step(direction) {
+    if (direction === "undo" && !(await outbox.drained())) {
+      const last = outbox.waiting().findLast(({ id }) => !takenBack.has(id));
+      if (last) return takeBack(last);
+    }
+    const id = newId();
+    sent.add(id);
+    const { changes, ...counts } = await api.send(direction, { id });
+    merge(counts, changes);
+    return changes.length ? editFromChange(changes[0]) : null;
+  }
+  model.undo = () => step("undo");
+  model.redo = () => step("redo");
+
+  model.listen = () =>
+    api.listen({
+      opened: () =>
+        model
+          .readState()
+          .then(() => outbox.reconnected())
+          .catch((fault) => outbox.disconnected(fault)),
+      closed: () => outbox.disconnected(),
+      news({ job, project, trouble, edits, ...counts }) {
+        if (job) model.jobs.set(job.id, job);
+        if (project) model.readProject().catch((fault) => outbox.disconnected(fault));
+        if (trouble !== undefined) model.notify(trouble);
+        const others = edits?.filter(({ id }) => !sent.has(id));
+        if (others?.length)
+          merge(
+            counts,
+            others.flatMap(({ changes }) => changes),
+          );
+        model.redraw();
+      },
+    });
+
+  model.marks = (frame = model.ui.frame) => marksOf(model.state, frame);
+  model.nearer = (frame = model.ui.frame) => nearerOf(model.state, frame);
+  model.keyframes = () => allKeyframes(model.project, model.state);
+  model.keyframe = () => model.keyframes().find(({ frame }) => frame === model.ui.frame);
+  model.isDone = (keyframe) =>
+    isDone(model.project, keyframe, marksOf(model.state, keyframe.frame));
+  // The marks, a joint that is being dragged where the pointer has it: name -> [x, y, v].
+  model.placed = () => {
+    const marks = { ...model.marks() },
+      { dragged } = model.ui;
+    if (dragged) marks[dragged.joint] = [...dragged.at, marks[dragged.joint]?.[2] || 2];
+    return marks;
+  };
+  model.update = (changes) => {
+    Object.assign(model.ui, changes);
+    model.redraw();
+  };
+  model.poses = createPoses(model);
+  return model;
+}

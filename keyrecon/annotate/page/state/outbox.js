@@ -1,0 +1,120 @@
+// Edits on their way to the server. Each is kept in the browser until the server has answered that it
+// is on disk; what is still kept when a page opens is sent again, oldest first. An edit's id makes
+// that harmless: the server applies it once.
+import { Gone } from "./api.js";
+
+const RETRY_MS = [300, 600, 1200, 2500, 5000]; // before trying again
+const BATCH = 200; // edits in one message
+
+// Edits kept in the browser for one project, readable by every page of it.
+export function pendingEdits(storage, project) {
+  const prefix = `keyrecon/${project}/`;
+  let count = 0;
+  const keys = () =>
+    Object.keys(storage)
+      .filter((key) => key.startsWith(prefix))
+      .sort();
+  return {
+    keep(edit) {
+      const order = `${String(Date.now()).padStart(15, "0")}-${String(count++).padStart(6, "0")}`;
+      storage.setItem(`${prefix}${order}/${edit.id}`, JSON.stringify(edit));
+    },
+    drop(ids) {
+      keys()
+        .filter((key) => ids.has(key.split("/").at(-1)))
+        .forEach((key) => storage.removeItem(key));
+    },
+    all: () => keys().map((key) => JSON.parse(storage.getItem(key))),
+  };
+}
+
+// `send` takes edits and resolves to the server's answer. Callbacks: `status` ("saved" |
+// "saving" | "unsaved", how many wait, and why), `delivered` (the answer and the edits that were sent),
+// `rejected` (an edit that the server will never take, and why).
+export function createOutbox({ send, pending, status, delivered, rejected, wait = setTimeout }) {
+  const drains = [];
+  let waiting = pending.all(),
+    sending = false,
+    failures = 0,
+    batchSize = BATCH,
+    timer = null,
+    offline = false,
+    why = "";
+
+  function report() {
+    if (failures || (offline && !waiting.length)) status("unsaved", waiting.length, why);
+    else status(waiting.length ? "saving" : "saved", waiting.length);
+    if (!waiting.length || failures || offline)
+      drains.splice(0).forEach((done) => done(!waiting.length));
+  }
+
+  function forget(edits) {
+    const ids = new Set(edits.map((edit) => edit.id));
+    waiting = waiting.filter((edit) => !ids.has(edit.id));
+    pending.drop(ids);
+  }
+
+  async function flush() {
+    if (sending || !waiting.length) return;
+    sending = true;
+    const batch = waiting.slice(0, batchSize);
+    try {
+      const answer = await send(batch);
+      failures = 0;
+      offline = false;
+      batchSize = BATCH;
+      forget(batch);
+      delivered(answer, batch);
+    } catch (fault) {
+      if (fault instanceof Gone) retry(fault);
+      else reject(batch, fault);
+    } finally {
+      sending = false;
+      report();
+    }
+    if (!failures) flush();
+  }
+
+  function retry(fault) {
+    why = fault.message;
+    timer = wait(flush, RETRY_MS[Math.min(failures, RETRY_MS.length - 1)]);
+    failures += 1;
+  }
+
+  // One bad edit must not hold up the good ones: they go one by one until it is found.
+  function reject(batch, fault) {
+    batchSize = 1;
+    if (batch.length > 1) return;
+    forget(batch);
+    rejected(batch[0], fault.message);
+  }
+
+  return {
+    add(edit) {
+      pending.keep(edit);
+      waiting.push(edit);
+      report();
+      if (!failures) flush();
+    },
+    disconnected(fault) {
+      offline = true;
+      why = fault?.message ?? "";
+      report();
+    },
+    reconnected() {
+      // the server answers again
+      clearTimeout(timer);
+      offline = false;
+      failures = 0;
+      report();
+      flush();
+    },
+    waiting: () => waiting,
+    // True once nothing waits any more, false when that may take long.
+    drained() {
+      const drained = new Promise((done) => drains.push(done));
+      report();
+      return drained;
+    },
+  };
+}

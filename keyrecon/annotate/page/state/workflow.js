@@ -1,0 +1,141 @@
+// What is to be done, in which order: joints and depths of a keyframe, keyframes, colours to pick.
+
+export function requiredJoints(project, half) {
+  const wanted = half === "both" || !half ? null : new Set(project.halves[half]);
+  return project.order.filter((joint) => !wanted || wanted.has(joint));
+}
+
+export const unmarked = (joints, marks) => joints.filter((joint) => !marks[joint]);
+
+// The next unmarked joint after one, going round; null when all are marked.
+export function nextUnmarked(joints, marks, after) {
+  const start = joints.indexOf(after) + 1;
+  return [...joints.slice(start), ...joints.slice(0, start)].find((joint) => !marks[joint]) ?? null;
+}
+
+// Where the suggestion may be taken: unmarked joints that it knows.
+export function suggestedJoints(joints, marks, suggestion) {
+  return Object.fromEntries(
+    unmarked(joints, marks)
+      .filter((joint) => suggestion?.joints?.[joint])
+      .map((joint) => [joint, suggestion.joints[joint]]),
+  );
+}
+
+// Limbs whose depth sign can be given: both ends are placed.
+export function placedLimbs(limbs, marks) {
+  const placed = (joint) => marks[joint]?.[2] > 0;
+  return limbs.filter(({ name, parent }) => placed(name) && placed(parent));
+}
+
+// {do: "accept" | "place" | "depth" | "next", ...}: the one next step on this keyframe.
+export function nextStep({ project, half, marks, nearer, suggestion, pose, joint }) {
+  const joints = requiredJoints(project, half),
+    suggested = Object.keys(suggestedJoints(joints, marks, suggestion));
+  const missing = unmarked(joints, marks);
+  if (suggested.length) return { do: "accept", joints: suggested, joint: joint ?? missing[0] };
+  if (missing.length)
+    return {
+      do: "place",
+      joint: missing.includes(joint) ? joint : missing[0],
+      left: missing.length,
+    };
+  const open = placedLimbs(project.limbs, marks).filter(
+    ({ name }) => pose?.limbs?.[name] && !nearer[name],
+  );
+  if (open.length) return { do: "depth", limbs: open.map(({ name }) => name) };
+  return { do: "next" };
+}
+
+export function isDone(project, keyframe, marks) {
+  return unmarked(requiredJoints(project, keyframe.half), marks).length === 0;
+}
+
+// The next keyframe that is not done after a frame, going round; null when all are.
+export function nextOpen(keyframes, frame, done) {
+  const after = keyframes.filter((keyframe) => keyframe.frame > frame);
+  const before = keyframes.filter((keyframe) => keyframe.frame < frame);
+  return [...after, ...before].find((keyframe) => !done(keyframe))?.frame ?? null;
+}
+
+// Keyframes that were chosen and those that a person added, by frame.
+export function allKeyframes(project, state) {
+  const byFrame = new Map(project.keyframes.map((keyframe) => [keyframe.frame, keyframe]));
+  for (const [frame, half] of Object.entries(state.own)) {
+    const chosen = byFrame.get(Number(frame));
+    byFrame.set(Number(frame), {
+      why: "added by you",
+      ...chosen,
+      frame: Number(frame),
+      half: joinHalves(chosen?.half, half),
+      own: true,
+    });
+  }
+  return [...byFrame.values()]
+    .filter(({ frame, own }) => !own || state.own[frame])
+    .map((keyframe) => ({ ...keyframe, locked: Boolean(state.locked[keyframe.frame]) }))
+    .sort((a, b) => a.frame - b.frame);
+}
+
+const joinHalves = (a, b) => (!a || a === b ? b : "both");
+
+// "right_ankle" -> "right ankle"
+export const label = (joint) => joint.replaceAll("_", " ");
+
+// "left", "right" or "middle" for every joint.
+export function sidesOf(project) {
+  const sides = Object.fromEntries(project.joints.map((joint) => [joint, "middle"]));
+  for (const [left, right] of project.mirror) [sides[left], sides[right]] = ["left", "right"];
+  return sides;
+}
+
+// Where the server can say nothing of the body: why, and what helps; else null.
+export function whyNoAssistant({ has }) {
+  if (!has.keyframes || has.assistant) return null;
+  return "The stored results are missing or of another version. Make the motion, and this works again.";
+}
+
+// Parts whose colours are picked: those that the tracker cannot do without, then regions of one colour.
+export const REQUIRED_PARTS = [
+  { part: "head", text: "head", hint: "the middle of the head", count: 1 },
+  { part: "foot", text: "feet", hint: "both shoes, one click each", count: 2 },
+];
+const COMMON_PARTS = ["shirt", "shorts", "skin", "hair"];
+
+const counted = (picks, part) => picks.filter((pick) => pick.part === part).length;
+
+// All parts in the order of the list: required, common, and what else was picked or named.
+export function partsOf(picks, named = []) {
+  const regions = [...new Set([...COMMON_PARTS, ...named, ...picks.map(({ part }) => part)])].filter(
+    (part) => !REQUIRED_PARTS.some((required) => required.part === part),
+  );
+  return [
+    ...REQUIRED_PARTS.map((required) => ({ ...required, picked: counted(picks, required.part) })),
+    ...regions.map((part) => ({
+      part,
+      text: part,
+      hint: `the ${part}, away from its rim`,
+      count: 1,
+      picked: counted(picks, part),
+    })),
+  ];
+}
+
+// What still has to be clicked before the program can start: head, both feet and one region.
+export function missingParts(parts) {
+  const open = parts.filter(
+    ({ part, picked, count }) => REQUIRED_PARTS.some((required) => required.part === part) && picked < count,
+  );
+  const regions = parts.slice(REQUIRED_PARTS.length);
+  return regions.some(({ picked }) => picked) ? open : [...open, regions[0]];
+}
+
+// Share of the frames to mark that is usual for a video: some 25 keyframes, which is 1.5 % of half a
+// minute, and less where little repeats because there is little.
+export const defaultBudget = (count) => Math.max(0.015, Math.min(0.05, 25 / count));
+
+// Frames spread over the video, to see how well the picks do elsewhere.
+export function spreadFrames(count, n) {
+  const even = Array.from({ length: n }, (_, k) => Math.floor(((k + 0.5) * count) / n));
+  return [...new Set(even)]; // a short video has fewer frames than places
+}

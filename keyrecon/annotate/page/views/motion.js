@@ -1,0 +1,166 @@
+// The motion played over the picture, with the skeleton in space beside it.
+import { drawJoint, drawLimb } from "../draw/skeleton.js";
+import { createViewer } from "../draw/viewer.js";
+import { createMotionCache } from "../state/caches.js";
+import { createPoseFigure } from "./depth.js";
+import { byId, numberIn, setText } from "./dom.js";
+
+const PREFETCHED = 24; // frames fetched ahead while playing
+const WIDTH = 960; // of the pictures, px
+
+export function createMotion(model, { frames, shell, actions, colors }) {
+  const { project, sides } = model,
+    last = project.n_frames - 1,
+    root = byId("motion-picture");
+  const viewer = createViewer({ root, project, frames, redraw: model.redraw });
+  const figure = createPoseFigure(byId("motion-canvas"), model);
+  const motion = createMotionCache(project, model.redraw);
+  const slider = byId("motion-frame");
+  let frame = 0;
+
+  const player = createPlayer({
+    fps: project.fps,
+    last,
+    show,
+    ready: (number) => frames.has(number, WIDTH),
+    load: (number) => frames.get(Math.min(last, number), WIDTH),
+    active: () => model.ui.view === "motion",
+  });
+
+  const exists = () => model.project.has.motion;
+  const points = (kind) => (exists() ? motion.points(frame, kind) : null);
+  model.onProject(motion.forget); // a new run makes new motion
+
+  function show(number) {
+    const next = Math.max(0, Math.min(last, number));
+    if (next !== frame) frames.prefetch(Array.from({ length: PREFETCHED }, (_, n) => [next + n, WIDTH]));
+    frame = next;
+    model.redraw();
+  }
+
+  function play() {
+    if (player.playing()) player.stop();
+    else player.start(frame);
+    model.redraw();
+  }
+
+  function go(number) {
+    player.stop();
+    show(number);
+  }
+
+  function primary() {
+    const height = numberIn(byId("height"));
+    if (Number.isNaN(height)) model.notify("The height is a number of metres, such as 1.80.");
+    else if (!shell.runningJob()) shell.startJob("run", height === null ? {} : { height });
+  }
+
+  byId("height").value = project.settings.height ?? "";
+  slider.max = last;
+  slider.addEventListener("input", () => go(Number(slider.value)));
+  byId("play").addEventListener("click", play);
+  byId("motion-primary").addEventListener("click", primary);
+  viewer.listen({ grab: () => null, drag() {}, drop() {}, click() {}, hover() {} });
+
+  function drawSkeleton() {
+    const [pen] = viewer.overlay(),
+      places = Object.entries(points("points2d") ?? {});
+    const at = Object.fromEntries(places.map(([name, place]) => [name, viewer.toScreen(place)]));
+    for (const { name, parent } of project.limbs) {
+      const style = { color: colors[sides[name]], sign: 0, alpha: 0.8 };
+      if (at[name] && at[parent]) drawLimb(pen, at[parent], at[name], style);
+    }
+    for (const [name, place] of Object.entries(at)) {
+      drawJoint(pen, place, { side: sides[name], color: colors[sides[name]], size: 3.5 });
+    }
+  }
+
+  function words() {
+    const keyframes = model.keyframes(),
+      open = keyframes.filter((keyframe) => !model.isDone(keyframe)).length;
+    if (shell.runningJob())
+      return ["The motion is being made", "You may go on marking meanwhile."];
+    const left = open
+      ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
+      : "All keyframes are marked.";
+    if (exists()) return ["The motion", left];
+    if (open < keyframes.length) return ["Make the motion", left];
+    return [
+      "No marks yet",
+      keyframes.length ? "Mark some keyframes first." : "The colours come first.",
+    ];
+  }
+
+  function draw() {
+    const [text, more] = words(),
+      { fps, time } = project,
+      seconds = time?.[frame] ?? frame / fps;
+    const idle = !shell.runningJob() && model.keyframes().some(model.isDone);
+    setText(byId("motion-text"), text);
+    setText(byId("motion-more"), more);
+    byId("motion-primary").hidden = byId("height-row").hidden = !idle;
+    setText(byId("motion-primary"), exists() ? "Make it anew" : "Make the motion");
+    setText(
+      byId("motion-note"),
+      exists()
+        ? "Where the skeleton leaves the body, press K: that frame becomes a keyframe of yours."
+        : "",
+    );
+    slider.value = frame;
+    setText(byId("motion-where"), `frame ${frame} of ${project.n_frames}, ${seconds.toFixed(2)} s`);
+    setText(byId("play"), player.playing() ? "❚❚" : "▶");
+    viewer.drawPicture(frame, [WIDTH]);
+    drawSkeleton();
+    const body = points("points3d");
+    byId("motion-empty").hidden = body !== null;
+    figure.show(body);
+  }
+
+  const commands = {
+    primary,
+    play,
+    add() {
+      player.stop();
+      actions.addKeyframe(frame, "both");
+    },
+    step: ({ index, shift }) =>
+      go(frame + (index ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
+  };
+  return { draw, commands };
+}
+
+// A clock that plays frames. A frame whose picture is not here yet holds the clock up, so that the
+// picture and what is drawn over it always belong together.
+function createPlayer({ fps, last, ready, load, show, active }) {
+  let playing = null; // {frame, since}: where and when the clock was set
+
+  function step(now) {
+    if (!playing || !active()) {
+      playing = null;
+      return;
+    }
+    const due = playing.frame + Math.floor(((now - playing.since) * fps) / 1000);
+    const frame = Math.min(last, due);
+    if (ready(frame)) {
+      show(frame);
+    } else {
+      load(playing.frame + 1);
+      if (ready(playing.frame + 1)) playing.frame += 1;
+      playing.since = now;
+      show(playing.frame);
+    }
+    if (frame >= last) playing = null;
+    requestAnimationFrame(step);
+  }
+
+  return {
+    playing: () => playing !== null,
+    stop() {
+      playing = null;
+    },
+    start(frame) {
+      playing = { frame: frame >= last ? 0 : frame, since: performance.now() };
+      requestAnimationFrame(step);
+    },
+  };
+}

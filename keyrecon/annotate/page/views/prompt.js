@@ -1,0 +1,125 @@
+// The bar over the picture: the next step in words, and the button that Enter presses; and the slider
+// below it.
+import { byId, setText } from "./dom.js";
+import { label, requiredJoints, unmarked } from "../state/workflow.js";
+
+const UNCERTAIN = 0.75; // certainty below which a limb is named
+const SIDES = { left: "the player's left", right: "the player's right", middle: "the" };
+
+function named(model, joint) {
+  const side = model.sides[joint];
+  return `${SIDES[side]} ${label(joint).replace(/^(left|right) /, "")}`;
+}
+
+function counted(n, word) {
+  return `${n} ${word}${n === 1 ? "" : "s"}`;
+}
+
+function leastCertain(model, limbs) {
+  const uncertain = limbs
+    .filter((limb) => (model.poses.current()?.limbs?.[limb]?.certainty ?? 1) < UNCERTAIN)
+    .map(label);
+  if (!uncertain.length) return "The program is fairly sure of all of them.";
+  const listed =
+    uncertain.slice(0, 3).join(", ") + (uncertain.length > 3 ? ` and ${uncertain.length - 3} more` : "");
+  return `Least sure: ${listed}. Click a limb to turn it, or try 1, 2, 3.`;
+}
+
+const PROMPTS = {
+  accept(model, { joints, joint }) {
+    const from = model.poses.suggestion().from?.slice(0, 3).join(", ");
+    return {
+      text: `Take the suggestion for ${counted(joints.length, "joint")}?`,
+      more: `${from ? `From frame ${from}. ` : ""}Drag what is wrong, or click ${named(model, joint)}.`,
+      button: "Take it",
+    };
+  },
+  place: (model, { joint, left }) => ({
+    text: `Click ${named(model, joint)}`,
+    more: `${counted(left, "joint")} to go. Shift-click if it is hidden, V if it cannot be placed.`,
+  }),
+  depth: (model, { limbs }) => ({
+    text: "Which ends are nearer the camera?",
+    more: leastCertain(model, limbs),
+    button: "Right as shown",
+  }),
+  next(model) {
+    const open = model.keyframes().filter((keyframe) => !model.isDone(keyframe)).length;
+    return open
+      ? {
+          text: "This keyframe is done",
+          more: `${counted(open, "keyframe")} to go.`,
+          button: "Next keyframe",
+        }
+      : {
+          text: "All keyframes are done",
+          more: "The motion can be made.",
+          button: "Go to the motion",
+        };
+  },
+};
+
+function tooLong(model) {
+  const stretched = Object.entries(model.poses.current()?.stretched ?? {});
+  if (!stretched.length) return null;
+  const [limb, ratio] = stretched.sort((a, b) => b[1] - a[1])[0];
+  const joints = requiredJoints(model.project, model.keyframe()?.half);
+  if (unmarked(joints, model.marks()).length) return null;
+  const share = Math.round(100 * (ratio - 1));
+  return `The limb to ${named(model, limb)} is ${share} % longer than it can be: check its ends.`;
+}
+
+export function createPrompt(model, actions) {
+  byId("primary").addEventListener("click", actions.primary);
+
+  function words() {
+    if (!model.keyframe())
+      return {
+        text: "No keyframes yet",
+        more: "Pick the colours first; the program then chooses the keyframes.",
+      };
+    if (model.ui.offset)
+      return {
+        text: "Looking around the keyframe",
+        more: "Nothing is marked here.",
+        button: "Back to the keyframe",
+      };
+    const step = actions.next(),
+      prompt = PROMPTS[step.do](model, step);
+    return { ...prompt, more: tooLong(model) ?? prompt.more };
+  }
+
+  return {
+    draw() {
+      const { text, more, button } = words();
+      setText(byId("prompt-text"), text);
+      setText(byId("prompt-more"), more);
+      byId("primary").hidden = !button;
+      setText(byId("primary"), button ?? "");
+    },
+  };
+}
+
+// The slider under the picture: a second before and after the keyframe, for context.
+export function createScrub(model, actions) {
+  const slider = byId("scrub");
+  slider.addEventListener("input", () => actions.scrub(Number(slider.value)));
+  byId("scrub-back").addEventListener("click", () => actions.scrub(model.ui.offset - 1));
+  byId("scrub-ahead").addEventListener("click", () => actions.scrub(model.ui.offset + 1));
+
+  return {
+    draw() {
+      const { frame, offset } = model.ui,
+        { fps, time, n_frames: count } = model.project;
+      const second = Math.round(fps);
+      slider.min = -Math.min(second, frame);
+      slider.max = Math.min(second, count - 1 - frame);
+      slider.value = offset;
+      const at = frame + offset,
+        seconds = time?.[at] ?? at / fps;
+      setText(byId("position"), `frame ${at} of ${count}, ${seconds.toFixed(2)} s`);
+      byId("offset").hidden = offset === 0;
+      setText(byId("offset"), `${offset > 0 ? "+" : "−"}${Math.abs(offset)} frames from the keyframe`);
+    },
+  };
+}

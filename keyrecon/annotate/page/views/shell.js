@@ -1,0 +1,187 @@
+// What surrounds every page: the steps, whether all is saved, notices, long work on the server, and
+// the table of keys.
+import * as api from "../state/api.js";
+import { byId, make, setText } from "./dom.js";
+import { KEYS, keyText } from "./keyboard.js";
+
+const SAVING = {
+  saved: () => "All saved",
+  saving: () => "Saving …",
+  unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
+};
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", pick: "Colours", motion: "Motion" };
+
+function keyElements(keys) {
+  const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
+  return shortened.flatMap((key, n) => [
+    ...(n && keys.length > 4 ? ["–"] : []),
+    make("kbd", {}, keyText(key)),
+  ]);
+}
+
+function keysTable() {
+  const parts = Object.entries(KEYS).map(([page, rows]) =>
+    make(
+      "section",
+      {},
+      make("h2", {}, TITLES[page]),
+      make(
+        "dl",
+        {},
+        ...rows.flatMap(([keys, what]) => [
+          make("dt", {}, ...keyElements(keys)),
+          make("dd", {}, what),
+        ]),
+      ),
+    ),
+  );
+  const pointer = make(
+    "section",
+    {},
+    make("h2", {}, "Pointer"),
+    make(
+      "dl",
+      {},
+      ...[
+        ["click", "place the joint that is asked for; else select a joint, turn a limb"],
+        ["Shift click", "place it as hidden"],
+        ["drag", "move a joint, or the picture"],
+        ["wheel", "zoom at the pointer"],
+        ["over a joint or limb", "the keys V, F, R and Del mean what is under the pointer"],
+      ].flatMap(([what, does]) => [make("dt", {}, what), make("dd", {}, does)]),
+    ),
+  );
+  return [parts[0], pointer, ...parts.slice(1)];
+}
+
+export function createShell(model, go) {
+  const jobs = createJobs(model);
+  document
+    .querySelectorAll("[data-go]")
+    .forEach((button) => button.addEventListener("click", () => go(button.dataset.go)));
+  const keys = byId("keys-panel");
+  keys.append(
+    make(
+      "form",
+      { method: "dialog" },
+      make("button", { className: "plain close", "aria-label": "Close" }, "✕"),
+    ),
+    make("div", { className: "keys" }, ...keysTable()),
+  );
+  const help = () => (keys.open ? keys.close() : keys.showModal());
+  byId("help").addEventListener("click", help);
+  for (const panel of document.querySelectorAll("dialog")) {
+    panel.addEventListener("click", (event) => event.target === panel && panel.close());
+  }
+  byId("notice-close").addEventListener("click", () => model.notify(null));
+  byId("notice-offer").addEventListener("click", () => {
+    const { offer } = model.notice;
+    model.notify(null);
+    offer.act();
+  });
+  byId("job-cancel").addEventListener("click", () => {
+    const job = jobs.runningJob();
+    if (job) api.remove(`jobs/${job.id}`).catch((fault) => model.notify(fault.message));
+  });
+  addEventListener("beforeunload", (event) => {
+    if (model.saving.status !== "saved") event.preventDefault();
+  });
+
+  function drawJob() {
+    const job = jobs.runningJob();
+    byId("job").hidden = !job;
+    if (!job) return;
+    setText(byId("job-text"), job.text || "Starting");
+    if (job.total) byId("job-progress").value = job.done / job.total;
+    else byId("job-progress").removeAttribute("value");
+  }
+
+  function drawNotice() {
+    const { text, offer } = model.notice ?? {};
+    byId("notice").hidden = !text;
+    setText(byId("notice-text"), text ?? "");
+    byId("notice-offer").hidden = !offer;
+    setText(byId("notice-offer"), offer?.text ?? "");
+  }
+
+  function draw() {
+    const { status, waiting, why } = model.saving,
+      { undo, redo } = model.state,
+      keyframes = model.keyframes();
+    const { view } = model.ui;
+    document.body.dataset.view = view;
+    for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
+    document.querySelectorAll("[data-go]").forEach((button) => {
+      button.setAttribute("aria-current", button.dataset.go === view ? "step" : "false");
+    });
+    setText(byId("project-name"), model.project.name);
+    setText(byId("saving"), SAVING[status](waiting));
+    byId("saving").dataset.status = status;
+    byId("saving").title =
+      status === "unsaved"
+        ? why || "The server does not answer; is keyrecon annotate still running?"
+        : "";
+    byId("undo").disabled = !undo && !waiting;
+    byId("redo").disabled = !redo;
+    setText(
+      byId("pick-count"),
+      model.state.picks.length ? `${model.state.picks.length} picks` : "",
+    );
+    setText(
+      byId("done-count"),
+      keyframes.length ? `${keyframes.filter(model.isDone).length} of ${keyframes.length}` : "",
+    );
+    setText(byId("motion-state"), model.project.has?.motion ? "made" : "");
+    drawNotice();
+    jobs.noteEnds();
+    drawJob();
+  }
+
+  return { draw, help, ...jobs };
+}
+
+// Long work on the server: starting it, and what its end means for the page.
+function createJobs(model) {
+  const states = new Map(); // job -> last state that was acted on
+
+  async function startJob(kind, options = {}) {
+    try {
+      await api.send("jobs", { kind, options });
+      await refreshJobs();
+    } catch (fault) {
+      model.notify(
+        fault instanceof api.Gone
+          ? "The server does not answer; is keyrecon annotate still running?"
+          : fault.message,
+      );
+    }
+  }
+
+  async function refreshJobs() {
+    for (const job of await api.read("jobs")) model.jobs.set(job.id, job);
+    model.redraw();
+  }
+
+  function ended(job) {
+    if (job.state === "failed") model.notify(job.text || "The work failed.");
+    if (job.state === "cancelled")
+      model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
+    if (job.state !== "done") return;
+    model.readProject().then(() => {
+      if (job.kind === "keyframes") model.update({ view: "keyframes" });
+      if (job.kind === "run") model.update({ view: "motion" });
+    });
+  }
+
+  // Ends that happened before the page was opened are no news.
+  function noteEnds() {
+    for (const job of model.jobs.values()) {
+      if (states.get(job.id) === "running" && job.state !== "running") ended(job);
+      states.set(job.id, job.state);
+    }
+  }
+
+  const runningJob = () => [...model.jobs.values()].find(({ state }) => state === "running");
+
+  return { startJob, refreshJobs, noteEnds, runningJob };
+}

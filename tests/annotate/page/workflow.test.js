@@ -1,0 +1,95 @@
+// What is to be done next.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import * as workflow from "../../../keyrecon/annotate/page/state/workflow.js";
+import { KEYS, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
+
+const PROJECT = {
+  joints: ["neck", "left_wrist", "left_knee"],
+  order: ["neck", "left_wrist", "left_knee"],
+  halves: { upper: ["neck", "left_wrist"], lower: ["left_knee"] },
+  limbs: [{ name: "left_wrist", parent: "neck" }, { name: "left_knee", parent: "neck" }],
+  mirror: [["left_wrist", "right_wrist"]],
+  keyframes: [{ frame: 30, half: "upper" }, { frame: 10, half: "both" }],
+  has: { keyframes: true, assistant: true },
+};
+const AT = [1, 1, 2];
+const step = (changes) =>
+  workflow.nextStep({
+    project: PROJECT,
+    half: "both",
+    marks: {},
+    nearer: {},
+    suggestion: null,
+    pose: null,
+    joint: null,
+    ...changes,
+  });
+
+test("a keyframe is suggested, placed, given depths, and done", () => {
+  const all = { neck: AT, left_wrist: AT, left_knee: AT };
+  const pose = { limbs: { left_wrist: { sign: 1 } } };
+  const suggestion = { joints: { neck: [1, 2, 0.5] } };
+  assert.deepEqual(step({ suggestion }).joints, ["neck"]);
+  assert.deepEqual(step({ marks: { neck: AT } }), { do: "place", joint: "left_wrist", left: 2 });
+  assert.deepEqual(step({ marks: all, pose }), { do: "depth", limbs: ["left_wrist"] });
+  assert.deepEqual(step({ marks: all, pose, nearer: { left_wrist: 1 } }), { do: "next" });
+});
+
+test("a keyframe of the upper body asks for no legs, and its depths need both ends", () => {
+  assert.deepEqual(workflow.requiredJoints(PROJECT, "upper"), ["neck", "left_wrist"]);
+  assert.ok(workflow.isDone(PROJECT, { half: "upper" }, { neck: AT, left_wrist: [0, 0, 0] }));
+  assert.deepEqual(workflow.placedLimbs(PROJECT.limbs, { neck: AT, left_wrist: [0, 0, 0] }), []);
+});
+
+test("joints and keyframes are asked for going round", () => {
+  assert.equal(workflow.nextUnmarked(PROJECT.order, { neck: AT }, "left_knee"), "left_wrist");
+  const keyframes = [10, 30, 50].map((frame) => ({ frame }));
+  assert.equal(workflow.nextOpen(keyframes, 30, ({ frame }) => frame === 50), 10);
+  assert.equal(workflow.nextOpen(keyframes, 30, () => true), null);
+});
+
+test("keyframes that a person added stand among those that were chosen", () => {
+  const state = { own: { 20: "lower", 30: "lower" }, locked: { 10: true } };
+  const rows = workflow.allKeyframes(PROJECT, state);
+  assert.deepEqual(
+    rows.map(({ frame, half, locked }) => [frame, half, locked]),
+    [[10, "both", true], [20, "lower", false], [30, "both", false]],
+  );
+});
+
+test("head, both feet and one region are picked before the program can start", () => {
+  const picks = [];
+  const missing = () => workflow.missingParts(workflow.partsOf(picks)).map(({ part }) => part);
+  assert.deepEqual(missing(), ["head", "foot", "shirt"]);
+  for (const part of ["head", "foot", "socks"]) picks.push({ part });
+  assert.deepEqual(missing(), ["foot"]);
+  picks.push({ part: "foot" });
+  assert.deepEqual(missing(), []);
+});
+
+test("a video of few frames has each in the strip once", () => {
+  for (const count of [1, 2, 6, 7, 12]) {
+    const frames = workflow.spreadFrames(count, 7);
+    assert.equal(new Set(frames).size, Math.min(count, 7));
+    assert.ok(frames.every((frame) => frame >= 0 && frame < count));
+  }
+});
+
+test("without stored results the page says why it knows nothing of the body", () => {
+  const has = { keyframes: true, assistant: false };
+  assert.match(workflow.whyNoAssistant({ has }), /stored results are missing/);
+  assert.equal(workflow.whyNoAssistant(PROJECT), null);
+});
+
+test("a key means one thing on a page, and is written as it stands on the keyboard", () => {
+  for (const [page, rows] of Object.entries(KEYS)) {
+    const keys = [...rows, ...(page === "any" ? [] : KEYS.any)].flatMap(([names]) => names);
+    assert.equal(new Set(keys).size, keys.length, page);
+  }
+  const key = (parts) => interpret({ ctrlKey: false, altKey: false, ...parts }, "keyframes");
+  assert.equal(key({ key: "Z", ctrlKey: true, shiftKey: true }).action, "redo");
+  assert.equal(key({ key: "d" }).index, 1);
+  assert.equal(key({ key: "F9" }), null);
+  assert.equal(keyText("Ctrl+Shift+z"), "Ctrl Shift Z");
+});

@@ -1,0 +1,46 @@
+// The figure in space: where a turned point is seen, and what lies before what.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { createProjection, sortBones, turned, zoomed } from "../../keyrecon/report/figure3d.js";
+
+const SCENE = { center: [1, 2, 3], unit: 1.8, scale: 100, size: [400, 300] };
+const AHEAD = { yaw: 0, pitch: 0, zoom: 1 };
+const project = (view, point) => createProjection(view, SCENE)(point);
+const near = (one, other) => assert.ok(Math.abs(one - other) < 1e-9, `${one} is not ${other}`);
+
+test("the center stays in the middle however the figure is turned", () => {
+  for (const view of [AHEAD, { yaw: 1, pitch: 0.4 }, { yaw: -3, pitch: -1.5 }]) {
+    const [x, y, depth, magnification] = project(view, SCENE.center);
+    assert.deepEqual([x, y, depth, magnification], [200, 150, 0, 1]);
+  }
+});
+
+test("from ahead x is right, y is down, and what is nearer is larger", () => {
+  const [x, y] = project(AHEAD, [1.5, 2.5, 3]);
+  assert.deepEqual([x, y], [250, 200]);
+  assert.ok(project(AHEAD, [1, 2, 2])[3] > 1);
+  assert.ok(project(AHEAD, [1, 2, 4])[3] < 1);
+});
+
+test("from the side depth becomes width, from above it becomes height", () => {
+  const side = project({ yaw: Math.PI / 2, pitch: 0 }, [1, 2, 3.5]);
+  near(side[0], 250);
+  near(side[2], 0);
+  const above = project({ yaw: 0, pitch: Math.PI / 2 }, [1, 2, 3.5]);
+  near(above[1], 100);
+  near(above[2], 0);
+});
+
+test("nobody sees the figure upside down, and the zoom has its limits", () => {
+  assert.equal(turned(AHEAD, 0, 9).pitch, Math.PI / 2);
+  near(turned(AHEAD, 0.1, 0).yaw, 0.1);
+  assert.equal(zoomed(AHEAD, 1e9).zoom, 4);
+  assert.equal(zoomed(AHEAD, 1e-9).zoom, 0.4);
+});
+
+test("bones are drawn far to near, those of unknown ends not at all", () => {
+  const points = { hip: [0, 0, 0], far: [0, 1, 5], near: [0, 1, -5], lost: [NaN, NaN, NaN] };
+  const bones = ["near", "far", "lost", "nowhere"].map((to) => ({ from: "hip", to, side: "left" }));
+  const sorted = sortBones({ points, bones }, createProjection(AHEAD, SCENE));
+  assert.deepEqual(sorted.map(({ to }) => to), ["far", "near"]);
+});
