@@ -252,7 +252,8 @@ class Person:
 
     def call(self, module, expression):
         """What an expression on a module of the page gives; the module is called `m`."""
-        return self.page.evaluate(f"import('/annotate/page/{module}.js').then((m) => ({expression}))")
+        address = f"/annotate/page/{module}.js"
+        return self.page.evaluate(f"import('{address}').then((m) => ({expression}))")
 
 
 def clearest_place(limb, place_of):

