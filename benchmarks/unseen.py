@@ -5,13 +5,15 @@ sequences among them. Measured with it, a sequence would be one that it knows. S
 lifted with a model learnt from all captures but those of its own players.
 """
 
+import sys
 from pathlib import Path
 
 from sequences import Sequence, mocap_files
 
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import learn_from_files
-from keyrecon.io.formats.mocap import find_captures
+from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
 from keyrecon.lifting.priors.depth_model import DepthModel
 
@@ -22,9 +24,19 @@ def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, Dep
     path = work / f"depths-without-{'-'.join(sorted(players))}.npz"
     if not path.is_file():
         folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
-        others = [f for f in find_captures(folders) if player(f) not in players]
+        others = [f for f in find_captures(folders) if player(f) not in players and readable(f)]
         write_depth_model(path, learn_from_files(others, progress=show))
     return path, read_depth_model(path)
+
+
+def readable(file: Path) -> bool:
+    """Whether a capture can be read; what cannot is told and left out."""
+    try:
+        read_capture(file)
+    except KeyreconError as fault:
+        print(f"left out: {fault}", file=sys.stderr)
+        return False
+    return True
 
 
 def player(file: Path) -> str:

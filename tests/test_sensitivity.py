@@ -1,0 +1,152 @@
+"""The parts of benchmarks/sensitivity.py that find and change numbers, on a package of their own."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
+
+PIPELINE = """
+from keyrecon.tracking.find import FindOptions, find
+from keyrecon.lifting.lift import lift
+
+class Options:
+    find: FindOptions = FindOptions()
+    depths: str = "none"
+
+def prepare(keep):
+    return keep("find", find)
+
+def reconstruct(keep):
+    return keep("lift", lift)
+"""
+FIND = '''
+from dataclasses import dataclass
+from keyrecon.numerics.shared import STEP
+
+RADIUS = 0.5
+"""Evidence."""
+LEFT, RIGHT = 2, -3.0
+HALF_TURN = np.pi / 2
+BY_PART = {"head": 0.1, "foot": 0.0}
+LADDER = (Rung(1.0, 2), Rung(3.0, 4), Rung(5.0, every=6))
+SQUARE = 1 << 4
+lower = 7.0
+
+@dataclass
+class Rung:
+    height: float
+    every: int
+
+class FindOptions:
+    speed: float = 3.0
+    method: str = "x"
+    limit: float | None = None
+    flag: bool = True
+
+class NoOptions:
+    speed: float = 4.0
+
+def find(size=LEFT):
+    return RADIUS * STEP
+'''
+SOURCES = {
+    "pipeline.py": PIPELINE,
+    "tracking/find.py": FIND,
+    "lifting/lift.py": "from keyrecon.numerics.shared import OTHER\ndef lift(): return OTHER\n",
+    "numerics/shared.py": "STEP = 4\nOTHER = 5\n",
+    "golf/club.py": "LENGTH = 1.0\n",
+}
+
+
+@pytest.fixture
+def numbers(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import tuned_numbers
+
+    yield tuned_numbers
+    sys.modules.pop("tuned_numbers")
+
+
+@pytest.fixture
+def trees():
+    return {file: ast.parse(text) for file, text in SOURCES.items()}
+
+
+def test_every_number_is_found_by_file_and_name(numbers, trees):
+    found = {number.key: number.values for number in numbers.find_numbers(trees)}
+    assert found == {
+        "tracking/find.py:RADIUS": (0.5,),
+        "tracking/find.py:LEFT": (2,),
+        "tracking/find.py:RIGHT": (-3.0,),
+        "tracking/find.py:HALF_TURN": (pytest.approx(1.5708, abs=1e-4),),
+        "tracking/find.py:BY_PART['head']": (0.1,),
+        "tracking/find.py:LADDER.height": (1.0, 3.0, 5.0),
+        "tracking/find.py:LADDER.every": (2, 4, 6),
+        "tracking/find.py:SQUARE": (16,),
+        "tracking/find.py:FindOptions.speed": (3.0,),
+        "numerics/shared.py:STEP": (4,),
+        "numerics/shared.py:OTHER": (5,),
+    }
+
+
+def test_a_changed_number_stands_where_the_old_one_stood(numbers, trees):
+    for number in numbers.find_numbers(trees):
+        new = {place: float(at + 100) for at, place in enumerate(number.places)}
+        changed = numbers.rewrite(ast.parse(SOURCES[number.module]), new)
+        again = {**trees, number.module: ast.parse(ast.unparse(changed))}
+        found = {n.key: n.values for n in numbers.find_numbers(again)}
+        assert found[number.key] == tuple(new.values())
+        others = {n.key: n.values for n in numbers.find_numbers(trees) if n.key != number.key}
+        assert {key: found[key] for key in others} == others
+
+
+def test_a_place_without_a_number_is_refused(numbers, trees):
+    with pytest.raises(ValueError, match="no number"):
+        numbers.rewrite(trees["tracking/find.py"], {(1, 90, 1, 95): 1.0})
+
+
+@pytest.mark.parametrize(
+    ("value", "factor", "expected"),
+    [(2.0, 1.25, 2.5), (8, 0.75, 6), (1, 1.25, 2), (1, 0.75, 0), (-2, 1.25, -3), (-2, 0.75, -1)],
+)
+def test_whole_numbers_stay_whole_and_move(numbers, value, factor, expected):
+    assert numbers.vary(value, factor) == expected
+    assert isinstance(numbers.vary(value, factor), type(value))
+
+
+def test_a_number_is_run_from_the_first_stage_that_imports_it(numbers, trees):
+    stages = numbers.find_stages(trees)
+    assert list(stages) == ["find", "lift"]
+    first = [
+        numbers.first_stage(module, trees, stages)
+        for module in ("tracking/find.py", "numerics/shared.py", "lifting/lift.py", "golf/club.py")
+    ]
+    assert first == ["find", "find", "lift", None]
+
+
+def test_a_number_counts_as_used_where_code_that_ran_names_it(numbers, trees):
+    called = {"tracking/find.py": {"RADIUS", "STEP", "speed"}}
+    used = {n.name for n in numbers.find_numbers(trees) if numbers.is_used(n, trees, called)}
+    assert used == {"RADIUS", "STEP", "LEFT", "FindOptions.speed"}
+
+
+def test_prose_makes_no_other_version(numbers, trees):
+    digest = numbers.code_digest(trees)
+    prose = {**trees, "tracking/find.py": ast.parse(FIND.replace("Evidence.", "Better evidence."))}
+    code = {**trees, "tracking/find.py": ast.parse(FIND.replace("0.5", "0.6"))}
+    assert numbers.code_digest(prose) == digest
+    assert numbers.code_digest(code) != digest
+
+
+def test_the_package_itself_has_stages_and_numbers_for_all_of_them(numbers):
+    trees = numbers.read_package()
+    stages = numbers.find_stages(trees)
+    assert list(stages)[0] == "camera" and list(stages)[-1] == "lift"
+    found = numbers.find_numbers(trees)
+    assert len({number.key for number in found}) == len(found) > 200
+    for number in found:
+        new = {place: 1.0 for place in number.places}
+        numbers.rewrite(ast.parse((numbers.PACKAGE / number.module).read_text()), new)
