@@ -1,6 +1,8 @@
-"""The parts of benchmarks/sensitivity.py that find and change numbers, on a package of their own."""
+"""The parts of benchmarks/sensitivity.py that find and change numbers, on a small package."""
 
 import ast
+import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -143,10 +145,34 @@ def test_prose_makes_no_other_version(numbers, trees):
 
 def test_the_package_itself_has_stages_and_numbers_for_all_of_them(numbers):
     trees = numbers.read_package()
-    stages = numbers.find_stages(trees)
-    assert list(stages)[0] == "camera" and list(stages)[-1] == "lift"
+    names = list(numbers.find_stages(trees))
+    assert (names[0], names[-1]) == ("camera", "lift")
     found = numbers.find_numbers(trees)
     assert len({number.key for number in found}) == len(found) > 200
     for number in found:
         new = {place: 1.0 for place in number.places}
         numbers.rewrite(ast.parse((numbers.PACKAGE / number.module).read_text()), new)
+
+
+def test_the_package_is_imported_with_the_other_number(numbers):
+    number = next(
+        n
+        for n in numbers.find_numbers(numbers.read_package())
+        if n.name == n.symbol and isinstance(n.values[0], float)
+    )
+    module = "keyrecon." + number.module.removesuffix(".py").replace("/", ".")
+    code = (
+        "import importlib, json, sys; from varied_import import vary_imports;"
+        "module, file, place, name = json.loads(sys.argv[1]);"
+        "vary_imports(file, {tuple(place): 123.5});"
+        "print(getattr(importlib.import_module(module), name))"
+    )
+    told = json.dumps([module, number.module, number.places[0], number.symbol])
+    found = subprocess.run(
+        [sys.executable, "-c", code, told],
+        env={"PYTHONPATH": f"{BENCHMARKS.parent}:{BENCHMARKS}"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.strip() == "123.5"
