@@ -5,8 +5,8 @@
         [--out CSV] [--plan | --summary]
 
 Every tuned number (see tuned_numbers.py) by +-25 % on the rendered sequences and on the real clips
-whose marks are kept: change of carried PCK@0.2 (points) and of PA-MPJPE (mm). Each is run as if it
-had been written so in the source, in a process of its own, from the first stage that it can
+whose marks are kept: change of carried PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs from
+the person and without (`auto`). Each is run as if it had been written so in the source, in a process of its own, from the first stage that it can
 affect; what comes before is taken from the clip's store. `--clicks` moves the picked heads and
 feet by 0.15 of a head or a shin, and repeats the clips with other clicks on the joints: the
 size of a change that tells nothing. Rows are appended to the CSV as they are measured;
@@ -90,10 +90,13 @@ class Row:
     """0-1"""
     pa: float
     """mm; NaN where nothing is known in 3D."""
+    pa_unsigned: float
+    """The same without depth signs from the person."""
     d_pck: float
     """Points against the base."""
     d_pa: float
     """mm against the base."""
+    d_pa_unsigned: float
     seconds: float
     fault: str
     """Last line of what was said when it failed."""
@@ -127,6 +130,7 @@ class Base:
 
     pck: float
     pa: float
+    pa_unsigned: float
     seconds: dict[str, float]
     """Of every stage."""
     called: dict[str, set[str]]
@@ -165,9 +169,8 @@ class Bench:
         if "pck" not in found:
             file.unlink()
             raise SystemExit(f"{clip} cannot be run as it is: {found['fault']}")
-        pa = float("nan") if found["pa"] is None else found["pa"]
         called = {module: set(names) for module, names in found["called"].items()}
-        return Base(found["pck"], pa, found["seconds"], called)
+        return Base(*scores_of(found), found["seconds"], called)
 
     def run(self, clip: str, change: Change, limit: float | None) -> dict:
         """Scores and seconds, or the fault, of one clip in a process of its own."""
@@ -195,14 +198,20 @@ class Bench:
         started = time.perf_counter()
         foreseen = foresee(base, change.first)
         found = self.run(clip, change, 60 + PATIENCE * foreseen)
-        pck = found.get("pck", float("nan"))
-        pa = found.get("pa")
-        pa = float("nan") if pa is None else pa
+        pck, pa, unsigned = scores_of(found)
         return Row(
             self.code, clip, self.frames, change.number, change.line, change.old, change.new,
-            change.change, change.first, pck, pa, 100 * (pck - base.pck), pa - base.pa,
-            round(time.perf_counter() - started, 1), found.get("fault", ""),
+            change.change, change.first, pck, pa, unsigned, 100 * (pck - base.pck), pa - base.pa,
+            unsigned - base.pa_unsigned, round(time.perf_counter() - started, 1),
+            found.get("fault", ""),
         )  # fmt: skip
+
+
+def scores_of(found: dict) -> tuple[float, float, float]:
+    """PCK, PA-MPJPE with and without signs; NaN where there is none."""
+    scores = [found.get(name) for name in ("pck", "pa", "pa_unsigned")]
+    pck, pa, unsigned = (float("nan") if score is None else score for score in scores)
+    return pck, pa, unsigned
 
 
 def foresee(base: Base, first: str) -> float:
@@ -313,7 +322,10 @@ def measure_all(bench: Bench, todo: list[tuple[str, Change]]) -> None:
             due = foresee(bases[clip], change.first)
             spent, foreseen, rest = spent + row.seconds, foreseen + due, rest - due
             minutes = rest * spent / foreseen / bench.words.workers / 60
-            told = row.fault or f"{row.d_pck:+7.2f} points {row.d_pa:+7.2f} mm"
+            told = (
+                row.fault
+                or f"{row.d_pck:+.2f} points {row.d_pa:+.2f} mm {row.d_pa_unsigned:+.2f} mm auto"
+            )
             print(
                 f"{done}/{len(left)} {clip:<20}{row.number} {row.old} -> {row.new}"
                 f"{change.change if not row.new else ''}  {told}  (about {minutes:.0f} min left)",
@@ -323,20 +335,18 @@ def measure_all(bench: Bench, todo: list[tuple[str, Change]]) -> None:
 
 @dataclass(frozen=True)
 class Effect:
-    """What one number does, over both directions and all clips."""
+    """What one number does, over both directions and all clips: changes for the worse, >= 0."""
 
     number: str
     line: int
     old: str
-    worst_pck: float
-    """Lowest mean change over the clips of either direction, points."""
-    worst_pa: float
-    """Highest, mm."""
-    best_pck: float
-    best_pa: float
-    lowest_pck: float
-    """Lowest change of a single clip."""
-    highest_pa: float
+    cost: tuple[float, float, float]
+    """Largest loss on the mean over the clips, of either direction: points of PCK, mm of PA-MPJPE,
+    mm without signs."""
+    cost_one: tuple[float, float, float]
+    """The same on the worst clip."""
+    gain: tuple[float, float, float]
+    """Largest gain on the mean."""
     largest: float
     """Largest absolute change in any row, points or mm."""
     faults: tuple[str, ...]
@@ -354,26 +364,28 @@ def summarise(rows: Iterable[Row]) -> list[Effect]:
 
 def effect_of(number: str, rows: list[Row]) -> Effect:
     """The effect of the number that these rows vary."""
-    by: dict[str, list[Row]] = defaultdict(list)
-    for row in rows:
-        if not row.fault:
-            by[row.change].append(row)
-    means = [(mean(r.d_pck for r in group), mean(r.d_pa for r in group)) for group in by.values()]
-    pcks, pas = ([m[i] for m in means if np.isfinite(m[i])] or [0.0] for i in (0, 1))
-    single_pck = [r.d_pck for g in by.values() for r in g] or [0.0]
-    single_pa = [r.d_pa for g in by.values() for r in g if np.isfinite(r.d_pa)] or [0.0]
+    good = [row for row in rows if not row.fault]
+    losses = np.array([(-r.d_pck, r.d_pa, r.d_pa_unsigned) for r in good]).reshape(-1, 3)
+    losses = np.nan_to_num(losses)  # of a real clip, nothing is known in 3D
+    changes = np.array([row.change for row in good])
+    means = [losses[changes == change].mean(axis=0) for change in sorted(set(changes))]
+    means, none = np.array(means).reshape(-1, 3), np.zeros(3)
+    cost, cost_one, gain = (
+        tuple(float(x) for x in np.max([none, *values], axis=0))
+        for values in (means, losses, -means)
+    )
+    faults = tuple(sorted({f"{r.change}: {r.fault}" for r in rows if r.fault}))
+    largest = float(np.abs(losses).max(initial=0))
+    complete = len({row.change for row in rows}) > 1
     return Effect(
-        number, rows[-1].line, rows[-1].old, min(pcks), max(pas), max(pcks), min(pas),
-        min(single_pck), max(single_pa), max(map(abs, (*single_pck, *single_pa))),
-        tuple(sorted({f"{r.change}: {r.fault}" for r in rows if r.fault})),
-        len({r.change for r in rows}) > 1,
-    )  # fmt: skip
+        number, rows[-1].line, rows[-1].old, cost, cost_one, gain, largest, faults, complete
+    )
 
 
-def mean(values: Iterable[float]) -> float:
-    """Mean of those that are known; NaN where none is."""
-    found = [value for value in values if np.isfinite(value)]
-    return float(np.mean(found)) if found else float("nan")
+def is_much(loss: tuple[float, float, float], share: float = 1.0) -> bool:
+    """Whether points or millimetres are more than a share of what counts as much."""
+    pck, *errors = loss
+    return pck > share * MUCH_PCK or max(errors) > share * MUCH_PA
 
 
 def print_summary(rows: list[Row], unused: list[TunedNumber]) -> None:
@@ -381,35 +393,41 @@ def print_summary(rows: list[Row], unused: list[TunedNumber]) -> None:
     effects = summarise(rows)
     clicks = [e for e in effects if e.number.startswith("clicks:")]
     numbers = [e for e in effects if not e.number.startswith("clicks:")]
-    much = [e for e in numbers if e.worst_pa > MUCH_PA or e.worst_pck < -MUCH_PCK]
-    single = [e for e in numbers if e not in much
-              and (e.highest_pa > MUCH_PA or e.lowest_pck < -MUCH_PCK)]  # fmt: skip
-    better = [e for e in numbers if e.best_pa < -MUCH_PA / 2 or e.best_pck > MUCH_PCK / 2]
+    much = [e for e in numbers if is_much(e.cost)]
+    single = [e for e in numbers if not is_much(e.cost) and is_much(e.cost_one)]
+    better = [e for e in numbers if is_much(e.gain, 0.5)]
     nothing = [e for e in numbers if e.largest < NOTHING and not e.faults and e.complete]
-    title = f"{'':<62}{'value':>10}{'PCK':>8}{'PA':>8}{'PCK':>8}{'PA':>8}"
-    for text, group in (
-        (f"+-25 % costs more than {MUCH_PA:g} mm or {MUCH_PCK:g} points on the mean", much),
-        ("the same on one clip, not on the mean", single),
-        ("+-25 % gains on the mean more than half of that (best direction)", better),
-        ("clicks", clicks),
-    ):
-        print(f"\n{text}: {len(group)}\n{title}   (mean; worst clip)")
-        for e in sorted(group, key=lambda e: -e.worst_pa):
-            pck, pa = (e.best_pck, e.best_pa) if group is better else (e.worst_pck, e.worst_pa)
-            where = e.number.replace(":", f":{e.line}:", 1) if e.line else e.number
-            print(
-                f"{where:<62}{e.old:>10}{pck:8.2f}{pa:8.2f}{e.lowest_pck:8.2f}{e.highest_pa:8.2f}"
-            )
+    limits = f"{MUCH_PCK:g} points or {MUCH_PA:g} mm"
+    print_table(f"a quarter more or less costs more than {limits} on the mean", much)
+    print_table("the same on one clip, not on the mean", single)
+    print_table("a quarter more or less gains half of that on the mean", better)
+    print_table("clicks", clicks)
     print(f"\nchange nothing (all under {NOTHING:g} points and mm): {len(nothing)}")
     for e in nothing:
-        print(f"  {e.number.replace(':', f':{e.line}:', 1)} = {e.old}")
+        print(f"  {where(e)} = {e.old}")
     print(f"\nin no code that these clips run: {len(unused)}")
     for number in unused:
         print(f"  {number.module}:{number.line}:{number.name} = {shorten(number.values)}")
     print("\ncannot be varied so:")
     for e in numbers:
         for fault in e.faults:
-            print(f"  {e.number.replace(':', f':{e.line}:', 1)} {fault}")
+            print(f"  {where(e)} {fault}")
+
+
+def print_table(title: str, effects: list[Effect]) -> None:
+    """Costs and gains, the largest cost in space first."""
+    print(f"\n{title}: {len(effects)}")
+    head = "".join(f"{name:>8}" for name in ("PCK", "PA", "auto"))
+    print(f"{'':<62}{'value':>10} |{head} |{head} |{head}")
+    print(f"{'':<62}{'':>10} |{'mean loss':>24} |{'worst clip':>24} |{'mean gain':>24}")
+    for e in sorted(effects, key=lambda e: -max(e.cost[1:])):
+        groups = ("".join(f"{x:8.2f}" for x in part) for part in (e.cost, e.cost_one, e.gain))
+        print(f"{where(e):<62}{e.old:>10.10} |{' |'.join(groups)}")
+
+
+def where(effect: Effect) -> str:
+    """file:line:name."""
+    return effect.number.replace(":", f":{effect.line}:", 1) if effect.line else effect.number
 
 
 def real_clips(videos: Path) -> list[str]:
@@ -431,7 +449,7 @@ def obey(order: str) -> None:
         vary_imports(told["module"], {tuple(place): value for place, value in told["places"]})
     from variant import Task, run_task  # imports the package, which must be varied by then
 
-    print(json.dumps(run_task(Task(**told["task"]))))
+    print(json.dumps(asdict(run_task(Task(**told["task"])))))
 
 
 def main() -> None:

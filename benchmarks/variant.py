@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -63,13 +63,18 @@ class Task:
 
 
 class PartialStore(StageStore):
-    """Takes stages from the store up to one, and runs that and all after it."""
+    """Takes stages from the store up to one, and runs that and all after it.
+
+    Joints are propagated once: depth signs, which are all that a second set of marks differs in,
+    do not count for that.
+    """
 
     def __init__(self, folder: Path, first: str) -> None:
         """`first`: the stage to begin with; 'all' runs and stores them all."""
         super().__init__(folder, force=first == "all")
         self.first = first
         self.begun = False
+        self.propagated: object = None
 
     def keep(
         self,
@@ -80,13 +85,37 @@ class PartialStore(StageStore):
         **named: Inputs.kwargs,
     ) -> Result:
         """The stored result, or the result made now."""
+        if name == "propagate" and self.propagated is not None:
+            return self.propagated
+        result = self._make(name, stage, inputs, named)
+        if name == "propagate":
+            self.propagated = result
+        return result
+
+    def _make(self, name: str, stage: Callable[..., Result], inputs: tuple, named: dict) -> Result:
         self.begun |= name == self.first
         if not self.begun:
             return super().keep(name, stage, *inputs, **named)
         started = time.perf_counter()
         result = stage(*inputs, **named)
-        self.seconds[name] = time.perf_counter() - started
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
         return result
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Scores of one clip."""
+
+    pck: float
+    """Carried PCK@0.2, 0-1."""
+    pa: float | None
+    """PA-MPJPE, mm; None where nothing is known in 3D."""
+    pa_unsigned: float | None
+    """The same where nobody gave depth signs."""
+    seconds: dict[str, float]
+    """Of every stage that ran."""
+    called: dict[str, list[str]] = field(default_factory=dict)
+    """What the functions name that were called, by module; only of a run of all stages."""
 
 
 class CalledNames:
@@ -121,19 +150,18 @@ class CalledNames:
         return {module: sorted(found) for module, found in names.items()}
 
 
-def run_task(task: Task) -> dict[str, object]:
-    """Scores (share, mm or None), seconds of each stage that ran, and what it called."""
+def run_task(task: Task) -> Outcome:
+    """Run the clip's stages that a change can affect, and score what comes out."""
     cv2.setNumThreads(1)
     run = run_rendered if any(s.name == task.clip for s in (*TENNIS, *OTHER)) else run_real
     if task.first != "all":
-        carried, error, seconds = run(task)
-        return {"pck": carried, "pa": error, "seconds": seconds}
+        return run(task)
     with CalledNames() as called:
-        carried, error, seconds = run(task)
-    return {"pck": carried, "pa": error, "seconds": seconds, "called": called.by_module()}
+        found = run(task)
+    return replace(found, called=called.by_module())
 
 
-def run_rendered(task: Task) -> tuple[float, float | None, dict[str, float]]:
+def run_rendered(task: Task) -> Outcome:
     """A rendered sequence, marked from its truth."""
     sequence = next(s for s in (*TENNIS, *OTHER) if s.name == task.clip)
     folder = render(sequence, Path(task.work), Path(task.mocap))
@@ -149,12 +177,14 @@ def run_rendered(task: Task) -> tuple[float, float | None, dict[str, float]]:
     picks = moved_picks(folder / "picks.json", count, task)
     preparation = prepare(video, picks, options, store.keep)
     sequence = replace(sequence, seed=sequence.seed + task.seed)
-    motion = solve(Case(sequence, preparation, truth, store), options)
-    error = pa_mpjpe(1000 * motion.points3d, 1000 * truth["points3d"])
-    return pck(motion.points2d_propagated, truth["points2d"], TORSO), error, store.seconds
+    case = Case(sequence, preparation, truth, store)
+    motion, unsigned = (solve(case, options, signs) for signs in (True, False))
+    errors = [pa_mpjpe(1000 * m.points3d, 1000 * truth["points3d"]) for m in (motion, unsigned)]
+    carried = pck(motion.points2d_propagated, truth["points2d"], TORSO)
+    return Outcome(carried, *errors, store.seconds)
 
 
-def run_real(task: Task) -> tuple[float, float | None, dict[str, float]]:
+def run_real(task: Task) -> Outcome:
     """A real clip, scored on frames marked by eye that are no keyframes; nothing is known in 3D."""
     video = open_video(Path(task.videos) / f"{task.clip}.mp4")
     size = video.width, video.height
@@ -169,7 +199,7 @@ def run_real(task: Task) -> tuple[float, float | None, dict[str, float]]:
     motion: Motion = reconstruct(preparation, marks, options, store.keep)
     rows = ~np.isin(truth.frames, marks.frames)
     carried = motion.points2d_propagated[truth.frames[rows]]
-    return pck(carried, truth.joints[rows], TORSO), None, store.seconds
+    return Outcome(pck(carried, truth.joints[rows], TORSO), None, None, store.seconds)
 
 
 def with_budget(options: Options, budget: float) -> Options:
