@@ -5,29 +5,29 @@
         [--out CSV] [--plan | --summary]
 
 Every tuned number (see tuned_numbers.py) by +-25 % on the rendered sequences and on the real clips
-whose marks are kept: change of carried PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs from
-the person and without (`auto`). Each is run as if it had been written so in the source, in a process of its own, from the first stage that it can
-affect; what comes before is taken from the clip's store. `--clicks` moves the picked heads and
-feet by 0.15 of a head or a shin, and repeats the clips with other clicks on the joints: the
-size of a change that tells nothing. Rows are appended to the CSV as they are measured;
-started again, rows of the same code are not measured again. A whole run over everything takes
-days of one core: choose clips, folders and `--frames`.
+whose marks are kept: change of carried PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs
+from the person and without (`auto`). Each is run as if it had been written so in the source, in a
+process of its own, from the first stage that it can affect; what comes before is taken from the
+clip's store. `--clicks` moves the picked heads and feet by 0.15 of a head or a shin, and repeats
+the clips with other clicks on the joints: the size of a change that tells nothing. Rows are
+appended to the CSV as they are measured; started again, rows of the same code are not measured
+again. A whole run over everything takes days of one core: choose clips, folders and `--frames`.
 """
 
 import argparse
+import ast
 import csv
 import json
 import os
 import subprocess
 import sys
 import time
-from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
-import numpy as np
+from sensitivity_rows import Row, print_summary, read_rows, shorten
 from tuned_numbers import (
     FOLDERS,
     TunedNumber,
@@ -58,53 +58,10 @@ FACTORS = (0.75, 1.25)
 MOVE = 0.15
 """Of a head or a shin: how far picks are moved."""
 OTHER_SEEDS = (100, 200, 300)
-NOTHING = 0.05
-"""Points of PCK and mm of PA-MPJPE that are no change."""
-MUCH_PCK, MUCH_PA = 2.0, 3.0
-"""Points and mm from which on a number matters much."""
 START = 2.0
 """Seconds that a process needs before its first stage."""
 PATIENCE = 10.0
 """A variant that takes so many times as long as foreseen, and a minute, is given up."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measurement, as it stands in the CSV."""
-
-    code: str
-    """Version of the package's code (`code_digest`)."""
-    clip: str
-    frames: int
-    """Used of the clip; 0 for all."""
-    number: str
-    """file:name of a number, 'clicks:...' or 'base'."""
-    line: int
-    old: str
-    new: str
-    change: str
-    """'x0.75', 'x1.25', '+0.15', ..."""
-    first: str
-    """First stage that was run."""
-    pck: float
-    """0-1"""
-    pa: float
-    """mm; NaN where nothing is known in 3D."""
-    pa_unsigned: float
-    """The same without depth signs from the person."""
-    d_pck: float
-    """Points against the base."""
-    d_pa: float
-    """mm against the base."""
-    d_pa_unsigned: float
-    seconds: float
-    fault: str
-    """Last line of what was said when it failed."""
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """Tells it from all other measurements."""
-        return self.code, self.clip, str(self.frames), self.number, self.change
 
 
 @dataclass(frozen=True)
@@ -220,15 +177,6 @@ def foresee(base: Base, first: str) -> float:
     return START + sum(base.seconds[s] for s in stages[stages.index(first) :])
 
 
-def read_rows(file: Path) -> Iterator[Row]:
-    """The rows of a CSV; none where there is no file."""
-    kinds = {f.name: f.type for f in fields(Row)}
-    if file.is_file():
-        with file.open(newline="") as lines:
-            for line in csv.DictReader(lines):
-                yield Row(**{name: kinds[name](value) for name, value in line.items()})
-
-
 def changes_of(number: TunedNumber, first: str) -> Iterator[Change]:
     """A number by a quarter less and more."""
     for factor in FACTORS:
@@ -253,12 +201,6 @@ def changes_of_clicks(stages: Iterable[str]) -> Iterator[Change]:
     for seed in OTHER_SEEDS:
         yield Change("clicks:other clicks on joints", f"seed +{seed}", "propagate",
                      task={"seed": seed})  # fmt: skip
-
-
-def shorten(values: Iterable[float]) -> str:
-    """Numbers as text, the first four of many."""
-    texts = [f"{value:.4g}" for value in values]
-    return " ".join(texts[:4]) + (" ..." if len(texts) > 4 else "")
 
 
 def plan(bench: Bench, clips: list[str]) -> tuple[list[tuple[str, Change]], list[TunedNumber]]:
@@ -333,103 +275,6 @@ def measure_all(bench: Bench, todo: list[tuple[str, Change]]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Effect:
-    """What one number does, over both directions and all clips: changes for the worse, >= 0."""
-
-    number: str
-    line: int
-    old: str
-    cost: tuple[float, float, float]
-    """Largest loss on the mean over the clips, of either direction: points of PCK, mm of PA-MPJPE,
-    mm without signs."""
-    cost_one: tuple[float, float, float]
-    """The same on the worst clip."""
-    gain: tuple[float, float, float]
-    """Largest gain on the mean."""
-    largest: float
-    """Largest absolute change in any row, points or mm."""
-    faults: tuple[str, ...]
-    complete: bool
-    """Whether both directions were measured."""
-
-
-def summarise(rows: Iterable[Row]) -> list[Effect]:
-    """The effect of every number in the rows."""
-    of: dict[str, list[Row]] = defaultdict(list)
-    for row in rows:
-        of[row.number].append(row)
-    return [effect_of(number, group) for number, group in of.items()]
-
-
-def effect_of(number: str, rows: list[Row]) -> Effect:
-    """The effect of the number that these rows vary."""
-    good = [row for row in rows if not row.fault]
-    losses = np.array([(-r.d_pck, r.d_pa, r.d_pa_unsigned) for r in good]).reshape(-1, 3)
-    losses = np.nan_to_num(losses)  # of a real clip, nothing is known in 3D
-    changes = np.array([row.change for row in good])
-    means = [losses[changes == change].mean(axis=0) for change in sorted(set(changes))]
-    means, none = np.array(means).reshape(-1, 3), np.zeros(3)
-    cost, cost_one, gain = (
-        tuple(float(x) for x in np.max([none, *values], axis=0))
-        for values in (means, losses, -means)
-    )
-    faults = tuple(sorted({f"{r.change}: {r.fault}" for r in rows if r.fault}))
-    largest = float(np.abs(losses).max(initial=0))
-    complete = len({row.change for row in rows}) > 1
-    return Effect(
-        number, rows[-1].line, rows[-1].old, cost, cost_one, gain, largest, faults, complete
-    )
-
-
-def is_much(loss: tuple[float, float, float], share: float = 1.0) -> bool:
-    """Whether points or millimetres are more than a share of what counts as much."""
-    pck, *errors = loss
-    return pck > share * MUCH_PCK or max(errors) > share * MUCH_PA
-
-
-def print_summary(rows: list[Row], unused: list[TunedNumber]) -> None:
-    """What matters, what does nothing, what cannot be varied."""
-    effects = summarise(rows)
-    clicks = [e for e in effects if e.number.startswith("clicks:")]
-    numbers = [e for e in effects if not e.number.startswith("clicks:")]
-    much = [e for e in numbers if is_much(e.cost)]
-    single = [e for e in numbers if not is_much(e.cost) and is_much(e.cost_one)]
-    better = [e for e in numbers if is_much(e.gain, 0.5)]
-    nothing = [e for e in numbers if e.largest < NOTHING and not e.faults and e.complete]
-    limits = f"{MUCH_PCK:g} points or {MUCH_PA:g} mm"
-    print_table(f"a quarter more or less costs more than {limits} on the mean", much)
-    print_table("the same on one clip, not on the mean", single)
-    print_table("a quarter more or less gains half of that on the mean", better)
-    print_table("clicks", clicks)
-    print(f"\nchange nothing (all under {NOTHING:g} points and mm): {len(nothing)}")
-    for e in nothing:
-        print(f"  {where(e)} = {e.old}")
-    print(f"\nin no code that these clips run: {len(unused)}")
-    for number in unused:
-        print(f"  {number.module}:{number.line}:{number.name} = {shorten(number.values)}")
-    print("\ncannot be varied so:")
-    for e in numbers:
-        for fault in e.faults:
-            print(f"  {where(e)} {fault}")
-
-
-def print_table(title: str, effects: list[Effect]) -> None:
-    """Costs and gains, the largest cost in space first."""
-    print(f"\n{title}: {len(effects)}")
-    head = "".join(f"{name:>8}" for name in ("PCK", "PA", "auto"))
-    print(f"{'':<62}{'value':>10} |{head} |{head} |{head}")
-    print(f"{'':<62}{'':>10} |{'mean loss':>24} |{'worst clip':>24} |{'mean gain':>24}")
-    for e in sorted(effects, key=lambda e: -max(e.cost[1:])):
-        groups = ("".join(f"{x:8.2f}" for x in part) for part in (e.cost, e.cost_one, e.gain))
-        print(f"{where(e):<62}{e.old:>10.10} |{' |'.join(groups)}")
-
-
-def where(effect: Effect) -> str:
-    """file:line:name."""
-    return effect.number.replace(":", f":{effect.line}:", 1) if effect.line else effect.number
-
-
 def real_clips(videos: Path) -> list[str]:
     """Real clips of which picks, keyframe marks and other marks are kept, and whose video is."""
     kept = ROOT / "annotations"
@@ -472,7 +317,8 @@ def main() -> None:
     parser.add_argument("--summary", action="store_true", help="only of the rows that are there")
     words = parser.parse_args()
     clips = [c for c in (*RENDERED, *real_clips(words.videos)) if not words.only or c in words.only]
-    bench = Bench(words, code_digest(read_package()))
+    scoring = ast.parse((Path(__file__).parent / "variant.py").read_text(encoding="utf-8"))
+    bench = Bench(words, code_digest({**read_package(), "variant.py": scoring}))
     todo, unused = plan(bench, clips)
     if words.plan:
         for clip, change in todo:

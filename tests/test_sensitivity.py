@@ -176,3 +176,65 @@ def test_the_package_is_imported_with_the_other_number(numbers):
         check=True,
     )
     assert found.stdout.strip() == "123.5"
+
+
+@pytest.fixture
+def make_row(numbers):
+    import sensitivity_rows
+
+    def make(number, change, clip, losses, fault=""):
+        pck, pa, unsigned = losses
+        scores = 0.9, 50.0, 60.0, -pck, pa, unsigned
+        return sensitivity_rows.Row(
+            "code", clip, 0, number, 7, "1", "2", change, "lift", *scores, 1.0, fault
+        )
+
+    yield make
+    sys.modules.pop("sensitivity_rows")
+
+
+def test_a_numbers_cost_is_the_worse_directions_mean_over_the_clips(make_row):
+    import sensitivity_rows
+
+    nan = float("nan")
+    rows = [
+        make_row("a.py:N", "x0.75", "one", (1.0, 8.0, 2.0)),
+        make_row("a.py:N", "x0.75", "two", (2.0, -2.0, 0.0)),
+        make_row("a.py:N", "x0.75", "real", (0.0, nan, nan)),
+        make_row("a.py:N", "x1.25", "one", (-1.0, -4.0, 1.0)),
+        make_row("a.py:N", "x1.25", "two", (nan, nan, nan), "ValueError"),
+    ]
+    (effect,) = sensitivity_rows.summarise(rows)
+    assert effect.cost == (1.0, 3.0, 1.0)
+    assert effect.cost_one == (2.0, 8.0, 2.0)
+    assert effect.gain == (1.0, 4.0, 0.0)
+    assert effect.largest == 8.0
+    assert effect.faults == ("x1.25: ValueError",)
+
+
+def test_rows_are_read_as_they_were_written(make_row, numbers, tmp_path):
+    import argparse
+
+    import sensitivity
+
+    file = tmp_path / "rows.csv"
+    rows = [make_row("a.py:N", change, "one", (0.1, 1 / 3, 2.0)) for change in ("x0.75", "x1.25")]
+    for row in rows:  # a bench of its own each time, as after an interruption
+        sensitivity.Bench(argparse.Namespace(out=file, frames=None), "code").add(row)
+    bench = sensitivity.Bench(argparse.Namespace(out=file, frames=None), "code")
+    assert bench.rows == rows
+    assert bench.known == {row.key for row in rows}
+
+
+def test_the_rendered_sequences_are_those_of_the_other_benchmarks(numbers):
+    import sensitivity
+
+    code = "import sequences; print(*(s.name for s in sequences.TENNIS))"
+    found = subprocess.run(
+        [sys.executable, "-c", code],
+        env={"PYTHONPATH": f"{BENCHMARKS.parent}:{BENCHMARKS}"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert tuple(found.stdout.split()) == sensitivity.RENDERED
