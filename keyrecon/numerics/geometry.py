@@ -1,4 +1,4 @@
-"""Points, directions and cameras.
+"""Points, directions, cameras and crops.
 
 Two cameras: perspective for rendering, scaled orthography for reconstruction. Both map points in
 camera axes (x right, y down, z away) to pixels (x right, y down). Scaled orthography, u = s X, is
@@ -6,8 +6,9 @@ what a distant player looks like and what Taylor's method assumes (CVIU 80, 2000
 depth of the whole body open.
 """
 
+import cv2
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, UInt8
 
 
 def project_perspective(
@@ -54,6 +55,24 @@ def warp_points(
     """Points moved by homographies, one each or one for all."""
     moved = np.einsum("...ij,...j->...i", homography[..., :, :2], points) + homography[..., :, 2]
     return moved[..., :2] / moved[..., 2:]
+
+
+def cut_affine(
+    picture: UInt8[np.ndarray, "h w *c"],
+    to_picture: Float[np.ndarray, "2 3"],
+    size: tuple[int, int],
+) -> UInt8[np.ndarray, "y x *c"]:
+    """A crop of `size` (rows, columns) whose pixels lie where `to_picture` maps them.
+
+    Beyond the picture its last pixels go on, so that a crop has no edge there.
+    """
+    return cv2.warpAffine(
+        picture,
+        to_picture,
+        size[::-1],
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
 
 
 def to_complex(points: Float[np.ndarray, "*n 2"]) -> Complex[np.ndarray, "*n"]:

@@ -26,6 +26,7 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.video import Video
 from keyrecon.keyframes.edge_distance import align_edges, match_edges
+from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Edges, HalfKeyframes, HalfName, JointTracks, Preparation
 
@@ -73,10 +74,7 @@ class PatchSource:
         cosine, sine = scale * np.cos(turn), scale * np.sin(turn)
         matrix = np.array([[cosine, sine, 0], [-sine, cosine, 0]])
         matrix[:, 2] = middle - matrix[:, :2] @ np.full(2, (size - 1) / 2)
-        return cv2.warpAffine(
-            self.grey, matrix, (size, size), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REPLICATE,
-        )  # fmt: skip
+        return cut_affine(self.grey, matrix, (size, size))
 
 
 def crop_patches(picture: UInt8[np.ndarray, "h w 3"], width: int, height: float) -> PatchSource:

@@ -1,7 +1,7 @@
 """Coloured regions of the player and their directed edges (Section 4.1).
 
 Every frame is cut out around the player and brought to a common player height, and its pixels are
-told which part of the player they show (`regions.py`). Contours of each region, inner borders
+told which part of the player they show (`part_labels.py`). Contours of each region, inner borders
 between two colours included, are walked so that the region lies on the left as seen on the
 picture, and sampled at regular arc length: each sample is an edge element, a point with a unit
 tangent.
@@ -15,13 +15,14 @@ from jaxtyping import Bool, Complex, Float, Int, UInt8
 
 from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
-from keyrecon.numerics.geometry import from_complex
+from keyrecon.numerics.geometry import cut_affine, from_complex
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
 from keyrecon.segmentation.part_labels import label_crop, mix_palette
+from keyrecon.segmentation.player_crops import Cropping
 
 CROP_WIDTH, CROP_HEIGHT = 1.75, 1.5
 """Size of the crop, player heights: a lunge with an arm stretched out; a raised arm."""
@@ -60,46 +61,38 @@ def find_edges(
     """Label crops and directed edges of every frame; edges in px of the full picture."""
     scene = ForegroundModel(background, camera)
     palette = mix_palette(colors)
-    scale = options.player / track.height
-    size = (round(CROP_WIDTH * options.player), round(CROP_HEIGHT * options.player))
-    center = (track.box[:, :2] + track.box[:, 2:]) / 2
-    origin = center - (np.array(size) - 1) / 2 / scale[:, None]
-    # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
-    width = min(video.width, round(video.width * 1.2 * float(np.median(scale))))
-    shrink = width / video.width
-    labels = np.zeros((len(video), size[1], size[0]), np.uint8)
+    size = (round(CROP_HEIGHT * options.player), round(CROP_WIDTH * options.player))
+    cropping = Cropping.around_boxes(track, float(options.player), size)
+    width = cropping.reading_width(video)
+    to_small = shrinking(width / video.width)
+    labels = np.zeros((len(video), *size), np.uint8)
 
-    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Edges:
+    def trace(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Edges:
         t, picture = entry
-        crop, to_picture, present = _cut_out(picture, origin[t], float(scale[t]), shrink, size)
+        to_picture = cropping.crop_to_picture(t)
+        way = (to_small @ to_picture)[:2]
+        crop = to_lab(cut_affine(picture, way, size))
         foreground = scene.foreground(crop, t, to_picture)
-        spots = (track.head[t], track.mid_feet[t])
-        axis = np.stack([(p - origin[t]) * scale[t] for p in spots])
-        labels[t] = label_crop(crop, foreground * present, palette, axis, options.player)
-        found = trace_edges(labels[t], options)
-        return _place(found, origin[t], float(scale[t]), track, t)
+        foreground = foreground * _inside_picture(way, size, picture.shape[:2])
+        axis = cropping.from_picture(np.stack([track.head[t], track.mid_feet[t]]), t)
+        labels[t] = label_crop(crop, foreground, palette, axis, options.player)
+        elements = trace_edges(labels[t], options)
+        return _to_picture(elements, cropping, track, t)
 
-    pictures = progress(read_small(video, width), "Finding edges", len(video))
-    return PlayerContours(tuple(side_by_side(look, enumerate(pictures))), labels, origin, scale)
+    pictures = progress(read_small(video, width), "Tracing edges", len(video))
+    edges = tuple(side_by_side(trace, enumerate(pictures)))
+    return PlayerContours(edges, labels, cropping.origin, cropping.scale)
 
 
-def _cut_out(
-    picture: UInt8[np.ndarray, "h w 3"],
-    origin: Float[np.ndarray, "2"],
-    scale: float,
-    shrink: float,
-    size: tuple[int, int],
-) -> tuple[UInt8[np.ndarray, "y x 3"], Float[np.ndarray, "3 3"], UInt8[np.ndarray, "y x"]]:
-    """The crop in Lab, the way from its pixels to the full picture, and where there is one."""
-    to_picture = np.array([[1 / scale, 0, origin[0]], [0, 1 / scale, origin[1]], [0, 0, 1]])
-    to_small = shrinking(shrink) @ to_picture
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    crop = cv2.warpAffine(picture, to_small[:2], size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    columns = to_small[0, 0] * np.arange(size[0]) + to_small[0, 2]
-    rows = to_small[1, 1] * np.arange(size[1]) + to_small[1, 2]
-    inside = (rows >= 0) & (rows <= picture.shape[0] - 1)
-    across = (columns >= 0) & (columns <= picture.shape[1] - 1)
-    return to_lab(crop), to_picture, (inside[:, None] & across).astype(np.uint8)
+def _inside_picture(
+    to_picture: Float[np.ndarray, "2 3"], size: tuple[int, int], picture: tuple[int, int]
+) -> UInt8[np.ndarray, "y x"]:
+    """1 where a crop of `size` lies inside a picture of another (rows, columns)."""
+    rows = to_picture[1, 1] * np.arange(size[0]) + to_picture[1, 2]
+    columns = to_picture[0, 0] * np.arange(size[1]) + to_picture[0, 2]
+    inside = (rows >= 0) & (rows <= picture[0] - 1)
+    across = (columns >= 0) & (columns <= picture[1] - 1)
+    return (inside[:, None] & across).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,17 +197,15 @@ def _thin(found: _Elements, keep: Bool[np.ndarray, "E"], most: int) -> _Elements
     return _Elements(found.points[chosen], found.tangent[chosen], found.color[chosen])
 
 
-def _place(
-    found: _Elements, origin: Float[np.ndarray, "2"], scale: float, track: Track, frame: int
-) -> Edges:
+def _to_picture(elements: _Elements, cropping: Cropping, track: Track, frame: int) -> Edges:
     """Elements in pixels of the full picture, told which half of the body they belong to."""
-    points = origin + found.points / scale
+    points = cropping.to_picture(elements.points, frame)
     head, way = track.head[frame], track.mid_feet[frame] - track.head[frame]
     share = (points - head) @ way / max(float(way @ way), 1e-9)
     return Edges(
         points=points,
-        tangent=found.tangent,
-        color=found.color,
+        tangent=elements.tangent,
+        color=elements.color,
         upper=share < WAIST + OVERLAP / 2,
         lower=share > WAIST - OVERLAP / 2,
     )

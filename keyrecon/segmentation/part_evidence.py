@@ -1,8 +1,8 @@
 """Where a small picture shows the player's colours: maps that candidates are searched in.
 
 Colours recur in the scene (clay like skin, lines like white shoes), so back-projection is weighted
-by how far a pixel is from the background. The background is learnt before the player is known, from
-what lacks the player's colours.
+by how far a pixel is from the background. That background is estimated before the player is
+tracked, from what lacks the player's colours.
 """
 
 from collections.abc import Callable, Iterable
@@ -28,10 +28,11 @@ SHOE_RADIUS = 0.045
 """Geometric mean radius of a shoe, player heights: .15 x .07 of stature from the side."""
 HEAD_RADIUS = 0.062
 """Player heights: .055 of stature, and head to feet is .9 of stature (Drillis and Contini)."""
-STILL_WEIGHT = 0.2
-"""Weight of colour where nothing differs from the background: a player may stand still."""
-LEAST_CLEAR = 0.15
-"""Share of the frames in which a place must lack the player's colours to be judged by those:
+BACKGROUND_WEIGHT = 0.2
+"""Weight of colour where nothing differs from the background: a player may stand still. Chosen on
+rendered sequences; see benchmarks/sensitivity.py."""
+MIN_CLEAR_SHARE = 0.15
+"""Share of the frames in which a place must lack the player's colours for their median to count:
 a racket or a shadow passes more rarely than that, even where the scene has the colours itself."""
 
 
@@ -47,14 +48,14 @@ class Evidence:
     """Integral of `player`."""
 
 
-def first_scene(
+def model_scene_by_colour(
     pictures: Reader,
     numbers: Int[np.ndarray, "n"],
     camera: CameraPath,
     shrink: float,
     player: Float[np.ndarray, "bins"],
 ) -> ForegroundModel:
-    """A plate before the player is known: the median of what does not have their colours.
+    """A background before the player is tracked: the median of what does not have their colours.
 
     Where everything has, the background does, and the median of all it is. `pictures` gives the
     frames with some of the `numbers`, reduced by `shrink`.
@@ -64,12 +65,12 @@ def first_scene(
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
-    clear = combine_plate(lab, free, paths, shrink, least=LEAST_CLEAR)
+    clear = combine_plate(lab, free, paths, shrink, least=MIN_CLEAR_SHARE)
     plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
     return ForegroundModel(fill_plate(clear, plain), camera)
 
 
-def weigh_evidence(
+def evaluate_evidence(
     lab: UInt8[np.ndarray, "h w 3"],
     tables: Float[np.ndarray, "3 bins"],
     foreground: Float[np.ndarray, "h w"],
@@ -77,7 +78,7 @@ def weigh_evidence(
 ) -> Evidence:
     """Back-projection weighted by foreground, low-passed at the size of each part."""
     bins = color_bins(lab)
-    weight = (STILL_WEIGHT + (1 - STILL_WEIGHT) * foreground).astype(np.float32)
+    weight = (BACKGROUND_WEIGHT + (1 - BACKGROUND_WEIGHT) * foreground).astype(np.float32)
     head = tables[0][bins] * weight
     foot = tables[1][bins] * weight
     any_part = tables[2][bins] * foreground.astype(np.float32)

@@ -7,7 +7,6 @@ four directions, doubled in angle so that dark-on-bright and bright-on-dark coun
 
 from collections import deque
 from dataclasses import dataclass
-from functools import cached_property
 
 import cv2
 import numpy as np
@@ -16,14 +15,17 @@ from scipy.fft import next_fast_len
 
 from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Colors, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_tables, to_lab
-from keyrecon.segmentation.part_evidence import STILL_WEIGHT
+from keyrecon.segmentation.part_evidence import BACKGROUND_WEIGHT
 
-ABOVE, BELOW, ASIDE = 0.3, 1.25, 0.86
+ABOVE_HEAD, BELOW_HEAD, ASIDE = 0.3, 1.25, 0.86
 """Reach of a crop from the head, player heights: a jump or a deep lunge stays inside."""
+OVERSAMPLING = 1.2
+"""Pictures are read this much larger than the crops, which keeps edges sharp, and no larger."""
 DIRECTIONS = 4
 """Of edges: level, upright and the two diagonals."""
 FAINT = 8.0
@@ -32,29 +34,42 @@ FAINT = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Cropping:
-    """Where the crop of each frame lies."""
+    """Where the crop of each frame lies; the player is equally tall in all of them."""
 
-    track: Track
-    """The rough one."""
-    player: float
-    """Player height in the crops, px."""
+    origin: Float[np.ndarray, "T 2"]
+    """Picture position of each crop's pixel (0, 0)."""
+    scale: Float[np.ndarray, "T"]
+    """Crop pixels per picture pixel."""
+    size: tuple[int, int]
+    """Rows and columns."""
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Rows and columns, even, and quick to transform."""
-        rows, columns = (ABOVE + BELOW) * self.player, 2 * ASIDE * self.player
-        return 2 * next_fast_len(round(rows / 2)), 2 * next_fast_len(round(columns / 2))
+    @classmethod
+    def below_heads(cls, track: Track, player: float) -> "Cropping":
+        """Crops that hang on the head, the player `player` px tall; quick to Fourier-transform."""
+        rows, columns = (ABOVE_HEAD + BELOW_HEAD) * player, 2 * ASIDE * player
+        size = 2 * next_fast_len(round(rows / 2)), 2 * next_fast_len(round(columns / 2))
+        corner, scale = np.array([(size[1] - 1) / 2, ABOVE_HEAD * player]), player / track.height
+        return cls(track.head - corner / scale[:, None], scale, size)
 
-    @cached_property
-    def scale(self) -> Float[np.ndarray, "T"]:
-        """Crop pixels per picture pixel."""
-        return self.player / self.track.height
+    @classmethod
+    def around_boxes(cls, track: Track, player: float, size: tuple[int, int]) -> "Cropping":
+        """Crops of one size around the middle of the track's box."""
+        scale = player / track.height
+        center = (track.box[:, :2] + track.box[:, 2:]) / 2
+        return cls(center - (np.array(size[::-1]) - 1) / 2 / scale[:, None], scale, size)
 
-    @cached_property
-    def origin(self) -> Float[np.ndarray, "T 2"]:
-        """Picture position of each crop's pixel (0, 0)."""
-        corner = np.array([(self.size[1] - 1) / 2, ABOVE * self.player])
-        return self.track.head - corner / self.scale[:, None]
+    def every(self, step: int) -> "Cropping":
+        """The crops of each `step`-th frame."""
+        return Cropping(self.origin[::step], self.scale[::step], self.size)
+
+    def reading_width(self, video: Video) -> int:
+        """Width that pictures are reduced to before they are cropped, px."""
+        return min(video.width, round(video.width * OVERSAMPLING * float(np.median(self.scale))))
+
+    def crop_to_picture(self, t: int) -> Float[np.ndarray, "3 3"]:
+        """Affine map from the crop of frame t to its picture."""
+        scale, corner = float(self.scale[t]), self.origin[t]
+        return np.array([[1 / scale, 0, corner[0]], [0, 1 / scale, corner[1]], [0, 0, 1]])
 
     def to_picture(self, places: Float[np.ndarray, "m 2"], t: int) -> Float[np.ndarray, "m 2"]:
         """Picture pixels of places in the crop of frame t."""
@@ -78,34 +93,30 @@ def cut_crops(
     video: Video, cropping: Cropping, scene: ForegroundModel, progress: Progress = silent
 ) -> Crops:
     """Read all frames and cut the player out."""
-    count, (rows, columns) = len(video), cropping.size
-    lab = np.zeros((count, rows, columns, 3), np.uint8)
-    foreground = np.zeros((count, rows, columns), np.uint8)
-    # Pictures are read no larger than needed; a little larger than the crop keeps edges sharp.
-    width = min(video.width, round(video.width * 1.2 * float(np.median(cropping.scale))))
+    count, size = len(video), cropping.size
+    lab = np.zeros((count, *size, 3), np.uint8)
+    foreground = np.zeros((count, *size), np.uint8)
+    width = cropping.reading_width(video)
     to_small = shrinking(width / video.width)
 
     def cut(entry: tuple[int, UInt8[np.ndarray, "y x 3"]]) -> None:
         t, picture = entry
-        scale, corner = float(cropping.scale[t]), cropping.origin[t]
-        to_picture = np.array([[1 / scale, 0, corner[0]], [0, 1 / scale, corner[1]], [0, 0, 1]])
-        way, flags = (to_small @ to_picture)[:2], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        crop = cv2.warpAffine(
-            picture, way, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE
-        )
+        to_picture = cropping.crop_to_picture(t)
+        way = (to_small @ to_picture)[:2]
         inside = np.full(picture.shape[:2], 255, np.uint8)
-        inside = cv2.warpAffine(inside, way, (columns, rows), flags=flags)
-        lab[t] = to_lab(crop)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        inside = cv2.warpAffine(inside, way, size[::-1], flags=flags)
+        lab[t] = to_lab(cut_affine(picture, way, size))
         foreground[t] = np.rint(scene.foreground(lab[t], t, to_picture) * inside)
 
-    pictures = progress(read_small(video, width), "Following the player", count)
+    pictures = progress(read_small(video, width), "Cutting out the player", count)
     deque(side_by_side(cut, enumerate(pictures)), maxlen=0)
     return Crops(lab, foreground)
 
 
 @dataclass(frozen=True, eq=False)
 class Channels:
-    """What filters see of a crop."""
+    """Feature channels of crops, which correlation filters are trained on."""
 
     tables: Float[np.ndarray, "C bins"]
     """Posterior of each part by colour bin."""
@@ -119,25 +130,27 @@ class Channels:
         rows, columns = (np.hanning(n + 2)[1:-1] ** 0.25 for n in size)
         return cls(tables.astype(np.float32), np.outer(rows, columns).astype(np.float32))
 
-    def see(
+    def compute(
         self, lab: UInt8[np.ndarray, "h w 3"], foreground: UInt8[np.ndarray, "h w"]
     ) -> Float[np.ndarray, "D h w"]:
         """All channels of a crop."""
         parts = len(self.tables)
-        seen = np.empty((1 + parts + DIRECTIONS, *foreground.shape), np.float32)
-        np.multiply(foreground, np.float32(1 / 255), out=seen[0])
-        np.take(self.tables, color_bins(lab), axis=1, out=seen[1 : 1 + parts])
-        seen[1 : 1 + parts] *= STILL_WEIGHT + (1 - STILL_WEIGHT) * seen[0]
+        channels = np.empty((1 + parts + DIRECTIONS, *foreground.shape), np.float32)
+        np.multiply(foreground, np.float32(1 / 255), out=channels[0])
+        np.take(self.tables, color_bins(lab), axis=1, out=channels[1 : 1 + parts])
+        channels[1 : 1 + parts] *= BACKGROUND_WEIGHT + (1 - BACKGROUND_WEIGHT) * channels[0]
         light = np.ascontiguousarray(lab[..., 0])
         gx, gy = (cv2.Sobel(light, cv2.CV_32F, *d, scale=0.25) for d in ((1, 0), (0, 1)))
         size = np.hypot(gx, gy)
         share = 1 / ((size + FAINT) * (size + 1e-6))
         along, across = (gx * gx - gy * gy) * share, 2 * gx * gy * share
-        for channel, map_ in zip(seen[-DIRECTIONS:], (along, -along, across, -across), strict=True):
+        for channel, map_ in zip(
+            channels[-DIRECTIONS:], (along, -along, across, -across), strict=True
+        ):
             np.maximum(map_, 0, out=channel)
-        seen *= self.border
-        return seen
+        channels *= self.border
+        return channels
 
-    def player(self, seen: Float[np.ndarray, "D h w"]) -> Float[np.ndarray, "h w"]:
+    def player(self, channels: Float[np.ndarray, "D h w"]) -> Float[np.ndarray, "h w"]:
         """Any part of the player where the scene is covered, from the channels of a crop."""
-        return seen[1 : 1 + len(self.tables)].max(axis=0) * seen[0]
+        return channels[1 : 1 + len(self.tables)].max(axis=0) * channels[0]

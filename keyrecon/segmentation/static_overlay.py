@@ -2,7 +2,7 @@
 
 Edges that keep their place and direction in pictures from all over the video are laid over it, or
 they run along the way the camera pans, like a base line. Both mislead: a corner on such a line is
-found anywhere along it. A corner that was seen to move with the scene is neither.
+tracked anywhere along it. A corner that once moved with the scene is neither.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-PERSISTENT = 0.85
+MIN_PERSISTENCE = 0.85
 """An edge that keeps its place and direction to this degree all along is laid over the picture
 (or the camera is static)."""
 
 
 @dataclass(eq=False)
-class Overlay:
+class StaticOverlay:
     """Running evidence of what keeps its place in the picture."""
 
     gradient: Float[np.ndarray, "2 h w"] | None = None
@@ -33,22 +33,22 @@ class Overlay:
         self.gradient = slope if self.gradient is None else self.gradient + slope
         self.strength = size if self.strength is None else self.strength + size
 
-    def vote(
+    def count(
         self,
         shape: tuple[int, ...],
         corners: Float[np.ndarray, "n 2"],
-        follows: Bool[np.ndarray, "n"],
+        moves_along: Bool[np.ndarray, "n"],
     ) -> None:
         """Take corners into account at whose place the scene moved, and whether they did."""
         if self.moved is None:
             self.moved = np.zeros(shape[:2], int)
         x, y = corners.astype(int).T
-        self.moved[y, x] += np.where(follows, 1, -1)
+        self.moved[y, x] += np.where(moves_along, 1, -1)
 
     def mask(self) -> Bool[np.ndarray, "h w"]:
         """Where persistent edges lie, if they are few against those that do not persist."""
         strong = self.strength > np.percentile(self.strength, 90)
-        persistent = strong & (np.hypot(*self.gradient) > PERSISTENT * self.strength)
+        persistent = strong & (np.hypot(*self.gradient) > MIN_PERSISTENCE * self.strength)
         if persistent.sum() > 0.5 * strong.sum():
             return np.zeros(strong.shape, bool)
         size = max(3, strong.shape[1] // 60)

@@ -2,7 +2,7 @@
 
 A camera that turns and zooms without travelling maps the background between any two frames by a
 homography (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., 8.4). Corners spread evenly
-over a key picture are followed into each frame by pyramidal Lucas-Kanade (Bouguet 2000) and a
+over a key picture are tracked into each frame by pyramidal Lucas-Kanade (Bouguet 2000) and a
 model is fitted by RANSAC, so that whatever moves on its own, the player first of all, is outvoted.
 A similarity is fitted first; a full homography replaces it only where it explains the corners
 clearly better, since its extra freedom otherwise drifts where there are no corners.
@@ -10,7 +10,7 @@ clearly better, since its extra freedom otherwise drifts where there are no corn
 Frames are registered to key pictures, not to their predecessors: a new key picture is taken only
 when the view has left all earlier ones, so errors add up per view, not per frame, and a camera that
 comes back finds its old key picture. While the camera rests, only a few frames are registered.
-Letters and logos laid over the picture are left out (`overlay.py`).
+Letters and logos laid over the picture are left out (`static_overlay.py`).
 
 If no corner moves noticeably over the whole sequence, the camera is static and the path is
 exactly the identity.
@@ -28,34 +28,36 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
-from keyrecon.segmentation.static_overlay import Overlay
+from keyrecon.segmentation.static_overlay import StaticOverlay
 
 Grey = UInt8[np.ndarray, "h w"]
 Matrix = Float[np.ndarray, "3 3"]
 
-CORNERS = 240
-"""Corners followed from a key picture."""
-INLIER = 1.0
+MAX_CORNERS = 240
+"""Corners tracked from a key picture."""
+INLIER_DISTANCE = 1.0
 """How far a corner may lie from the model, reduced px: the accuracy of Lucas-Kanade."""
-LEAST_INLIERS = 12
+MIN_INLIERS = 12
 """Fewer agreeing corners say nothing about the camera."""
-CLEARLY_BETTER = 0.8
+MAX_RESIDUAL_RATIO = 0.8
 """A homography must bring the median residual below this share of a similarity's."""
-FEW = 0.05
+MAX_OVERLAY_SHARE = 0.05
 """Share of the corners that may lie on overlays: so few are outvoted with the player."""
-NOTICEABLE = 3.0
+MIN_SCENE_MOTION = 3.0
 """A corner that the model moves by so much shows whether it belongs to the scene, reduced px."""
-REST_MOTION = 4
-"""Frames looked at together while the camera rests: only the last of them is registered."""
-STATIC_MOTION = 0.25
+FRAMES_AT_REST = 4
+"""Frames that share one registration while the camera rests: only the last is registered."""
+MAX_REST_MOTION = 0.25
 """A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
+KEY_HYSTERESIS = 0.08
+"""A key picture is kept unless another is nearer by this share of the picture's width."""
 MIN_CONFIDENCE = 0.35
 """Share of agreeing corners below which a key picture has nothing to say."""
 
 
 @dataclass(frozen=True)
 class CameraMotionOptions:
-    """How the background is followed."""
+    """How the background is tracked."""
 
     width: int = 480
     """Pictures are reduced to this width, px; smaller is faster and less exact."""
@@ -67,7 +69,7 @@ class CameraMotionOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class _Key:
+class _KeyPicture:
     """A picture that others are registered to."""
 
     picture: Grey
@@ -77,15 +79,15 @@ class _Key:
 
 @dataclass(frozen=True, eq=False)
 class _Match:
-    """How a key picture is found again in a frame."""
+    """How a key picture is registered to a frame."""
 
     model: Float[np.ndarray, "3 3"]
     confidence: float
     """Share of agreeing corners."""
     moved: Float[np.ndarray, "m 2"]
     """Corners of the key picture that the model moves noticeably."""
-    follows: Bool[np.ndarray, "m"]
-    """Whether they were found where it puts them."""
+    moves_along: Bool[np.ndarray, "m"]
+    """Whether they were tracked to where it puts them."""
 
 
 @dataclass(eq=False)
@@ -93,9 +95,9 @@ class _FeatureTracker:
     """Registers one frame after the other."""
 
     options: CameraMotionOptions
-    forbidden: Bool[np.ndarray, "h w"] | None = None
-    overlay: Overlay = field(default_factory=Overlay)
-    keys: list[_Key] = field(default_factory=list)
+    overlaid: Bool[np.ndarray, "h w"] | None = None
+    overlay: StaticOverlay = field(default_factory=StaticOverlay)
+    keys: list[_KeyPicture] = field(default_factory=list)
     current: int = 0
 
     def register(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float]:
@@ -110,40 +112,40 @@ class _FeatureTracker:
             # The view was cut or blurred: start a view of its own where we believe to be.
             self.keys.append(self._key(grey, guess))
             return guess, 0.0
-        self.overlay.vote(grey.shape, match.moved, match.follows)
-        to_start = _chain(key, match)
+        self.overlay.count(grey.shape, match.moved, match.moves_along)
+        to_start = _to_start(key, match)
         if self._leaves(match, grey):
             self.keys.append(self._key(grey, to_start))
         return to_start, match.confidence
 
-    def glance(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
+    def register_at_rest(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
         """The same for a frame a little later; None if the camera has moved since."""
         key = self.keys[self.current]
         match = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
         if match is None or self._leaves(match, grey):
             return None
-        to_start = _chain(key, match)
+        to_start = _to_start(key, match)
         step = _displacement(np.linalg.inv(guess) @ to_start, grey.shape)
-        return None if step * grey.shape[1] > STATIC_MOTION else (to_start, match.confidence)
+        return None if step * grey.shape[1] > MAX_REST_MOTION else (to_start, match.confidence)
 
     def _leaves(self, match: _Match, grey: Grey) -> bool:
         """Whether this frame shares too little with its key picture."""
         far = _displacement(match.model, grey.shape) > self.options.leave
         return far or match.confidence < MIN_CONFIDENCE
 
-    def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> _Key:
-        return _Key(grey, _corners(grey, self.forbidden), to_start)
+    def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> _KeyPicture:
+        return _KeyPicture(grey, _corners(grey, self.overlaid), to_start)
 
     def _nearest(self, to_start: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> int:
         """The key picture whose view is nearest; the current one unless another is clearly so."""
         inverse = np.linalg.inv(to_start)
         apart = np.array([_displacement(inverse @ k.to_start, shape) for k in self.keys])
         best = int(apart.argmin())
-        keep = self.current < len(apart) and apart[self.current] < apart[best] + 0.08
+        keep = self.current < len(apart) and apart[self.current] < apart[best] + KEY_HYSTERESIS
         return self.current if keep else best
 
 
-def _chain(key: _Key, match: _Match) -> Float[np.ndarray, "3 3"]:
+def _to_start(key: _KeyPicture, match: _Match) -> Float[np.ndarray, "3 3"]:
     """Homography to frame 0 by way of a key picture."""
     to_start = key.to_start @ np.linalg.inv(match.model)
     return to_start / to_start[2, 2]
@@ -160,15 +162,15 @@ def estimate_camera_motion(
     shape = (round(video.height * width / video.width), width)
 
     def pictures() -> Iterator[Grey]:
-        return progress(read_grey(video, width), "Following the camera", len(video))
+        return progress(read_grey(video, width), "Estimating the camera's motion", len(video))
 
-    follower = _FeatureTracker(options)
-    path, confidence = _follow(pictures(), follower, max(1, len(video) // 64))
+    tracker = _FeatureTracker(options)
+    path, confidence = _register_all(pictures(), tracker, max(1, len(video) // 64))
     if _is_static(path, shape, options):
         return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
-    if follower.overlay.share(np.concatenate([k.corners for k in follower.keys])) > FEW:
-        follower = _FeatureTracker(options, follower.overlay.mask())
-        path, confidence = _follow(pictures(), follower)
+    if tracker.overlay.share(np.concatenate([k.corners for k in tracker.keys])) > MAX_OVERLAY_SHARE:
+        tracker = _FeatureTracker(options, tracker.overlay.mask())
+        path, confidence = _register_all(pictures(), tracker)
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
@@ -177,48 +179,48 @@ def estimate_camera_motion(
     return CameraPath(full / full[:, 2:, 2:], confidence)
 
 
-def _follow(
-    pictures: Iterable[Grey], follower: _FeatureTracker, watch: int | None = None
+def _register_all(
+    pictures: Iterable[Grey], tracker: _FeatureTracker, watch: int | None = None
 ) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T"]]:
     """Homographies to frame 0 in reduced pixels; evidence of overlays from each `watch`-th."""
     path: list[tuple[Matrix, float]] = []
     waiting: list[Grey] = []
     for number, grey in enumerate(pictures):
         if watch and number % watch == 0:
-            follower.overlay.add(grey)
+            tracker.overlay.add(grey)
         waiting.append(grey)
-        if len(waiting) == REST_MOTION or len(path) < REST_MOTION:
-            path += _register(follower, waiting, path)
+        if len(waiting) == FRAMES_AT_REST or len(path) < FRAMES_AT_REST:
+            path += _register(tracker, waiting, path)
             waiting = []
-    path += _register(follower, waiting, path)
+    path += _register(tracker, waiting, path)
     return np.array([pose for pose, _ in path]), np.array([confidence for _, confidence in path])
 
 
 def _register(
-    follower: _FeatureTracker, waiting: list[Grey], before: list[tuple[Matrix, float]]
+    tracker: _FeatureTracker, waiting: list[Grey], before: list[tuple[Matrix, float]]
 ) -> list[tuple[Matrix, float]]:
     """Poses of frames in a row; while the camera rests, the last one tells those before it."""
-    found = list(before[-2:])
-    if len(found) == 2 and waiting:
-        last, there = found[0][0], found[1][0]
+    poses = list(before[-2:])
+    if len(poses) == 2 and waiting:
+        last, there = poses[0][0], poses[1][0]
         step = _displacement(np.linalg.inv(last) @ there, waiting[0].shape)
-        if step * waiting[0].shape[1] < STATIC_MOTION and (
-            rest := follower.glance(waiting[-1], there)
+        if step * waiting[0].shape[1] < MAX_REST_MOTION and (
+            rest := tracker.register_at_rest(waiting[-1], there)
         ):
             along = np.linspace(0, 1, len(waiting) + 1)[1:]
             return [(there + share * (rest[0] - there), rest[1]) for share in along]
     for grey in waiting:
-        found.append(follower.register(grey, found[-1][0] if found else np.eye(3)))
-    return found[len(before[-2:]) :]
+        poses.append(tracker.register(grey, poses[-1][0] if poses else np.eye(3)))
+    return poses[len(before[-2:]) :]
 
 
-def _corners(grey: Grey, forbidden: Bool[np.ndarray, "h w"] | None) -> Float[np.ndarray, "n 2"]:
+def _corners(grey: Grey, overlaid: Bool[np.ndarray, "h w"] | None) -> Float[np.ndarray, "n 2"]:
     """Corners spread over the picture: the best of each cell of a grid, weak ones left out."""
-    mask = None if forbidden is None else (~forbidden).astype(np.uint8)
+    mask = None if overlaid is None else (~overlaid).astype(np.uint8)
     response = cv2.cornerMinEigenVal(grey, 5)
     if mask is not None:
         response = response * mask
-    cell = max(6, round(np.sqrt(grey.size / CORNERS)))
+    cell = max(6, round(np.sqrt(grey.size / MAX_CORNERS)))
     rows, columns = grey.shape[0] // cell, grey.shape[1] // cell
     blocks = response[: rows * cell, : columns * cell]
     blocks = blocks.reshape(rows, cell, columns, cell).swapaxes(1, 2).reshape(rows, columns, -1)
@@ -229,14 +231,14 @@ def _corners(grey: Grey, forbidden: Bool[np.ndarray, "h w"] | None) -> Float[np.
     return np.stack([x[good], y[good]], axis=1).astype(np.float32)
 
 
-def _match(key: _Key, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Match | None:
+def _match(key: _KeyPicture, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Match | None:
     """Homography from a key picture to this one; None where too few corners agree."""
-    if len(key.corners) < LEAST_INLIERS:
+    if len(key.corners) < MIN_INLIERS:
         return None
     start = warp_points(guess, key.corners.astype(float)).astype(np.float32)
     size = np.array(grey.shape[::-1])
     inside = ((start > 4) & (start < size - 5)).all(axis=1)
-    if inside.sum() < LEAST_INLIERS:
+    if inside.sum() < MIN_INLIERS:
         return None
     source = np.ascontiguousarray(key.corners[inside])
     found, status, _ = cv2.calcOpticalFlowPyrLK(
@@ -250,10 +252,10 @@ def _match(key: _Key, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Match | N
     if model is None:
         return None
     put = warp_points(model, source)
-    agrees = np.linalg.norm(put - found, axis=1) < 1.5 * INLIER
-    if agrees.sum() < LEAST_INLIERS:
+    agrees = np.linalg.norm(put - found, axis=1) < 1.5 * INLIER_DISTANCE
+    if agrees.sum() < MIN_INLIERS:
         return None
-    moved = np.linalg.norm(put - source, axis=1) > NOTICEABLE
+    moved = np.linalg.norm(put - source, axis=1) > MIN_SCENE_MOTION
     return _Match(model, float(agrees.sum()) / int(inside.sum()), source[moved], agrees[moved])
 
 
@@ -261,32 +263,32 @@ def _fit(
     source: Float[np.ndarray, "n 2"], target: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, "3 3"] | None:
     """A similarity, or a homography where that is clearly better."""
-    if len(source) < LEAST_INLIERS:
+    if len(source) < MIN_INLIERS:
         return None
     similar, _ = cv2.estimateAffinePartial2D(
-        source, target, method=cv2.RANSAC, ransacReprojThreshold=2 * INLIER, maxIters=500
+        source, target, method=cv2.RANSAC, ransacReprojThreshold=2 * INLIER_DISTANCE, maxIters=500
     )
     if similar is None:
         return None
     model = np.vstack([similar, [0, 0, 1]])
     # Four parameters more need many corners to be known well.
-    if len(source) < 5 * LEAST_INLIERS:
+    if len(source) < 5 * MIN_INLIERS:
         return model
-    full, _ = cv2.findHomography(source, target, cv2.RANSAC, INLIER, maxIters=500)
+    full, _ = cv2.findHomography(source, target, cv2.RANSAC, INLIER_DISTANCE, maxIters=500)
     if full is None:
         return model
     error, other = (
         np.median(np.minimum(np.linalg.norm(warp_points(m, source) - target, axis=1), 3))
         for m in (model, full)
     )
-    return full if other < CLEARLY_BETTER * error else model
+    return full if other < MAX_RESIDUAL_RATIO * error else model
 
 
-def _displacement(moved: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> float:
+def _displacement(homography: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> float:
     """How far a homography moves the picture's corners, as a share of its width."""
     height, width = shape[:2]
     corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], float)
-    return float(np.linalg.norm(warp_points(moved, corners) - corners, axis=1).mean() / width)
+    return float(np.linalg.norm(warp_points(homography, corners) - corners, axis=1).mean() / width)
 
 
 def _is_static(

@@ -15,44 +15,46 @@ from scipy.ndimage import maximum_filter1d
 from keyrecon.segmentation.part_evidence import HEAD_RADIUS, SHOE_RADIUS, Evidence, mean_inside
 from keyrecon.tracking.radial_symmetry import ellipse, find_peaks, gradient_field, radial_symmetry
 
-RADII = (0.8, 1.0, 1.25)
-"""Shares of a part's radius that are searched."""
-SHOES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
+SEARCHED_SCALES = (0.8, 1.0, 1.25)
+"""Shares of a part's radius that are searched: players differ, and come nearer."""
+SHOE_SHAPES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
 """Shoes from the side and pointing to or from the camera."""
-HEADS, FEET = 8, 10
+MAX_HEADS, MAX_FEET = 8, 10
 """Candidates kept of each, per frame."""
-LEG_ENDS = 4
+MAX_LEG_ENDS = 4
 """Ends of legs kept beside the shoes, per frame."""
-LEG_ABOVE = 0.3
-"""Least share of the player above the end of a leg."""
-ONE_PLACE = 0.07
+MIN_LEG_SHARE = 0.3
+"""Share of the player above the end of a leg, at least."""
+MAX_UNDER_SHARE = 0.2
+"""Share of the player beneath the end of a leg, at most."""
+MIN_FOOT_SEPARATION = 0.07
 """Candidates nearer to one another are parts of one shoe, player heights: half its length."""
-KNEE_ROOM = 0.06
+KNEE_DEVIATION = 0.06
 """How far a leg may bend away from the straight line from hips to foot, player heights."""
-LEAST_BODY = 0.05
+MIN_BODY_SHARE = 0.05
 """Share of the player's colours beneath a head, at least; a trunk fills about a third."""
 
 
 @dataclass(frozen=True, eq=False)
 class PartCandidates:
-    """What one frame offers."""
+    """Candidates of one frame."""
 
     heads: Float[np.ndarray, "m 2"]
     head_score: Float[np.ndarray, "m"]
     feet: Float[np.ndarray, "n 2"]
     foot_score: Float[np.ndarray, "n"]
-    """NaN where only the end of a leg was seen, and no shoe."""
+    """NaN where there is the end of a leg and no shoe."""
 
 
 def search_frame(evidence: Evidence, tall: float) -> PartCandidates:
     """Round head-coloured and elliptical shoe-coloured places, scored with their neighbourhood."""
-    radii = [max(1.0, r * HEAD_RADIUS * tall) for r in RADII]
+    radii = [max(1.0, r * HEAD_RADIUS * tall) for r in SEARCHED_SCALES]
     score = radial_symmetry(gradient_field(evidence.head), radii)
-    heads, strength = find_peaks(score, HEAD_RADIUS * tall, 3 * HEADS)
+    heads, strength = find_peaks(score, HEAD_RADIUS * tall, 3 * MAX_HEADS)
     body = mean_inside(evidence, heads, (-0.15, 0.12, 0.15, 0.65), tall)
     strength = strength * (0.02 + body)
-    order = np.argsort(-strength)[:HEADS]
-    order = order[body[order] > LEAST_BODY]
+    order = np.argsort(-strength)[:MAX_HEADS]
+    order = order[body[order] > MIN_BODY_SHARE]
     heads, strength = heads[order], strength[order]
     feet, foot_strength = _search_feet(evidence, heads[:4], tall)
     return PartCandidates(heads, strength, feet, foot_strength)
@@ -73,9 +75,9 @@ def _search_feet(
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     corner = np.array([columns[0], rows[0]])
     slope = gradient_field(np.where(below, evidence.foot, 0)[window])
-    radii = [max(1.0, r * SHOE_RADIUS * tall) for r in RADII]
-    score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOES], axis=0)
-    feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * FEET, below[window])
+    radii = [max(1.0, r * SHOE_RADIUS * tall) for r in SEARCHED_SCALES]
+    score = np.max([radial_symmetry(slope, radii, 1.0, form) for form in SHOE_SHAPES], axis=0)
+    feet, strength = find_peaks(score, 0.8 * SHOE_RADIUS * tall, 3 * MAX_FEET, below[window])
     ends = _leg_ends(np.where(below, evidence.player, 0)[window], tall)
     feet = np.concatenate([feet, ends]) + corner
     strength = np.concatenate([strength, np.full(len(ends), np.nan)])
@@ -83,20 +85,22 @@ def _search_feet(
     leg *= _leg_between(evidence, heads[0], feet, tall) ** 2
     under = mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
     strength = strength * (0.02 + leg) * (1.05 - under) ** 2
-    shoes = np.argsort(-strength)[:FEET]
+    shoes = np.argsort(-strength)[:MAX_FEET]
     shoes = shoes[np.isfinite(strength[shoes])]
-    bare = np.flatnonzero(np.isnan(strength) & (leg > LEG_ABOVE) & (under < 0.2))[:LEG_ENDS]
-    order = _apart(feet, np.concatenate([shoes, bare]), ONE_PLACE * tall)
+    bare = np.flatnonzero(np.isnan(strength) & (leg > MIN_LEG_SHARE) & (under < MAX_UNDER_SHARE))[
+        :MAX_LEG_ENDS
+    ]
+    order = _apart(feet, np.concatenate([shoes, bare]), MIN_FOOT_SEPARATION * tall)
     return feet[order], strength[order]
 
 
 def _apart(
-    places: Float[np.ndarray, "n 2"], order: Int[np.ndarray, "m"], least: float
+    places: Float[np.ndarray, "n 2"], order: Int[np.ndarray, "m"], min_distance: float
 ) -> Int[np.ndarray, "k"]:
     """The places of an order, but those too near an earlier one: heel and toe of one shoe."""
     kept: list[int] = []
     for place in order:
-        if not kept or np.linalg.norm(places[kept] - places[place], axis=1).min() >= least:
+        if not kept or np.linalg.norm(places[kept] - places[place], axis=1).min() >= min_distance:
             kept.append(int(place))
     return np.array(kept, int)
 
@@ -117,8 +121,8 @@ def _leg_between(
     hips = np.array([head[0] if middle is None else max(0, x0) + middle, (y0 + y1) / 2])
     share = np.linspace(0.2, 0.85, 10)[:, None, None]
     way = hips + share * (feet - hips)
-    reach = max(1, round(KNEE_ROOM * tall))
-    wide = cv2.blur(evidence.player, (2 * reach + 1, 2 * reach + 1))
+    margin = max(1, round(KNEE_DEVIATION * tall))
+    wide = cv2.blur(evidence.player, (2 * margin + 1, 2 * margin + 1))
     x = np.rint(way[..., 0]).astype(int).clip(0, columns - 1)
     y = np.rint(way[..., 1]).astype(int).clip(0, rows - 1)
     # A limb a third as wide as the window covers it; the widest gaps tell, not the mean.
@@ -130,8 +134,8 @@ def _leg_ends(player: Float[np.ndarray, "h w"], tall: float) -> Float[np.ndarray
     """Where the outline of the player reaches down farthest, lowest first."""
     filled = cv2.GaussianBlur(player, (0, 0), max(0.8, 0.01 * tall)) > 0.4
     low = np.where(filled.any(axis=0), filled.shape[0] - 1 - filled[::-1].argmax(axis=0), -1)
-    reach = max(1, round(0.07 * tall))
-    lowest = low == maximum_filter1d(low, 2 * reach + 1)
+    margin = max(1, round(MIN_FOOT_SEPARATION * tall))
+    lowest = low == maximum_filter1d(low, 2 * margin + 1)
     x = np.flatnonzero(lowest & (low >= 0))
     # One place for each run of columns that reach equally far.
     starts = np.flatnonzero(np.diff(x, prepend=-9) > 1)

@@ -1,4 +1,4 @@
-"""Correlation filters over several channels: find again what was shown on examples.
+"""Correlation filters over several channels, trained on frames in which a track is right.
 
 A filter h turns the channels x of a picture into a response that should be a narrow peak y on the
 part and zero elsewhere. Over N examples the ridge regression
@@ -10,13 +10,10 @@ channel; Kiani Galoogahi, Sim and Lucey, ICCV 2013, for several):
 
     H(w) = (sum_n conj(X_n(w)) X_n(w)^T + lambda I)^-1 sum_n conj(X_n(w)) Y_n(w).
 
-Everything around the part speaks too, as far as it tends to come with it: a shoe has a leg above.
-
-Learn what a player's head and feet look like from a track that is right most of the time.
-
-A racket, a line or the other leg passes for a shoe now and then. So frames are chosen first that
-show both feet clearly: apart, and as far below the head as those of a standing player. Correlation
-filters learnt from them look for everything that comes with a foot: shoe, leg above, court beneath.
+The surroundings of a part count as far as they tend to come with it: a shoe has a leg above and the
+court beneath. A rough track takes a racket, a line or the other leg for a shoe now and then, so the
+filters are trained on frames that show both feet clearly: apart, and as far below the head as those
+of a standing player.
 """
 
 from dataclasses import dataclass
@@ -30,6 +27,17 @@ from keyrecon.segmentation.player_crops import Channels, Cropping, Crops
 
 RIDGE = 0.02
 """lambda, as a share of the mean power of a channel at a frequency."""
+STANDING_MIN, STANDING_MAX = 0.85, 1.15
+"""A foot of a clear frame is this far below the head, player heights: a racket seldom is."""
+MIN_FEET_DISTANCE = 0.09
+"""Feet nearer to one another may be one foot taken twice, or one that hides the other, player
+heights."""
+MIN_EXAMPLES = 12
+"""Fewer clear frames are not enough to train on; then all count."""
+PEAK_SPREAD = 0.027
+"""Standard deviation of the peak that a filter should respond with, player heights."""
+MIN_RESPONSE = 1e-3
+"""Filters that respond with less have no use and are not scaled up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +55,17 @@ def spectrum(channels: Float[np.ndarray, "*n h w"]) -> Complex64[np.ndarray, "*n
     return scipy.fft.rfft2(channels.astype(np.float32, copy=False))
 
 
-def learn_filters(
+def solve_filters(
     spectra: Complex64[np.ndarray, "N C h f"], targets: Float[np.ndarray, "N P h w"]
 ) -> Filters:
     """Filters that turn each example into its targets."""
     count, shape = len(spectra), spectra.shape[2:]
-    seen, wanted = (_by_frequency(s) for s in (spectra, spectrum(targets)))
-    mirrored = np.conj(seen.transpose(0, 2, 1))
-    power, common = mirrored @ seen / count, mirrored @ wanted / count
+    examples, wanted = (_by_frequency(s) for s in (spectra, spectrum(targets)))
+    conjugate = np.conj(examples.transpose(0, 2, 1))
+    power, cross_power = conjugate @ examples / count, conjugate @ wanted / count
     ridge = RIDGE * float(np.trace(power, axis1=1, axis2=2).real.mean()) / power.shape[1]
     power += np.float32(ridge) * np.eye(power.shape[1], dtype=np.float32)
-    transfer = np.linalg.solve(power, common).transpose(2, 1, 0)
+    transfer = np.linalg.solve(power, cross_power).transpose(2, 1, 0)
     return Filters(transfer.reshape(*transfer.shape[:2], *shape), targets.shape[2:])
 
 
@@ -66,10 +74,12 @@ def _by_frequency(spectra: Complex64[np.ndarray, "N C h f"]) -> Complex64[np.nda
     return spectra.reshape(*spectra.shape[:2], -1).transpose(2, 0, 1)
 
 
-def respond(filters: Filters, seen: Complex64[np.ndarray, "C h f"]) -> Float[np.ndarray, "P h w"]:
-    """The response of every filter to one picture."""
-    found = np.stack([(seen * part).sum(axis=0) for part in filters.transfer])
-    return scipy.fft.irfft2(found, filters.size)
+def respond(
+    filters: Filters, channels: Complex64[np.ndarray, "C h f"]
+) -> Float[np.ndarray, "P h w"]:
+    """The response of every filter to the spectrum of one picture."""
+    response = np.stack([(channels * part).sum(axis=0) for part in filters.transfer])
+    return scipy.fft.irfft2(response, filters.size)
 
 
 def peaks_at(
@@ -81,45 +91,36 @@ def peaks_at(
     return np.exp(-np.min(squares, axis=0) / (2 * spread**2))
 
 
-UPRIGHT = 0.85, 1.15
-"""A foot of a clear frame is this far below the head, player heights: a racket seldom is."""
-TWO_FEET = 0.09
-"""Feet nearer to one another may be one foot taken twice, or one that hides the other, player
-heights."""
-FEWEST = 12
-"""Fewer clear frames teach nothing; then all count."""
-SPREAD = 0.027
-"""Width of the peak that a filter should respond with, player heights."""
-LEAST_RESPONSE = 1e-3
-"""Filters that respond with less have learnt nothing and are not scaled up."""
-
-
 def train_filters(
     crops: Crops,
     channels: Channels,
     cropping: Cropping,
+    player: float,
     track: Track,
     chosen: Int[np.ndarray, "n"],
 ) -> Filters:
-    """Filters of head and foot whose usual response is 1, from chosen frames of a track."""
+    """Filters of head and foot whose usual response is 1, from chosen frames of a track.
+
+    The player is `player` px tall in the crops.
+    """
     frames = chosen.tolist()
-    seen = [channels.see(crops.lab[t], crops.foreground[t]) for t in frames]
-    spectra = np.stack([spectrum(s) for s in seen])
-    parts = np.concatenate([track.head[:, None], track.feet], axis=1)
-    places = np.stack([cropping.from_picture(parts[t], t) for t in frames])
-    size, spread = cropping.size, SPREAD * cropping.player
-    targets = [[peaks_at(p, size, spread) for p in (own[:1], own[1:])] for own in places]
-    filters = learn_filters(spectra, np.stack([np.stack(t) for t in targets]))
+    examples = [channels.compute(crops.lab[t], crops.foreground[t]) for t in frames]
+    spectra = np.stack([spectrum(example) for example in examples])
+    joints = np.concatenate([track.head[:, None], track.feet], axis=1)
+    places = np.stack([cropping.from_picture(joints[t], t) for t in frames])
+    size, spread = cropping.size, PEAK_SPREAD * player
+    targets = [[peaks_at(p, size, spread) for p in (parts[:1], parts[1:])] for parts in places]
+    filters = solve_filters(spectra, np.stack([np.stack(t) for t in targets]))
     usual = np.median([_strength(filters, *e) for e in zip(spectra, places, strict=True)], axis=0)
-    usual = np.maximum(usual, LEAST_RESPONSE).astype(np.float32)[:, None, None, None]
+    usual = np.maximum(usual, MIN_RESPONSE).astype(np.float32)[:, None, None, None]
     return Filters(filters.transfer / usual, size)
 
 
 def _strength(
-    filters: Filters, seen: Complex64[np.ndarray, "C h f"], places: Float[np.ndarray, "3 2"]
+    filters: Filters, channels: Complex64[np.ndarray, "C h f"], places: Float[np.ndarray, "3 2"]
 ) -> tuple[float, float]:
     """Response of each filter at its part."""
-    response = respond(filters, seen)
+    response = respond(filters, channels)
     row, column = np.rint(places[:, ::-1]).astype(int).clip(0, np.array(filters.size) - 1).T
     return float(response[0, row[0], column[0]]), float(response[1, row[1:], column[1:]].max())
 
@@ -127,7 +128,7 @@ def _strength(
 def clear_frames(track: Track) -> Int[np.ndarray, "n"]:
     """Frames in which a track has two feet, and both where a standing player has them."""
     below = (track.feet[..., 1] - track.head[:, None, 1]) / track.height[:, None]
-    upright = ((below > UPRIGHT[0]) & (below < UPRIGHT[1])).all(axis=1)
+    upright = ((below > STANDING_MIN) & (below < STANDING_MAX)).all(axis=1)
     return _enough(np.flatnonzero(upright & _apart(track)), len(below))
 
 
@@ -138,9 +139,10 @@ def sound_frames(track: Track) -> Int[np.ndarray, "n"]:
 
 def _apart(track: Track) -> Bool[np.ndarray, "T"]:
     """Where one foot does not stand for both."""
-    return np.linalg.norm(track.feet[:, 0] - track.feet[:, 1], axis=1) > TWO_FEET * track.height
+    apart = np.linalg.norm(track.feet[:, 0] - track.feet[:, 1], axis=1)
+    return apart > MIN_FEET_DISTANCE * track.height
 
 
 def _enough(frames: Int[np.ndarray, "n"], count: int) -> Int[np.ndarray, "m"]:
     """The frames, or all where these are too few."""
-    return frames if len(frames) >= FEWEST else np.arange(count)
+    return frames if len(frames) >= MIN_EXAMPLES else np.arange(count)

@@ -1,4 +1,4 @@
-"""Find the player: roughly, where the head and the feet are, and how tall they stand (Section 4.1).
+"""Detect the player: roughly, where head and feet are, and how tall they stand (Section 4.1).
 
 In pictures reduced so that the player is about 96 px tall, a few frames a second are searched
 whole:
@@ -26,9 +26,16 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
-from keyrecon.segmentation.part_evidence import Reader, first_scene, weigh_evidence
+from keyrecon.segmentation.part_evidence import Reader, evaluate_evidence, model_scene_by_colour
 from keyrecon.tracking.candidates import PartCandidates, search_frame
-from keyrecon.tracking.foot_pairs import COLOR_PRIOR, foot_pairs, foot_pose_cost
+from keyrecon.tracking.foot_pairs import (
+    COLOR_PRIOR,
+    FOOT_SKIP_COST,
+    MAX_FOOT_GAP,
+    MAX_PAIRS,
+    foot_pairs,
+    foot_pose_cost,
+)
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.smoothing import (
     fill_gaps,
@@ -39,21 +46,22 @@ from keyrecon.tracking.smoothing import (
 
 EVERY_FRAME = 1e4
 """A pace that no video has: every frame is searched."""
-MOST_KEPT = 2**28
-"""Pictures that take no more memory than this are kept rather than read twice, bytes."""
-PAIRS = 30
-"""Pairs of feet kept, per frame."""
-NO_SHOE = 2.0
+MAX_CACHE_BYTES = 2**28
+"""Pictures that take no more memory than this are kept rather than read twice."""
+NO_SHOE_COST = 2.0
 """Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
-FAIR = 0.15
-"""Share of the best scores that is as good as half sure."""
-LEAST_FOUND = 0.4
-"""Share of the frames in which a head must be found for a track to be believed."""
+BEST_SCORE_PERCENTILE = 95
+"""Of the best scores of all frames: a few may be of something that shines."""
+SCORE_SATURATION, SCORE_FLOOR = 0.15, 0.001
+"""Shares of the best score: beyond the first, contrast says little; the second keeps costs finite.
+Chosen on rendered sequences; see benchmarks/sensitivity.py."""
+MIN_DETECTED_SHARE = 0.4
+"""Share of the searched frames in which a head must be detected for a track to be believed."""
 
 
 @dataclass(frozen=True)
 class FindOptions:
-    """How the player is looked for."""
+    """How the player is detected."""
 
     player: float = 96.0
     """Height of the player in the searched pictures, px; smaller is faster and less exact."""
@@ -84,28 +92,28 @@ def find_player(
     every = max(1, round(video.fps / options.pace))
     numbers = np.unique(np.append(np.arange(0, len(video), every), len(video) - 1))
     pictures = _read_pictures(video, width, numbers, progress)
-    scene = first_scene(pictures, numbers, camera, shrink, parts.max(axis=0))
+    scene = model_scene_by_colour(pictures, numbers, camera, shrink, parts.max(axis=0))
     tall = colors.height * shrink
     head = parts[colors.names.index("head")]
     tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
     to_picture = np.linalg.inv(shrinking(shrink))
 
-    def look(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> PartCandidates:
+    def search(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> PartCandidates:
         lab = to_lab(entry[1])
         foreground = scene.foreground(lab, entry[0], to_picture)
-        return search_frame(weigh_evidence(lab, tables, foreground, tall), tall)
+        return search_frame(evaluate_evidence(lab, tables, foreground, tall), tall)
 
-    shown = progress(pictures(numbers), "Finding the player", len(numbers))
-    small = list(side_by_side(look, zip(numbers.tolist(), shown, strict=True)))
-    found = [_enlarge(c, shrink) for c in small]
-    return _connect(found, numbers, video, camera, colors.height, options)
+    searched = progress(pictures(numbers), "Detecting the player", len(numbers))
+    reduced = list(side_by_side(search, zip(numbers.tolist(), searched, strict=True)))
+    candidates = [_enlarge(c, shrink) for c in reduced]
+    return _link(candidates, numbers, video, camera, colors.height, options)
 
 
 def _read_pictures(
     video: Video, width: int, numbers: Int[np.ndarray, "n"], progress: Progress
 ) -> Reader:
     """Reduced pictures of some frames: kept if they take little memory, else read when wanted."""
-    if 3 * len(numbers) * width * round(video.height * width / video.width) > MOST_KEPT:
+    if 3 * len(numbers) * width * round(video.height * width / video.width) > MAX_CACHE_BYTES:
         return lambda wanted: read_small(video, width, set(wanted.tolist()))
     pictures = read_small(video, width, set(numbers.tolist()))
     pictures = progress(pictures, "Reading pictures of the player", len(numbers))
@@ -113,15 +121,15 @@ def _read_pictures(
     return lambda wanted: (kept[number] for number in wanted.tolist())
 
 
-def _enlarge(found: PartCandidates, shrink: float) -> PartCandidates:
+def _enlarge(candidates: PartCandidates, shrink: float) -> PartCandidates:
     """Candidates in pixels of the full picture."""
     back = (1 / shrink - 1) / 2
-    heads, feet = (places / shrink + back for places in (found.heads, found.feet))
-    return PartCandidates(heads, found.head_score, feet, found.foot_score)
+    heads, feet = (places / shrink + back for places in (candidates.heads, candidates.feet))
+    return PartCandidates(heads, candidates.head_score, feet, candidates.foot_score)
 
 
-def _connect(
-    found: list[PartCandidates],
+def _link(
+    candidates: list[PartCandidates],
     numbers: Int[np.ndarray, "n"],
     video: Video,
     camera: CameraPath,
@@ -132,18 +140,19 @@ def _connect(
     from_reference = np.linalg.inv(camera.to_reference)
     searched = camera.to_reference[numbers]
     step = height / video.fps * float(np.median(np.diff(numbers))) if len(numbers) > 1 else height
-    head_cost = _costs([c.head_score for c in found])
-    stable = [h[:, None] for h in to_reference_frame([c.heads for c in found], searched)]
+    head_cost = _costs([c.head_score for c in candidates])
+    stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     chosen = find_cheapest_track(head_cost, stable, TransitionModel(options.head_speed * step))
-    if (chosen >= 0).mean() < LEAST_FOUND:
-        raise _lost(chosen, numbers)
+    if (chosen >= 0).mean() < MIN_DETECTED_SHARE:
+        raise _missed_head(chosen, numbers)
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
-    pairs, costs = _pair(found, head[numbers], height)
-    stable = to_reference_frame([c.feet for c in found], searched)
+    pairs, costs = _pair(candidates, head[numbers], height)
+    stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
-    taken = find_cheapest_track(
-        costs, stable, TransitionModel(options.foot_speed * step, max_gap=12, skip_cost=7.0)
+    model = TransitionModel(
+        options.foot_speed * step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST
     )
+    taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)
     standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
@@ -154,36 +163,37 @@ def _connect(
 
 
 def _pair(
-    found: list[PartCandidates], head: Float[np.ndarray, "n 2"], height: float
+    candidates: list[PartCandidates], head: Float[np.ndarray, "n 2"], height: float
 ) -> tuple[list[Int[np.ndarray, "_ 2"]], list[Float[np.ndarray, "_"]]]:
     """The best pairs of feet of every frame, and their costs."""
-    foot_cost = _costs([c.foot_score for c in found])
+    foot_cost = _costs([c.foot_score for c in candidates])
     pairs, costs = [], []
-    for t, candidates in enumerate(found):
-        every = foot_pairs(len(candidates.feet))
-        posture = foot_pose_cost(candidates.feet[every], head[t], height, COLOR_PRIOR)
+    for t, frame in enumerate(candidates):
+        every = foot_pairs(len(frame.feet))
+        posture = foot_pose_cost(frame.feet[every], head[t], height, COLOR_PRIOR)
         cost = foot_cost[t][every].sum(axis=1) + posture
-        best = np.argsort(cost)[:PAIRS]
+        best = np.argsort(cost)[:MAX_PAIRS]
         pairs.append(every[best])
         costs.append(cost[best])
     return pairs, costs
 
 
-def _lost(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) -> KeyreconError:
-    """What to tell when there is no track."""
-    seen = chosen >= 0
-    gaps = numbers[~seen]
+def _missed_head(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) -> KeyreconError:
+    """The error that says where a head was missed."""
+    detected = chosen >= 0
+    gaps = numbers[~detected]
     middle = int(gaps[len(gaps) // 2])
     return KeyreconError(
-        f"The head was found in only {seen.sum()} of {len(seen)} frames; pick its colour again "
-        f"on a frame where it was missed, for instance frame {middle}."
+        f"The head was found in only {detected.sum()} of {len(detected)} frames; pick its colour "
+        f"again on a frame where it was missed, for instance frame {middle}."
     )
 
 
 def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]:
     """-log of each score against the best scores of the sequence."""
     best = [float(np.nanmax(s)) for s in scores if np.isfinite(s).any()]
-    reference = max(float(np.percentile(best, 95)), 1e-12) if best else 1.0
+    best_score = max(float(np.percentile(best, BEST_SCORE_PERCENTILE)), 1e-12) if best else 1.0
     # Shoes differ in contrast; beyond a fair score more of it says little.
-    costs = [-np.log((s + 0.001 * reference) / (s + FAIR * reference)) for s in scores]
-    return [np.where(np.isnan(c), NO_SHOE, c) for c in costs]
+    low, high = SCORE_FLOOR * best_score, SCORE_SATURATION * best_score
+    costs = [-np.log((s + low) / (s + high)) for s in scores]
+    return [np.where(np.isnan(c), NO_SHOE_COST, c) for c in costs]

@@ -1,10 +1,10 @@
-"""The track from what the filters saw: the head's path, then that of both feet.
+"""Link the detections of all frames into a track: the head's path, then that of both feet.
 
-The path of the feet runs over pairs. A foot that cannot be seen is behind the other leg, so one
-candidate alone makes a pair too, with the hidden foot on the shin above it. Or it was seen a moment
-ago, or will be in a moment: where a sure candidate of a frame nearby lies on the player now, it is
+The path of the feet runs over pairs. An occluded foot is behind the other leg, so one candidate
+alone makes a pair too, with the hidden foot on the shin above it. Or it was detected a moment ago,
+or will be in a moment: where a strong candidate of a frame nearby lies on the player now, it is
 a weak candidate of this frame too. A foot that stands therefore stays, while one in the air is soon
-forgotten. What was guessed gives way to what was seen before and after it (see `smooth`).
+forgotten. Weak candidates give way to strong ones before and after them (see `smoothing`).
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,15 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
-from keyrecon.tracking.foot_pairs import FILTER_PRIOR, foot_pairs, foot_pose_cost
+from keyrecon.tracking.candidates import MIN_FOOT_SEPARATION
+from keyrecon.tracking.foot_pairs import (
+    FILTER_PRIOR,
+    FOOT_SKIP_COST,
+    MAX_FOOT_GAP,
+    MAX_PAIRS,
+    foot_pairs,
+    foot_pose_cost,
+)
 from keyrecon.tracking.smoothing import (
     fill_gaps,
     smooth_pairs,
@@ -25,28 +33,25 @@ from keyrecon.tracking.smoothing import (
     to_reference_frame,
 )
 
-EVEN, DOUBT = 0.36, 0.07
-"""Strength that is as likely a part as not, and how fast the odds change with it, on rendered
+EVEN_STRENGTH, STRENGTH_SPREAD = 0.36, 0.07
+"""Strength that is as likely a part as not, and how fast the log odds change with it, on rendered
 players: on the floor a third of the usual strength is a foot, higher up half of it may be a
 racket."""
-HIDDEN = 1.5
-"""Cost of a foot that is not seen, but was nearby in time."""
-FARTHER_UP = 0.07
+PROPAGATED_COST = 1.5
+"""Cost of a foot that is not detected, but was nearby in time. Chosen on rendered sequences; see
+benchmarks/sensitivity.py."""
+HIDDEN_FOOT_RISE = 0.07
 """A hidden foot is this far above the one that hides it, player heights: floor farther away is
 higher up in the picture, and it is the shin that covers the foot."""
-APART = 0.07
-"""Two candidates nearer to one another are one foot, player heights."""
-APPEARANCE_WEIGHT = 6
-"""Frames looked up before and after for hidden feet."""
-REMEMBERED = 8
-"""Remembered feet of a frame, at most."""
-PAIRS = 30
-"""Pairs of feet kept, per frame."""
+MEMORY_SAMPLES = 6
+"""Frames before and after that feet are propagated from, ever farther apart."""
+MAX_PROPAGATED = 8
+"""Propagated feet of a frame, at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """What the filters saw in one frame, in pixels of its crop."""
+    """Candidates that the filters give in one frame, in pixels of its crop."""
 
     heads: Float[np.ndarray, "m 2"]
     head_strength: Float[np.ndarray, "m"]
@@ -59,21 +64,21 @@ class Detections:
 
 @dataclass(frozen=True)
 class FootMotionModel:
-    """How feet move and hide."""
+    """How feet move and occlude one another."""
 
     step: float
     """Usual movement from one frame to the next, px."""
     memory: int
-    """Frames before and after in which a hidden foot is looked up."""
-    behind: float
-    """Cost of a foot that is not seen and taken to be behind the other."""
+    """Frames before and after that feet are propagated from."""
+    occlusion_cost: float
+    """Cost of a foot that is not detected and taken to be behind the other."""
     stiffness: float
-    """How smooth the paths of feet are, see `smooth`."""
+    """How smooth the paths of feet are: r of `smooth_path`."""
 
 
 @dataclass(frozen=True, eq=False)
 class FootPairs:
-    """What a frame offers for both feet."""
+    """Candidates of a frame for both feet together."""
 
     places: Float[np.ndarray, "s 2 2"]
     each: Float[np.ndarray, "s 2"]
@@ -84,95 +89,101 @@ class FootPairs:
 
 def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """-log of the probability that a response comes from the part."""
-    return np.logaddexp(0.0, (EVEN - strength) / DOUBT)
+    return np.logaddexp(0.0, (EVEN_STRENGTH - strength) / STRENGTH_SPREAD)
 
 
 def link_head(
-    seen: list[Detections], camera: CameraPath, cropping: Cropping, sigma: float
+    detections: list[Detections], camera: CameraPath, cropping: Cropping, sigma: float
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
     """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px."""
-    places = [cropping.to_picture(s.heads, t) for t, s in enumerate(seen)]
+    places = [cropping.to_picture(found.heads, t) for t, found in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
-    costs = [part_costs(s.head_strength) for s in seen]
+    costs = [part_costs(found.head_strength) for found in detections]
     chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
-    back = np.linalg.inv(camera.to_reference)
-    head = fill_gaps(taken_states(stable, chosen), np.arange(len(seen)), back)[:, 0]
-    return head, state_confidence(costs, chosen)
+    from_reference = np.linalg.inv(camera.to_reference)
+    head = fill_gaps(taken_states(stable, chosen), np.arange(len(detections)), from_reference)
+    return head[:, 0], state_confidence(costs, chosen)
 
 
 def link_feet(
-    seen: list[Detections],
+    detections: list[Detections],
     camera: CameraPath,
     cropping: Cropping,
     head: Float[np.ndarray, "T 2"],
-    gait: FootMotionModel,
+    height: Float[np.ndarray, "T"],
+    motion: FootMotionModel,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Both feet in the picture of every frame, and their confidence."""
-    places = [cropping.to_picture(s.feet, t) for t, s in enumerate(seen)]
-    back = np.linalg.inv(camera.to_reference)
+    """Both feet in the picture of every frame, and their confidence; `height` of the player, px."""
+    places = [cropping.to_picture(found.feet, t) for t, found in enumerate(detections)]
+    from_reference = np.linalg.inv(camera.to_reference)
     stable = to_reference_frame(places, camera.to_reference)
-    hidden = carry_feet_forward(seen, stable, back, cropping, gait.memory)
+    hidden = propagate_feet(detections, stable, from_reference, cropping, height, motion.memory)
     pairs = []
-    for t, look in enumerate(seen):
-        own = np.concatenate([part_costs(look.foot_strength), np.full(len(hidden[t]), HIDDEN)])
+    for t, found in enumerate(detections):
+        propagated = np.full(len(hidden[t]), PROPAGATED_COST)
+        cost = np.concatenate([part_costs(found.foot_strength), propagated])
         feet = np.concatenate([stable[t], hidden[t]])
-        in_picture = warp_points(back[t], feet) if len(feet) else feet
-        body = head[t], float(cropping.track.height[t])
-        both = _pair(in_picture, own, gait.behind, body)
+        in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
+        both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
     costs, places = [p.cost for p in pairs], [p.places for p in pairs]
-    taken = find_cheapest_track(
-        costs, places, TransitionModel(gait.step, max_gap=12, skip_cost=7.0)
-    )
+    model = TransitionModel(motion.step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST)
+    taken = find_cheapest_track(costs, places, model)
     each = taken_states([p.each for p in pairs], taken)
-    smooth = smooth_pairs(taken_states(places, taken), each, gait.stiffness)
-    return warp_points(back[:, None], smooth), state_confidence([c / 2 for c in costs], taken)
+    smooth = smooth_pairs(taken_states(places, taken), each, motion.stiffness)
+    feet = warp_points(from_reference[:, None], smooth)
+    return feet, state_confidence([c / 2 for c in costs], taken)
 
 
 def _pair(
     feet: Float[np.ndarray, "n 2"],
     cost: Float[np.ndarray, "n"],
-    behind: float,
-    body: tuple[Float[np.ndarray, "2"], float],
+    occlusion_cost: float,
+    head: Float[np.ndarray, "2"],
+    height: float,
 ) -> FootPairs:
-    """The best pairs of feet below a head and of a height, and their costs.
+    """The best pairs of feet below a head, and their costs.
 
-    A place alone hides another foot, at the cost `behind`.
+    A place alone hides another foot, at the cost `occlusion_cost`.
     """
-    head, height = body
     every = foot_pairs(len(feet))
     both, each = feet[every], cost[every]
     alone = every[:, 0] == every[:, 1]
-    both[alone, 1, 1] -= FARTHER_UP * height
-    each[alone, 1] = behind
+    both[alone, 1, 1] -= HIDDEN_FOOT_RISE * height
+    each[alone, 1] = occlusion_cost
     total = each.sum(axis=1) + foot_pose_cost(both, head, height, FILTER_PRIOR)
-    best = np.argsort(total)[:PAIRS]
+    best = np.argsort(total)[:MAX_PAIRS]
     return FootPairs(both[best], each[best], total[best])
 
 
-def carry_feet_forward(
-    seen: list[Detections],
+def propagate_feet(
+    detections: list[Detections],
     stable: list[Float[np.ndarray, "_ 2"]],
     from_reference: Float[np.ndarray, "T 3 3"],
     cropping: Cropping,
+    height: Float[np.ndarray, "T"],
     memory: int,
 ) -> list[Float[np.ndarray, "_ 2"]]:
-    """Stabilised places of sure feet of frames nearby that the player covers in each frame."""
-    sure = [s[look.foot_strength > EVEN] for s, look in zip(stable, seen, strict=True)]
-    offsets = np.unique(np.rint(np.geomspace(1, max(1, memory), APPEARANCE_WEIGHT)).astype(int))
+    """Strong feet of frames nearby, where the player covers them in each frame, stabilised."""
+    strong = [
+        places[found.foot_strength > EVEN_STRENGTH]
+        for places, found in zip(stable, detections, strict=True)
+    ]
+    offsets = np.unique(np.rint(np.geomspace(1, max(1, memory), MEMORY_SAMPLES)).astype(int))
     hidden = []
-    for t, look in enumerate(seen):
-        near = [t + side * k for k in offsets for side in (-1, 1) if 0 <= t + side * k < len(seen)]
-        known = np.concatenate([sure[u] for u in near]) if near else np.zeros((0, 2))
+    for t, found in enumerate(detections):
+        near = [t + sign * k for k in offsets for sign in (-1, 1)]
+        near = [u for u in near if 0 <= u < len(detections)]
+        known = np.concatenate([strong[u] for u in near]) if near else np.zeros((0, 2))
         if len(known):
-            known = known[_on_player(known, look, from_reference[t], cropping, t)]
-        hidden.append(_new_places(known, stable[t], APART * float(cropping.track.height[t])))
+            known = known[_on_player(known, found, from_reference[t], cropping, t)]
+        hidden.append(_new_places(known, stable[t], MIN_FOOT_SEPARATION * float(height[t])))
     return hidden
 
 
 def _on_player(
     places: Float[np.ndarray, "m 2"],
-    look: Detections,
+    found: Detections,
     from_reference: Float[np.ndarray, "3 3"],
     cropping: Cropping,
     t: int,
@@ -180,19 +191,19 @@ def _on_player(
     """Which stabilised places the player covers in frame t."""
     spots = cropping.from_picture(warp_points(from_reference, places), t)
     x, y = np.rint((spots - 0.5) / 2).astype(int).T
-    rows, columns = look.covered.shape
+    rows, columns = found.covered.shape
     inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-    return inside & look.covered[y.clip(0, rows - 1), x.clip(0, columns - 1)]
+    return inside & found.covered[y.clip(0, rows - 1), x.clip(0, columns - 1)]
 
 
 def _new_places(
-    places: Float[np.ndarray, "m 2"], known: Float[np.ndarray, "n 2"], least: float
+    places: Float[np.ndarray, "m 2"], known: Float[np.ndarray, "n 2"], min_distance: float
 ) -> Float[np.ndarray, "k 2"]:
     """The first few places that are no known ones, and not one another."""
     taken, count = known, len(known)
     for place in places:
-        if len(taken) == count + REMEMBERED:
+        if len(taken) == count + MAX_PROPAGATED:
             break
-        if not len(taken) or np.linalg.norm(taken - place, axis=1).min() > least:
+        if not len(taken) or np.linalg.norm(taken - place, axis=1).min() > min_distance:
             taken = np.concatenate([taken, place[None]])
     return taken[count:]

@@ -1,13 +1,13 @@
 """Fast radial symmetry: where a map is bright and round, or elliptical.
 
-Every pixel with a noticeable gradient g votes for the point a radius n up the gradient, where the
+Every pixel with a noticeable gradient g counts for the point a radius n up the gradient, where the
 centre of a bright disc of that radius would be (Loy and Zelinsky, PAMI 25(8), 2003):
 
     O_n(p+) += 1,  M_n(p+) += |g|,        p+ = p + n g / |g|
     S_n = A_n * (M_n / k_n) (min(O_n, k_n) / k_n)^alpha,   S the mean over n,
 
 with k_n = 9.9 (8 for n = 1) and A_n a Gaussian of deviation n / 4 that sums to n. Only bright
-centres are wanted, so the votes down the gradient are left out.
+centres are wanted, so the points down the gradient are left out.
 
 For an ellipse G (unit circle) n, G = R diag(a, b) R^T, the centre lies at
 
@@ -24,11 +24,12 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-ROUND = np.eye(2)
-
-
-MOST_VOTERS = 6000
-"""Only the steepest pixels vote: a part's outline has a hundred, the rest is clutter."""
+CIRCLE = np.eye(2)
+"""G of a disc."""
+MAX_GRADIENTS = 6000
+"""Only the steepest pixels count: a part's outline has a hundred, the rest is clutter."""
+MIN_PEAK_SHARE = 0.02
+"""Maxima below this share of the highest are noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +44,15 @@ class GradientField:
     """Of the map."""
 
 
-def gradient_field(smooth: Float[np.ndarray, "h w"], least: float = 0.1) -> GradientField:
-    """Gradients steeper than `least` times the steepest, at most MOST_VOTERS of them."""
+def gradient_field(smooth: Float[np.ndarray, "h w"], min_share: float = 0.1) -> GradientField:
+    """Gradients steeper than `min_share` times the steepest, at most MAX_GRADIENTS of them."""
     gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
     gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
     size = np.hypot(gx, gy)
-    spots = np.flatnonzero(size > least * max(float(size.max()), 1e-9))
-    if len(spots) > MOST_VOTERS:
+    spots = np.flatnonzero(size > min_share * max(float(size.max()), 1e-9))
+    if len(spots) > MAX_GRADIENTS:
         steepness = size.ravel()[spots]
-        spots = spots[np.argpartition(steepness, -MOST_VOTERS)[-MOST_VOTERS:]]
+        spots = spots[np.argpartition(steepness, -MAX_GRADIENTS)[-MAX_GRADIENTS:]]
     y, x = np.divmod(spots, smooth.shape[1])
     x, y = x.astype(np.float32), y.astype(np.float32)
     return GradientField(x, y, gx.ravel()[spots], gy.ravel()[spots], smooth.shape)
@@ -67,7 +68,7 @@ def radial_symmetry(
     slope: GradientField,
     radii: Sequence[float],
     strictness: float = 2.0,
-    form: Float[np.ndarray, "2 2"] = ROUND,
+    form: Float[np.ndarray, "2 2"] = CIRCLE,
 ) -> Float[np.ndarray, "h w"]:
     """S for discs (or ellipses of one form) of the given radii, px; `strictness` is alpha."""
     rows, columns = slope.shape
@@ -82,11 +83,11 @@ def radial_symmetry(
         y = np.rint(slope.y + radius * vy).astype(np.int32)
         inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
         spot = (y * columns + x)[inside]
-        votes = np.bincount(spot, minlength=rows * columns).astype(np.float32)
+        count = np.bincount(spot, minlength=rows * columns).astype(np.float32)
         strength = np.bincount(spot, weights=size[inside], minlength=rows * columns)
         cap = 8.0 if radius <= 1 else 9.9
-        found = strength.astype(np.float32) * (np.minimum(votes, cap) / cap) ** strictness / cap
-        total += found.reshape(rows, columns) * radius
+        symmetry = strength.astype(np.float32) * (np.minimum(count, cap) / cap) ** strictness / cap
+        total += symmetry.reshape(rows, columns) * radius
     # The radii differ little, so one Gaussian does for all of them.
     return cv2.GaussianBlur(total, (0, 0), 0.25 * float(np.mean(radii))) / len(radii)
 
@@ -94,17 +95,17 @@ def radial_symmetry(
 def find_peaks(
     score: Float[np.ndarray, "h w"],
     apart: float,
-    most: int,
+    max_peaks: int,
     where: Bool[np.ndarray, "h w"] | None = None,
 ) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m"]]:
     """The highest maxima at least `apart` px from each other: positions to sub-pixel, scores."""
     size = 2 * max(1, round(apart)) + 1
     top = cv2.dilate(score, np.ones((size, size), np.uint8))
-    maxima = (score >= top) & (score > 0.02 * max(float(score.max()), 1e-12))
+    maxima = (score >= top) & (score > MIN_PEAK_SHARE * max(float(score.max()), 1e-12))
     if where is not None:
         maxima &= where
     y, x = np.nonzero(maxima)
-    order = np.argsort(-score[y, x], kind="stable")[:most]
+    order = np.argsort(-score[y, x], kind="stable")[:max_peaks]
     y, x = y[order], x[order]
     places = np.stack([x + _offset(score, y, x, 1), y + _offset(score, y, x, 0)], axis=1)
     return places.astype(float), score[y, x].astype(float)

@@ -1,4 +1,4 @@
-"""How large the player is: the unit of length of everything that follows.
+"""How large the player is: the unit of length of all later stages.
 
 Players crouch, lunge and jump, so the standing height from head to mid-feet is an upper envelope
 over time of the distance between them. A zooming camera changes it faster than any player can; its

@@ -1,18 +1,17 @@
-"""From candidates to places in every frame: the cheapest path, and what lies between.
+"""Places in every frame from the states of a path: gaps interpolated, weak detections smoothed.
 
-Paths are sought in stabilised coordinates, where a camera's own motion is undone, and gaps are
-interpolated there too: a foot that stands still while the camera turns stays where it stands.
+Gaps are interpolated in stabilised coordinates, where a camera's own motion is undone: a foot that
+stands still while the camera turns stays where it stands.
 
-A smooth path through places that are sure in some frames and guessed in others.
-
-A foot that is hidden for a moment, or whose shoe hardly shows, is guessed frame by frame, and the
-guesses jump. Whittaker's smoother (Proc. Edinburgh Math. Soc. 41, 1923; Eilers, Anal. Chem. 75,
-2003) weighs every place y_t by how sure it is and asks for little acceleration,
+A foot that is occluded for a moment, or whose shoe hardly shows, is placed frame by frame with
+little confidence, and its places jump. Whittaker's smoother (Proc. Edinburgh Math. Soc. 41, 1923;
+Eilers, Anal. Chem. 75, 2003) weighs every place y_t by its probability and asks for little
+acceleration,
 
     min_x  sum_t w_t |x_t - y_t|^2 + r sum_t |x_(t-1) - 2 x_t + x_(t+1)|^2,
 
-so that guesses give way to the sure places before and after them. r = (fps / (2 pi f))^4 halves
-what moves at the frequency f where places are sure.
+so that uncertain places give way to certain ones before and after them. r = (fps / (2 pi f))^4
+halves what moves at the frequency f where places are certain.
 """
 
 import numpy as np
@@ -25,6 +24,12 @@ from keyrecon.numerics.banded_least_squares import (
     upper_form,
 )
 from keyrecon.numerics.geometry import warp_points
+
+CERTAINTY_POWER = 3.0
+"""A place counts by the power of this of the probability that its cost tells. Chosen on rendered
+sequences; see benchmarks/sensitivity.py."""
+MIN_WEIGHT = 1e-4
+"""Places count at least this much, which keeps the equations solvable."""
 
 
 def to_reference_frame(
@@ -62,16 +67,16 @@ def interpolate(
     places: Float[np.ndarray, "n p d"], numbers: Int[np.ndarray, "n"], wanted: Int[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T p d"]:
     """Values at the wanted frames, linear between those that are known, and held beyond them."""
-    seen = np.flatnonzero(np.isfinite(places).reshape(len(places), -1).all(axis=1))
-    if not len(seen):
+    known = np.flatnonzero(np.isfinite(places).reshape(len(places), -1).all(axis=1))
+    if not len(known):
         raise KeyreconError(
             "Neither a head nor two feet below it make a path through the video; pick the colours "
             "of head and shoes again, on another frame too."
         )
-    known = keep_order(places[seen])
-    columns = known.reshape(len(seen), -1).T
-    between = [np.interp(wanted, numbers[seen], column) for column in columns]
-    return np.stack(between, axis=1).reshape(len(wanted), *known.shape[1:])
+    ordered = keep_order(places[known])
+    columns = ordered.reshape(len(known), -1).T
+    between = [np.interp(wanted, numbers[known], column) for column in columns]
+    return np.stack(between, axis=1).reshape(len(wanted), *ordered.shape[1:])
 
 
 def keep_order(places: Float[np.ndarray, "n p d"]) -> Float[np.ndarray, "n p d"]:
@@ -96,12 +101,6 @@ def state_confidence(
     return np.exp(-0.5 * np.maximum(0.0, taken))
 
 
-SURENESS = 3.0
-"""A place counts by the power of this of the probability that its cost tells."""
-LEAST_WEIGHT = 1e-4
-"""Places count at least this much, which keeps the equations solvable."""
-
-
 def smooth_pairs(
     places: Float[np.ndarray, "T p 2"], cost: Float[np.ndarray, "T p"], stiffness: float
 ) -> Float[np.ndarray, "T p 2"]:
@@ -112,7 +111,7 @@ def smooth_pairs(
     frames = np.arange(len(places))
     known = np.concatenate([places, cost[..., None]], axis=2)
     filled = interpolate(known, frames, frames)
-    weight = np.exp(-SURENESS * filled[..., 2])
+    weight = np.exp(-CERTAINTY_POWER * filled[..., 2])
     weight[np.isnan(places).any(axis=(1, 2))] = 0.0
     paths = [smooth_path(filled[:, k, :2], weight[:, k], stiffness) for k in range(places.shape[1])]
     return np.stack(paths, axis=1)
@@ -125,7 +124,7 @@ def smooth_path(
     count = len(places)
     if count < 3:
         return places
-    sure = np.maximum(weight, LEAST_WEIGHT)
+    weight = np.maximum(weight, MIN_WEIGHT)
     bands = stiffness * second_difference_bands(count)
-    bands[0] += sure
-    return solve_banded(upper_form(bands), sure[:, None] * places, lower=False)
+    bands[0] += weight
+    return solve_banded(upper_form(bands), weight[:, None] * places, lower=False)

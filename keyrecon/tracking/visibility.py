@@ -12,27 +12,27 @@ from jaxtyping import Bool, Float
 from keyrecon.records import Track
 from keyrecon.segmentation.player_crops import Cropping, Crops
 
-LEAST_FOREGROUND = 0.3
+MIN_FOREGROUND_SHARE = 0.3
 """Share of the usual foreground between head and feet below which nobody is there."""
-_BROAD = 0.08
-"""Half the breadth of the strip, player heights: that of a trunk seen from the side."""
-_ALONG, _ACROSS = 24, 9
-"""Places looked at."""
+HALF_BREADTH = 0.08
+"""Half the breadth of the strip, player heights: that of a trunk from the side."""
+SAMPLES_ALONG, SAMPLES_ACROSS = 24, 9
+"""Places of the strip that are sampled."""
 
 
 def is_visible(crops: Crops, cropping: Cropping, track: Track) -> Bool[np.ndarray, "T"]:
     """Frames in which something stands between the track's head and feet."""
-    share = _foreground(crops, cropping, track)
-    return share >= LEAST_FOREGROUND * np.median(share)
+    share = _foreground_share(crops, cropping, track)
+    return share >= MIN_FOREGROUND_SHARE * np.median(share)
 
 
-def _foreground(crops: Crops, cropping: Cropping, track: Track) -> Float[np.ndarray, "T"]:
+def _foreground_share(crops: Crops, cropping: Cropping, track: Track) -> Float[np.ndarray, "T"]:
     """Mean probability that the strip from head to mid-feet is not background."""
     scale, origin = cropping.scale[:, None], cropping.origin
     head, feet = (scale * (place - origin) for place in (track.head, track.mid_feet))
-    along = np.linspace(0, 1, _ALONG)[None, :, None]
+    along = np.linspace(0, 1, SAMPLES_ALONG)[None, :, None]
     spine = head[:, None] + along * (feet - head)[:, None]
-    aside = np.linspace(-_BROAD, _BROAD, _ACROSS) * scale * track.height[:, None]
+    aside = np.linspace(-HALF_BREADTH, HALF_BREADTH, SAMPLES_ACROSS) * scale * track.height[:, None]
     rows, columns = cropping.size
     x = np.clip(np.rint(spine[:, :, None, 0] + aside[:, None]), 0, columns - 1).astype(int)
     y = np.clip(np.rint(spine[:, :, None, 1]), 0, rows - 1).astype(int)

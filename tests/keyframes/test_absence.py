@@ -79,7 +79,7 @@ def test_an_empty_scene_between_head_and_feet_is_no_player():
     head = np.tile([200.0, 100.0], (frames, 1))
     feet = np.tile([[190.0, 200.0], [210.0, 200.0]], (frames, 1, 1))
     track = Track(head, feet, np.full(frames, height), np.zeros((frames, 4)), np.ones(frames))
-    cropping = Cropping(track, 56.0)
+    cropping = Cropping.below_heads(track, 56.0)
     rows, columns = cropping.size
     foreground = np.zeros((frames, rows, columns), np.uint8)
     foreground[:, :, columns // 2 - 6 : columns // 2 + 6] = 230

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.tracking.camera_motion import CameraMotionOptions, _FeatureTracker, _follow
+from keyrecon.tracking.camera_motion import CameraMotionOptions, _FeatureTracker, _register_all
 
 SIZE = 320, 180
 REST, PAN = 24, 60
@@ -32,15 +32,17 @@ def view(scene, shift, logo=False):
 
 def test_the_path_is_right_in_frames_that_were_not_registered_themselves(scene):
     pictures = [view(scene, shift) for shift in shifts()]
-    path, _ = _follow(pictures, _FeatureTracker(CameraMotionOptions()))
+    path, _ = _register_all(pictures, _FeatureTracker(CameraMotionOptions()))
     assert np.abs(path[:, 0, 2] - shifts()).max() < 0.3
     assert np.abs(path[:, 1, 2]).max() < 0.3
 
 
 def follow_pan(scene, logo=False):
-    follower = _FeatureTracker(CameraMotionOptions())
-    path, _ = _follow([view(scene, s, logo) for s in np.linspace(0, 90, PAN)], follower, watch=2)
-    return path, follower.overlay.share(follower.keys[0].corners)
+    tracker = _FeatureTracker(CameraMotionOptions())
+    path, _ = _register_all(
+        [view(scene, s, logo) for s in np.linspace(0, 90, PAN)], tracker, watch=2
+    )
+    return path, tracker.overlay.share(tracker.keys[0].corners)
 
 
 def test_letters_laid_over_a_moving_scene_are_told_from_it(scene):

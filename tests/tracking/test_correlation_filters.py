@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from keyrecon.tracking.correlation_filters import learn_filters, peaks_at, respond, spectrum
+from keyrecon.tracking.correlation_filters import peaks_at, respond, solve_filters, spectrum
 
 SIZE = (48, 60)
 
@@ -21,7 +21,7 @@ def filters():
     places = generator.integers((12, 20), (48, 40), (30, 1, 2))
     spectra = np.stack([spectrum(picture(p, generator)) for p in places])
     targets = np.stack([peaks_at(p.astype(float), SIZE, 1.5)[None] for p in places])
-    return learn_filters(spectra, targets)
+    return solve_filters(spectra, targets)
 
 
 def test_a_part_is_found_where_no_example_had_it(filters):

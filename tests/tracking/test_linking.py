@@ -8,7 +8,7 @@ from keyrecon.segmentation.player_crops import Cropping
 from keyrecon.tracking.correlation_filters import clear_frames
 from keyrecon.tracking.linking import Detections, FootMotionModel, link_feet
 from keyrecon.tracking.smoothing import fill_gaps
-from keyrecon.tracking.tracker import search_crop
+from keyrecon.tracking.tracker import detect_in_crop
 
 COUNT, TALL = 60, 56.0
 HEAD, LEFT, RIGHT = (np.array(spot) for spot in ((200.0, 100.0), (195.0, 150.0), (205.0, 158.0)))
@@ -21,31 +21,30 @@ def track(feet=(LEFT, RIGHT)):
     return Track(head, both, np.full(COUNT, TALL), np.zeros((COUNT, 4)), np.ones(COUNT))
 
 
-def see(covered):
-    """Both feet are seen, the left one not while it is gone; the player covers all or nothing."""
-    cropping, seen = Cropping(track(), TALL), []
+def link(covered):
+    """Both feet are detected but for the left one while it is gone; all or nothing is covered."""
+    cropping, detections = Cropping.below_heads(track(), TALL), []
     gone = np.isin(np.arange(COUNT), np.arange(COUNT)[GONE])
     for t in range(COUNT):
         spots = np.stack([RIGHT] if gone[t] else [LEFT, RIGHT])
         places = cropping.from_picture(spots, t)
         strength = np.ones(len(places))
         mask = np.full([n // 2 for n in cropping.size], covered)
-        seen.append(Detections(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
+        detections.append(Detections(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
-    return link_feet(
-        seen, camera, cropping, track().head, FootMotionModel(0.04 * TALL, 50, 1.0, 1.0)
-    )
+    standing, motion = track(), FootMotionModel(0.04 * TALL, 50, 1.0, 1.0)
+    return link_feet(detections, camera, cropping, standing.head, standing.height, motion)
 
 
 def test_a_foot_behind_the_other_leg_stays_where_it_stood():
-    feet, confidence = see(covered=True)
+    feet, confidence = link(covered=True)
     off = np.linalg.norm(feet[:, :, None] - np.array([LEFT, RIGHT]), axis=3).min(axis=1)
     assert off.max() < 0.02 * TALL
     assert confidence[GONE].max() < confidence[:20].min()
 
 
 def test_a_foot_is_not_remembered_where_the_scene_shows_but_is_behind_the_other_leg():
-    feet, _ = see(covered=False)
+    feet, _ = link(covered=False)
     nearest, farthest = feet[30][np.argsort(-feet[30, :, 1])]
     assert nearest == pytest.approx(RIGHT, abs=0.02 * TALL)
     assert farthest[0] == pytest.approx(RIGHT[0], abs=0.02 * TALL)
@@ -61,11 +60,11 @@ def test_feet_that_stand_while_the_camera_turns_stand_in_between_too():
     assert placed[:, 0, 0] == pytest.approx(LEFT[0] + shift)
 
 
-def test_frames_with_a_racket_or_one_shoe_for_both_feet_teach_nothing():
-    told = track()
-    told.feet[10:20, 1] = (220, 136)
-    told.feet[30:40, 0] = (206, 158)
-    assert set(clear_frames(told)) == set(range(COUNT)) - set(range(10, 20)) - set(range(30, 40))
+def test_frames_with_a_racket_or_one_shoe_for_both_feet_are_not_trained_on():
+    rough = track()
+    rough.feet[10:20, 1] = (220, 136)
+    rough.feet[30:40, 0] = (206, 158)
+    assert set(clear_frames(rough)) == set(range(COUNT)) - set(range(10, 20)) - set(range(30, 40))
 
 
 def test_a_place_with_the_leg_beneath_it_is_less_a_foot_than_one_with_the_floor():
@@ -73,7 +72,9 @@ def test_a_place_with_the_leg_beneath_it_is_less_a_foot_than_one_with_the_floor(
     response[1, 60, 40] = response[1, 72, 60] = 1.0
     player = np.zeros((88, 96), np.float32)
     player[40:74, 36:45] = player[40:73, 56:65] = 1.0
-    seen = search_crop(response, (255 * player).astype(np.uint8), player, TALL)
-    strength = {round(x): s for (x, _), s in zip(seen.feet, seen.foot_strength, strict=True)}
+    detections = detect_in_crop(response, (255 * player).astype(np.uint8), player, TALL)
+    strength = {
+        round(x): s for (x, _), s in zip(detections.feet, detections.foot_strength, strict=True)
+    }
     assert strength[60] == pytest.approx(1.0)
     assert strength[40] == pytest.approx(0.5)

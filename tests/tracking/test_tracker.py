@@ -72,7 +72,7 @@ def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
 def test_a_video_too_long_for_its_pictures_to_be_kept_is_read_again(found, monkeypatch):
     _, video, camera, colors, _ = found
     kept = find_player(video, colors, camera)
-    monkeypatch.setattr("keyrecon.tracking.detection.MOST_KEPT", 0)
+    monkeypatch.setattr("keyrecon.tracking.detection.MAX_CACHE_BYTES", 0)
     again = find_player(video, colors, camera)
     assert (again.head == kept.head).all()
     assert (again.feet == kept.feet).all()
