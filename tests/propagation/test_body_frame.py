@@ -10,7 +10,7 @@ from keyrecon.records import CameraPath, Track
 def track_of(middle):
     """A player of 180 px whose midpoint of head and feet is given."""
     count = len(middle)
-    head, feet = middle - [0, 90], np.stack([middle + [0, 90]] * 2, axis=1)
+    head, feet = middle - [0, 90], np.repeat(middle[:, None] + [0, 90], 2, axis=1)
     return Track(head, feet, np.full(count, 180.0), np.zeros((count, 4)), np.ones(count))
 
 
