@@ -24,11 +24,10 @@ from unseen import unseen_model
 
 from keyrecon.app.console import show
 from keyrecon.keyframes.selection import KeyframeOptions
-from keyrecon.lifting import initial_motion as follow
-from keyrecon.lifting import lifting as lift
-from keyrecon.lifting.bone_directions import bone_vectors, breadths
+from keyrecon.lifting import lifting, motion_fitting
+from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSigns
-from keyrecon.lifting.lifting import LiftOptions, LiftResult, lift_motion
+from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
@@ -78,7 +77,11 @@ def carry(case: Case, model: DepthModel) -> Trial:
 def lift_trial(trial: Trial) -> LiftResult:
     """The lift as it is."""
     given = trial.tracks, trial.marks, trial.keyframes, trial.height_px, trial.fps
-    return lift_motion(*given, model=trial.model, options=LiftOptions(height=trial.height))
+    return lift_motion(
+        *given,
+        priors=LiftPriors(depth_model=trial.model),
+        options=LiftOptions(height=trial.height),
+    )
 
 
 def true_signs(trial: Trial) -> np.ndarray:
@@ -91,9 +94,9 @@ def true_size(trial: Trial) -> BodySize:
     """Lengths, breadths and scale of the truth."""
     points, skeleton = trial.truth["points3d"] / trial.height, trial.marks.skeleton
     lengths = np.median(np.linalg.norm(bone_vectors(points, skeleton), axis=-1), axis=0)
-    across = [points[:, left] - points[:, right] for left, right, _ in breadths(skeleton)]
+    across = [points[:, pair.left] - points[:, pair.right] for pair in skeleton.breadths]
     broad = np.median(np.linalg.norm(across, axis=-1), axis=1)
-    return BodySize(lengths, broad, trial.truth["focal"] / points[..., 2].mean(axis=1))
+    return BodySize(skeleton, lengths, broad, trial.truth["focal"] / points[..., 2].mean(axis=1))
 
 
 @contextmanager
@@ -103,15 +106,15 @@ def perfect_size(trial: Trial, lengths: bool = True, scale: bool = True) -> Iter
     Only the product of lengths and scale shows in the picture: where one is found, the other is
     brought to the same size of the whole body.
     """
-    estimate, true = lift.estimate_lengths, true_size(trial)
+    estimate, true = lifting.estimate_lengths, true_size(trial)
 
     def know(*given: object) -> BodySize:
         found = estimate(*given)
         bones, seen = true if lengths else found, true if scale else found
         factor = seen.lengths.sum() / bones.lengths.sum()
-        return BodySize(bones.lengths, bones.breadths, seen.scale * factor)
+        return BodySize(bones.skeleton, bones.lengths, bones.breadths, seen.scale * factor)
 
-    with patch.object(lift, "estimate_lengths", know):
+    with patch.object(lifting, "estimate_lengths", know):
         yield
 
 
@@ -120,7 +123,7 @@ def perfect_signs(trial: Trial) -> Iterator[None]:
     """Depth signs of every frame from the truth."""
     signs = true_signs(trial)
     known = DepthSigns(signs, np.ones(signs.shape))
-    with patch.object(follow, "follow_signs", lambda *given: known):
+    with patch.object(motion_fitting, "track_depth_signs", lambda *given: known):
         yield
 
 

@@ -6,10 +6,8 @@ joints that a person can mark: neck to head top, to both shoulders and to both h
 outwards along the limbs. A skeleton is a record of names and indices; nothing else in the
 package knows which joints exist, and a user can bring another one from a JSON file.
 
-Bone lengths are fractions of stature after Drillis and Contini (1966) as tabulated by Winter,
-"Biomechanics and Motor Control of Human Movement" (upper arm .186, forearm .146, thigh .245,
-shank .246, shoulder half breadth .129, hip half breadth .0955, hip line .530, shoulder line
-.818), with the neck placed .012 above the shoulder line.
+Bone lengths are fractions of stature, all of them in `MARKED_LENGTHS` and `JOINT_CENTER_LENGTHS`
+with their sources.
 """
 
 import json
@@ -21,6 +19,79 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.errors import KeyreconError, explain
+
+
+@dataclass(frozen=True)
+class BodyLengths:
+    """Lengths of the body as fractions of stature."""
+
+    neck_to_hip: float
+    """From the neck to one hip joint."""
+    trunk: float
+    """From the neck to the middle between the hip joints."""
+    head: float
+    """From the neck to the top of the head."""
+    shoulder: float
+    """From the neck to a shoulder joint."""
+    upper_arm: float
+    forearm: float
+    thigh: float
+    shank: float
+    hip_breadth: float
+    """Between the hip joints."""
+    shoulder_breadth: float
+    """Between the shoulder joints."""
+
+
+MARKED_LENGTHS = BodyLengths(
+    neck_to_hip=0.315,  # Pythagoras: trunk .300, outer half breadth .0955 (Winter)
+    trunk=0.300,  # shoulder line .818 less hip line .530 (Winter), the neck .012 higher
+    head=0.170,  # 1 less shoulder line .818 (Winter), the neck .012 higher
+    shoulder=0.130,  # half breadth .129 (Winter), the neck .012 higher
+    upper_arm=0.186,  # Winter
+    forearm=0.146,  # Winter
+    thigh=0.245,  # Winter
+    shank=0.246,  # Winter
+    # Midway between the joints' centres (.104) and the breadth over the hips (.191, Winter), since
+    # people mark somewhere between.
+    hip_breadth=0.145,
+    shoulder_breadth=0.258,  # twice the half breadth .129 (Winter)
+)
+"""Between joints as people mark them, on the outline of the body as it shows in pictures.
+
+Winter is Drillis and Contini (1966) as tabulated in his "Biomechanics and Motor Control of Human
+Movement". Its breadths are outer ones, over the deltoids and the trochanters."""
+JOINT_CENTER_LENGTHS = BodyLengths(
+    neck_to_hip=0.312,  # Pythagoras
+    trunk=0.308,  # mid-hip to mid-shoulder (de Leva), the neck .012 higher
+    head=0.161,  # what is left of stature above ankle height, shank, thigh and trunk
+    shoulder=0.095,  # half of what lies between the joints' centres; its source is not recorded
+    upper_arm=0.162,  # de Leva
+    forearm=0.155,  # de Leva
+    thigh=0.243,  # de Leva
+    shank=0.249,  # de Leva
+    hip_breadth=0.104,  # 0.36 of the pelvis's breadth on either side (Bell), .145 statures
+    shoulder_breadth=0.190,  # twice .095
+)
+"""Between centres of rotation, for bodies that are posed by turning their segments.
+
+De Leva is J. Biomechanics 29, 1996, men; Bell is Bell, Pedersen and Brand, J. Biomechanics 23,
+1990. Shoulder and hip joints lie well inside the outline, so the breadths are a quarter smaller
+than the marked ones, and the limbs differ by where a shoulder ends and an arm begins. The two
+tables stay apart: one is a prior of what is marked in pictures, the other the size of the
+simulated player whose motion prior was learnt with it."""
+ANKLE_HEIGHT = 0.039
+"""Ankle above the floor as a fraction of stature (Winter)."""
+
+
+@dataclass(frozen=True)
+class Breadth:
+    """Two joints that the trunk holds at a constant distance; no bone of the tree joins them."""
+
+    left: int
+    right: int
+    length: float
+    """Fraction of stature."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +130,25 @@ class Skeleton:
         return np.array([self.proportions[child] for _, child in self.bones])
 
     @cached_property
+    def ancestry(self) -> Float[np.ndarray, "J B"]:
+        """1 where a bone lies on the way from the root to a joint, else 0."""
+        ways = np.zeros((len(self.names), len(self.bones)))
+        for bone, (parent, child) in enumerate(self.bones):
+            ways[child] = ways[parent]
+            ways[child, bone] = 1.0
+        return ways
+
+    @cached_property
+    def breadths(self) -> tuple[Breadth, ...]:
+        """Hips and shoulders, where the skeleton has them."""
+        pairs = (("hip", MARKED_LENGTHS.hip_breadth), ("shoulder", MARKED_LENGTHS.shoulder_breadth))
+        return tuple(
+            Breadth(self.index(f"left_{name}"), self.index(f"right_{name}"), length)
+            for name, length in pairs
+            if {f"left_{name}", f"right_{name}"} <= set(self.names)
+        )
+
+    @cached_property
     def mirror(self) -> Int[np.ndarray, "J"]:
         """Index of each joint's mirror image; a joint on the midline is its own."""
         mirror = np.arange(len(self.names))
@@ -87,20 +177,20 @@ class Skeleton:
 
 
 _LSP = (  # name, parent, bone length in statures
-    ("right_ankle", "right_knee", 0.246),
-    ("right_knee", "right_hip", 0.245),
-    ("right_hip", "neck", 0.315),
-    ("left_hip", "neck", 0.315),
-    ("left_knee", "left_hip", 0.245),
-    ("left_ankle", "left_knee", 0.246),
-    ("right_wrist", "right_elbow", 0.146),
-    ("right_elbow", "right_shoulder", 0.186),
-    ("right_shoulder", "neck", 0.130),
-    ("left_shoulder", "neck", 0.130),
-    ("left_elbow", "left_shoulder", 0.186),
-    ("left_wrist", "left_elbow", 0.146),
+    ("right_ankle", "right_knee", MARKED_LENGTHS.shank),
+    ("right_knee", "right_hip", MARKED_LENGTHS.thigh),
+    ("right_hip", "neck", MARKED_LENGTHS.neck_to_hip),
+    ("left_hip", "neck", MARKED_LENGTHS.neck_to_hip),
+    ("left_knee", "left_hip", MARKED_LENGTHS.thigh),
+    ("left_ankle", "left_knee", MARKED_LENGTHS.shank),
+    ("right_wrist", "right_elbow", MARKED_LENGTHS.forearm),
+    ("right_elbow", "right_shoulder", MARKED_LENGTHS.upper_arm),
+    ("right_shoulder", "neck", MARKED_LENGTHS.shoulder),
+    ("left_shoulder", "neck", MARKED_LENGTHS.shoulder),
+    ("left_elbow", "left_shoulder", MARKED_LENGTHS.upper_arm),
+    ("left_wrist", "left_elbow", MARKED_LENGTHS.forearm),
     ("neck", None, 0.0),
-    ("head_top", "neck", 0.170),
+    ("head_top", "neck", MARKED_LENGTHS.head),
 )
 
 
@@ -123,13 +213,6 @@ LSP14 = _skeleton_from_rows(
     list(_LSP), [n for n, _, _ in _LSP if n.split("_")[-1] in ("hip", "knee", "ankle")]
 )
 """The default skeleton."""
-
-HIP_BREADTH = 0.145
-"""Distance between marked hips as a fraction of stature: midway between the joints' centres (.10,
-Bell, Pedersen and Brand, J. Biomechanics 23, 1990) and the breadth over the hips (.191, Winter),
-since people mark somewhere between."""
-SHOULDER_BREADTH = 0.258
-"""Distance between the shoulder joints as a fraction of stature (Winter)."""
 
 
 def read_skeleton(path: Path) -> Skeleton:

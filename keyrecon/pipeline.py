@@ -24,7 +24,7 @@ from keyrecon.keyframes.selection import (
     choose_keyframes,
     count_labels,
 )
-from keyrecon.lifting.lifting import LiftOptions, LiftResult, lift_motion
+from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, propagate_joints
@@ -226,8 +226,7 @@ def reconstruct(
         preparation.keyframes,
         height,
         video.fps,
-        expected,
-        models.depth,
+        LiftPriors(expected, models.depth),
         options=options.lift,
         progress=progress,
     )

@@ -7,21 +7,7 @@ lengths cannot drift, and under orthography each bone has just two unknowns.
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.body import HIP_BREADTH, SHOULDER_BREADTH, Skeleton
-
-_BREADTHS = (
-    ("left_hip", "right_hip", HIP_BREADTH),
-    ("left_shoulder", "right_shoulder", SHOULDER_BREADTH),
-)
-
-
-def ancestry(skeleton: Skeleton) -> Float[np.ndarray, "J B"]:
-    """1 where a bone lies on the way from the root to a joint, else 0."""
-    ways = np.zeros((len(skeleton.names), len(skeleton.bones)))
-    for bone, (parent, child) in enumerate(skeleton.bones):
-        ways[child] = ways[parent]
-        ways[child, bone] = 1.0
-    return ways
+from keyrecon.body import Skeleton
 
 
 def pose_from_directions(
@@ -41,15 +27,3 @@ def bone_vectors(
 ) -> Float[np.ndarray, "T B D"]:
     """From the parent to the child end of every bone."""
     return points[:, skeleton.bones[:, 1]] - points[:, skeleton.bones[:, 0]]
-
-
-def breadths(skeleton: Skeleton) -> tuple[tuple[int, int, float], ...]:
-    """Pairs of joints that the trunk holds at a constant distance: (left, right, statures).
-
-    Hips and shoulders, where the skeleton has them; they are no bones of the tree.
-    """
-    return tuple(
-        (skeleton.index(left), skeleton.index(right), breadth)
-        for left, right, breadth in _BREADTHS
-        if left in skeleton.names and right in skeleton.names
-    )

@@ -1,4 +1,4 @@
-"""What is known of depth signs: what speaks for them, what the picture shows, and the answer."""
+"""Depth signs: the weights of the evidence, what the picture tells of bones, and the signs."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -9,23 +9,26 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True)
 class DepthSignOptions:
-    """What speaks for a sign, and how loudly; per frame at 50 frames a second."""
+    """Weights of the evidence for a sign; per frame at 50 frames a second.
 
-    confirmed: float = 8.0
+    Chosen on rendered sequences; see benchmarks/sensitivity.py.
+    """
+
+    annotated: float = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
-    limits: float = 0.15
+    joint_limits: float = 0.15
     """Weight of joint limits per frame; errors stay alike over several frames."""
-    votes: float = 0.3
-    """Weight of the key poses per frame."""
-    guide: float = 1.0
+    exemplars: float = 0.3
+    """Weight, per frame, of the key poses that are alike in the picture."""
+    initial_motion: float = 1.0
     """Weight of the slerped key poses per frame."""
-    usual: float = 0.7
-    """Weight, per frame, of the depth that limbs usually have where they look like this."""
-    alike: float = 0.08
-    """Difference of shown bone vectors at which two poses look alike, statures."""
-    jerk: float = 0.1
-    """Second difference of depth between frames to be expected, statures."""
-    reach: float = 6.0
+    expected_depth: float = 0.7
+    """Weight, per frame, of the depth model's expectation."""
+    exemplar_spread: float = 0.08
+    """Standard deviation of bone vectors in the picture between alike poses, statures."""
+    acceleration: float = 0.1
+    """Standard deviation of the second difference of depth over 1/50 s, statures."""
+    max_jump_cost: float = 6.0
     """Largest cost of one jump, nats."""
 
 
@@ -34,32 +37,34 @@ def at_rate(options: DepthSignOptions, fps: float) -> DepthSignOptions:
     step = 50.0 / fps
     return replace(
         options,
-        limits=options.limits * step,
-        votes=options.votes * step,
-        guide=options.guide * step,
-        usual=options.usual * step,
-        jerk=options.jerk * step**2,
+        joint_limits=options.joint_limits * step,
+        exemplars=options.exemplars * step,
+        initial_motion=options.initial_motion * step,
+        expected_depth=options.expected_depth * step,
+        acceleration=options.acceleration * step**2,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class ForeshortenedBones:
-    """Bones as the picture shows them: everything but the sign of their depth."""
+    """Bones as they appear in the picture: everything but the sign of their depth."""
 
-    flat: Float[np.ndarray, "T B 2"]
+    in_plane: Float[np.ndarray, "T B 2"]
     """In-plane part of the bone vectors, statures."""
     depth: Float[np.ndarray, "T B"]
     """|dz|, statures."""
-    doubt: Float[np.ndarray, "T B"]
+    depth_spread: Float[np.ndarray, "T B"]
     """Standard deviation of |dz|, statures."""
-    usual: Float[np.ndarray, "T B"]
-    """Depth, with its sign, that bones usually have that look like this, statures; NaN where
-    nothing is known of that."""
+    expected_depth: Float[np.ndarray, "T B"]
+    """Depth with its sign by a depth model, statures; NaN where there is none."""
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> "ForeshortenedBones":
         """Some of the frames."""
         return ForeshortenedBones(
-            self.flat[frames], self.depth[frames], self.doubt[frames], self.usual[frames]
+            self.in_plane[frames],
+            self.depth[frames],
+            self.depth_spread[frames],
+            self.expected_depth[frames],
         )
 
 
@@ -77,9 +82,6 @@ def sign_states(bones: int) -> Int[np.ndarray, "S g"]:
     return np.array(list(product((1, -1), repeat=bones)))
 
 
-def sign_depths(
-    bones: tuple[int, ...], shown: ForeshortenedBones
-) -> tuple[Float[np.ndarray, "T S g"], Float[np.ndarray, "T g"]]:
-    """Depth of a group of bones for every sign vector, and its doubt, statures."""
-    states = sign_states(len(bones))
-    return states * shown.depth[:, None, list(bones)], shown.doubt[:, list(bones)]
+def sign_depths(group: tuple[int, ...], bones: ForeshortenedBones) -> Float[np.ndarray, "T S g"]:
+    """Depth of a group of bones for every sign vector, statures."""
+    return sign_states(len(group)) * bones.depth[:, None, list(group)]

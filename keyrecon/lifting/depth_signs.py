@@ -5,8 +5,8 @@ scale and lengths the 2^B reconstructions fall apart into small groups (trunk, l
 coupled through joint limits. For single poses the cheapest signs of trunk and limbs are found
 exactly: limbs hang on the trunk as a tree. Over time each group is a chain whose states are
 the sign vectors of its bones; a second-order cost on depth lets a bone swing through the image
-plane, which a first-order one would take for a bounce. The key poses vote, where they look
-alike in the picture, for the depths that the person confirmed there.
+plane, which a first-order one would take for a bounce. Key poses that are alike in the picture
+are exemplars of the depths that the person annotated there.
 """
 
 from functools import lru_cache
@@ -37,15 +37,15 @@ from keyrecon.lifting.priors.occlusion import hidden_cost
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
-_USUAL_SPREAD = 0.4
-"""How far depths are from the usual, in lengths of the bone: root mean square over players whose
-captures a model had not learnt from."""
-_CHUNK = 200
-"""Frames whose jumps are weighed at once: 7 MB."""
+_EXPECTED_DEPTH_SPREAD = 0.4
+"""Error of a depth model, in lengths of the bone: root mean square over players whose captures a
+model had not learnt from."""
+_CHUNK_FRAMES = 200
+"""Frames whose transitions are computed at once: 7 MB."""
 
 
 def choose_depth_signs(
-    shown: ForeshortenedBones,
+    bones: ForeshortenedBones,
     nearer: Int[np.ndarray, "T B"],
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
@@ -56,24 +56,25 @@ def choose_depth_signs(
     `nearer` as in `Annotations` (1: child end nearer, dz < 0); `breadths` in statures.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = sign_costs(shown, nearer, breadths, skeleton, options)
+    trunk, limbs = sign_costs(bones, nearer, breadths, skeleton, options)
     total = trunk + sum(cost.min(axis=-1) for cost in limbs)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
     rows = np.arange(len(sign))
     best = total.argmin(axis=1)
     if anatomy.trunk:
-        bones = list(anatomy.trunk)
-        sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
+        group = list(anatomy.trunk)
+        sign[:, group], probability[:, group] = _signs_of_states(best, total, len(group))
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         given = cost[rows, best % cost.shape[1]]
-        bones = list(limb.bones)
-        sign[:, bones], probability[:, bones] = _read(given.argmin(axis=1), given, len(bones))
+        group = list(limb.bones)
+        signs = _signs_of_states(given.argmin(axis=1), given, len(group))
+        sign[:, group], probability[:, group] = signs
     return DepthSigns(sign, probability)
 
 
 def sign_costs(
-    shown: ForeshortenedBones,
+    bones: ForeshortenedBones,
     nearer: Int[np.ndarray, "T B"],
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
@@ -84,18 +85,18 @@ def sign_costs(
     States as `sign_states` lists them, limbs in the order of `anatomy_of`.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = _costs(shown, breadths, anatomy, (1.0, 1.0))
-    trunk = trunk + _contradiction(anatomy.trunk, nearer, options.confirmed)
+    trunk, limbs = _prior_costs(bones, breadths, anatomy, 1.0, 1.0)
+    trunk = trunk + _contradiction_cost(anatomy.trunk, nearer, options.annotated)
     limbs = [
-        cost + _contradiction(limb.bones, nearer, options.confirmed)[:, None]
+        cost + _contradiction_cost(limb.bones, nearer, options.annotated)[:, None]
         for limb, cost in zip(anatomy.limbs, limbs, strict=True)
     ]
     return trunk, limbs
 
 
 def track_depth_signs(
-    shown: ForeshortenedBones,
-    votes: ExemplarPrior,
+    bones: ForeshortenedBones,
+    exemplars: ExemplarPrior,
     breadths: Float[np.ndarray, "P"],
     skeleton: Skeleton,
     options: DepthSignOptions = DepthSignOptions(),
@@ -103,47 +104,43 @@ def track_depth_signs(
 ) -> DepthSigns:
     """Signs in every frame of a sequence, group by group: trunk first, then what hangs on it.
 
-    `hidden` tells of joints that were marked though they could not be seen.
+    `hidden`: joints that were marked as not visible.
     """
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = _costs(shown, breadths, anatomy, (options.limits, options.usual))
+    trunk, limbs = _prior_costs(
+        bones, breadths, anatomy, options.joint_limits, options.expected_depth
+    )
     if hidden is not None:
-        limbs = _with_hidden(limbs, shown, hidden, skeleton)
-    sign = np.ones(shown.depth.shape, dtype=np.int64)
-    probability = np.ones(shown.depth.shape)
+        limbs = _with_occlusion(limbs, bones, hidden, skeleton)
+    sign = np.ones(bones.depth.shape, dtype=np.int64)
+    probability = np.ones(bones.depth.shape)
     rows = np.arange(len(sign))
     best = np.zeros(len(sign), dtype=np.int64)
     if anatomy.trunk:
         total = trunk + sum(cost.min(axis=-1) for cost in limbs)
-        total += votes.cost(anatomy.trunk, shown, options)
-        total += votes.guided(anatomy.trunk, shown, options)
-        best = _path(total, anatomy.trunk, shown, options)
-        bones = list(anatomy.trunk)
-        sign[:, bones], probability[:, bones] = _read(best, total, len(bones))
+        total += exemplars.cost(anatomy.trunk, bones, options)
+        total += exemplars.initial_motion_cost(anatomy.trunk, bones, options)
+        group = list(anatomy.trunk)
+        best = second_order_path(
+            total, bones.depth[:, group], bones.depth_spread[:, group], options
+        )
+        sign[:, group], probability[:, group] = _signs_of_states(best, total, len(group))
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         given = cost[rows, best % cost.shape[1]]
-        given += votes.cost(limb.bones, shown, options)
-        given += votes.guided(limb.bones, shown, options)
-        path = _path(given, limb.bones, shown, options)
-        bones = list(limb.bones)
-        sign[:, bones], probability[:, bones] = _read(path, given, len(bones))
+        given += exemplars.cost(limb.bones, bones, options)
+        given += exemplars.initial_motion_cost(limb.bones, bones, options)
+        group = list(limb.bones)
+        path = second_order_path(
+            given, bones.depth[:, group], bones.depth_spread[:, group], options
+        )
+        sign[:, group], probability[:, group] = _signs_of_states(path, given, len(group))
     return DepthSigns(sign, probability)
-
-
-def _path(
-    cost: Float[np.ndarray, "T S"],
-    bones: tuple[int, ...],
-    shown: ForeshortenedBones,
-    options: DepthSignOptions,
-) -> Int[np.ndarray, "T"]:
-    members = list(bones)
-    return second_order_path(cost, shown.depth[:, members], shown.doubt[:, members], options)
 
 
 def second_order_path(
     cost: Float[np.ndarray, "T S"],
     depth: Float[np.ndarray, "T g"],
-    doubt: Float[np.ndarray, "T g"],
+    depth_spread: Float[np.ndarray, "T g"],
     options: DepthSignOptions,
 ) -> Int[np.ndarray, "T"]:
     """Cheapest sequence of states; jumps in the second difference of depth cost.
@@ -156,83 +153,88 @@ def second_order_path(
 
     @lru_cache(maxsize=1)
     def jumps_of(chunk: int) -> Float[np.ndarray, "n S S S"]:
-        first = chunk * _CHUNK
-        last = min(first + _CHUNK, frames - 2)
-        return _jumps(depth[first : last + 2], doubt[first + 1 : last + 1], options)
+        first = chunk * _CHUNK_FRAMES
+        last = min(first + _CHUNK_FRAMES, frames - 2)
+        return _jump_costs(depth[first : last + 2], depth_spread[first + 1 : last + 1], options)
 
     def transition(before: int, _: int) -> Float[np.ndarray, "S S S"]:
-        return jumps_of(before // _CHUNK)[before % _CHUNK]
+        return jumps_of(before // _CHUNK_FRAMES)[before % _CHUNK_FRAMES]
 
     pairs = np.broadcast_to(cost[2:, None], (frames - 2, states, states))
     return find_cheapest_path([cost[0][:, None] + cost[1], *pairs], transition)
 
 
-def _jumps(
-    depth: Float[np.ndarray, "m g"], doubt: Float[np.ndarray, "n g"], options: DepthSignOptions
+def _jump_costs(
+    depth: Float[np.ndarray, "m g"],
+    depth_spread: Float[np.ndarray, "n g"],
+    options: DepthSignOptions,
 ) -> Float[np.ndarray, "n S S S"]:
-    """Cost of all states of three frames in a row: a sum over bones, of their own signs."""
+    """Cost of all states of three frames in a row: a sum over bones, each with its own sign."""
     signs = np.array([1.0, -1.0])
-    before, now, after = (depth[k : k + len(doubt), :, None] * signs for k in range(3))
+    before, now, after = (depth[k : k + len(depth_spread), :, None] * signs for k in range(3))
     bend = before[..., :, None, None] - 2 * now[..., None, :, None] + after[..., None, None, :]
-    each = bend**2 / (2 * (options.jerk**2 + doubt**2))[..., None, None, None]
-    bones, total = doubt.shape[1], np.zeros(1)
+    variance = options.acceleration**2 + depth_spread**2
+    each = bend**2 / (2 * variance)[..., None, None, None]
+    bones, total = depth_spread.shape[1], np.zeros(1)
     for bone in range(bones):
-        own = [2 if b == bone else 1 for b in range(bones)]
-        total = total + each[:, bone].reshape(-1, *own, *own, *own)
-    return np.minimum(total, options.reach).reshape(-1, *[2**bones] * 3)
+        axes = [2 if b == bone else 1 for b in range(bones)]
+        total = total + each[:, bone].reshape(-1, *axes, *axes, *axes)
+    return np.minimum(total, options.max_jump_cost).reshape(-1, *[2**bones] * 3)
 
 
-def _costs(
-    shown: ForeshortenedBones,
+def _prior_costs(
+    bones: ForeshortenedBones,
     breadths: Float[np.ndarray, "P"],
     anatomy: Anatomy,
-    weights: tuple[float, float],
+    limit_weight: float,
+    expected_depth_weight: float,
 ) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of every trunk state, and of every limb state given it.
 
-    `weights` of joint limits and of what is usual. The latter is not asked about the trunk: its
-    lean cannot be told from a camera that looks down, so what is usual there tells of cameras.
+    The depth model is not asked about the trunk: its lean cannot be told from a camera that looks
+    down, so what a model expects there tells of cameras.
     """
-    limits, usual = weights
-    trunk, limbs = _limit_costs(shown, breadths, anatomy)
-    return limits * trunk, [
-        limits * cost + usual * _unusual(limb.bones, shown)[:, None]
+    trunk, limbs = _limit_costs(bones, breadths, anatomy)
+    return limit_weight * trunk, [
+        limit_weight * cost
+        + expected_depth_weight * _expected_depth_cost(limb.bones, bones)[:, None]
         for limb, cost in zip(anatomy.limbs, limbs, strict=True)
     ]
 
 
-def _unusual(bones: tuple[int, ...], shown: ForeshortenedBones) -> Float[np.ndarray, "T S"]:
-    """How far the depth of a group of bones is from the usual, for every sign vector, nats."""
-    depth, doubt = sign_depths(bones, shown)
-    usual = shown.usual[:, None, list(bones)]
-    length = np.sqrt((shown.flat**2).sum(axis=-1) + shown.depth**2)[:, None, list(bones)]
-    spread = (_USUAL_SPREAD * length) ** 2 + doubt[:, None] ** 2
-    return np.nan_to_num((depth - usual) ** 2 / (2 * spread)).sum(axis=-1)
+def _expected_depth_cost(
+    group: tuple[int, ...], bones: ForeshortenedBones
+) -> Float[np.ndarray, "T S"]:
+    """How far the depth of a group of bones is from the expected, for every sign vector, nats."""
+    depth, members = sign_depths(group, bones), list(group)
+    expected = bones.expected_depth[:, None, members]
+    length = np.sqrt((bones.in_plane**2).sum(axis=-1) + bones.depth**2)[:, None, members]
+    variance = (_EXPECTED_DEPTH_SPREAD * length) ** 2 + bones.depth_spread[:, None, members] ** 2
+    return np.nan_to_num((depth - expected) ** 2 / (2 * variance)).sum(axis=-1)
 
 
 def _limit_costs(
-    shown: ForeshortenedBones, breadths: Float[np.ndarray, "P"], anatomy: Anatomy
+    bones: ForeshortenedBones, breadths: Float[np.ndarray, "P"], anatomy: Anatomy
 ) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
     """Cost of joint limits for every trunk state, and of every limb state given it."""
-    frames = len(shown.flat)
+    frames = len(bones.in_plane)
     if not anatomy.trunk:
         free = [np.zeros((frames, 1, 2 ** len(limb.bones))) for limb in anatomy.limbs]
         return np.zeros((frames, 1)), free
-    corners = _candidates(anatomy.trunk, shown)
+    corners = _vectors_of_states(anatomy.trunk, bones)
     trunk = trunk_cost(corners, breadths)
     hips, shoulders, up = trunk_axes(corners)
     limbs = []
     for limb in anatomy.limbs:
-        bones = _candidates(limb.bones, shown)[:, None]
-        bones = unit_vectors(bones, 1e-9)
+        directions = unit_vectors(_vectors_of_states(limb.bones, bones)[:, None], 1e-9)
         axes = hips if limb.kind == "leg" else shoulders
-        limbs.append(_limb_cost(limb, bones, axes[:, :, None], up[:, :, None]))
+        limbs.append(_limb_cost(limb, directions, axes[:, :, None], up[:, :, None]))
     return trunk, limbs
 
 
-def _with_hidden(
+def _with_occlusion(
     limbs: list[Float[np.ndarray, "T S _"]],
-    shown: ForeshortenedBones,
+    bones: ForeshortenedBones,
     hidden: Bool[np.ndarray, "T J"],
     skeleton: Skeleton,
 ) -> list[Float[np.ndarray, "T S _"]]:
@@ -241,51 +243,53 @@ def _with_hidden(
     frames = np.flatnonzero(hidden.any(axis=1))
     if not anatomy.trunk or not len(frames):
         return limbs
-    seen = shown.part(frames)
-    corners = _candidates(anatomy.trunk, seen)
+    observed = bones.part(frames)
+    corners = _vectors_of_states(anatomy.trunk, observed)
     result = []
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         if limb.kind == "arm":
             joints = list(skeleton.bones[list(limb.bones), 1])
             shoulder = corners[:, :, 2 if limb.side > 0 else 3]
-            bones = _candidates(limb.bones, seen)
-            cost[frames] += hidden_cost(corners, shoulder, bones, hidden[frames][:, joints])
+            vectors = _vectors_of_states(limb.bones, observed)
+            cost[frames] += hidden_cost(corners, shoulder, vectors, hidden[frames][:, joints])
         result.append(cost)
     return result
 
 
 def _limb_cost(
     limb: Limb,
-    bones: Float[np.ndarray, "T 1 L g 3"],
+    directions: Float[np.ndarray, "T 1 L g 3"],
     axis: Float[np.ndarray, "T S 1 3"],
     up: Float[np.ndarray, "T S 1 3"],
 ) -> Float[np.ndarray, "T S L"]:
     if limb.kind == "leg":
-        return leg_cost(axis, up, bones[..., 0, :], bones[..., 1, :], limb.side)
+        return leg_cost(axis, up, directions[..., 0, :], directions[..., 1, :], limb.side)
     if limb.kind == "arm":
-        return arm_cost(axis, up, bones[..., 0, :], bones[..., 1, :], limb.side)
+        return arm_cost(axis, up, directions[..., 0, :], directions[..., 1, :], limb.side)
     if limb.kind == "head":
-        return head_cost(axis, up, bones[..., 0, :])
-    return np.zeros((*axis.shape[:2], bones.shape[2]))
+        return head_cost(axis, up, directions[..., 0, :])
+    return np.zeros((*axis.shape[:2], directions.shape[2]))
 
 
-def _candidates(bones: tuple[int, ...], shown: ForeshortenedBones) -> Float[np.ndarray, "T S g 3"]:
+def _vectors_of_states(
+    group: tuple[int, ...], bones: ForeshortenedBones
+) -> Float[np.ndarray, "T S g 3"]:
     """Bone vectors for every sign vector of a group."""
-    depth, _ = sign_depths(bones, shown)
-    flat = np.broadcast_to(shown.flat[:, None, list(bones)], (*depth.shape, 2))
-    return np.concatenate([flat, depth[..., None]], axis=-1)
+    depth = sign_depths(group, bones)
+    in_plane = np.broadcast_to(bones.in_plane[:, None, list(group)], (*depth.shape, 2))
+    return np.concatenate([in_plane, depth[..., None]], axis=-1)
 
 
-def _contradiction(
-    bones: tuple[int, ...], nearer: Int[np.ndarray, "T B"], cost: float
+def _contradiction_cost(
+    group: tuple[int, ...], nearer: Int[np.ndarray, "T B"], cost: float
 ) -> Float[np.ndarray, "T S"]:
-    if not bones:
+    if not group:
         return np.zeros((len(nearer), 1))
-    wanted = -nearer[:, None, list(bones)]
-    return cost * ((sign_states(len(bones)) * wanted) < 0).sum(-1)
+    annotated = -nearer[:, None, list(group)]
+    return cost * ((sign_states(len(group)) * annotated) < 0).sum(-1)
 
 
-def _read(
+def _signs_of_states(
     best: Int[np.ndarray, "T"], cost: Float[np.ndarray, "T S"], bones: int
 ) -> tuple[Int[np.ndarray, "T g"], Float[np.ndarray, "T g"]]:
     """Signs of the chosen states, and their probability by the costs of all states."""

@@ -1,11 +1,11 @@
-"""How long a bone looks whose direction is unknown, and how deep it then reaches.
+"""Foreshortening: the length in the picture of a bone of unknown direction, and its depth.
 
-A bone of length l under scaled orthography shows |dp| = s l r. With its direction equally
-likely everywhere, its depth share c = |dz| / l is uniform on [0, 1] and r = sqrt(1 - c^2) is
-crowded towards 1. Marking noise blurs r. This module tabulates, over the shown length
-q = |dp| / (s l) and its relative noise nu, the density of log q and the expected depth share
-E[c | q]; the latter replaces Taylor's sqrt(1 - q^2), whose slope is infinite at q = 1 and
-which has no value beyond (Taylor, CVIU 80, 2000).
+A bone of length l under scaled orthography has the length |dp| = s l r in the picture. With its
+direction equally likely everywhere, its depth share c = |dz| / l is uniform on [0, 1] and
+r = sqrt(1 - c^2) is crowded towards 1. Marking noise blurs r. This module tabulates, over the
+foreshortening q = |dp| / (s l) and its relative noise nu, the density of log q and the expected
+depth share E[c | q]; the latter replaces Taylor's sqrt(1 - q^2), whose slope is infinite at q = 1
+and which has no value beyond (Taylor, CVIU 80, 2000).
 """
 
 from functools import cache
@@ -15,48 +15,52 @@ from jaxtyping import Float
 from scipy.interpolate import RectBivariateSpline
 
 _OUTLIER_SHARE = 0.03
-"""Density of gross errors over log q: one shown length in thirty says nothing."""
-_LONGEST, _FINEST, _COARSEST = 2.0, 0.005, 0.8
+"""Density of gross errors over log q: one observed length in thirty says nothing. Chosen on
+rendered sequences; see benchmarks/sensitivity.py."""
+_MAX_FORESHORTENING, _MIN_NOISE, _MAX_NOISE = 2.0, 0.005, 0.8
+"""Range of the tables."""
 
 
 INCLINATIONS = (-1.0, 0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
 """How a bone may prefer some directions: towards the image (negative) or the line of sight."""
 
 
-def _leaning_weight(share: Float[np.ndarray, "n"], leaning: float) -> Float[np.ndarray, "n"]:
-    """Density of the depth share: c^k for a leaning k > 0, (1 - c)^|k| for k < 0."""
-    power = abs(leaning)
-    return (power + 1) * (share if leaning > 0 else 1 - share) ** power
+def _inclination_weight(
+    share: Float[np.ndarray, "n"], inclination: float
+) -> Float[np.ndarray, "n"]:
+    """Density of the depth share: c^k for an inclination k > 0, (1 - c)^|k| for k < 0."""
+    power = abs(inclination)
+    return (power + 1) * (share if inclination > 0 else 1 - share) ** power
 
 
 @cache
 def _kernel() -> tuple[Float[np.ndarray, "..."], ...]:
-    """Blurred densities of the shown length for single depth shares on the grid."""
-    shown = np.linspace(0.0, _LONGEST, 301)
-    noise = np.geomspace(_FINEST, _COARSEST, 20)
+    """Blurred densities of the foreshortening for single depth shares on the grid."""
+    foreshortening = np.linspace(0.0, _MAX_FORESHORTENING, 301)
+    noise = np.geomspace(_MIN_NOISE, _MAX_NOISE, 20)
     share = (np.arange(400) + 0.5) / 400
-    gap = (shown[:, None, None] - np.sqrt(1 - share**2)) / noise[:, None]
+    gap = (foreshortening[:, None, None] - np.sqrt(1 - share**2)) / noise[:, None]
     exponent = -0.5 * gap**2
     peak = exponent.max(axis=-1)
-    return shown, noise, share, peak, np.exp(exponent - peak[..., None])
+    return foreshortening, noise, share, peak, np.exp(exponent - peak[..., None])
 
 
 @cache
-def _density(leaning: float) -> RectBivariateSpline:
-    shown, noise, share, peak, kernel = _kernel()
-    weight = _leaning_weight(share, leaning)
+def _density(inclination: float) -> RectBivariateSpline:
+    foreshortening, noise, share, peak, kernel = _kernel()
+    weight = _inclination_weight(share, inclination)
     density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
-    table = np.log(shown[:, None] * density + _OUTLIER_SHARE)
-    return RectBivariateSpline(shown, np.log(noise), table, kx=2, ky=1)
+    table = np.log(foreshortening[:, None] * density + _OUTLIER_SHARE)
+    return RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=1)
 
 
 @cache
 def _moments() -> tuple[RectBivariateSpline, RectBivariateSpline]:
-    shown, noise, share, _, kernel = _kernel()
+    foreshortening, noise, share, _, kernel = _kernel()
     total = kernel.sum(axis=-1)
     mean = kernel @ share / total
     variance = np.maximum(kernel @ share**2 / total - mean**2, 0.0)
-    grid = (shown, np.log(noise))
+    grid = (foreshortening, np.log(noise))
     return (
         RectBivariateSpline(*grid, mean, kx=1, ky=1),
         RectBivariateSpline(*grid, np.sqrt(variance), kx=1, ky=1),
@@ -64,31 +68,35 @@ def _moments() -> tuple[RectBivariateSpline, RectBivariateSpline]:
 
 
 def log_density(
-    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"], leaning: float = 0.0
+    foreshortening: Float[np.ndarray, "*n"],
+    noise: Float[np.ndarray, "*n"],
+    inclination: float = 0.0,
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
     """Logarithm of the density of log q, and its derivative by q."""
-    at = _grid(shown, noise)
-    table = _density(leaning)
+    at = _grid(foreshortening, noise)
+    table = _density(inclination)
     return table.ev(*at), table.ev(*at, dx=1)
 
 
 def depth_share(
-    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
+    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
 ) -> Float[np.ndarray, "*n"]:
-    """Expected |dz| / l of a bone that shows the share `shown` of its length."""
+    """Expected |dz| / l of a bone of which the picture shows the share `foreshortening`."""
     mean, _ = _moments()
-    return mean.ev(*_grid(shown, noise))
+    return mean.ev(*_grid(foreshortening, noise))
 
 
-def depth_doubt(
-    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
+def depth_share_spread(
+    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
 ) -> Float[np.ndarray, "*n"]:
     """Standard deviation of |dz| / l about `depth_share`."""
     _, deviation = _moments()
-    return deviation.ev(*_grid(shown, noise))
+    return deviation.ev(*_grid(foreshortening, noise))
 
 
 def _grid(
-    shown: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
+    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
-    return np.clip(shown, 0.0, _LONGEST), np.log(np.clip(noise, _FINEST, _COARSEST))
+    return np.clip(foreshortening, 0.0, _MAX_FORESHORTENING), np.log(
+        np.clip(noise, _MIN_NOISE, _MAX_NOISE)
+    )

@@ -52,8 +52,8 @@ def interpolate_poses(
         (keyframes.lower, skeleton.is_lower, lower_bone),
     ):
         key = _key_index(half, key_frames)
-        misfit = reprojection_residual(flat[key][:, member], joints[:, member])
-        control = drop_controls(half, misfit, keyframes.reach)
+        residual = reprojection_residual(flat[key][:, member], joints[:, member])
+        control = drop_controls(half, residual, keyframes.reach)
         poses = key_directions[key[control]][:, bones]
         directions[:, bones] = slerp_between(poses, control, len(joints))
         controls.append(control)
@@ -79,7 +79,7 @@ def reprojection_residual(
 
 
 def drop_controls(
-    half: HalfKeyframes, misfit: Float[np.ndarray, "T"], reach: int
+    half: HalfKeyframes, residual: Float[np.ndarray, "T"], reach: int
 ) -> Int[np.ndarray, "u"]:
     """Represented frames that remain control points; gaps grow to `reach` frames at most."""
     frames = np.flatnonzero(half.represented)
@@ -91,7 +91,7 @@ def drop_controls(
     before = np.arange(-1, len(frames) - 1)
     after = np.arange(1, len(frames) + 1)
     kept = np.ones(len(frames), dtype=bool)
-    heap = [(-misfit[frame], int(frame), i) for i, frame in enumerate(frames)]
+    heap = [(-residual[frame], int(frame), i) for i, frame in enumerate(frames)]
     heapq.heapify(heap)
     while heap:
         _, _, i = heapq.heappop(heap)
@@ -108,7 +108,7 @@ def drop_controls(
 def slerp_between(
     directions: Float[np.ndarray, "u B 3"], frames: Int[np.ndarray, "u"], count: int
 ) -> Float[np.ndarray, "T B 3"]:
-    """Unit vectors at `frames` carried to all frames; held before the first and after the last."""
+    """Unit vectors at `frames` interpolated to all frames, and held before and after them."""
     time = np.clip(np.arange(count), frames[0], frames[-1])
     right = np.clip(np.searchsorted(frames, time, side="left"), 1, max(len(frames) - 1, 1))
     right = np.minimum(right, len(frames) - 1)

@@ -1,11 +1,10 @@
-"""Depth signs of the keyframes, read from the frames around them.
+"""Depth signs of the keyframes, inferred from the frames around them.
 
 A single picture often fits two poses that are each other's mirror image. Over time one of them
-becomes absurd: the signs of a whole sequence are followed first, by what bodies do and by how
-depth moves, with the person's signs pinned, and the keyframes adopt what they passed through
+becomes absurd: the signs of a whole sequence are tracked first, by the priors on bodies and by how
+depth moves, with the person's signs fixed, and the keyframes adopt what they passed through
 (automatic default A: continuity first, then key poses). Joints marked as hidden within the trunk's
-outline speak for an arm behind it. Long motions are taken in pieces, with frames on both sides that
-are only looked at.
+outline speak for an arm behind it. Long motions are taken in chunks, with a margin on both sides.
 """
 
 from dataclasses import replace
@@ -16,70 +15,67 @@ from jaxtyping import Float
 from keyrecon.lifting.depth_evidence import DepthSignOptions, DepthSigns, at_rate
 from keyrecon.lifting.depth_signs import track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
-from keyrecon.lifting.preprocessing import PreparedTracks, smooth_joints
+from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks, smooth_joints
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
-from keyrecon.records import Annotations
 
-_SMOOTH_SECONDS = 0.03
-_SMOOTHED = 0.02
+_SMOOTHING_SECONDS = 0.03
+"""Standard deviation of the smoothing of the tracks; half of the fastest stroke's rise."""
+_SMOOTHED_NOISE = 0.02
 """Standard deviation of smoothed joints, body heights; marked joints are sharper."""
-_PIECE, _ASIDE = 2000, 100
-"""Frames decided together, and frames looked at on both sides of them."""
+_CHUNK_FRAMES, _MARGIN_FRAMES = 2000, 100
+"""Frames decided together, and further frames on both sides of them that are tracked with them."""
 
 
 def infer_keyframe_signs(
     observed: PreparedTracks,
-    annotations: Annotations,
+    marks: KeyframeMarks,
     size: BodySize,
     fps: float,
     options: DepthSignOptions = DepthSignOptions(),
     model: DepthModel | None = None,
 ) -> DepthSigns:
-    """Signs of every bone in every keyframe; those that the person confirmed stay."""
-    frames, nearer = annotations.frames, annotations.nearer
-    joints, noise = _joints(observed, annotations, fps)
-    shown = foreshorten_bones(joints, noise, size.lengths, annotations.skeleton, model)
-    vectors = np.concatenate([shown.flat, shown.depth[..., None]], axis=-1)[frames]
+    """Signs of every bone in every keyframe; those that the person annotated stay."""
+    skeleton, frames, nearer = size.skeleton, marks.frames, marks.nearer
+    joints = _smoothed_joints(observed, marks, fps)
+    noise = np.full(joints.shape[:2], _SMOOTHED_NOISE)
+    noise[frames] = np.where(marks.marked, observed.spread[frames], _SMOOTHED_NOISE)
+    bones = foreshorten_bones(joints, noise, size.lengths, skeleton, model)
+    vectors = np.concatenate([bones.in_plane, bones.depth[..., None]], axis=-1)[frames]
     vectors[..., 2] *= -nearer
     hidden = np.zeros(observed.joints.shape[:2], dtype=bool)
-    hidden[frames] = np.isfinite(annotations.joints[..., 0]) & ~annotations.visible
-    alone = replace(at_rate(options, fps), votes=0.0, guide=0.0)
+    hidden[frames] = marks.marked & ~marks.visible
+    options = replace(at_rate(options, fps), exemplars=0.0, initial_motion=0.0)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
-    for first in range(0, len(shown.flat), _PIECE):
-        inside = (frames >= first) & (frames < first + _PIECE)
+    for first in range(0, len(joints), _CHUNK_FRAMES):
+        inside = (frames >= first) & (frames < first + _CHUNK_FRAMES)
         if not inside.any():
             continue
-        start = max(first - _ASIDE, 0)
-        piece = slice(start, first + _PIECE + _ASIDE)
-        seen = shown.part(piece)
-        votes = ExemplarPrior(
-            vectors,
-            frames - start,
-            np.abs(nearer).astype(float),
-            np.zeros(seen.depth.shape),
-            annotations.skeleton,
+        start = max(first - _MARGIN_FRAMES, 0)
+        chunk = slice(start, first + _CHUNK_FRAMES + _MARGIN_FRAMES)
+        part = bones.part(chunk)
+        exemplars = ExemplarPrior(
+            vectors=vectors,
+            frames=frames - start,
+            confidence=np.abs(nearer).astype(float),
+            initial_depth=np.zeros(part.depth.shape),
+            skeleton=skeleton,
         )
-        signs = track_depth_signs(
-            seen, votes, size.breadths, annotations.skeleton, alone, hidden[piece]
-        )
+        signs = track_depth_signs(part, exemplars, size.breadths, skeleton, options, hidden[chunk])
         sign[inside] = signs.sign[frames[inside] - start]
         probability[inside] = signs.probability[frames[inside] - start]
-    confirmed = nearer != 0
-    return DepthSigns(np.where(confirmed, -nearer, sign), np.where(confirmed, 1.0, probability))
+    given = nearer != 0
+    return DepthSigns(np.where(given, -nearer, sign), np.where(given, 1.0, probability))
 
 
-def _joints(
-    observed: PreparedTracks, annotations: Annotations, fps: float
-) -> tuple[Float[np.ndarray, "T J 2"], Float[np.ndarray, "T J"]]:
-    """Joints of all frames, smoothed, and their noise; keyframes as they were marked."""
-    frames = annotations.frames
-    still = np.zeros_like(observed.joints)
-    joints = smooth_joints(observed.joints, still, _SMOOTH_SECONDS * fps)
-    noise: Float[np.ndarray, "T J"] = np.full(joints.shape[:2], _SMOOTHED)
-    marked = np.isfinite(annotations.joints[..., 0])
-    joints[frames] = np.where(marked[..., None], observed.joints[frames], joints[frames])
-    noise[frames] = np.where(marked, observed.spread[frames], _SMOOTHED)
-    return joints, noise
+def _smoothed_joints(
+    observed: PreparedTracks, marks: KeyframeMarks, fps: float
+) -> Float[np.ndarray, "T J 2"]:
+    """Joints of all frames, smoothed; marked ones as they were marked."""
+    at_rest = np.zeros_like(observed.joints)
+    joints = smooth_joints(observed.joints, at_rest, _SMOOTHING_SECONDS * fps)
+    marked = observed.joints[marks.frames]
+    joints[marks.frames] = np.where(marks.marked[..., None], marked, joints[marks.frames])
+    return joints

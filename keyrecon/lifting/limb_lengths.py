@@ -1,15 +1,16 @@
-"""Bone lengths and the scale of every frame, from the lengths that bones show in the picture.
+"""Bone lengths and the scale of every frame, from the lengths of bones in the picture.
 
-"Each limb is parallel to the image somewhere": the lengths that a bone shows pile up just
-below s l and stop there. That is a likelihood (see `shown`), and all bones of all frames vote
-at once for the lengths (left and right alike) and for the scale s_t, which follows the tracked
-height of the player and may leave it only slowly. Without noise this is the lower bound of
+"Each limb is parallel to the image somewhere": the lengths of a bone in the picture pile up just
+below s l and stop there. That is a likelihood (see `foreshortening`), and all bones of all frames
+together determine the lengths (left and right alike) and the scale s_t, which stays with the
+tracked height of the player and may leave it only slowly. Without noise this is the lower bound of
 Taylor (CVIU 80, 2000), s >= max |dp| / l, over the whole sequence.
 
 The anthropometric table is a prior, not the answer: a length wrong by 10 % turns an in-plane
 bone out of the plane by 25 degrees.
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,14 @@ from jaxtyping import Float, Int
 from scipy.optimize import minimize
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import ancestry, breadths
+from keyrecon.errors import KeyreconError
 from keyrecon.lifting.foreshortening import INCLINATIONS, log_density
 from keyrecon.records import Annotations, JointTracks
 
-_LEAST_CONFIDENCE = 0.05
+logger = logging.getLogger(__name__)
+
+_MIN_CONFIDENCE = 0.05
+"""Confidence below which a joint's noise grows no more."""
 
 
 @dataclass(frozen=True)
@@ -47,25 +51,26 @@ class LengthOptions:
 
 @dataclass(frozen=True, eq=False)
 class BodySize:
-    """How long the bones are and how large the body appears."""
+    """The player's skeleton, how long its bones are and how large the body appears."""
 
+    skeleton: Skeleton
     lengths: Float[np.ndarray, "B"]
     """Body heights; left and right alike."""
     breadths: Float[np.ndarray, "P"]
-    """Hip and shoulder breadth, as `chain.breadths` lists them, body heights."""
+    """Hip and shoulder breadth, as `Skeleton.breadths` lists them, body heights."""
     scale: Float[np.ndarray, "T"]
     """px per body height"""
 
 
 @dataclass(frozen=True, eq=False)
-class _LengthEvidence:
-    """Lengths that were seen: one row each."""
+class _ObservedLengths:
+    """Lengths of bones and breadths in the picture: one row each."""
 
-    shown: Float[np.ndarray, "n"]
-    """log of px"""
+    log_length: Float[np.ndarray, "n"]
+    """Of px."""
     noise: Float[np.ndarray, "n"]
     """px"""
-    kind: Int[np.ndarray, "n"]
+    group: Int[np.ndarray, "n"]
     frame: Int[np.ndarray, "n"]
 
 
@@ -76,34 +81,42 @@ def estimate_lengths(
     fps: float,
     options: LengthOptions = LengthOptions(),
 ) -> BodySize:
-    """Bone lengths, breadths and scale that explain the lengths seen in the picture.
+    """Bone lengths, breadths and scale that explain the lengths in the picture.
 
     `height_px` is the player's standing height (head centre to mid-feet) in the picture, any
     constant factor aside. The unit is the body height: the picture shows proportions only, and
-    what stands from head top to ankle is taken to be the table's share of it.
+    what stands from head top to ankle is taken to be the table's share of it. Where the search
+    does not converge, the better of its last step and the table is taken, with a warning. Raises
+    KeyreconError where no bone has both ends marked or tracked.
     """
     skeleton = annotations.skeleton
-    kind_of, table = _kinds(skeleton)
-    votes = _collect(tracks, annotations, height_px, fps, options)
+    group_of, table = _length_groups(skeleton)
+    observations = _observe_lengths(tracks, annotations, height_px, fps, options)
+    if not len(observations.frame):
+        raise KeyreconError(
+            "No bone has both ends marked or tracked, so nothing tells how large the player is; "
+            "mark more joints with `keyrecon annotate`."
+        )
     knots = np.linspace(0, len(height_px) - 1, 2 + int(len(height_px) / fps / options.knot))
-    log_lengths, log_scale = _fit(
-        votes, np.log(table), _ties(skeleton), np.log(height_px), knots, options
-    )
+    ties = _length_ties(skeleton)
+    fit = _fit(observations, np.log(table), ties, np.log(height_px), knots, options)
     bones = len(skeleton.bones)
-    lengths = np.exp(log_lengths)[kind_of]
+    lengths = np.exp(fit.log_lengths)[group_of]
     size = _standing(lengths[:bones], skeleton) / _standing(skeleton.lengths, skeleton)
-    return BodySize(lengths[:bones] / size, lengths[bones:] / size, np.exp(log_scale) * size)
+    return BodySize(
+        skeleton, lengths[:bones] / size, lengths[bones:] / size, np.exp(fit.log_scale) * size
+    )
 
 
 def joint_noise(
     confidence: Float[np.ndarray, "T J"], options: LengthOptions
 ) -> Float[np.ndarray, "T J"]:
     """Standard deviation of propagated joints, player heights."""
-    return options.track_noise / np.sqrt(np.clip(confidence, _LEAST_CONFIDENCE, 1.0))
+    return options.track_noise / np.sqrt(np.clip(confidence, _MIN_CONFIDENCE, 1.0))
 
 
 def marked_joints(tracks: JointTracks, annotations: Annotations) -> Float[np.ndarray, "T J 2"]:
-    """The tracks with every annotated joint put where the person placed it."""
+    """The tracks with every annotated joint where the person placed it."""
     joints = tracks.joints.copy()
     joints[annotations.frames] = np.where(
         np.isnan(annotations.joints), joints[annotations.frames], annotations.joints
@@ -111,138 +124,172 @@ def marked_joints(tracks: JointTracks, annotations: Annotations) -> Float[np.nda
     return joints
 
 
-def _kinds(skeleton: Skeleton) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "m"]]:
-    """Which length each bone and breadth has, and these lengths by the table, in statures."""
-    pairs = breadths(skeleton)
+def _length_groups(skeleton: Skeleton) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "m"]]:
+    """Which length each bone and breadth has (left and right share one), and the table of them,
+    in statures."""
     first = np.minimum(np.arange(len(skeleton.bones)), skeleton.bone_mirror)
-    names, kind = np.unique(first, return_inverse=True)
-    kind_of = np.concatenate([kind, len(names) + np.arange(len(pairs))])
-    table = np.concatenate([skeleton.lengths[names], [breadth for *_, breadth in pairs]])
-    return kind_of, table
+    names, group = np.unique(first, return_inverse=True)
+    group_of = np.concatenate([group, len(names) + np.arange(len(skeleton.breadths))])
+    table = np.concatenate(
+        [skeleton.lengths[names], [breadth.length for breadth in skeleton.breadths]]
+    )
+    return group_of, table
 
 
-def _ties(skeleton: Skeleton) -> Float[np.ndarray, "r m"]:
+def _length_ties(skeleton: Skeleton) -> Float[np.ndarray, "r m"]:
     """Pairs of lengths that grow together: one row each, 1 and -1."""
-    kind_of, table = _kinds(skeleton)
+    group_of, table = _length_groups(skeleton)
     bone_of = {skeleton.names[child]: bone for bone, (_, child) in enumerate(skeleton.bones)}
     pairs = [
         (bone_of[first], bone_of[second])
         for first, second in (("left_knee", "left_ankle"),)
         if first in bone_of and second in bone_of
     ]
-    for place, (left, _, _) in enumerate(breadths(skeleton)):
-        if skeleton.names[left] == "left_shoulder" and "left_shoulder" in bone_of:
+    for place, breadth in enumerate(skeleton.breadths):
+        if skeleton.names[breadth.left] == "left_shoulder" and "left_shoulder" in bone_of:
             pairs.append((bone_of["left_shoulder"], len(skeleton.bones) + place))
     ties = np.zeros((len(pairs), len(table)))
     for row, (first, second) in enumerate(pairs):
-        ties[row, kind_of[first]], ties[row, kind_of[second]] = 1.0, -1.0
+        ties[row, group_of[first]], ties[row, group_of[second]] = 1.0, -1.0
     return ties
 
 
-def _collect(
+def _observe_lengths(
     tracks: JointTracks,
     annotations: Annotations,
     height_px: Float[np.ndarray, "T"],
     fps: float,
     options: LengthOptions,
-) -> _LengthEvidence:
+) -> _ObservedLengths:
     """Every bone and breadth in every annotated frame, and in propagated ones now and then."""
     skeleton = annotations.skeleton
-    pairs = [(left, right) for left, right, _ in breadths(skeleton)]
+    pairs = [(breadth.left, breadth.right) for breadth in skeleton.breadths]
     ends = np.concatenate([skeleton.bones, np.array(pairs, dtype=np.int64).reshape(-1, 2)])
-    kind_of, _ = _kinds(skeleton)
+    group_of, _ = _length_groups(skeleton)
     step = max(1, round(options.correlation * fps))
     passing = np.setdiff1d(np.arange(0, len(height_px), step), annotations.frames)
     frames = np.concatenate([annotations.frames, passing])
     joints = np.concatenate([annotations.joints, tracks.joints[passing]])
     clicked = np.full(annotations.joints.shape[:2], options.click_noise)
-    carried = joint_noise(tracks.confidence[passing], options)
-    sigma = np.concatenate([clicked, carried])[:, ends]
-    shown = np.linalg.norm(joints[:, ends[:, 1]] - joints[:, ends[:, 0]], axis=-1)
-    known = shown > 0
+    propagated = joint_noise(tracks.confidence[passing], options)
+    sigma = np.concatenate([clicked, propagated])[:, ends]
+    length = np.linalg.norm(joints[:, ends[:, 1]] - joints[:, ends[:, 0]], axis=-1)
+    known = length > 0
     row, column = np.nonzero(known)
     noise = np.linalg.norm(sigma, axis=-1) * height_px[frames, None]
-    return _LengthEvidence(np.log(shown[known]), noise[known], kind_of[column], frames[row])
+    return _ObservedLengths(np.log(length[known]), noise[known], group_of[column], frames[row])
+
+
+@dataclass(frozen=True, eq=False)
+class _LengthFit:
+    """The most probable lengths and scale."""
+
+    log_lengths: Float[np.ndarray, "m"]
+    """Of statures."""
+    log_scale: Float[np.ndarray, "T"]
+    """Of px per stature."""
 
 
 def _fit(
-    votes: _LengthEvidence,
+    observations: _ObservedLengths,
     log_table: Float[np.ndarray, "m"],
     ties: Float[np.ndarray, "r m"],
     log_height: Float[np.ndarray, "T"],
     knots: Float[np.ndarray, "k"],
     options: LengthOptions,
-) -> tuple[Float[np.ndarray, "m"], Float[np.ndarray, "T"]]:
-    """Most probable log lengths (statures) and log scale (px per stature) of every frame."""
-    kinds = len(log_table)
+) -> _LengthFit:
+    """Maximise the posterior by L-BFGS-B."""
+    groups = len(log_table)
     frames = np.arange(len(log_height))
     blend = np.stack([np.interp(frames, knots, row) for row in np.eye(len(knots))], axis=1)
-    at_vote = blend[votes.frame]
-    start = np.concatenate([log_table, [_first_factor(votes, log_table, log_height)], 0 * knots])
+    at_observation = blend[observations.frame]
+    factor = _initial_factor(observations, log_table, log_height)
+    start = np.concatenate([log_table, [factor], 0 * knots])
     prior = _prior(ties, len(knots), options)
-    wanted = prior[:, :kinds] @ log_table
+    expected = prior[:, :groups] @ log_table
 
     def cost(x: Float[np.ndarray, "n"]) -> tuple[float, Float[np.ndarray, "n"]]:
-        lengths, factor, drift = x[:kinds], x[kinds], x[kinds + 1 :]
-        log_full = log_height[votes.frame] + factor + at_vote @ drift + lengths[votes.kind]
-        shown = np.exp(votes.shown - log_full)
-        value, pull = _agreement(votes, shown, votes.noise / np.exp(log_full), kinds)
-        off = prior @ x - wanted
-        by_kind = np.bincount(votes.kind, pull, kinds)
-        gradient = np.concatenate([by_kind, [pull.sum()], at_vote.T @ pull]) + prior.T @ off
-        return float(-value + 0.5 * off @ off), gradient
+        lengths, factor, drift = x[:groups], x[groups], x[groups + 1 :]
+        log_full = (
+            log_height[observations.frame]
+            + factor
+            + at_observation @ drift
+            + lengths[observations.group]
+        )
+        foreshortening = np.exp(observations.log_length - log_full)
+        noise = observations.noise / np.exp(log_full)
+        value, pull = _log_likelihood(observations.group, foreshortening, noise, groups)
+        off = prior @ x - expected
+        by_group = np.bincount(observations.group, pull, groups)
+        slope = np.concatenate([by_group, [pull.sum()], at_observation.T @ pull])
+        return float(-value + 0.5 * off @ off), slope + prior.T @ off
 
-    best = minimize(cost, start, jac=True, method="L-BFGS-B").x
-    return best[:kinds], log_height + best[kinds] + blend @ best[kinds + 1 :]
+    found = minimize(cost, start, jac=True, method="L-BFGS-B")
+    best = found.x
+    if not found.success:
+        if not found.fun < cost(start)[0]:
+            best = start
+        logger.warning(
+            "The search for bone lengths did not converge (%s); %s.",
+            found.message,
+            "the table's proportions are used" if best is start else "its last step is used",
+        )
+    return _LengthFit(best[:groups], log_height + best[groups] + blend @ best[groups + 1 :])
 
 
 def _prior(
     ties: Float[np.ndarray, "r m"], knots: int, options: LengthOptions
 ) -> Float[np.ndarray, "q n"]:
     """Rows of what is expected to be small: (lengths, factor, drift of the scale) -> nats^0.5."""
-    kinds = ties.shape[1]
+    groups = ties.shape[1]
     still = np.eye(knots)
     jump = options.scale_spread * np.sqrt(2 * (1 - np.exp(-0.5)))  # alike over two knots
     drift = np.concatenate([still / (2 * options.scale_spread), np.diff(still, axis=0) / jump])
-    lengths = np.concatenate([np.eye(kinds) / options.spread, ties / options.tie_spread])
-    rows = np.zeros((len(lengths) + len(drift), kinds + 1 + knots))
-    rows[: len(lengths), :kinds] = lengths
-    rows[len(lengths) :, kinds + 1 :] = drift
+    lengths = np.concatenate([np.eye(groups) / options.spread, ties / options.tie_spread])
+    rows = np.zeros((len(lengths) + len(drift), groups + 1 + knots))
+    rows[: len(lengths), :groups] = lengths
+    rows[len(lengths) :, groups + 1 :] = drift
     return rows
 
 
-def _agreement(
-    votes: _LengthEvidence, shown: Float[np.ndarray, "n"], noise: Float[np.ndarray, "n"], kinds: int
+def _log_likelihood(
+    group: Int[np.ndarray, "n"],
+    foreshortening: Float[np.ndarray, "n"],
+    noise: Float[np.ndarray, "n"],
+    groups: int,
 ) -> tuple[float, Float[np.ndarray, "n"]]:
-    """Log likelihood of shown lengths, and what it loses per unit of the log full length.
+    """Log likelihood of observed lengths, and what it loses per unit of the log full length.
 
-    How much a bone prefers the image plane or the line of sight is not known (hips seen from
-    the side never show their breadth): all of its votes share one unknown leaning.
+    How much a bone prefers the image plane or the line of sight is not known (hips filmed from
+    the side never have their full breadth): all observations of a group share one unknown
+    inclination.
     """
-    value = np.empty((len(INCLINATIONS), kinds))
+    value = np.empty((len(INCLINATIONS), groups))
     slopes = []
-    for row, leaning in enumerate(INCLINATIONS):
-        log_p, slope = log_density(shown, noise, leaning)
-        value[row] = np.bincount(votes.kind, log_p, kinds)
+    for row, inclination in enumerate(INCLINATIONS):
+        log_p, slope = log_density(foreshortening, noise, inclination)
+        value[row] = np.bincount(group, log_p, groups)
         slopes.append(slope)
     best = value.max(axis=0)
     weight = np.exp(value - best)
     total = weight.sum(axis=0)
-    mean_slope = ((weight / total)[:, votes.kind] * np.array(slopes)).sum(axis=0)
-    return float((best + np.log(total)).sum()), mean_slope * shown
+    mean_slope = ((weight / total)[:, group] * np.array(slopes)).sum(axis=0)
+    return float((best + np.log(total)).sum()), mean_slope * foreshortening
 
 
-def _first_factor(
-    votes: _LengthEvidence, log_table: Float[np.ndarray, "m"], log_height: Float[np.ndarray, "T"]
+def _initial_factor(
+    observations: _ObservedLengths,
+    log_table: Float[np.ndarray, "m"],
+    log_height: Float[np.ndarray, "T"],
 ) -> float:
     """Log ratio of stature to tracked height at which most bones fit into their length."""
-    ratio = votes.shown - log_table[votes.kind] - log_height[votes.frame]
+    ratio = observations.log_length - log_table[observations.group] - log_height[observations.frame]
     return float(np.quantile(ratio, 0.75))
 
 
 def _standing(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
     """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
-    reach = ancestry(skeleton) @ lengths
+    reach = skeleton.ancestry @ lengths
     midline = skeleton.mirror == np.arange(len(reach))
     lower = skeleton.is_lower
     return float(reach[lower].max(initial=0.0) + reach[midline].max(initial=0.0))

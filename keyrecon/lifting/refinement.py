@@ -1,4 +1,4 @@
-"""The final motion: key poses bent to follow the observed joints (Section 6.2 and Fig. 9).
+"""Refinement: the motion fitted to the observed joints (Section 6.2 and Fig. 9).
 
 Two ways. `descend_motion` is the paper's projected gradient descent: joints move towards the
 observed ones, then bone lengths and a low-pass are enforced, again and again. `refine_motion`
@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.body import Skeleton
 from keyrecon.lifting import terms
-from keyrecon.lifting.bone_directions import ancestry, bone_vectors, breadths
+from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks
 from keyrecon.lifting.priors.anatomy import TILT, anatomy_of
@@ -23,15 +22,19 @@ from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 
-_UPRIGHT_FROM = 0.3
+_MIN_TRUNK_HEIGHT = 0.3
 """Height of the trunk's middle above the ankles from which the tilt of the camera is read."""
-_HIPS_ALONG = 0.95
-"""Part of the bones from neck to hips that goes along the spine."""
+_HIPS_ALONG_SPINE = 0.95
+"""Part of the bones from neck to hips that goes along the spine: trunk over neck to hip of
+`keyrecon.body.MARKED_LENGTHS`."""
 
 
 @dataclass(frozen=True)
 class RefineOptions:
-    """How the motion follows the observed joints."""
+    """How the motion is fitted to the observed joints.
+
+    Chosen on rendered sequences; see benchmarks/sensitivity.py.
+    """
 
     rounds: int = 12
     """Steps of the trajectory solver at most."""
@@ -61,20 +64,19 @@ class RefineOptions:
 def refine_motion(
     start: MotionState,
     observed: PreparedTracks,
-    guide: Float[np.ndarray, "T B 3"],
+    initial: Float[np.ndarray, "T B 3"],
     size: BodySize,
-    skeleton: Skeleton,
     fps: float,
     options: RefineOptions = RefineOptions(),
 ) -> MotionState:
-    """Root and bone directions that follow the observed joints from a start near them.
+    """Root and bone directions fitted to the observed joints from a start near them.
 
-    `guide` holds the directions of the slerped key poses.
+    `initial` holds the directions of the initial motion, the slerped key poses.
     """
-    recipe = [terms.reprojection(observed, size.lengths, skeleton)]
-    recipe += _trunk_terms(size, skeleton, options)
-    recipe += _balance_terms(start, size, skeleton, fps, options)
-    recipe.append(terms.key_pose_prior(guide, options.key_spread))
+    recipe = [terms.reprojection(observed, size.lengths, size.skeleton)]
+    recipe += _trunk_terms(size, options)
+    recipe += _balance_terms(start, size, fps, options)
+    recipe.append(terms.key_pose_prior(initial, options.key_spread))
     expected = options.acceleration * (50.0 / fps) ** 2
     smoothness = Smoothness(1 / expected**2, size.lengths**2 / expected**2)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
@@ -84,10 +86,10 @@ def descend_motion(
     start: MotionState,
     observed: PreparedTracks,
     size: BodySize,
-    skeleton: Skeleton,
     options: RefineOptions = RefineOptions(),
 ) -> MotionState:
     """Projected gradient descent from the slerped key poses (Fig. 9)."""
+    skeleton = size.skeleton
     root = skeleton.root
     points = start.points(size.lengths, skeleton)
     lengths = keep_lengths(size.lengths, skeleton)
@@ -98,35 +100,36 @@ def descend_motion(
     return MotionState(valid[:, root, :2], unit_vectors(bone_vectors(valid, skeleton)))
 
 
-def _trunk_terms(size: BodySize, skeleton: Skeleton, options: RefineOptions) -> list[terms.Term]:
+def _trunk_terms(size: BodySize, options: RefineOptions) -> list[terms.Term]:
     """What holds the trunk together: breadths, and the head above it."""
-    lengths = size.lengths
+    lengths, skeleton, spread = size.lengths, size.skeleton, options.breadth_spread
     recipe = [
-        terms.breadth((left, right), float(wanted), options.breadth_spread, lengths, skeleton)
-        for (left, right, _), wanted in zip(breadths(skeleton), size.breadths, strict=True)
+        terms.breadth(pair.left, pair.right, float(length), spread, lengths, skeleton)
+        for pair, length in zip(skeleton.breadths, size.breadths, strict=True)
     ]
     anatomy = anatomy_of(skeleton)
     for limb in anatomy.limbs:
         if limb.kind == "head":
             share = np.zeros(len(lengths))
-            share[list(anatomy.trunk[:2])] = 0.5 / _HIPS_ALONG
+            share[list(anatomy.trunk[:2])] = 0.5 / _HIPS_ALONG_SPINE
             share[list(limb.bones)] = 1.0
             recipe.append(terms.alignment(share, options.head_spread))
     return recipe
 
 
 def _balance_terms(
-    start: MotionState, size: BodySize, skeleton: Skeleton, fps: float, options: RefineOptions
+    start: MotionState, size: BodySize, fps: float, options: RefineOptions
 ) -> list[terms.Term]:
     """The middle of the trunk stays over the point between the ankles."""
+    skeleton = size.skeleton
     corners = [f"{side}_{name}" for name in ("hip", "ankle") for side in ("right", "left")]
     if not set(corners) <= set(skeleton.names):
         return []
-    ways = ancestry(skeleton) * size.lengths
+    ways = skeleton.ancestry * size.lengths
     hips, ankles = ways[[skeleton.index(name) for name in corners]].reshape(2, 2, -1).mean(axis=1)
     share = 0.5 * (ways[skeleton.root] + hips) - ankles
     stance = np.einsum("b,tbi->ti", share, start.directions)
-    high = stance[stance[:, 1] < -_UPRIGHT_FROM]
+    high = stance[stance[:, 1] < -_MIN_TRUNK_HEIGHT]
     slope = float(np.median(high[:, 2] / high[:, 1])) if len(high) else TILT
     spread = options.balance_spread * np.sqrt(max(options.balance_correlation * fps, 1.0))
     return [terms.balance(share, 0.5 * (slope + TILT), spread)]

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt on unit bone directions, banded in time.
 
 Unknowns of frame t: the root (2, in units of length) and a small turn of every bone in the
-plane tangent to its direction (2 each), so bone lengths are exact by construction. Terms look
-at one frame each and add a block to the diagonal; smoothness ties a bone to itself in the next
+plane tangent to its direction (2 each), so bone lengths are exact by construction. Terms depend
+on one frame each and add a block to the diagonal; smoothness ties a bone to itself in the next
 two frames. The normal matrix is banded, one banded Cholesky solves it, and the cost grows
 linearly with the length of the motion.
 """
@@ -35,7 +35,7 @@ class MotionState:
     def points(
         self, lengths: Float[np.ndarray, "B"], skeleton: Skeleton
     ) -> Float[np.ndarray, "T J 3"]:
-        """Joints where they are seen in the image; the root has depth 0."""
+        """Joints where they appear in the image; the root has depth 0."""
         points = pose_from_directions(self.directions, lengths, skeleton)
         points[..., :2] += self.root[:, None]
         return points

@@ -4,7 +4,6 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import ancestry
 from keyrecon.lifting.preprocessing import PreparedTracks
 from keyrecon.lifting.solver import Linear, MotionState, Term
 
@@ -14,13 +13,13 @@ def reprojection(
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
 ) -> Term:
-    """Joints should project onto the observed ones; Huber beyond the knee times the spread.
+    """Joints should project onto the observed ones; Huber beyond `huber_delta` spreads.
 
     In units of length (px over scale); NaN or an infinite spread where nothing is known. The
-    squared loss of Eq. 6, made robust where a joint may have slipped.
+    squared loss of Eq. 6, made robust where a joint may be an outlier.
     """
-    spread, knee = observed.spread, observed.knee
-    reach = ancestry(skeleton) * lengths
+    spread, delta = observed.spread, observed.huber_delta
+    reach = skeleton.ancestry * lengths
     inverse = np.where(np.isnan(observed.joints[..., 0]) | np.isinf(spread), 0.0, 1.0 / spread)
     target = np.nan_to_num(observed.joints)
     slope = np.zeros((len(skeleton.names), 2, len(lengths), 3))
@@ -31,8 +30,8 @@ def reprojection(
         frames = len(target)
         residual = inverse[..., None] * (state.points(lengths, skeleton)[..., :2] - target)
         size = np.linalg.norm(residual, axis=-1)
-        near = np.minimum(size, knee)
-        shrink = np.sqrt(np.where(size > knee, near / np.maximum(size, 1e-12), 1.0))
+        near = np.minimum(size, delta)
+        shrink = np.sqrt(np.where(size > delta, near / np.maximum(size, 1e-12), 1.0))
         cost = (near * (size - 0.5 * near)).sum()
         weight = inverse * shrink
         by_direction = (weight[:, :, None, None, None] * slope).reshape(frames, -1, len(lengths), 3)
@@ -45,21 +44,22 @@ def reprojection(
 
 
 def breadth(
-    pair: tuple[int, int],
-    wanted: float,
+    left: int,
+    right: int,
+    length: float,
     spread: float,
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
 ) -> Term:
-    """The distance of two joints of the trunk stays `wanted`, within `spread`."""
-    ways = ancestry(skeleton) * lengths
-    difference = ways[pair[0]] - ways[pair[1]]
+    """The distance of two joints of the trunk stays `length`, within `spread`."""
+    ways = skeleton.ancestry * lengths
+    difference = ways[left] - ways[right]
 
     def term(state: MotionState) -> Linear:
         across = np.einsum("b,tbi->ti", difference, state.directions)
         size = np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
         toward = across / size / spread
-        return Linear((size - wanted) / spread, (toward[:, None, None, :] * difference[:, None]))
+        return Linear((size - length) / spread, (toward[:, None, None, :] * difference[:, None]))
 
     return term
 
@@ -89,19 +89,19 @@ def balance(share: Float[np.ndarray, "B"], tilt: float, spread: float) -> Term:
     return term
 
 
-def key_pose_prior(wanted: Float[np.ndarray, "T B 3"], spread: float) -> Term:
+def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Term:
     """Bone directions stay near those of the slerped key poses.
 
     Quadratic within `spread`, linear beyond (pseudo-Huber), so a pose that does not fit lets go.
     """
-    bones = wanted.shape[1]
+    bones = directions.shape[1]
     identity = np.zeros((bones, 3, bones, 3))
     for bone in range(bones):
         identity[bone, :, bone] = np.eye(3) / spread
 
     def term(state: MotionState) -> Linear:
-        frames = len(wanted)
-        off = (state.directions - wanted) / spread
+        frames = len(directions)
+        off = (state.directions - directions) / spread
         size = np.sqrt(1 + (off**2).sum(axis=-1, keepdims=True))
         weight = 1 / np.sqrt(size)
         by_direction = (weight[..., None, None] * identity).reshape(frames, -1, bones, 3)

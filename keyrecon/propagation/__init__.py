@@ -1,1 +1,1 @@
-"""Joints carried from the keyframes to every frame (Section 5, taken further)."""
+"""Joints propagated from the keyframes to every frame (Section 5, taken further)."""

@@ -132,7 +132,7 @@ def _propagate_fused(
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
-    for half in progress(halves, "carrying joints", len(halves)):
+    for half in progress(halves, "propagating joints", len(halves)):
         fixed = joints[:, half.joints[half.fixed]]
         poses = gather_poses(annotations, body_frame, half, fixed)
         templates = make_edge_templates(edges, body_frame, poses, options.elements)
@@ -215,7 +215,7 @@ def gather_poses(
         poses[missing, child] = poses[missing, parent] + bone
     if not np.isfinite(poses).all() or not rows.size:
         raise KeyreconError(
-            f"Too few joints of the {half.name} body are marked to carry them to other "
+            f"Too few joints of the {half.name} body are marked to propagate them to other "
             "frames; mark all of them on at least one keyframe."
         )
     return AnnotatedPoses(half, frames, poses, known)

@@ -83,7 +83,7 @@ def test_a_bone_with_a_missing_end_keeps_a_finite_depth():
     joints = np.zeros((1, 14, 2))
     joints[0, LSP14.index("left_ankle")] = np.nan
     shown = foreshorten_bones(joints, np.full((1, 14), 0.01), LSP14.lengths, LSP14)
-    assert np.isfinite(shown.flat).all() and np.isfinite(shown.depth).all()
+    assert np.isfinite(shown.in_plane).all() and np.isfinite(shown.depth).all()
 
 
 def price_of_body(vectors):
@@ -140,7 +140,8 @@ def test_keyframes_take_their_signs_from_the_frames_around_them():
 def test_half_the_frame_rate_gives_a_frame_twice_the_say_and_four_times_the_jump():
     once, slow = DepthSignOptions(), at_rate(DepthSignOptions(), 25.0)
     assert at_rate(once, 50.0) == once
-    assert slow.limits == 2 * once.limits and slow.jerk == 4 * once.jerk
+    assert slow.joint_limits == 2 * once.joint_limits
+    assert slow.acceleration == 4 * once.acceleration
 
 
 def bare(flat, depth):
@@ -160,7 +161,7 @@ def test_signs_are_the_cheapest_of_all_sign_vectors():
     for pose in range(3):
         vectors = np.concatenate(
             [
-                np.broadcast_to(shown.flat[pose], (len(every), 13, 2)),
+                np.broadcast_to(shown.in_plane[pose], (len(every), 13, 2)),
                 (every * depth[pose])[..., None],
             ],
             axis=-1,
@@ -179,8 +180,8 @@ def test_the_sign_path_is_the_cheapest_of_all_paths():
 
     def price(path):
         z = depth[np.arange(6), list(path), 0]
-        jumps = np.diff(z, 2) ** 2 / (2 * (options.jerk**2 + doubt[1:-1, 0] ** 2))
-        return cost[np.arange(6), list(path)].sum() + np.minimum(jumps, options.reach).sum()
+        jumps = np.diff(z, 2) ** 2 / (2 * (options.acceleration**2 + doubt[1:-1, 0] ** 2))
+        return cost[np.arange(6), list(path)].sum() + np.minimum(jumps, options.max_jump_cost).sum()
 
     found = second_order_path(cost, depth[:, 0], doubt, options)
     assert price(found) == pytest.approx(min(price(p) for p in product((0, 1), repeat=6)))
@@ -212,7 +213,7 @@ def test_what_is_usual_tells_apart_what_looks_the_same():
         flat, dz = LSP14.lengths[:, None] * directions[..., :2], LSP14.lengths * directions[..., 2]
         shown = bare(flat, np.abs(dz))
         blind.append(choose_depth_signs(shown, nobody, BREADTHS, LSP14).sign[0, arms])
-        known = choose_depth_signs(replace(shown, usual=dz), nobody, BREADTHS, LSP14)
+        known = choose_depth_signs(replace(shown, expected_depth=dz), nobody, BREADTHS, LSP14)
         told.append(known.sign[0, arms])
     np.testing.assert_array_equal(blind[0], blind[1])
     np.testing.assert_array_equal(told[0], 1)
@@ -225,7 +226,7 @@ def test_confirmed_signs_are_kept():
     flat = LSP14.lengths[:, None] * directions[..., :2]
     shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
     nearer = rng.choice([-1, 1], (5, 13))
-    chosen = choose_depth_signs(shown, nearer, BREADTHS, LSP14, DepthSignOptions(confirmed=1e3))
+    chosen = choose_depth_signs(shown, nearer, BREADTHS, LSP14, DepthSignOptions(annotated=1e3))
     np.testing.assert_array_equal(chosen.sign, -nearer)
 
 

@@ -134,7 +134,7 @@ def test_slopes_agree_with_finite_differences(name):
     term = {
         "reprojection": terms.reprojection(known(observed, 0.02, np.inf), LENGTHS, LSP14),
         "alignment": terms.alignment(np.linspace(0, 1, 13), 0.3),
-        "breadth": terms.breadth((2, 3), 0.2, 0.01, LENGTHS, LSP14),
+        "breadth": terms.breadth(2, 3, 0.2, 0.01, LENGTHS, LSP14),
     }[name]
     line, step = term(state), 1e-6
     basis = tangents(state.directions)
@@ -194,7 +194,7 @@ def test_what_a_person_saw_holds_against_neighbours_that_slipped():
     off = {}
     for knee in (HUBER_DELTA, np.inf):
         observed = known(slipped, 0.02)
-        observed.spread[marked], observed.knee[marked] = 0.007, knee
+        observed.spread[marked], observed.huber_delta[marked] = 0.007, knee
         term = terms.reprojection(observed, LENGTHS, LSP14)
         found = solve(truth, [term], Smoothness(1e4, 1e4 * LENGTHS**2), 20, 1e-6)
         off[knee] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])

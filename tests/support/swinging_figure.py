@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from keyrecon.body import HIP_BREADTH, LSP14, SHOULDER_BREADTH
+from keyrecon.body import LSP14
 from keyrecon.numerics.geometry import unit_vectors
 
-BREADTHS = np.array([HIP_BREADTH, SHOULDER_BREADTH])
+BREADTHS = np.array([breadth.length for breadth in LSP14.breadths])
 
 
 def standing_directions():

@@ -14,7 +14,6 @@ from jaxtyping import Float, Int
 from keyrecon.annotate.assist.pose_reading import Sighting
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import breadths
 from keyrecon.lifting.depth_signs import choose_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions, estimate_lengths
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
@@ -70,19 +69,19 @@ def estimate_body(
     fps: float,
 ) -> BodyEstimate:
     """Size and signs from everything annotated; `ghosts` by frame number, where there are any."""
-    skeleton, bones = annotations.skeleton, len(annotations.skeleton.bones)
+    skeleton, n_bones = annotations.skeleton, len(annotations.skeleton.bones)
     size = _measure(annotations, height_px, fps)
     plain = BodyEstimate(
-        size, annotations.frames[:0], np.zeros((0, bones, 3)), np.zeros((0, bones)), skeleton
+        size, annotations.frames[:0], np.zeros((0, n_bones, 3)), np.zeros((0, n_bones)), skeleton
     )
     rows = zip(annotations.frames.tolist(), annotations.joints, annotations.nearer, strict=True)
     seen = [plain.sighting(t, joints, signs, ghosts.get(t)) for t, joints, signs in rows]
     if not seen:
         return plain
     joints, spread = np.stack([s.joints for s in seen]), np.stack([s.spread for s in seen])
-    shown = foreshorten_bones(joints, spread, size.lengths, skeleton)
-    signs = choose_depth_signs(shown, annotations.nearer, size.breadths, skeleton)
-    vectors = np.concatenate([shown.flat, (signs.sign * shown.depth)[..., None]], axis=-1)
+    bones = foreshorten_bones(joints, spread, size.lengths, skeleton)
+    signs = choose_depth_signs(bones, annotations.nearer, size.breadths, skeleton)
+    vectors = np.concatenate([bones.in_plane, (signs.sign * bones.depth)[..., None]], axis=-1)
     known = np.isfinite(joints[:, skeleton.bones, 0]).all(axis=2)
     guessed = GUESSED * (2 * signs.probability - 1)
     confidence = known * np.where(annotations.nearer != 0, 1.0, guessed)
@@ -94,8 +93,8 @@ def _measure(annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: f
     skeleton = annotations.skeleton
     ends = annotations.joints[:, skeleton.bones]
     if not np.isfinite(ends).all(axis=(2, 3)).any():
-        across = np.array([breadth for *_, breadth in breadths(skeleton)])
-        return BodySize(skeleton.lengths, across, height_px / HEAD_TO_FEET)
+        across = np.array([breadth.length for breadth in skeleton.breadths])
+        return BodySize(skeleton, skeleton.lengths, across, height_px / HEAD_TO_FEET)
     nothing = np.full((len(height_px), len(skeleton.names), 2), np.nan)
     nowhere = np.zeros(nothing.shape[:2])
     tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))

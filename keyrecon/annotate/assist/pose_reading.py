@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import ancestry
 from keyrecon.lifting.depth_evidence import DepthSignOptions, ForeshortenedBones, sign_states
 from keyrecon.lifting.depth_signs import sign_costs
 from keyrecon.lifting.limb_lengths import BodySize
@@ -28,7 +27,7 @@ PLAUSIBLE = 6.0
 """Cost above the best at which a pose is not worth offering, nats: odds of 400 to 1."""
 DIFFERENT = 0.12
 """Poses look different when a joint's depth differs by this, body heights: a forearm's length."""
-SINGLE = replace(DepthSignOptions(), votes=1.0, confirmed=100.0)
+SINGLE = replace(DepthSignOptions(), exemplars=1.0, annotated=100.0)
 """A picture by itself counts once, and what the person says holds."""
 
 
@@ -122,7 +121,7 @@ def _weigh(
     anatomy = anatomy_of(skeleton)
     trunk, limbs = sign_costs(shown, nearer[None], size.breadths, skeleton, SINGLE)
     groups = (anatomy.trunk, *(limb.bones for limb in anatomy.limbs))
-    free = [SINGLE.confirmed * _contradicts(bones, nearer) for bones in groups]
+    free = [SINGLE.annotated * _contradicts(bones, nearer) for bones in groups]
     if not known[list(anatomy.trunk)].all():
         return _Costs(groups, free[0], tuple(cost[None] + 0 * trunk.T for cost in free[1:]))
     each = []
@@ -170,7 +169,7 @@ def _points(
     sighting: Sighting, depth: Float[np.ndarray, "B"], skeleton: Skeleton
 ) -> Float[np.ndarray, "J 3"]:
     """Joints where the picture has them, depths added up from the root."""
-    along = ancestry(skeleton) @ depth
+    along = skeleton.ancestry @ depth
     along = np.where(np.isfinite(sighting.joints[:, 0]), along, np.nan)
     middle = np.nanmean(sighting.joints, axis=0) if np.isfinite(along).any() else np.zeros(2)
     return np.column_stack([sighting.joints - middle, along])
@@ -184,7 +183,7 @@ def _differing(
 ) -> Iterator[Alternative]:
     """The cheapest poses of which each looks different from all before it."""
     costs, ranked = poses
-    ways, least = ancestry(skeleton), ranked[0][0]
+    ways, least = skeleton.ancestry, ranked[0][0]
     seen = [ways @ (depth * costs.signs(ranked[0][1]))]
     for cost, states in ranked[1:]:
         if cost - least > PLAUSIBLE or len(seen) > ALTERNATIVES:

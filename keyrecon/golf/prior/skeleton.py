@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from keyrecon.body import LSP14
+from keyrecon.body import JOINT_CENTER_LENGTHS, LSP14
 from keyrecon.golf.records import Body, Swing
 from keyrecon.numerics.geometry import unit_vectors
 
@@ -56,17 +56,17 @@ REST = np.array([segment.rest for segment in SEGMENTS])
 CLUB = NAMES.index("club")
 
 LENGTHS = {
-    "trunk": 0.308, "head": 0.161, "clavicle": 0.095, "upper_arm": 0.162, "forearm": 0.155,
-    "thigh": 0.243, "shank": 0.249,
-}  # fmt: skip
-"""Between joint centres, in statures: limbs after de Leva (J. Biomech. 29, 1996, men), the neck
-.012 above the shoulder line as in `body`. Breadths of the body are wider than these: shoulder and
-hip joints lie well inside the outline."""
-HALF_HIPS = 0.052
-"""From the middle to a hip joint in statures: 0.36 of the pelvis's breadth (Bell et al.,
-J. Biomech. 23, 1990), which is about 0.145 statures."""
-ANKLE_HEIGHT = 0.039
-"""Ankle above the floor as a fraction of stature (Winter)."""
+    "trunk": JOINT_CENTER_LENGTHS.trunk,
+    "head": JOINT_CENTER_LENGTHS.head,
+    "clavicle": JOINT_CENTER_LENGTHS.shoulder,
+    "upper_arm": JOINT_CENTER_LENGTHS.upper_arm,
+    "forearm": JOINT_CENTER_LENGTHS.forearm,
+    "thigh": JOINT_CENTER_LENGTHS.thigh,
+    "shank": JOINT_CENTER_LENGTHS.shank,
+}
+"""Of the segments, in statures."""
+HALF_HIPS = JOINT_CENTER_LENGTHS.hip_breadth / 2
+"""From the middle to a hip joint in statures."""
 GRIP = 0.045
 """From the left wrist along the forearm to between the hands, as a fraction of stature."""
 CLUB_LENGTH = 0.93

@@ -4,7 +4,7 @@ Under orthography a bone may point towards or away from the camera by the same a
 limits tell many of these mirror images apart. Body axes: R to the person's right, U up the
 trunk, F = U x R forward (right-handed like the camera's axes). A knee bends backwards only:
 (thigh x shank) . R <= 0. Every cost is capped: a limit speaks against a pose, it does not
-forbid it, since the joints it is told from are uncertain themselves.
+forbid it, since the joints that it is computed from are uncertain themselves.
 
 Groups of bones whose signs depend on each other are decided together: the trunk, each leg,
 each arm. Bones of a skeleton that has no such joints stand alone and are free.
@@ -53,7 +53,7 @@ class Anatomy:
 
 
 def anatomy_of(skeleton: Skeleton) -> Anatomy:
-    """Groups of a skeleton, told by joint names and by the tree."""
+    """Groups of a skeleton, by joint names and by the tree."""
     bone_of = {skeleton.names[child]: b for b, (_, child) in enumerate(skeleton.bones)}
     corners = ("right_hip", "left_hip", "right_shoulder", "left_shoulder")
     joined = all(

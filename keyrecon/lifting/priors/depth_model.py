@@ -1,20 +1,18 @@
-"""What depth limbs usually have in a picture like this: a regression learnt from captured motion.
+"""Expected depth of bones given the whole picture: a regression learnt from captured motion.
 
 A flat picture of a whole body says more about depth than joint limits can put into words: which
-way an arm reaches goes with how hips, shoulders and the other limbs look. The rule is a polynomial
-of second degree in what the picture shows of the 13 bones, in shares of their lengths: both
+way an arm reaches depends on how hips, shoulders and the other limbs are placed. The rule is a polynomial
+of second degree in the picture of the 13 bones, in shares of their lengths: both
 in-plane parts, and how much is left for depth (Taylor's sqrt(1 - q^2)). Its coefficients give the
-depths of captured people, seen from all around, with the least squared error. Only the sign of what
-it gives is of interest here, since lengths tell the rest better; a value near zero says that the
-picture fits both signs, and then it does not count.
+depths of captured people, filmed from all around, with the least squared error. Only the sign of
+what it gives is of interest here, since lengths tell the rest better; a value near zero says that
+the picture fits both signs, and then it does not count.
 
-Learning what depth bones usually have: captured poses, varied and seen from all around.
-
-Every pose that is learnt from is drawn anew: mirrored or not, each limb turned a little as other
-people would hold it, seen by a camera from any side and from a tripod or a stand, with bones
-as long and joints as exact as lengths and tracks really are. Left and right share what is learnt,
-and so do all ways that a player may face. The coefficients then follow from one linear system
-(ridge regression): the same captures give the same rule.
+The training poses are captured ones, varied and filmed from all around: mirrored or not, each
+limb turned a little as other people would hold it, filmed by a camera from any side and from a
+tripod or a stand, with bones as long and joints as exact as lengths and tracks really are. Left and
+right share what is learnt, and so do all ways that a player may face. The coefficients then follow
+from one linear system (ridge regression): the same captures give the same rule.
 """
 
 from collections.abc import Sequence
@@ -34,8 +32,8 @@ from keyrecon.progress import Progress, silent
 DEPTH_MODEL_VERSION = 1
 """Of the bones and terms that a model has coefficients for."""
 _BONES = len(LSP14.bones)
-_SHOWN = 3 * _BONES
-TERMS = 1 + _SHOWN + _SHOWN * (_SHOWN + 1) // 2
+_INPUTS = 3 * _BONES
+TERMS = 1 + _INPUTS + _INPUTS * (_INPUTS + 1) // 2
 """Of the polynomial: a constant, 39 linear ones, 780 products."""
 
 
@@ -69,10 +67,10 @@ def polynomial(flat: Float[np.ndarray, "n 13 2"]) -> Float[np.ndarray, "n terms"
     """
     flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1)
     left = np.sqrt(np.clip(1 - (flat**2).sum(axis=-1), 0, 1))
-    shown = np.concatenate([flat.reshape(len(flat), -1), left], axis=1)
-    one, other = np.triu_indices(_SHOWN)
-    constant = np.ones((len(flat), 1), shown.dtype)
-    return np.concatenate([constant, shown, shown[:, one] * shown[:, other]], axis=1)
+    inputs = np.concatenate([flat.reshape(len(flat), -1), left], axis=1)
+    one, other = np.triu_indices(_INPUTS)
+    constant = np.ones((len(flat), 1), inputs.dtype)
+    return np.concatenate([constant, inputs, inputs[:, one] * inputs[:, other]], axis=1)
 
 
 def expected_depth(
@@ -81,18 +79,18 @@ def expected_depth(
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
 ) -> Float[np.ndarray, "T B"]:
-    """Depth that bones usually have where they look like this, in units of `lengths`.
+    """Depth that the model expects of bones, in the unit of `lengths`.
 
     NaN for bones that the model does not know, for all of them where one of LSP14's is missing
-    from the skeleton. A bone that is not seen (NaN) tells nothing about the others.
+    from the skeleton. A bone that is not observed (NaN) tells nothing about the others.
     """
-    usual = np.full(vectors.shape[:2], np.nan)
+    expected = np.full(vectors.shape[:2], np.nan)
     places = _places(skeleton)
     if model is None or places is None:
-        return usual
+        return expected
     flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
-    usual[:, places] = model.depth_shares(flat) * lengths[places]
-    return usual
+    expected[:, places] = model.depth_shares(flat) * lengths[places]
+    return expected
 
 
 def _places(skeleton: Skeleton) -> list[int] | None:
@@ -180,11 +178,11 @@ def _draw(
     poses = np.concatenate(captures)[rows]
     mirrored = poses[:, _MIRROR] * np.float32([-1, 1, 1])
     poses = np.where((rng.random(len(poses)) < 0.5)[:, None, None], mirrored, poses)
-    seen = _film(_vary(poses, rng, options.limb_turn), rng, options)
-    error = 1 + options.length_error * rng.standard_normal((*seen.shape[:2], 1))
-    flat = seen[..., :2] * error
+    filmed = _film(_vary(poses, rng, options.limb_turn), rng, options)
+    error = 1 + options.length_error * rng.standard_normal((*filmed.shape[:2], 1))
+    flat = filmed[..., :2] * error
     flat = flat + options.joint_error * rng.standard_normal(flat.shape)
-    return flat.astype(np.float32), seen[..., 2].astype(np.float32)
+    return flat.astype(np.float32), filmed[..., 2].astype(np.float32)
 
 
 def _vary(

@@ -2,18 +2,18 @@
 
 A person marks elbows and wrists that cannot be seen where they must be. Within the outline of the
 trunk it is nearly always the trunk that hides them, so they are behind it: of all that a mark
-tells beside its place, this says most about depth. A joint that is seen there says less, since
-not every tool records what was seen.
+tells beside its place, this says most about depth. A joint that is visible there says less, since
+not every tool records visibility.
 """
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-_BEHIND = 0.03
+_DEPTH_SOFTNESS = 0.03
 """Depth over which a joint passes from before the trunk to behind it, body heights."""
-_CAP = 4.0
+_MAX_COST = 4.0
 """Cost of a hidden joint far before the trunk, nats: one mark in fifty is wrong."""
-_RIM = 0.04
+_OUTLINE_MARGIN = 0.04
 """How far flesh and clothes reach beyond the corners of the trunk, body heights."""
 
 
@@ -32,14 +32,14 @@ def hidden_cost(
     covered = hidden & within_trunk(corners[:, 0, :, :2], shoulder[:, :1, :2] + chain[:, 0, :, :2])
     depth = shoulder[:, :, None, None, 2] + chain[:, None, :, :, 2]
     ahead = corners[..., 2].mean(axis=2)[:, :, None, None] - depth
-    cost = np.minimum(np.logaddexp(0.0, ahead / _BEHIND), _CAP)
+    cost = np.minimum(np.logaddexp(0.0, ahead / _DEPTH_SOFTNESS), _MAX_COST)
     return (covered[:, None, None] * cost).sum(axis=-1)
 
 
 def within_trunk(
     corners: Float[np.ndarray, "n 4 2"], points: Float[np.ndarray, "n m 2"]
 ) -> Bool[np.ndarray, "n m"]:
-    """Whether points lie within the trunk's outline in the picture, its rim included."""
+    """Whether points lie within the trunk's outline in the picture, its margin included."""
     ring = corners[:, [0, 1, 3, 2]]  # right hip, left hip, left shoulder, right shoulder
     side = np.roll(ring, -1, axis=1) - ring
     off = points[:, :, None] - ring[:, None]
@@ -51,4 +51,4 @@ def within_trunk(
     cross = off[..., 0] * side[:, None, :, 1] - off[..., 1] * side[:, None, :, 0]
     rightward = np.where(side[:, None, :, 1] > 0, cross < 0, cross > 0)
     inside = ((below != after) & rightward).sum(axis=-1) % 2 == 1
-    return inside | (apart < _RIM)
+    return inside | (apart < _OUTLINE_MARGIN)

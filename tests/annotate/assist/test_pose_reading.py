@@ -7,7 +7,7 @@ from swinging_figure import BREADTHS, swinging_motion
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.pose_reading import DIFFERENT, Sighting, read_pose
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import ancestry, pose_from_directions
+from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.records import Annotations
 
@@ -125,5 +125,5 @@ def test_a_limb_drawn_too_long_shows_by_how_much():
 def test_depths_add_up_from_the_root():
     reading = read_pose(sighting(100), SIZE, LSP14)
     steps = np.diff(reading.points3d[LSP14.bones][:, :, 2], axis=1)[:, 0]
-    np.testing.assert_allclose(ancestry(LSP14) @ steps, reading.points3d[:, 2], atol=1e-9)
+    np.testing.assert_allclose(LSP14.ancestry @ steps, reading.points3d[:, 2], atol=1e-9)
     assert (np.sign(steps) == -reading.nearer).all()

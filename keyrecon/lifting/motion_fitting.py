@@ -1,0 +1,137 @@
+"""The motion fitted to tracked joints, depth signs and all.
+
+Depth signs of every frame come from a Viterbi path, the trajectory from the solver. Two
+passes: the first starts from smoothed tracks, the second from the first one's motion, where noise
+is lower and key poses agree with their neighbours in time. Long motions are cut into
+overlapping windows that are blended, so memory stays bounded and cost linear.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.lifting.depth_evidence import DepthSignOptions, at_rate
+from keyrecon.lifting.depth_signs import track_depth_signs
+from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.lifting.preprocessing import PreparedTracks, smooth_joints
+from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.lifting.priors.exemplars import ExemplarPrior
+from keyrecon.lifting.refinement import RefineOptions, refine_motion
+from keyrecon.lifting.solver import MotionState
+from keyrecon.lifting.taylor import KeyPoses, foreshorten_bones, lift_foreshortened
+from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.progress import Progress, silent
+
+WINDOW_FRAMES, OVERLAP_FRAMES = 2000, 100
+"""Frames solved together, and shared by neighbours."""
+_SMOOTHING_SECONDS = 0.03
+"""Smoothing of the tracks from which signs are inferred; half of the fastest stroke's rise."""
+_SMOOTHED_NOISE, _FITTED_NOISE = 0.02, 0.015
+"""Standard deviation of smoothed and of once fitted joints, body heights."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlayerModel:
+    """Who moves: body size, key poses and the depth model."""
+
+    size: BodySize
+    keys: KeyPoses
+    depth_model: DepthModel | None = None
+
+
+def fit_motion(
+    initial: MotionState,
+    observed: PreparedTracks,
+    player: PlayerModel,
+    fps: float,
+    sign_options: DepthSignOptions = DepthSignOptions(),
+    refine_options: RefineOptions = RefineOptions(),
+    progress: Progress = silent,
+) -> MotionState:
+    """Root and bone directions in every frame; `initial` bridges what was not observed."""
+    frames = len(initial.root)
+    root = np.zeros_like(initial.root)
+    directions = np.zeros_like(initial.directions)
+    windows = list(_windows(frames))
+    for window in progress(windows, "Lifting to 3D", len(windows)):
+        part, keys = slice(window.first, window.last), player.keys
+        fitted = _fit_window(
+            MotionState(initial.root[part], initial.directions[part]),
+            observed.part(part),
+            replace(player, keys=replace(keys, frames=keys.frames - window.first)),
+            fps,
+            sign_options,
+            refine_options,
+        )
+        root[part] += window.weight[:, None] * fitted.root
+        directions[part] += window.weight[:, None, None] * fitted.directions
+    return MotionState(root, unit_vectors(directions))
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """Frames fitted together, and their weights, which add up to 1 over all windows."""
+
+    first: int
+    last: int
+    weight: Float[np.ndarray, "n"]
+
+
+def _windows(frames: int) -> Iterator[_Window]:
+    first = 0
+    while True:
+        last = frames
+        if frames - first > WINDOW_FRAMES + OVERLAP_FRAMES:
+            last = first + WINDOW_FRAMES
+        weight = np.ones(last - first)
+        ramp = (np.arange(OVERLAP_FRAMES) + 0.5) / OVERLAP_FRAMES
+        if first > 0:
+            weight[:OVERLAP_FRAMES] = ramp
+        if last < frames:
+            weight[-OVERLAP_FRAMES:] = 1 - ramp
+        yield _Window(first, last, weight)
+        if last == frames:
+            return
+        first = last - OVERLAP_FRAMES
+
+
+def _fit_window(
+    initial: MotionState,
+    observed: PreparedTracks,
+    player: PlayerModel,
+    fps: float,
+    sign_options: DepthSignOptions,
+    refine_options: RefineOptions,
+) -> MotionState:
+    size, keys = player.size, player.keys
+    skeleton, lengths = size.skeleton, size.lengths
+    bridge = initial.points(lengths, skeleton)[..., :2]
+    joints = smooth_joints(observed.joints, bridge, _SMOOTHING_SECONDS * fps)
+    directions = keys.directions
+    noise, sign_options = _SMOOTHED_NOISE, at_rate(sign_options, fps)
+    initial_depth = lengths * initial.directions[..., 2]
+    for _ in range(2):
+        blur = np.full(joints.shape[:2], noise)
+        bones = foreshorten_bones(joints, blur, lengths, skeleton, player.depth_model)
+        exemplars = ExemplarPrior(
+            lengths[:, None] * directions, keys.frames, keys.confidence, initial_depth, skeleton
+        )
+        signs = track_depth_signs(bones, exemplars, size.breadths, skeleton, sign_options)
+        start = MotionState(joints[:, skeleton.root], lift_foreshortened(bones, signs.sign))
+        state = refine_motion(start, observed, initial.directions, size, fps, refine_options)
+        joints, noise = state.points(lengths, skeleton)[..., :2], _FITTED_NOISE
+        directions = _fitted_key_directions(keys, state)
+    return state
+
+
+def _fitted_key_directions(keys: KeyPoses, state: MotionState) -> Float[np.ndarray, "K B 3"]:
+    """Key poses as the motion passes through them, with the signs that a person annotated."""
+    inside = (keys.frames >= 0) & (keys.frames < len(state.root))
+    directions = keys.directions.copy()
+    fitted = state.directions[keys.frames[inside]]
+    nearer = keys.nearer[inside]
+    fitted[..., 2] = np.where(nearer != 0, -nearer * np.abs(fitted[..., 2]), fitted[..., 2])
+    directions[inside] = fitted
+    return directions
