@@ -5,10 +5,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.optimize import OptimizeResult, minimize
 from swinging_figure import BREADTHS, standing_directions, swinging_motion, turned
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.lifting import limb_lengths
 from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import (
     DepthSignOptions,
@@ -65,25 +67,25 @@ def aligned_error(points, truth):
 def test_a_projected_pose_with_known_signs_comes_back():
     directions = unit_vectors(np.random.default_rng(1).normal(size=(40, 13, 3)))
     truth = pose_from_directions(directions, LSP14.lengths, LSP14)
-    shown = foreshorten_bones(truth[..., :2], np.full((40, 14), 1e-4), LSP14.lengths, LSP14)
+    bones = foreshorten_bones(truth[..., :2], np.full((40, 14), 1e-4), LSP14.lengths, LSP14)
     sign = np.where(directions[..., 2] > 0, 1, -1)
-    lifted = pose_from_directions(lift_foreshortened(shown, sign), LSP14.lengths, LSP14)
+    lifted = pose_from_directions(lift_foreshortened(bones, sign), LSP14.lengths, LSP14)
     assert np.linalg.norm(lifted - truth, axis=-1).max() < 0.02
 
 
 def test_a_bone_longer_in_the_picture_than_in_life_lies_nearly_in_the_image_plane():
     joints = np.zeros((1, 14, 2))
     joints[0, LSP14.index("right_wrist")] = [0.16, 0.0]
-    shown = foreshorten_bones(joints, np.full((1, 14), 0.003), LSP14.lengths, LSP14)
+    bones = foreshorten_bones(joints, np.full((1, 14), 0.003), LSP14.lengths, LSP14)
     bone = [c for _, c in LSP14.bones].index(LSP14.index("right_wrist"))
-    assert shown.depth[0, bone] < 0.25 * LSP14.lengths[bone]
+    assert bones.depth[0, bone] < 0.25 * LSP14.lengths[bone]
 
 
 def test_a_bone_with_a_missing_end_keeps_a_finite_depth():
     joints = np.zeros((1, 14, 2))
     joints[0, LSP14.index("left_ankle")] = np.nan
-    shown = foreshorten_bones(joints, np.full((1, 14), 0.01), LSP14.lengths, LSP14)
-    assert np.isfinite(shown.in_plane).all() and np.isfinite(shown.depth).all()
+    bones = foreshorten_bones(joints, np.full((1, 14), 0.01), LSP14.lengths, LSP14)
+    assert np.isfinite(bones.in_plane).all() and np.isfinite(bones.depth).all()
 
 
 def price_of_body(vectors):
@@ -145,7 +147,7 @@ def test_half_the_frame_rate_gives_a_frame_twice_the_say_and_four_times_the_jump
 
 
 def bare(flat, depth):
-    """Bones of which nothing is known but what the picture shows."""
+    """Bones of which only the picture is known."""
     return ForeshortenedBones(flat, depth, np.full(depth.shape, 0.01), np.full(depth.shape, np.nan))
 
 
@@ -154,14 +156,14 @@ def test_signs_are_the_cheapest_of_all_sign_vectors():
     directions = unit_vectors(standing_directions() + 0.4 * rng.normal(size=(3, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
     depth = np.abs(LSP14.lengths * directions[..., 2])
-    shown = bare(flat, depth)
+    bones = bare(flat, depth)
     nearer = np.zeros((3, 13), dtype=np.int64)
-    chosen = choose_depth_signs(shown, nearer, BREADTHS, LSP14).sign
+    chosen = choose_depth_signs(bones, nearer, BREADTHS, LSP14).sign
     every = np.array(list(product((1, -1), repeat=13)))
     for pose in range(3):
         vectors = np.concatenate(
             [
-                np.broadcast_to(shown.in_plane[pose], (len(every), 13, 2)),
+                np.broadcast_to(bones.in_plane[pose], (len(every), 13, 2)),
                 (every * depth[pose])[..., None],
             ],
             axis=-1,
@@ -175,15 +177,15 @@ def test_the_sign_path_is_the_cheapest_of_all_paths():
     rng = np.random.default_rng(5)
     cost = rng.uniform(0, 1, (6, 2))
     depth = sign_states(1)[None] * rng.uniform(0.02, 0.2, (6, 1, 1))
-    doubt = rng.uniform(0.01, 0.05, (6, 1))
+    depth_spread = rng.uniform(0.01, 0.05, (6, 1))
     options = DepthSignOptions()
 
     def price(path):
         z = depth[np.arange(6), list(path), 0]
-        jumps = np.diff(z, 2) ** 2 / (2 * (options.acceleration**2 + doubt[1:-1, 0] ** 2))
+        jumps = np.diff(z, 2) ** 2 / (2 * (options.acceleration**2 + depth_spread[1:-1, 0] ** 2))
         return cost[np.arange(6), list(path)].sum() + np.minimum(jumps, options.max_jump_cost).sum()
 
-    found = second_order_path(cost, depth[:, 0], doubt, options)
+    found = second_order_path(cost, depth[:, 0], depth_spread, options)
     assert price(found) == pytest.approx(min(price(p) for p in product((0, 1), repeat=6)))
 
 
@@ -195,38 +197,38 @@ def test_knees_bend_backwards_whichever_way_the_figure_faces():
     for yaw in (0.4, -0.5, 2.6):
         directions = turned(lifted, yaw)[None]
         flat = LSP14.lengths[:, None] * directions[..., :2]
-        shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
-        chosen = choose_depth_signs(shown, np.zeros((1, 13), np.int64), BREADTHS, LSP14)
+        bones = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
+        chosen = choose_depth_signs(bones, np.zeros((1, 13), np.int64), BREADTHS, LSP14)
         np.testing.assert_array_equal(chosen.sign[0, shanks], np.sign(directions[0, shanks, 2]))
 
 
-def test_what_is_usual_tells_apart_what_looks_the_same():
+def test_the_expected_depth_tells_apart_what_looks_the_same():
     names = [LSP14.names[c] for _, c in LSP14.bones]
     arms = [
         names.index(f"{side}_{end}") for side in ("right", "left") for end in ("elbow", "wrist")
     ]
     nobody = np.zeros((1, 13), np.int64)
-    blind, told = [], []
+    alone, expected = [], []
     for side in (1, -1):
         directions = standing_directions()[None]
         directions[:, arms] = unit_vectors(np.array([0.1, 0.6, 0.8 * side]))
         flat, dz = LSP14.lengths[:, None] * directions[..., :2], LSP14.lengths * directions[..., 2]
-        shown = bare(flat, np.abs(dz))
-        blind.append(choose_depth_signs(shown, nobody, BREADTHS, LSP14).sign[0, arms])
-        known = choose_depth_signs(replace(shown, expected_depth=dz), nobody, BREADTHS, LSP14)
-        told.append(known.sign[0, arms])
-    np.testing.assert_array_equal(blind[0], blind[1])
-    np.testing.assert_array_equal(told[0], 1)
-    np.testing.assert_array_equal(told[1], -1)
+        bones = bare(flat, np.abs(dz))
+        alone.append(choose_depth_signs(bones, nobody, BREADTHS, LSP14).sign[0, arms])
+        known = choose_depth_signs(replace(bones, expected_depth=dz), nobody, BREADTHS, LSP14)
+        expected.append(known.sign[0, arms])
+    np.testing.assert_array_equal(alone[0], alone[1])
+    np.testing.assert_array_equal(expected[0], 1)
+    np.testing.assert_array_equal(expected[1], -1)
 
 
-def test_confirmed_signs_are_kept():
+def test_annotated_signs_are_kept():
     rng = np.random.default_rng(7)
     directions = unit_vectors(standing_directions() + 0.3 * rng.normal(size=(5, 13, 3)))
     flat = LSP14.lengths[:, None] * directions[..., :2]
-    shown = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
+    bones = bare(flat, np.abs(LSP14.lengths * directions[..., 2]))
     nearer = rng.choice([-1, 1], (5, 13))
-    chosen = choose_depth_signs(shown, nearer, BREADTHS, LSP14, DepthSignOptions(annotated=1e3))
+    chosen = choose_depth_signs(bones, nearer, BREADTHS, LSP14, DepthSignOptions(annotated=1e3))
     np.testing.assert_array_equal(chosen.sign, -nearer)
 
 
@@ -240,6 +242,43 @@ def test_lengths_and_scale_come_from_the_picture():
     assert off[np.logical_not(across)].max() < 0.12
     assert np.abs(size.scale / np.median(size.scale) - 1).max() < 0.05
     np.testing.assert_array_equal(size.lengths, size.lengths[LSP14.bone_mirror])
+
+
+def test_a_search_for_lengths_that_fails_leaves_the_table_and_says_so(monkeypatch, caplog):
+    _, tracks, marks, _ = scene(frames=60)
+
+    def fail(cost, start, **_):
+        lost = np.full(len(start), np.nan)
+        return OptimizeResult(x=lost, fun=np.nan, success=False, message="ABNORMAL")
+
+    monkeypatch.setattr(limb_lengths, "minimize", fail)
+    size = estimate_lengths(tracks, marks, np.full(60, 0.88 * SCALE), 50.0)
+    np.testing.assert_allclose(size.lengths, LSP14.lengths)
+    assert np.isfinite(size.scale).all()
+    assert "did not converge (ABNORMAL); the table's proportions are used" in caplog.text
+
+
+def test_a_search_that_stops_early_keeps_what_it_gained(monkeypatch, caplog):
+    _, tracks, marks, _ = scene(frames=60, noise=0.01)
+    height = np.full(60, 0.88 * SCALE)
+    found = estimate_lengths(tracks, marks, height, 50.0)
+
+    def stop(cost, start, **settings):
+        return OptimizeResult(minimize(cost, start, **settings), success=False, message="LIMIT")
+
+    monkeypatch.setattr(limb_lengths, "minimize", stop)
+    np.testing.assert_array_equal(
+        estimate_lengths(tracks, marks, height, 50.0).lengths, found.lengths
+    )
+    assert "did not converge (LIMIT); its last step is used" in caplog.text
+
+
+def test_lengths_of_nothing_are_refused():
+    _, tracks, marks, _ = scene(frames=60)
+    nothing = replace(tracks, joints=np.full_like(tracks.joints, np.nan))
+    unmarked = replace(marks, joints=np.full_like(marks.joints, np.nan))
+    with pytest.raises(KeyreconError, match="No bone has both ends"):
+        estimate_lengths(nothing, unmarked, np.full(60, 350.0), 50.0)
 
 
 def test_a_motion_is_lifted_from_keyframes_and_tracks():
@@ -269,20 +308,20 @@ def test_a_height_in_metres_scales_the_motion_and_nothing_else():
     np.testing.assert_allclose(metres.points2d, plain.points2d, rtol=1e-9)
 
 
-def test_gross_slips_of_joints_change_little():
+def test_gross_outliers_change_little():
     truth, tracks, marks, keys = scene(frames=150, noise=0.005)
     rng = np.random.default_rng(2)
     joints = tracks.joints.copy()
-    slip = rng.random(joints.shape[:2]) < 0.05
-    slip[marks.frames] = False
-    joints[slip] += rng.normal(0, 0.15 * SCALE, (slip.sum(), 2))
+    outlier = rng.random(joints.shape[:2]) < 0.05
+    outlier[marks.frames] = False
+    joints[outlier] += rng.normal(0, 0.15 * SCALE, (outlier.sum(), 2))
     height = np.full(150, 0.88 * SCALE)
-    calm = lift_motion(tracks, marks, keys, height, 50.0)
-    slipped = lift_motion(
+    clean = lift_motion(tracks, marks, keys, height, 50.0)
+    disturbed = lift_motion(
         JointTracks(joints, tracks.confidence, tracks.keyframe), marks, keys, height, 50.0
     )
-    assert aligned_error(slipped.points3d, truth) < aligned_error(calm.points3d, truth) + 0.008
-    assert slipped.rejected[slip].mean() > 0.6
+    assert aligned_error(disturbed.points3d, truth) < aligned_error(clean.points3d, truth) + 0.008
+    assert disturbed.rejected[outlier].mean() > 0.6
 
 
 def test_the_inputs_are_left_as_they_were():

@@ -70,9 +70,9 @@ def test_opposite_directions_turn_through_the_image_plane():
 
 def test_directions_are_held_outside_the_control_frames():
     poses = unit_vectors(np.random.default_rng(0).normal(size=(2, 1, 3)))
-    carried = slerp_between(poses, np.array([3, 6]), 10)
-    np.testing.assert_allclose(carried[:4], np.repeat(poses[:1], 4, axis=0))
-    np.testing.assert_allclose(carried[6:], np.repeat(poses[1:], 4, axis=0))
+    between = slerp_between(poses, np.array([3, 6]), 10)
+    np.testing.assert_allclose(between[:4], np.repeat(poses[:1], 4, axis=0))
+    np.testing.assert_allclose(between[6:], np.repeat(poses[1:], 4, axis=0))
 
 
 def test_control_points_never_part_further_than_their_reach():
@@ -84,8 +84,8 @@ def test_control_points_never_part_further_than_their_reach():
 
 
 def test_the_best_frame_of_a_run_stays_and_the_worst_go_first():
-    misfit = np.array([0.0, 5, 4, 1, 4, 5, 0.0])
-    kept = drop_controls(half_keyframes([0, 1, 1, 1, 1, 1, 2], np.ones(7)), misfit, 10)
+    residual = np.array([0.0, 5, 4, 1, 4, 5, 0.0])
+    kept = drop_controls(half_keyframes([0, 1, 1, 1, 1, 1, 2], np.ones(7)), residual, 10)
     np.testing.assert_array_equal(kept, [0, 3, 6])
 
 
@@ -119,10 +119,10 @@ def test_descent_filters_as_one_pass_whose_gain_follows_the_923_rule():
     assert loss == pytest.approx(0.707, abs=0.01)
 
 
-def known(joints, spread, knee=HUBER_DELTA):
+def known(joints, spread, delta=HUBER_DELTA):
     """Joints of which all are known equally well."""
     return PreparedTracks(
-        joints, np.full(joints.shape[:2], spread), np.full(joints.shape[:2], knee)
+        joints, np.full(joints.shape[:2], spread), np.full(joints.shape[:2], delta)
     )
 
 
@@ -185,19 +185,19 @@ def test_a_solver_step_never_raises_the_cost():
     assert costs[-1] < costs[0]
 
 
-def test_what_a_person_saw_holds_against_neighbours_that_slipped():
+def test_what_a_person_marked_holds_against_outlying_neighbours():
     truth, wrist, marked = smooth_state(60), LSP14.index("right_wrist"), 30
     joints = positions(truth)[..., :2]
-    slipped = joints.copy()
-    slipped[20:41, wrist, 0] += 0.1
-    slipped[marked] = joints[marked]
+    displaced = joints.copy()
+    displaced[20:41, wrist, 0] += 0.1
+    displaced[marked] = joints[marked]
     off = {}
-    for knee in (HUBER_DELTA, np.inf):
-        observed = known(slipped, 0.02)
-        observed.spread[marked], observed.huber_delta[marked] = 0.007, knee
+    for delta in (HUBER_DELTA, np.inf):
+        observed = known(displaced, 0.02)
+        observed.spread[marked], observed.huber_delta[marked] = 0.007, delta
         term = terms.reprojection(observed, LENGTHS, LSP14)
         found = solve(truth, [term], Smoothness(1e4, 1e4 * LENGTHS**2), 20, 1e-6)
-        off[knee] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])
+        off[delta] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])
     assert off[np.inf] < 0.5 * off[HUBER_DELTA]
 
 
@@ -215,16 +215,16 @@ def test_spikes_are_rejected_and_steady_offsets_are_not():
 
 
 def test_expected_depth_is_taylors_without_noise():
-    shown = np.array([0.1, 0.5, 0.8, 0.95])
-    found = depth_share(shown, np.full(4, 0.005))
-    np.testing.assert_allclose(found, np.sqrt(1 - shown**2), atol=0.01)
+    foreshortening = np.array([0.1, 0.5, 0.8, 0.95])
+    found = depth_share(foreshortening, np.full(4, 0.005))
+    np.testing.assert_allclose(found, np.sqrt(1 - foreshortening**2), atol=0.01)
 
 
-def test_long_shown_lengths_are_likelier_than_short_ones_up_to_the_full_length():
-    shown = np.array([0.3, 0.7, 0.97, 1.3])
-    value, slope = log_density(shown, np.full(4, 0.03))
+def test_long_lengths_in_the_picture_are_likelier_than_short_ones_up_to_the_full_length():
+    foreshortening = np.array([0.3, 0.7, 0.97, 1.3])
+    value, slope = log_density(foreshortening, np.full(4, 0.03))
     assert value[0] < value[1] < value[2] and value[3] < value[0]
-    nudged, _ = log_density(shown + 1e-5, np.full(4, 0.03))
+    nudged, _ = log_density(foreshortening + 1e-5, np.full(4, 0.03))
     np.testing.assert_allclose((nudged - value) / 1e-5, slope, rtol=0.02, atol=0.02)
 
 
@@ -240,7 +240,7 @@ def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
     assert np.abs(term(solved).residual).max() < 0.01
 
 
-def test_a_step_of_a_foot_that_rests_is_no_slip():
+def test_a_step_of_a_foot_that_rests_is_no_outlier():
     residual = np.random.default_rng(0).normal(0, 1e-4, (200, 1, 2))
     residual[90:96, 0, 1] -= 0.03 * np.sin(np.linspace(0, np.pi, 6))
     residual[150, 0] += 0.3

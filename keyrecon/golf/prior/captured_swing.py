@@ -16,12 +16,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from keyrecon.body import LSP14
+from keyrecon.body import ANKLE_HEIGHT, LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.prior.key_postures import find_key_postures
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.skeleton import (
-    ANKLE_HEIGHT,
     CLUB,
     CLUB_LENGTH,
     GRIP,

@@ -1,8 +1,8 @@
 """Expected depth of bones given the whole picture: a regression learnt from captured motion.
 
 A flat picture of a whole body says more about depth than joint limits can put into words: which
-way an arm reaches depends on how hips, shoulders and the other limbs are placed. The rule is a polynomial
-of second degree in the picture of the 13 bones, in shares of their lengths: both
+way an arm reaches depends on how hips, shoulders and the other limbs are placed. The rule is a
+polynomial of second degree in the picture of the 13 bones, in shares of their lengths: both
 in-plane parts, and how much is left for depth (Taylor's sqrt(1 - q^2)). Its coefficients give the
 depths of captured people, filmed from all around, with the least squared error. Only the sign of
 what it gives is of interest here, since lengths tell the rest better; a value near zero says that

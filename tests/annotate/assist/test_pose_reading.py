@@ -11,7 +11,7 @@ from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.records import Annotations
 
-SIZE = BodySize(LSP14.lengths, BREADTHS, np.full(240, 400.0))
+SIZE = BodySize(LSP14, LSP14.lengths, BREADTHS, np.full(240, 400.0))
 DIRECTIONS = swinging_motion()
 TRUTH = pose_from_directions(DIRECTIONS, LSP14.lengths, LSP14)
 NEARER = -np.sign(DIRECTIONS[..., 2]).astype(np.int64)

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from keyrecon.body import LSP14
+from keyrecon.body import ANKLE_HEIGHT, LSP14
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body, pose_rates
 from keyrecon.golf.prior.motion_model import left_jacobian, posture_at
 from keyrecon.golf.prior.skeleton import (
-    ANKLE_HEIGHT,
     CLUB,
     LENGTHS,
     REST,
