@@ -14,6 +14,18 @@ import msgspec
 from keyrecon.errors import KeyreconError
 
 Record = TypeVar("Record")
+FORMER_NAMES = {
+    "lift.flips": "lift.depth_signs",
+    "lift.depth_signs.confirmed": "lift.depth_signs.annotated",
+    "lift.depth_signs.limits": "lift.depth_signs.joint_limits",
+    "lift.depth_signs.votes": "lift.depth_signs.exemplars",
+    "lift.depth_signs.guide": "lift.depth_signs.initial_motion",
+    "lift.depth_signs.usual": "lift.depth_signs.expected_depth",
+    "lift.depth_signs.alike": "lift.depth_signs.exemplar_spread",
+    "lift.depth_signs.jerk": "lift.depth_signs.acceleration",
+    "lift.depth_signs.reach": "lift.depth_signs.max_jump_cost",
+}
+"""Options that older project files set under another name, in the order in which they are read."""
 NUMBERS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 
 
@@ -39,6 +51,39 @@ def nested_tables(changes: dict[str, Any]) -> dict[str, Any]:
             table = table.setdefault(part, {})
         table[last] = value
     return tables
+
+
+def with_current_names(changes: object) -> object:
+    """Nested tables with the options of `FORMER_NAMES` under their present names."""
+    if not isinstance(changes, dict):
+        return changes
+    tables = _copied(changes)
+    for former, current in FORMER_NAMES.items():
+        *path, last = former.split(".")
+        table = _table_at(tables, path)
+        if table is None or last not in table:
+            continue
+        value = table.pop(last)
+        *path, last = current.split(".")
+        table = tables
+        for part in path:
+            table = table.setdefault(part, {})
+        present = table.get(last)
+        both = isinstance(value, dict) and isinstance(present, dict)
+        table[last] = value | present if both else value if present is None else present
+    return tables
+
+
+def _copied(tables: dict[str, Any]) -> dict[str, Any]:
+    return {n: _copied(v) if isinstance(v, dict) else v for n, v in tables.items()}
+
+
+def _table_at(tables: dict[str, Any], path: list[str]) -> dict[str, Any] | None:
+    """The table under a path of names; None where there is none."""
+    table: object = tables
+    for part in path:
+        table = table.get(part) if isinstance(table, dict) else None
+    return table if isinstance(table, dict) else None
 
 
 def with_changes(options: Record, changes: object, where: str = "options") -> Record:

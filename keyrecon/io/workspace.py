@@ -23,7 +23,13 @@ from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, explain, quoted
 from keyrecon.io.durable import hold_lock, make_folder, write_durably
 from keyrecon.io.formats.picks import read_picks, write_picks
-from keyrecon.io.option_tables import Record, changed_options, nested_tables, with_changes
+from keyrecon.io.option_tables import (
+    Record,
+    changed_options,
+    nested_tables,
+    with_changes,
+    with_current_names,
+)
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, fingerprint_file, open_video
 from keyrecon.records import Pick
@@ -211,7 +217,7 @@ class Workspace:
 
     def options(self, given: Record, defaults: Record) -> Record:
         """Options that this project has set, and on top of them what `given` sets otherwise."""
-        kept = with_changes(defaults, self.project.get("options", {}))
+        kept = with_changes(defaults, with_current_names(self.project.get("options", {})))
         return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
     def remember(self, options: object, defaults: object) -> None:

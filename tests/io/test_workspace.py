@@ -137,3 +137,11 @@ def test_whole_numbers_serve_where_numbers_are_wanted(bare):
     file = bare / "project.toml"
     file.write_text(f"{file.read_text()}\n[options]\nlift.height = 2\n")
     assert Workspace(bare).options(Options(), Options()).lift.height == 2
+
+
+def test_a_project_that_sets_options_under_their_former_names_keeps_them(bare):
+    file = bare / "project.toml"
+    lines = "lift.flips.votes = 0.5\nlift.flips.jerk = 0.2\nlift.depth_signs.annotated = 9.0\n"
+    file.write_text(f"{file.read_text()}\n[options]\n{lines}")
+    signs = Workspace(bare).options(Options(), Options()).lift.depth_signs
+    assert (signs.exemplars, signs.acceleration, signs.annotated) == (0.5, 0.2, 9.0)
