@@ -208,12 +208,13 @@ def plan(bench: Bench, clips: list[str]) -> tuple[list[tuple[str, Change]], list
     words = bench.words
     trees = read_package()
     stages = find_stages(trees)
-    bases = {clip: bench.base(clip) for clip in clips}
     todo: list[tuple[str, Change]] = []
     unused = []
-    for number in find_numbers(trees):
-        if not wanted(number, words):
-            continue
+    numbers = [number for number in find_numbers(trees) if wanted(number, words)]
+    if not numbers:
+        raise SystemExit("No tuned number is called so; see tuned_numbers.py on their names.")
+    bases = {clip: bench.base(clip) for clip in clips}
+    for number in numbers:
         first = first_stage(number.module, trees, stages)
         using = [clip for clip in clips if is_used(number, trees, bases[clip].called)]
         if first is None or not using:
