@@ -27,6 +27,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
+import numpy as np
 from sensitivity_rows import Row, print_summary, read_rows, shorten
 from tuned_numbers import (
     FOLDERS,
@@ -207,13 +208,14 @@ def plan(bench: Bench, clips: list[str]) -> tuple[list[tuple[str, Change]], list
     """What is to be measured, the quick ones first, and the numbers that no clip uses."""
     words = bench.words
     trees = read_package()
-    stages = find_stages(trees)
     todo: list[tuple[str, Change]] = []
     unused = []
     numbers = [number for number in find_numbers(trees) if wanted(number, words)]
     if not numbers:
         raise SystemExit("No tuned number is called so; see tuned_numbers.py on their names.")
     bases = {clip: bench.base(clip) for clip in clips}
+    run = {stage for base in bases.values() for stage in base.seconds}
+    stages = {stage: file for stage, file in find_stages(trees).items() if stage in run}
     for number in numbers:
         first = first_stage(number.module, trees, stages)
         using = [clip for clip in clips if is_used(number, trees, bases[clip].called)]
@@ -253,11 +255,10 @@ def measure_all(bench: Bench, todo: list[tuple[str, Change]]) -> None:
     print(f"{len(left)} measurements, {len(todo) - len(left)} are there already.", flush=True)
     rest = sum(foresee(bases[clip], change.first) for clip, change in left)
     spent = foreseen = 0.0
-    with ThreadPoolExecutor(bench.words.workers) as pool:
-        jobs = {
-            pool.submit(bench.measure, clip, bases[clip], change): (clip, change)
-            for clip, change in left
-        }
+    pool = ThreadPoolExecutor(bench.words.workers)
+    jobs = {pool.submit(bench.measure, clip, bases[clip], change): (clip, change)
+            for clip, change in left}  # fmt: skip
+    try:
         for done, job in enumerate(as_completed(jobs), 1):
             clip, change = jobs[job]
             row = job.result()
@@ -265,15 +266,18 @@ def measure_all(bench: Bench, todo: list[tuple[str, Change]]) -> None:
             due = foresee(bases[clip], change.first)
             spent, foreseen, rest = spent + row.seconds, foreseen + due, rest - due
             minutes = rest * spent / foreseen / bench.words.workers / 60
-            told = (
-                row.fault
-                or f"{row.d_pck:+.2f} points {row.d_pa:+.2f} mm {row.d_pa_unsigned:+.2f} mm auto"
-            )
-            print(
-                f"{done}/{len(left)} {clip:<20}{row.number} {row.old} -> {row.new}"
-                f"{change.change if not row.new else ''}  {told}  (about {minutes:.0f} min left)",
-                flush=True,
-            )
+            ahead = f"(about {minutes:.0f} min left)"
+            print(f"{done}/{len(left)} {describe(row)}  {ahead}", flush=True)
+    finally:
+        pool.shutdown(cancel_futures=True)  # one that is interrupted does not go on for hours
+
+
+def describe(row: Row) -> str:
+    """A line on a measurement."""
+    changed = f"{row.old} -> {row.new}" if row.new else row.change
+    losses = ((row.d_pck, "points"), (row.d_pa, "mm"), (row.d_pa_unsigned, "mm auto"))
+    scores = " ".join(f"{value:+.2f} {unit}" for value, unit in losses if np.isfinite(value))
+    return f"{row.clip:<20}{row.number} {changed}  {row.fault or scores}"
 
 
 def real_clips(videos: Path) -> list[str]:

@@ -215,6 +215,8 @@ def cut(values: np.ndarray, count: int, frames: int) -> np.ndarray:
 def moved_picks(file: Path, count: int, task: Task) -> tuple[Pick, ...]:
     """The picks up to a frame, those of one part moved."""
     picks = tuple(pick for pick in read_picks(file) if pick.frame < count)
+    if not picks:
+        raise SystemExit(f"{file} has no picks before frame {count}; use more frames.")
     if not task.part:
         return picks
     length = {"head": HEAD, "foot": SHIN}[task.part] * stature(picks)
