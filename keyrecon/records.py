@@ -95,14 +95,14 @@ class Colors:
 class Background:
     """The scene without the player, a mosaic in the coordinates of the reference frame."""
 
-    plate: UInt8[np.ndarray, "h w 3"]
-    """Median colour, Lab."""
+    color: UInt8[np.ndarray, "h w 3"]
+    """Median, Lab."""
     spread: Float[np.ndarray, "h w"]
     """Usual deviation from the median, grey levels."""
     known: Bool[np.ndarray, "h w"]
-    """False where the scene was never seen."""
+    """False where the scene was never observed."""
     from_reference: Float[np.ndarray, "3 3"]
-    """Homography from pixels of the reference frame to those of the plate."""
+    """Homography from pixels of the reference frame to those of the background."""
 
 
 @dataclass(frozen=True, eq=False)

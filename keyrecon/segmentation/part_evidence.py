@@ -16,8 +16,8 @@ from keyrecon.records import CameraPath
 from keyrecon.segmentation.background_model import (
     BackgroundOptions,
     ForegroundModel,
-    combine_plate,
-    fill_plate,
+    complete_background,
+    median_background,
     sample_frames,
 )
 from keyrecon.segmentation.color_model import color_bins, to_lab
@@ -65,9 +65,9 @@ def model_scene_by_colour(
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
-    clear = combine_plate(lab, free, paths, shrink, least=MIN_CLEAR_SHARE)
-    plain = combine_plate(lab, [np.ones_like(f) for f in free], paths, shrink)
-    return ForegroundModel(fill_plate(clear, plain), camera)
+    clear = median_background(lab, free, paths, shrink, min_share=MIN_CLEAR_SHARE)
+    plain = median_background(lab, [np.ones_like(f) for f in free], paths, shrink)
+    return ForegroundModel(complete_background(clear, plain), camera)
 
 
 def evaluate_evidence(

@@ -5,7 +5,7 @@ from drawn_player import HEIGHT, draw_player, scene
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath, Track
-from keyrecon.segmentation.background_model import build_background, combine_plate
+from keyrecon.segmentation.background_model import build_background, median_background
 from keyrecon.segmentation.color_model import to_lab
 
 
@@ -25,9 +25,9 @@ def test_what_shows_between_moving_limbs_completes_the_background():
     free = np.ones((60, 80), bool)
     free[5:58, 15:65] = False  # the player never leaves
     paths = np.tile(np.eye(3), (40, 1, 1))
-    looks = [to_lab(v) for v, _ in views]
-    background = combine_plate(looks, [free] * 40, paths, 1.0, look_behind=True)
-    off = np.abs(background.plate.astype(int) - to_lab(views[0][1]).astype(int)).max(axis=2)
+    observations = [to_lab(v) for v, _ in views]
+    background = median_background(observations, [free] * 40, paths, 1.0, inpaint=True)
+    off = np.abs(background.color.astype(int) - to_lab(views[0][1]).astype(int)).max(axis=2)
     assert background.known[~free].mean() > 0.9
     assert np.percentile(off[background.known], 99) <= 6
 
@@ -39,8 +39,8 @@ def test_what_the_player_always_covers_stays_unknown():
     free = np.zeros((40, 40), bool)
     free[:, :10] = True
     paths = np.tile(np.eye(3), (40, 1, 1))
-    looks = [to_lab(p) for p in picture]
-    background = combine_plate(looks, [free] * 40, paths, 1.0, look_behind=True)
+    observations = [to_lab(p) for p in picture]
+    background = median_background(observations, [free] * 40, paths, 1.0, inpaint=True)
     assert background.known[:, :10].all()
     assert not background.known[:, 12:].any()
 
@@ -63,5 +63,5 @@ def test_a_leg_that_the_track_lacks_does_not_become_background(tmp_path):
     still = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
     background = build_background(open_video(tmp_path / "stands.mp4"), still, track)
     left = tuple((head[0] + np.array([-stride, HEIGHT])).round().astype(int)[::-1])
-    off = background.plate[left].astype(int) - to_lab(scene())[left]
+    off = background.color[left].astype(int) - to_lab(scene())[left]
     assert not background.known[left] or np.abs(off).max() < 12

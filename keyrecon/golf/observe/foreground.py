@@ -25,7 +25,7 @@ from keyrecon.io.frame_reader import read_grey, read_small, reduce_picture, side
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath
-from keyrecon.segmentation.background_model import ForegroundModel, combine_plate
+from keyrecon.segmentation.background_model import ForegroundModel, median_background
 from keyrecon.segmentation.color_model import to_lab
 
 BONES = (
@@ -190,9 +190,9 @@ def _learn_plate(
     height = cutter.clicks.height * width / video.width
     rim = np.ones((2 * max(1, round(SAFE * height)) + 1,) * 2)
     free = [cv2.dilate(m.astype(np.uint8), rim) == 0 for m in side_by_side(cutter, pictures)]
-    return combine_plate(
+    return median_background(
         [to_lab(p) for p in pictures], free, _still(len(numbers)).to_reference,
-        width / video.width, least=SEEN_LEAST,
+        width / video.width, min_share=SEEN_LEAST,
     )  # fmt: skip
 
 
