@@ -52,7 +52,7 @@ class Work:
     keys: int
     """To take the suggestion."""
     depth_keys: int
-    """To settle which ends are nearer."""
+    """To say which ends are nearer."""
 
     @property
     def placing(self) -> int:
@@ -111,10 +111,10 @@ def correct_suggestion(person: Person, frame: int, answers: Answers, seen: float
 
 
 def finish(person: Person, frame: int, answers: Answers, before: tuple[int, int, int]) -> Work:
-    """Click what is still asked for, settle the depths; what was done since `before`."""
+    """Click what is still asked for, give the depths; what was done since `before`."""
     person.mark_joints(partial(answers.place, frame))
     clicks, drags, keys = person.clicks - before[0], person.drags - before[1], person.keys
-    person.settle_depths(answers.signs(frame), partial(answers.place, frame))
+    person.give_depths(answers.signs(frame), partial(answers.place, frame))
     person.await_saved()
     joints = person.page.locator("#joints .marked").count()
     return Work(joints, clicks, drags, keys - before[2], person.keys - keys)
@@ -127,7 +127,7 @@ def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work],
     """
     assistant = replace(make_assistant(Workspace(folder)), checks=None, suggest=None)
     with browser() as chromium, serving(folder, assistant) as server:
-        person = Person(chromium.new_context(viewport=SCREEN), server.door.address)
+        person = Person(chromium.new_context(viewport=SCREEN), server.credentials.address)
         work = [way(person, frame) for frame in show(frames, "Marking keyframes", len(frames))]
         poses = person.durations("pose")
         person.page.close()
@@ -155,7 +155,7 @@ def time_switching(demo: Path) -> dict[str, list[float]]:
     shutil.rmtree(folder, ignore_errors=True)
     project.start(large, folder)
     with browser() as chromium, serving(folder) as server:
-        person = Person(chromium.new_context(viewport=SCREEN), server.door.address)
+        person = Person(chromium.new_context(viewport=SCREEN), server.credentials.address)
         person.add_keyframes(range(10, 600, 20))
         person.page.reload()  # as one who opens a project whose keyframes are known
         person.await_text("#done-count", "of")

@@ -148,7 +148,7 @@ def annotate(
         browser: Open the address; --no-browser only prints it.
     """
     say = partial(print, flush=True)  # whoever starts this from a script waits for the address
-    serve_annotator(Workspace(project), (host, port), browser, say)
+    serve_annotator(Workspace(project), host, port, browser, say)
 
 
 @app.command(name="import")

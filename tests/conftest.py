@@ -49,17 +49,17 @@ def opened(folder):
     """Open that project for annotation; the one opened before is closed."""
     from annotator import open_project
 
-    desks = []
+    sessions = []
 
     def again(*arguments):
-        for desk in desks:
-            desk.close()
-        desks[:] = [open_project(folder, *arguments)]
-        return desks[0]
+        for session in sessions:
+            session.close()
+        sessions[:] = [open_project(folder, *arguments)]
+        return sessions[0]
 
     yield again
-    for desk in desks:
-        desk.close()
+    for session in sessions:
+        session.close()
 
 
 @pytest.fixture

@@ -22,8 +22,7 @@ from keyrecon.annotate.server.address import (
 )
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
-from keyrecon.annotate.server.session import Session, open_session
-from keyrecon.annotate.store.watch import Watch
+from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import project
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
@@ -36,27 +35,31 @@ IDLE_SECONDS = 75
 
 
 def serve_annotator(
-    workspace: Workspace, place: tuple[str, int], open_browser: bool, say: Callable[[str], None]
+    workspace: Workspace,
+    host: str,
+    port: int,
+    open_browser: bool,
+    say: Callable[[str], None],
 ) -> None:
-    """Serve the page of a project at (host, port) until interrupted."""
-    file, private = workspace.folder / "cache" / "annotator.json", is_loopback(place[0])
+    """Serve the page of a project until interrupted; without a port at any that is free."""
+    file, private = workspace.folder / "cache" / "annotator.json", is_loopback(host)
     memory = recall(file) if private else LastAddress()
-    with listen(*place, memory) as listener:
-        desk = open_session(workspace, make_assistant(workspace), job_commands(workspace.folder))
-        watch = Watch(desk)
+    with listen(host, port, memory) as listener:
+        session = open_session(workspace, make_assistant(workspace), job_commands(workspace.folder))
+        watch = ProjectWatch(session)
         try:
-            door = make_credentials(listener, place[0], memory)
-            say(announce(workspace.folder, door.address, place[0]))
+            credentials = make_credentials(listener, host, memory)
+            say(announce(workspace.folder, credentials.address, host))
             if private:
-                remember(file, door)
+                remember(file, credentials)
             if open_browser:
-                webbrowser.open(door.address)
+                webbrowser.open(credentials.address)
             with suppress(KeyboardInterrupt):
-                asyncio.run(_Server(desk, door).serve(sockets=[listener]))
+                asyncio.run(_Server(session, credentials).serve(sockets=[listener]))
             say("Stopped. Everything that was marked is kept.")
         finally:
             watch.close()
-            desk.close()
+            session.close()
 
 
 def announce(folder: Path, address: str, host: str) -> str:
@@ -73,10 +76,10 @@ def announce(folder: Path, address: str, host: str) -> str:
 class _Server(uvicorn.Server):
     """Ends the streams of news when it is stopped; they would keep it waiting."""
 
-    def __init__(self, desk: Session, door: Credentials) -> None:
+    def __init__(self, session: Session, credentials: Credentials) -> None:
         """Serve a project; the address with its token appears in no log."""
         config = uvicorn.Config(
-            make_app(desk, door),
+            make_app(session, credentials),
             log_level="warning",
             access_log=False,
             server_header=False,
@@ -84,7 +87,7 @@ class _Server(uvicorn.Server):
             timeout_graceful_shutdown=GRACE_SECONDS,
         )
         super().__init__(config)
-        self._events = desk.events
+        self._events = session.events
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop; called in the server's own loop."""
@@ -97,17 +100,17 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
     return {"keyframes": partial(_find_keyframes, folder), "run": partial(_run, folder)}
 
 
-def _find_keyframes(folder: Path, told: dict[str, Any], progress: Progress) -> str:
-    reach = told.get("reach")
+def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -> str:
+    reach = options.get("reach")
     chosen = {
-        "budget": told.get("budget"),
-        "coverage": told.get("coverage"),
+        "budget": options.get("budget"),
+        "coverage": options.get("coverage"),
         "reach": None if reach is None else round(reach),
     }
     return project.find_keyframes(Workspace(folder), Options(), chosen, progress)
 
 
-def _run(folder: Path, told: dict[str, Any], progress: Progress) -> str:
+def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
-    options = project.settings(workspace, Options(), told.get("height"))
-    return project.run(workspace, options, progress, partial=True)
+    settings = project.settings(workspace, Options(), options.get("height"))
+    return project.run(workspace, settings, progress, partial=True)

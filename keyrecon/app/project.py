@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from keyrecon.annotate.store.cells import (
+    Cells,
+    annotations_from_cells,
+    apply_in_place,
+    cells_from_annotations,
+)
+from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
-from keyrecon.io.formats.annotations import (
-    find_conflicts,
-    merge_annotations,
-    missing_marks,
-    read_annotations,
-)
+from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.io.formats.motion_file import read_motion, write_motion
@@ -171,12 +173,20 @@ def write_keyframe_pictures(
 
 def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:
     """Add marks from a file to the project's annotations."""
-    video = workspace.video()
+    video, skeleton = workspace.video(), workspace.skeleton
     size = (video.width, video.height)
-    merged = read_annotations(file, workspace.skeleton, len(video), size)
+    imported = read_annotations(file, skeleton, len(video), size)
     with workspace.exclusive():
+        cells: Cells = {}
         if workspace.annotations_file.is_file():
-            merged = _merge(workspace, load_annotations(workspace, video), merged, replacing)
+            cells = cells_from_annotations(load_annotations(workspace, video))
+        comparison = compare_marks(cells, cells_from_annotations(imported))
+        if comparison.conflicts and not replacing:
+            raise _conflict_error(name_conflicts(comparison))
+        if comparison.conflicts:
+            workspace.put_aside(workspace.annotations_file)
+        apply_in_place(cells, comparison.changes(replace=True))
+        merged = annotations_from_cells(cells, skeleton)
         write_coco(workspace.annotations_file, merged, size)
     warnings = [*joints_outside(merged, size), *implausible_bones(merged)]
     return "\n".join(
@@ -188,19 +198,12 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
     )
 
 
-def _merge(
-    workspace: Workspace, old: Annotations, new: Annotations, replacing: bool
-) -> Annotations:
-    conflicts = find_conflicts(old, new)
-    if conflicts and not replacing:
-        listed = ", ".join(conflicts[:5]) + (" ..." if len(conflicts) > 5 else "")
-        raise KeyreconError(
-            f"{len(conflicts)} marks differ from those in the project ({listed}); nothing was "
-            "changed. Add --replace to take the new ones and keep the old file beside them."
-        )
-    if conflicts:
-        workspace.put_aside(workspace.annotations_file)
-    return merge_annotations(old, new)
+def _conflict_error(conflicts: list[str]) -> KeyreconError:
+    listed = ", ".join(conflicts[:5]) + (" ..." if len(conflicts) > 5 else "")
+    return KeyreconError(
+        f"{len(conflicts)} marks differ from those in the project ({listed}); nothing was "
+        "changed. Add --replace to take the new ones and keep the old file beside them."
+    )
 
 
 def load_annotations(workspace: Workspace, video: Video) -> Annotations:

@@ -56,7 +56,7 @@ for first in sys.stdin:
     os.waitpid(child, 0)
     say("dead")
 """
-"""Begins to edit at the number it is told, in a process that can be killed, again and again."""
+"""Begins to edit at the number it is given, in a process that can be killed, again and again."""
 
 
 @pytest.fixture

@@ -76,9 +76,9 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
     for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", socket.gethostname())):
         with address.listen(host, 0) as listener:
             port = listener.getsockname()[1]
-            door = address.make_credentials(listener, host)
-            assert door.hosts[0] == f"{first}:{port}"
-            assert f"localhost:{port}" in door.hosts
+            credentials = address.make_credentials(listener, host)
+            assert credentials.hosts[0] == f"{first}:{port}"
+            assert f"localhost:{port}" in credentials.hosts
             for taken in (port, 99_999):
                 with pytest.raises(KeyreconError, match="choose another --port"):
                     address.listen(host, taken)
@@ -101,13 +101,13 @@ def test_a_damaged_memory_of_the_address_is_no_memory(tmp_path, text):
 def test_the_last_address_is_kept_for_oneself_and_used_again_if_free(tmp_path):
     file = tmp_path / "cache" / "annotator.json"
     with address.listen("127.0.0.1", 0) as first:
-        door = address.make_credentials(first, "127.0.0.1")
-        address.remember(file, door)
+        credentials = address.make_credentials(first, "127.0.0.1")
+        address.remember(file, credentials)
         memory = address.recall(file)
         with address.listen("127.0.0.1", 0, memory) as second:
-            assert second.getsockname()[1] != door.port
+            assert second.getsockname()[1] != credentials.port
     with address.listen("127.0.0.1", 0, memory) as third:
         again = address.make_credentials(third, "127.0.0.1", memory)
-    assert (again.port, again.session) == (door.port, door.session)
-    assert again.token != door.token
+    assert (again.port, again.cookie_secret) == (credentials.port, credentials.cookie_secret)
+    assert again.token != credentials.token
     assert file.stat().st_mode & 0o077 == 0

@@ -7,18 +7,18 @@ from contextlib import suppress
 from dataclasses import dataclass
 from urllib.parse import unquote
 
+from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import open_session
-from keyrecon.annotate.store.assistant import Assistant
 from keyrecon.app import project
 from keyrecon.io.workspace import Workspace
 
-DOOR = Credentials(("127.0.0.1:8000", "localhost:8000"), 8000)
+CREDENTIALS = Credentials(("127.0.0.1:8000", "localhost:8000"), 8000)
 HEADERS = {
     "host": "127.0.0.1:8000",
     "origin": "http://127.0.0.1:8000",
-    "cookie": f"{DOOR.cookie}={DOOR.session}",
+    "cookie": f"{CREDENTIALS.cookie}={CREDENTIALS.cookie_secret}",
     "content-type": "application/json",
 }
 """What a browser sends for the page."""
@@ -78,9 +78,9 @@ async def call(app, method, address, headers, body=b""):
 
     with suppress(Exception):  # the server logs it; what counts is what was answered
         await app(scope, receive, send)
-    told = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
+    answer = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
     content = b"".join(message.get("body", b"") for message in sent[1:])
-    return Answer(sent[0]["status"], told, content)
+    return Answer(sent[0]["status"], answer, content)
 
 
 def request(*question):
@@ -88,7 +88,7 @@ def request(*question):
     return run_apart(call(*question))
 
 
-def ask(desk, method, path, body=None):
+def ask(session, method, path, body=None):
     """Ask as the page does."""
     data = b"" if body is None else json.dumps(body).encode()
-    return request(make_app(desk, DOOR), method, path, HEADERS, data)
+    return request(make_app(session, CREDENTIALS), method, path, HEADERS, data)

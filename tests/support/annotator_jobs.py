@@ -7,7 +7,7 @@ from keyrecon.errors import KeyreconError
 
 
 def counting(options, progress):
-    """A job that counts, and waits a while where it is told to."""
+    """A job that counts, and waits a while where it is asked to."""
     for n in progress(range(options.get("steps", 3)), "Counting"):
         time.sleep(options.get("seconds", 0))
         if n == options.get("fail_at"):

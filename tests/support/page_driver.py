@@ -11,9 +11,9 @@ from urllib.request import Request, urlopen
 
 import uvicorn
 
+from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.session import open_session
-from keyrecon.annotate.store.assistant import Assistant
 from keyrecon.app.annotator import listen, make_credentials
 from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
@@ -30,15 +30,17 @@ class Serving:
 
     def __init__(self, folder, assistant=Assistant(), commands=None):
         self.folder, self.assistant, self.commands = folder, assistant, commands or {}
-        self.door = None
+        self.credentials = None
         self.start()
 
     def start(self):
-        listener = listen("127.0.0.1", self.door.port if self.door else 0)
-        self.door = self.door or make_credentials(listener, "127.0.0.1")
-        self.desk = open_session(Workspace(self.folder), self.assistant, self.commands)
+        listener = listen("127.0.0.1", self.credentials.port if self.credentials else 0)
+        self.credentials = self.credentials or make_credentials(listener, "127.0.0.1")
+        self.session = open_session(Workspace(self.folder), self.assistant, self.commands)
         config = uvicorn.Config(
-            make_app(self.desk, self.door), log_level="critical", timeout_graceful_shutdown=0
+            make_app(self.session, self.credentials),
+            log_level="critical",
+            timeout_graceful_shutdown=0,
         )
         self._server = uvicorn.Server(config)
         self._thread = Thread(target=asyncio.run, args=(self._server.serve(sockets=[listener]),))
@@ -47,12 +49,12 @@ class Serving:
     def stop(self):
         self._server.should_exit = True
         self._thread.join()
-        self.desk.close()
+        self.session.close()
 
     def ask(self, path):
         """An answer of the server, as the page would get it."""
-        cookie = f"{self.door.cookie}={self.door.session}"
-        request = Request(f"{self.door.origins[0]}/api/{path}", headers={"Cookie": cookie})
+        cookie = f"{self.credentials.cookie}={self.credentials.cookie_secret}"
+        request = Request(f"{self.credentials.origins[0]}/api/{path}", headers={"Cookie": cookie})
         with urlopen(request) as answer:
             return json.load(answer)
 
@@ -160,7 +162,7 @@ class Person:
         self.page.wait_for_selector(f"#picture[data-frame='{frame}']")
 
     def pose(self):
-        """What the server last told the page of the pose."""
+        """The server's last answer about the pose."""
         self.await_drawn()
         self.page.wait_for_selector("#pose-canvas[aria-busy=false]")
         return self._pose.json()
@@ -180,12 +182,12 @@ class Person:
         self.click(place_of(joint))
         self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
 
-    def settle_depths(self, signs, place_of):
-        """Take the best of the readings offered and turn the limbs that are wrong in it.
+    def give_depths(self, signs, place_of):
+        """Take the best of the poses offered and turn the limbs that are wrong in it.
 
         To point at a limb is no action: the key that turns it is.
         """
-        offered = [reading["nearer"] for reading in self.pose().get("alternatives", [])[:3]]
+        offered = [pose["nearer"] for pose in self.pose().get("alternatives", [])[:3]]
         wrong = [[limb for limb in signs if signs[limb] != nearer.get(limb)] for nearer in offered]
         if not offered:
             return

@@ -1,7 +1,7 @@
-"""The annotator's help, put together: records in, what the page reads out.
+"""An `Assistant` for a project: marks in, answers for JSON out.
 
-Joints, limbs (named by their outer joint) and frames are told by name and number, unknown ones are
-left out, and depths have the camera's axes in body heights.
+Joints and limbs go by name (a limb by that of its outer joint), frames by number; what is unknown
+is left out, and points in space have the camera's axes in body heights.
 """
 
 from collections.abc import Iterable
@@ -14,38 +14,43 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.annotate.assist.body_estimate import BodyEstimate
 from keyrecon.annotate.assist.checks import EVEN_EXCESS, find_checks, measure_excess
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
-from keyrecon.annotate.assist.pose_reading import Alternative, PoseReading, Sighting, read_pose
+from keyrecon.annotate.assist.pose_estimate import (
+    Alternative,
+    FrameObservation,
+    PoseEstimate,
+    estimate_pose,
+)
 from keyrecon.annotate.assist.preview import find_player, tint_part
 from keyrecon.annotate.assist.project_cache import ProjectCache
-from keyrecon.annotate.store.assistant import Assistant, Json, Marks, Signs
+from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Annotations, Pick
 
-SURE = 0.8
-"""Depth signs that a ghost tells are at least so sure: nine in ten are right."""
+MIN_CERTAINTY = 0.8
+"""Of the depth signs that come with a suggestion: nine in ten are right."""
 
 
 def make_assistant(workspace: Workspace) -> Assistant:
-    """Help for a project; what needs the automatic part says nothing before it was run."""
-    study = ProjectCache(workspace)
+    """What needs the automatic part answers with nothing before that was run."""
+    cache = ProjectCache(workspace)
     return Assistant(
-        keyframes=partial(describe_keyframes, study),
-        ghost=partial(describe_suggestion, study),
-        pose=partial(describe_pose, study),
-        checks=partial(describe_checks, study),
-        suggest=partial(describe_suggestions, study),
-        preview=partial(describe_preview, study),
-        backprojection=partial(show_part, study),
+        keyframes=partial(describe_keyframes, cache),
+        suggestion=partial(describe_suggestion, cache),
+        pose=partial(describe_pose, cache),
+        checks=partial(describe_checks, cache),
+        next_frames=partial(describe_next_frames, cache),
+        preview=partial(describe_preview, cache),
+        backprojection=partial(show_part, cache),
     )
 
 
-def describe_keyframes(study: ProjectCache, own: dict[int, str]) -> Json:
+def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:
     """Why each keyframe is one, and where the player is on it."""
-    preparation = study.preparation()
+    preparation = cache.preparation()
     if preparation is None:
         return {}
-    reasons = explain_keyframes(preparation.pose_distances, preparation.keyframes, own)
+    reasons = explain_keyframes(preparation.pose_distances, preparation.keyframes, added)
     boxes = preparation.track.box
     frames = {
         frame: {
@@ -58,104 +63,106 @@ def describe_keyframes(study: ProjectCache, own: dict[int, str]) -> Json:
     return {"frames": frames, "height_px": float(np.median(preparation.track.height))}
 
 
-def describe_suggestion(study: ProjectCache, annotations: Annotations, frame: int) -> Json:
+def describe_suggestion(cache: ProjectCache, annotations: Annotations, frame: int) -> Json:
     """Joints with confidence, the frames they come from, and depth signs that are sure."""
-    ghost = study.ghost(annotations, frame)
-    if ghost is None:
+    suggestion = cache.suggestion(annotations, frame)
+    if suggestion is None:
         return {}
-    skeleton = annotations.skeleton
+    skeleton, places = annotations.skeleton, suggestion.joints
     joints = {
-        skeleton.names[j]: [*_rounded(ghost.joints[j], 2), round(float(ghost.confidence[j]), 3)]
-        for j in np.flatnonzero(np.isfinite(ghost.joints[:, 0]))
+        skeleton.names[j]: [*_rounded(places[j], 2), round(float(suggestion.confidence[j]), 3)]
+        for j in np.flatnonzero(np.isfinite(places[:, 0]))
     }
-    sources = sorted({int(source) for source in ghost.source if source >= 0})
-    return {"joints": joints, "from": sources, "nearer": _sure_signs(study, annotations, frame)}
+    sources = sorted({int(source) for source in suggestion.source if source >= 0})
+    return {"joints": joints, "from": sources, "nearer": _certain_signs(cache, annotations, frame)}
 
 
-def _sure_signs(study: ProjectCache, annotations: Annotations, frame: int) -> Signs:
-    """Depth signs that the marks and the ghost of a frame leave little doubt about."""
-    knowledge, names = study.knowledge(annotations), _limb_names(annotations.skeleton)
-    sighting = _sight(study, knowledge, annotations, frame, ({}, {}))
-    reading = read_pose(sighting, knowledge.size, annotations.skeleton, knowledge.votes(frame))
-    return {names[b]: int(reading.nearer[b]) for b in np.flatnonzero(reading.sure >= SURE)}
+def _certain_signs(cache: ProjectCache, annotations: Annotations, frame: int) -> Signs:
+    """Depth signs that are nearly certain from the suggestion for a frame."""
+    body, names = cache.body(annotations), _limb_names(annotations.skeleton)
+    observation = _observe(cache, body, annotations, frame, {}, {})
+    pose = estimate_pose(observation, body.size, annotations.skeleton, body.exemplars(frame))
+    certain = np.flatnonzero(pose.certainty >= MIN_CERTAINTY)
+    return {names[b]: int(pose.nearer[b]) for b in certain}
 
 
 def describe_pose(
-    study: ProjectCache, annotations: Annotations, frame: int, marks: Marks, nearer: Signs
+    cache: ProjectCache, annotations: Annotations, frame: int, marks: Marks, nearer: Signs
 ) -> Json:
-    """The pose in space, how sure its signs are, and what else it could be."""
-    knowledge, skeleton = study.knowledge(annotations), annotations.skeleton
-    if knowledge is None:
+    """The pose in space, how certain its signs are, and what else it could be."""
+    body, skeleton = cache.body(annotations), annotations.skeleton
+    if body is None:
         return {}
-    sighting = _sight(study, knowledge, annotations, frame, (marks, nearer))
-    reading = read_pose(sighting, knowledge.size, skeleton, knowledge.votes(frame))
-    itself = Alternative(reading.nearer, reading.points3d, 0.0)
-    points = _points(skeleton, reading.points3d)
+    observation = _observe(cache, body, annotations, frame, marks, nearer)
+    pose = estimate_pose(observation, body.size, skeleton, body.exemplars(frame))
+    itself = Alternative(pose.nearer, pose.points3d, 0.0)
+    points = _points(skeleton, pose.points3d)
     marked = {name for name, place in marks.items() if place[2]}
     return {
         "points3d": points,
-        "limbs": _limbs(skeleton, sighting, reading),
+        "limbs": _limbs(skeleton, observation, pose),
         "alternatives": [
             {
-                "nearer": _signs(skeleton, reading, other.nearer),
+                "nearer": _signs(skeleton, pose, other.nearer),
                 "points3d": _points(skeleton, other.points3d),
                 "cost": round(other.cost, 2),
             }
-            for other in (itself, *reading.alternatives)
+            for other in (itself, *pose.alternatives)
         ],
-        "stretched": _stretched(skeleton, reading, knowledge, marked),
-        "foreseen": sorted({*points} - marked),
+        "stretched": _stretched(skeleton, pose, body, marked),
+        "predicted": sorted({*points} - marked),
     }
 
 
-def _sight(
-    study: ProjectCache,
-    knowledge: BodyEstimate,
+def _observe(
+    cache: ProjectCache,
+    body: BodyEstimate,
     annotations: Annotations,
     frame: int,
-    told: tuple[Marks, Signs],
-) -> Sighting:
-    """What is marked on a frame, and its ghost where nothing is."""
-    skeleton, (marks, signs) = annotations.skeleton, told
+    marks: Marks,
+    signs: Signs,
+) -> FrameObservation:
+    """What is marked on a frame, and the suggestion where nothing is."""
+    skeleton = annotations.skeleton
     joints = np.full((len(skeleton.names), 2), np.nan)
-    for name, (x, y, seen) in marks.items():
-        if seen:
+    for name, (x, y, visibility) in marks.items():
+        if visibility:
             joints[skeleton.index(name)] = x, y
     names = _limb_names(skeleton)
     nearer = np.array([signs.get(name, 0) for name in names])
-    return knowledge.sighting(frame, joints, nearer, study.any_ghost(annotations, frame))
+    return body.observe(frame, joints, nearer, cache.any_suggestion(annotations, frame))
 
 
-def _limbs(skeleton: Skeleton, sighting: Sighting, reading: PoseReading) -> Json:
-    """Sign of every limb whose ends are known, how sure it is, and whether a person gave it."""
+def _limbs(skeleton: Skeleton, observation: FrameObservation, pose: PoseEstimate) -> Json:
+    """Sign of every limb whose ends are known, how certain it is, and whether a person gave it."""
     names = _limb_names(skeleton)
     return {
         names[b]: {
-            "sign": int(reading.nearer[b]),
-            "certainty": round(float(reading.sure[b]), 3),
-            "given": bool(sighting.nearer[b] != 0),
+            "sign": int(pose.nearer[b]),
+            "certainty": round(float(pose.certainty[b]), 3),
+            "given": bool(observation.nearer[b] != 0),
         }
-        for b in np.flatnonzero(np.isfinite(reading.stretch))
+        for b in np.flatnonzero(np.isfinite(pose.stretch))
     }
 
 
 def _stretched(
-    skeleton: Skeleton, reading: PoseReading, knowledge: BodyEstimate, marked: set[str]
+    skeleton: Skeleton, pose: PoseEstimate, body: BodyEstimate, marked: set[str]
 ) -> Json:
     """Limbs between marked joints that look longer than they can be, and how many times."""
-    names, lengths = _limb_names(skeleton), knowledge.size.lengths
+    names, lengths = _limb_names(skeleton), body.size.lengths
     ends = [{skeleton.names[j] for j in bone} for bone in skeleton.bones]
-    excess = measure_excess(reading.stretch, lengths)
+    excess = measure_excess(pose.stretch, lengths)
     return {
-        names[b]: round(float(reading.stretch[b]), 2)
+        names[b]: round(float(pose.stretch[b]), 2)
         for b in np.flatnonzero(np.nan_to_num(excess) > EVEN_EXCESS)
         if ends[b] <= marked
     }
 
 
-def _signs(skeleton: Skeleton, reading: PoseReading, nearer: Int[np.ndarray, "B"]) -> Signs:
+def _signs(skeleton: Skeleton, pose: PoseEstimate, nearer: Int[np.ndarray, "B"]) -> Signs:
     names = _limb_names(skeleton)
-    return {names[b]: int(nearer[b]) for b in np.flatnonzero(np.isfinite(reading.stretch))}
+    return {names[b]: int(nearer[b]) for b in np.flatnonzero(np.isfinite(pose.stretch))}
 
 
 def _points(skeleton: Skeleton, points: Float[np.ndarray, "J 3"]) -> Json:
@@ -172,12 +179,12 @@ def _rounded(values: Iterable[float], digits: int) -> list[float]:
     return [round(float(value), digits) for value in values]
 
 
-def describe_checks(study: ProjectCache, annotations: Annotations) -> list[Json]:
-    """Marks to look at again, the most suspicious first."""
-    preparation, knowledge = study.preparation(), study.knowledge(annotations, wait=True)
-    if preparation is None or knowledge is None:
+def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]:
+    """Marks that look wrong, the most suspicious first."""
+    preparation, body = cache.preparation(), cache.body(annotations, wait=True)
+    if preparation is None or body is None:
         return []
-    looks = study.lookalikes(_decided(annotations))
+    neighbours = cache.neighbours(_completed_halves(annotations))
     return [
         {
             "frame": check.frame,
@@ -186,11 +193,11 @@ def describe_checks(study: ProjectCache, annotations: Annotations) -> list[Json]
             "suspicion": round(float(check.suspicion), 3),
             "text": check.text,
         }
-        for check in find_checks(annotations, knowledge.size, looks)
+        for check in find_checks(annotations, body.size, neighbours)
     ]
 
 
-def _decided(annotations: Annotations) -> Annotations:
+def _completed_halves(annotations: Annotations) -> Annotations:
     """Halves of the body of which every joint is marked or said to be absent.
 
     A frame in the middle of being marked is not compared with others yet.
@@ -204,22 +211,22 @@ def _decided(annotations: Annotations) -> Annotations:
     return replace(annotations, joints=joints)
 
 
-def describe_suggestions(
-    study: ProjectCache, annotations: Annotations, taken: frozenset[int]
+def describe_next_frames(
+    cache: ProjectCache, annotations: Annotations, taken: frozenset[int]
 ) -> list[Json]:
-    """Frames to annotate next, once there is a result to judge."""
-    preparation, motion = study.preparation(), study.motion()
+    """Frames to annotate next, once there is a motion."""
+    preparation, motion = cache.preparation(), cache.motion()
     if preparation is None or motion is None:
         return []
-    found = suggest_frames(preparation.pose_distances, motion, annotations, taken)
-    return [{**asdict(one), "gain": round(one.gain, 4)} for one in found]
+    suggestions = suggest_frames(preparation.pose_distances, motion, annotations, taken)
+    return [{**asdict(one), "gain": round(one.gain, 4)} for one in suggestions]
 
 
-def describe_preview(study: ProjectCache, picks: tuple[Pick, ...], frames: tuple[int, ...]) -> Json:
-    """Head, feet and box that these picks find on some frames; no places where unseen."""
-    strip, camera = study.strip(frames)
-    found = find_player(strip, study.colors(picks), camera, frames)
-    rows = zip(found.frames.tolist(), found.head, found.feet, found.box, strict=True)
+def describe_preview(cache: ProjectCache, picks: tuple[Pick, ...], frames: tuple[int, ...]) -> Json:
+    """Head, feet and box that these picks find on some frames; no places where not found."""
+    strip, camera = cache.strip(frames)
+    player = find_player(strip, cache.colors(picks), camera, frames)
+    rows = zip(player.frames.tolist(), player.head, player.feet, player.box, strict=True)
     strip_rows = [
         {
             "frame": frame,
@@ -229,12 +236,12 @@ def describe_preview(study: ProjectCache, picks: tuple[Pick, ...], frames: tuple
         }
         for frame, head, feet, box in rows
     ]
-    return {"frames": strip_rows, "confidence": round(found.confidence, 3)}
+    return {"frames": strip_rows, "confidence": round(player.confidence, 3)}
 
 
 def show_part(
-    study: ProjectCache, picks: tuple[Pick, ...], frame: int, part: str
+    cache: ProjectCache, picks: tuple[Pick, ...], frame: int, part: str
 ) -> UInt8[np.ndarray, "h w 4"]:
     """How much each pixel of a frame looks like a part."""
-    colors = study.colors(picks)
-    return tint_part(study.video.frame(frame), colors, part)
+    colors = cache.colors(picks)
+    return tint_part(cache.video.frame(frame), colors, part)

@@ -1,8 +1,8 @@
 """What the frames annotated so far say about the body: its size, and poses whose signs are known.
 
 A keyframe of one half of the body shows no whole trunk, and without a trunk nobody can tell which
-way a limb points. Joints that are not marked are therefore taken from the frame's ghost, with the
-spread that carried joints have.
+way a limb points. Joints that are not marked are therefore taken from the suggestion for the frame,
+with the spread that propagated joints have.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.annotate.assist.pose_reading import Sighting
+from keyrecon.annotate.assist.pose_estimate import FrameObservation
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
 from keyrecon.body import Skeleton
 from keyrecon.lifting.depth_signs import choose_depth_signs
@@ -22,7 +22,7 @@ from keyrecon.records import Annotations, JointTracks
 
 HEAD_TO_FEET = 0.9
 """Share of stature from the head's centre to the feet (Drillis and Contini)."""
-GUESSED = 0.3
+UNCONFIRMED_SIGN = 0.3
 """Weight of a sign that nobody gave, against one that was given."""
 
 
@@ -38,8 +38,8 @@ class BodyEstimate:
     """0-1: how far the sign of each bone's depth can be believed."""
     skeleton: Skeleton
 
-    def votes(self, frame: int) -> ExemplarPrior | None:
-        """All other frames, asked for the signs of this one; None without any."""
+    def exemplars(self, frame: int) -> ExemplarPrior | None:
+        """All other frames as evidence for the signs of this one; None without any."""
         rows = np.flatnonzero(self.frames != frame)
         if not len(rows):
             return None
@@ -48,42 +48,44 @@ class BodyEstimate:
             self.vectors[rows], nowhere, self.confidence[rows], unguided, self.skeleton
         )
 
-    def sighting(
+    def observe(
         self,
         frame: int,
         joints: Float[np.ndarray, "J 2"],
         nearer: Int[np.ndarray, "B"],
-        ghost: PoseSuggestion | None = None,
-    ) -> Sighting:
-        """A frame's marks (px), and what its ghost has where nothing is marked."""
+        suggestion: PoseSuggestion | None = None,
+    ) -> FrameObservation:
+        """A frame's marks (px), and its suggestion where nothing is marked."""
         marked = np.isfinite(joints[:, 0])
-        places = joints if ghost is None else np.where(marked[:, None], joints, ghost.joints)
+        places = joints
+        if suggestion is not None:
+            places = np.where(marked[:, None], joints, suggestion.joints)
         spread = np.where(marked, LengthOptions.click_noise, LengthOptions.track_noise)
-        return Sighting(places / self.size.scale[frame], spread, nearer)
+        return FrameObservation(places / self.size.scale[frame], spread, nearer)
 
 
 def estimate_body(
     annotations: Annotations,
-    ghosts: Mapping[int, PoseSuggestion],
+    suggestions: Mapping[int, PoseSuggestion],
     height_px: Float[np.ndarray, "T"],
     fps: float,
 ) -> BodyEstimate:
-    """Size and signs from everything annotated; `ghosts` by frame number, where there are any."""
+    """Size and signs from everything annotated; `suggestions` by frame, where there are any."""
     skeleton, n_bones = annotations.skeleton, len(annotations.skeleton.bones)
     size = _measure(annotations, height_px, fps)
     plain = BodyEstimate(
         size, annotations.frames[:0], np.zeros((0, n_bones, 3)), np.zeros((0, n_bones)), skeleton
     )
     rows = zip(annotations.frames.tolist(), annotations.joints, annotations.nearer, strict=True)
-    seen = [plain.sighting(t, joints, signs, ghosts.get(t)) for t, joints, signs in rows]
-    if not seen:
+    observed = [plain.observe(t, joints, signs, suggestions.get(t)) for t, joints, signs in rows]
+    if not observed:
         return plain
-    joints, spread = np.stack([s.joints for s in seen]), np.stack([s.spread for s in seen])
+    joints, spread = np.stack([s.joints for s in observed]), np.stack([s.spread for s in observed])
     bones = foreshorten_bones(joints, spread, size.lengths, skeleton)
     signs = choose_depth_signs(bones, annotations.nearer, size.breadths, skeleton)
     vectors = np.concatenate([bones.in_plane, (signs.sign * bones.depth)[..., None]], axis=-1)
     known = np.isfinite(joints[:, skeleton.bones, 0]).all(axis=2)
-    guessed = GUESSED * (2 * signs.probability - 1)
+    guessed = UNCONFIRMED_SIGN * (2 * signs.probability - 1)
     confidence = known * np.where(annotations.nearer != 0, 1.0, guessed)
     return BodyEstimate(size, annotations.frames, vectors, confidence, skeleton)
 

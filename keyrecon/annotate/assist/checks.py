@@ -1,20 +1,18 @@
-"""Annotated frames seen through one another.
+"""Marks that look wrong, the most suspicious first: annotated frames checked by one another.
 
-Every annotated frame is fitted with the annotated figures that look most like it, itself left out:
+The annotated poses most similar to a frame are fitted to it as edge templates, its own left out:
 where they put the joints is what the other marks say about this frame. All frames are fitted at
 once, which takes a second or two.
 
-Marks that look wrong, the most suspicious first.
-
 long     a bone shows more of its length than it has: impossible under scaled orthography
 crossed  left and right of a limb agree better with the other annotated frames when swapped
-far      a joint lies where none of the annotated figures that look alike puts it
+far      a joint lies where none of the similar poses puts it
 missing  joints of a half that was begun
 
-Silhouettes do not tell left from right, so frames only say of one another whether they agree. Which
-of them is wrong is settled by the majority: the frame whose swap settles most disagreement is
-taken to be swapped, and again, until none is left worth it. Evidence on the same joints is put
-together as if independent, 1 - (1 - a)(1 - b), and told once.
+Silhouettes do not show left from right, so frames only say of one another whether they agree. Which
+of them is wrong is decided by the majority: the frame whose swap ends most disagreement is taken
+to be swapped, and again, until none is left worth it. Evidence on the same joints is put
+together as if independent, 1 - (1 - a)(1 - b), and reported once.
 """
 
 from collections.abc import Iterator
@@ -25,10 +23,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.annotate.assist.pose_suggestion import (
-    marked_figures,
+    fill_in_hips,
     prepare_fitting,
     scene_of,
-    stand_in,
+    template_frames,
 )
 from keyrecon.body import Skeleton
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions
@@ -37,24 +35,24 @@ from keyrecon.propagation.hypotheses import fit_similar
 from keyrecon.propagation.propagation import LEAST_MARKED
 from keyrecon.records import Annotations, Preparation
 
-MOST = 5
-"""Other figures that each frame is fitted with."""
+MAX_NEIGHBOURS = 5
+"""Other poses fitted to each frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """One half of the body on K annotated frames, as S other annotated frames have it."""
+    """One half of the body on K annotated frames, as S other annotated poses have it."""
 
     members: Int[np.ndarray, "J"]
     """Joints of the skeleton that this half has of its own."""
     frames: Int[np.ndarray, "K"]
     sources: Int[np.ndarray, "K S"]
-    """Row in `frames` that each figure comes from."""
-    away: Float[np.ndarray, "K S J J"]
-    """From each mark (first J) to where a figure has each joint (second J), player heights; NaN
-    where nothing is marked."""
-    misfit: Float[np.ndarray, "K S"]
-    """Share of the figure that finds no edges, 0-1; NaN where there is no such figure."""
+    """Row in `frames` that each fitted pose comes from."""
+    distance: Float[np.ndarray, "K S J J"]
+    """From each mark (first J) to where a fitted pose has each joint (second J), player heights;
+    NaN where nothing is marked."""
+    residual: Float[np.ndarray, "K S"]
+    """Share of the template that finds no edges, 0-1; NaN where there is none."""
 
 
 def find_neighbours(preparation: Preparation, annotations: Annotations) -> tuple[Neighbours, ...]:
@@ -64,56 +62,58 @@ def find_neighbours(preparation: Preparation, annotations: Annotations) -> tuple
     joints = np.full((len(preparation.track.head), len(annotations.skeleton.names)), np.nan + 0j)
     marks = scene.from_pixels(annotations.joints, annotations.frames)
     joints[annotations.frames] = marks
-    found = []
+    neighbours = []
     for half in (lower, upper):
-        frames = marked_figures(annotations, half)
-        own = half.joints[half.free]
+        frames = template_frames(annotations, half)
+        members = half.joints[half.free]
         if len(frames) > 1:
-            beyond = np.setdiff1d(marked_figures(annotations, upper), frames)
-            asked = np.concatenate([frames, beyond]) if half is lower else frames
-            fitting = prepare_fitting(scene, half, joints, asked)
+            only_upper = np.setdiff1d(template_frames(annotations, upper), frames)
+            fitted_frames = np.concatenate([frames, only_upper]) if half is lower else frames
+            fitting = prepare_fitting(scene, half, joints, fitted_frames)
             fitting.distance[np.arange(len(frames)), np.arange(len(frames))] = np.inf
-            most = min(MOST, len(frames) - 1)
+            count = min(MAX_NEIGHBOURS, len(frames) - 1)
             fitted = fit_similar(
-                fitting.templates, fitting.index, fitting.distance, fitting.shift, most
+                fitting.templates, fitting.index, fitting.distance, fitting.shift, count
             )
             places = fitted.joints[:, :, half.free]
-            misfit = fitted.residual.mean(axis=2)
-            best = misfit.argmin(axis=1)[len(frames) :]
-            joints[beyond[:, None], own] = places[np.arange(len(frames), len(asked)), best]
-            known = joints[frames][:, own]
-            away = np.abs(known[:, None, :, None] - places[: len(frames), :, None])
-            found.append(
-                Neighbours(own, frames, fitted.template[: len(frames)], away, misfit[: len(frames)])
+            residual = fitted.residual.mean(axis=2)
+            best = residual.argmin(axis=1)[len(frames) :]
+            rest = np.arange(len(frames), len(fitted_frames))
+            joints[only_upper[:, None], members] = places[rest, best]
+            known = joints[frames][:, members]
+            distance = np.abs(known[:, None, :, None] - places[: len(frames), :, None])
+            sources = fitted.template[: len(frames)]
+            neighbours.append(
+                Neighbours(members, frames, sources, distance, residual[: len(frames)])
             )
         if half is lower:
-            stand_in(scene, joints, upper)
-    return tuple(found)
+            fill_in_hips(scene, joints, upper)
+    return tuple(neighbours)
 
 
-CAP = 0.15
+MAX_JOINT_DISTANCE = 0.15
 """Distance at which a joint counts as elsewhere, player heights: half a thigh."""
 EVEN_DISAGREEMENT = 1.5
 """Frames that speak for a swap, less those against it, at which it is as likely as not."""
 EVEN_DISTANCE = 0.10
-"""Distance from all look-alikes at which a mark is as likely wrong as not, player heights: one
+"""Distance from all similar poses at which a mark is as likely wrong as not, player heights: one
 joint in fifty of careful marks lies farther than half of that."""
-UNLIKE = 4.0
-"""How much farther that is, per distance that the figure's other joints have."""
+DISTANCE_PER_USUAL = 4.0
+"""How much farther that is, per distance that the pose's other joints have."""
 EVEN_EXCESS = 4.0
 """Clicks' deviations by which a bone is too long when it is as likely wrong as not."""
-POOR_FIT = 0.06
-"""Mean distance of a figure's joints, left and right as they agree better, at which it says half as
-much about left and right, player heights."""
-MISSING, BEGUN = 0.95, 0.5
-"""Suspicion of joints left out of a half that is marked, and of one that is only begun."""
-WORTH_TELLING = 0.2
-"""Suspicion below which nothing is said."""
+POOR_FIT_DISTANCE = 0.06
+"""Mean distance of a fitted pose's joints, left and right as they agree better, at which it says
+half as much about left and right, player heights."""
+MISSING_SUSPICION, BEGUN_SUSPICION = 0.95, 0.5
+"""Of joints left out of a half that is marked, and of one that is only begun."""
+MIN_SUSPICION = 0.2
+"""Suspicion below which nothing is reported."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Something to look at."""
+    """A mark that may be wrong."""
 
     frame: int
     joint: str
@@ -126,35 +126,36 @@ class Check:
 
 
 def find_checks(
-    annotations: Annotations, size: BodySize, looks: tuple[Neighbours, ...]
+    annotations: Annotations, size: BodySize, neighbours: tuple[Neighbours, ...]
 ) -> list[Check]:
-    """All that is worth telling."""
-    found = [*_too_long(annotations, size), *_left_out(annotations)]
-    for look in looks:
-        found += [*_swapped(look, annotations.skeleton), *_elsewhere(look, annotations.skeleton)]
-    told: list[Check] = []
-    for check in sorted(found, key=lambda c: (c.kind != "crossed", -c.suspicion)):
-        same = [n for n, c in enumerate(told) if _about_the_same(c, check)]
+    """All marks that look wrong, evidence about the same joints put together."""
+    skeleton = annotations.skeleton
+    evidence = [*_too_long(annotations, size), *_left_out(annotations)]
+    for half in neighbours:
+        evidence += [*_swapped(half, skeleton), *_elsewhere(half, skeleton)]
+    checks: list[Check] = []
+    for check in sorted(evidence, key=lambda c: (c.kind != "crossed", -c.suspicion)):
+        same = [n for n, c in enumerate(checks) if _about_the_same(c, check)]
         if same:
-            first = told[same[0]]
+            first = checks[same[0]]
             both = 1 - (1 - first.suspicion) * (1 - check.suspicion)
-            told[same[0]] = replace(first, suspicion=both)
+            checks[same[0]] = replace(first, suspicion=both)
         else:
-            told.append(check)
-    told = [check for check in told if check.suspicion >= WORTH_TELLING]
-    return sorted(told, key=lambda check: (-check.suspicion, check.frame))
+            checks.append(check)
+    checks = [check for check in checks if check.suspicion >= MIN_SUSPICION]
+    return sorted(checks, key=lambda check: (-check.suspicion, check.frame))
 
 
 def _about_the_same(one: Check, other: Check) -> bool:
     return one.frame == other.frame and bool(set(one.joints) & set(other.joints))
 
 
-def _likely(value: float, even: float) -> float:
+def _suspicion(value: float, even: float) -> float:
     """0 at 0, one half at `even`, 1 far beyond."""
     return value**4 / (value**4 + even**4)
 
 
-def _spoken(name: str) -> str:
+def _label(name: str) -> str:
     return name.replace("_", " ")
 
 
@@ -180,8 +181,8 @@ def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
             frame=int(annotations.frames[row]),
             joint=child,
             kind="long",
-            suspicion=_likely(float(excess[row, bone]), EVEN_EXCESS),
-            text=f"From {_spoken(parent)} to {_spoken(child)} is {stretch[row, bone]:.1f} times as "
+            suspicion=_suspicion(float(excess[row, bone]), EVEN_EXCESS),
+            text=f"From {_label(parent)} to {_label(child)} is {stretch[row, bone]:.1f} times as "
             "long as it can be; check both ends.",
             joints=(child, parent),
         )
@@ -198,61 +199,72 @@ def _left_out(annotations: Annotations) -> Iterator[Check]:
             names = tuple(name for name in open_ if (frame, name) not in absent)
             done = marked[row, half].mean() >= LEAST_MARKED
             if names:
-                listed = ", ".join(_spoken(name) for name in names)
+                listed = ", ".join(_label(name) for name in names)
                 text = f"Not marked: {listed}; place them, or say that they are not seen."
-                yield Check(frame, names[0], "missing", MISSING if done else BEGUN, text, names)
+                yield Check(
+                    frame,
+                    names[0],
+                    "missing",
+                    MISSING_SUSPICION if done else BEGUN_SUSPICION,
+                    text,
+                    names,
+                )
 
 
-def _elsewhere(look: Neighbours, skeleton: Skeleton) -> Iterator[Check]:
-    away = np.diagonal(look.away, axis1=2, axis2=3).min(axis=1)
-    # a figure that is far off as a whole tells nothing about one joint: the frame is like no other
-    usual = np.nanmedian(away, axis=1)
-    for row, place in np.argwhere(np.nan_to_num(away) > 0):
-        name, off = skeleton.names[look.members[place]], float(away[row, place])
+def _elsewhere(half: Neighbours, skeleton: Skeleton) -> Iterator[Check]:
+    distance = np.diagonal(half.distance, axis1=2, axis2=3).min(axis=1)
+    # a pose that is far off as a whole says nothing about one joint: the frame is like no other
+    usual = np.nanmedian(distance, axis=1)
+    for row, place in np.argwhere(np.nan_to_num(distance) > 0):
+        name, off = skeleton.names[half.members[place]], float(distance[row, place])
         yield Check(
-            frame=int(look.frames[row]),
+            frame=int(half.frames[row]),
             joint=name,
             kind="far",
-            suspicion=_likely(off, EVEN_DISTANCE + UNLIKE * usual[row]),
-            text=f"The {_spoken(name)} is {off:.0%} of the player's height from where similar "
+            suspicion=_suspicion(off, EVEN_DISTANCE + DISTANCE_PER_USUAL * usual[row]),
+            text=f"The {_label(name)} is {off:.0%} of the player's height from where similar "
             "frames have it.",
             joints=(name,),
         )
 
 
-def _swapped(look: Neighbours, skeleton: Skeleton) -> Iterator[Check]:
-    gain = _swap_gain(look, skeleton)
-    swapped = np.zeros(len(look.frames), dtype=bool)
+def _swapped(half: Neighbours, skeleton: Skeleton) -> Iterator[Check]:
+    gain = _swap_gain(half, skeleton)
+    swapped = np.zeros(len(half.frames), dtype=bool)
     while True:
-        evidence = np.where(swapped[:, None] == swapped[look.sources], gain, -gain)
+        evidence = np.where(swapped[:, None] == swapped[half.sources], gain, -gain)
         total = evidence.sum(axis=1)
-        np.add.at(total, look.sources, evidence)
+        np.add.at(total, half.sources, evidence)
         row = int(np.where(swapped, -np.inf, total).argmax())
-        suspicion = _likely(max(float(total[row]), 0.0), EVEN_DISAGREEMENT)
-        if swapped[row] or suspicion < WORTH_TELLING:
+        suspicion = _suspicion(max(float(total[row]), 0.0), EVEN_DISAGREEMENT)
+        if swapped[row] or suspicion < MIN_SUSPICION:
             return
         swapped[row] = True
-        yield _tell_swap(look, skeleton, row, suspicion)
+        yield _swap_check(half, skeleton, row, suspicion)
 
 
-def _swap_gain(look: Neighbours, skeleton: Skeleton) -> Float[np.ndarray, "K S"]:
+def _swap_gain(half: Neighbours, skeleton: Skeleton) -> Float[np.ndarray, "K S"]:
     """How much nearer the joints of a limb are to those of the other side, -1 to 1."""
-    paired = np.flatnonzero(skeleton.mirror[look.members] != look.members)
-    twin = np.array([list(look.members).index(skeleton.mirror[j]) for j in look.members[paired]])
-    straight = np.minimum(look.away[:, :, paired, paired], CAP)
-    crossed = np.minimum(look.away[:, :, paired, twin], CAP)
+    paired = np.flatnonzero(skeleton.mirror[half.members] != half.members)
+    twin = np.array([list(half.members).index(skeleton.mirror[j]) for j in half.members[paired]])
+    straight = np.minimum(half.distance[:, :, paired, paired], MAX_JOINT_DISTANCE)
+    crossed = np.minimum(half.distance[:, :, paired, twin], MAX_JOINT_DISTANCE)
     known = np.isfinite(straight) & np.isfinite(crossed)
     count = np.maximum(known.sum(axis=2), 1)
     straight, crossed = (np.where(known, a, 0).sum(axis=2) / count for a in (straight, crossed))
-    return (straight - crossed) / CAP / (1 + (np.minimum(straight, crossed) / POOR_FIT) ** 2)
+    return (
+        (straight - crossed)
+        / MAX_JOINT_DISTANCE
+        / (1 + (np.minimum(straight, crossed) / POOR_FIT_DISTANCE) ** 2)
+    )
 
 
-def _tell_swap(look: Neighbours, skeleton: Skeleton, row: int, suspicion: float) -> Check:
+def _swap_check(half: Neighbours, skeleton: Skeleton, row: int, suspicion: float) -> Check:
     """Joints that lie nearer to the other side's, in a sentence."""
-    paired = [int(j) for j in look.members if skeleton.mirror[j] != j]
+    paired = [int(j) for j in half.members if skeleton.mirror[j] != j]
     limb = "legs" if skeleton.is_lower[paired].all() else "arms"
-    others = np.unique(look.frames[look.sources[row]])[:3]
+    others = np.unique(half.frames[half.sources[row]])[:3]
     named = ", ".join(str(frame) for frame in others)
     names = tuple(skeleton.names[j] for j in paired)
     text = f"Left and right of the {limb} look swapped beside frames {named}."
-    return Check(int(look.frames[row]), names[-1], "crossed", suspicion, text, names)
+    return Check(int(half.frames[row]), names[-1], "crossed", suspicion, text, names)

@@ -1,19 +1,17 @@
-"""Why a frame is worth annotating, in a sentence, and how many frames it stands for.
+"""Why a keyframe is one, and which frames would help most as further keyframes.
 
 Every frame goes to the keyframe whose pose is nearest. What a keyframe alone covers, frames that
 all others are farther from than beta, is what would be lost without it.
 
-Where one more annotation would help most.
+After a run every joint has a confidence, 0 where it was taken for an outlier. A frame is helped by
+an annotation elsewhere as far as its joints are uncertain and the nearest annotated pose comes
+closer. So the gain of annotating frame f is, for each half of the body,
 
-After a run every joint has a confidence, 0 where it was taken for a slip. A frame is in need as far
-as its joints are unsure, and an annotation elsewhere helps it as far as it brings the nearest
-annotated pose closer. So the gain of annotating frame f is, for each half of the body,
+    sum over t of  u(t) * max(0, d(t) - C(t, f)),        d(t) = min over annotated k of C(t, k),
 
-    sum over t of  doubt(t) * max(0, d(t) - C(t, f)),        d(t) = min over annotated k of C(t, k),
-
-the gain of a medoid in weighted k-medoids, with the pose distance C of Section 4.2. The best frame
-is taken, d is brought up to date, and so on: a suggestion makes its likes worthless, which spreads
-suggestions out by itself.
+the gain of a medoid in weighted k-medoids, with the uncertainty u and the pose distance C of
+Section 4.2. The best frame is taken, d is brought up to date, and so on: a suggestion takes the
+gain from frames like it, which spreads suggestions out by itself.
 """
 
 from dataclasses import dataclass, replace
@@ -25,6 +23,8 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.propagation.propagation import LEAST_MARKED, distances_to
 from keyrecon.records import Annotations, HalfName, Keyframes, Motion, PoseDistances
 
+HALVES: tuple[HalfName, ...] = ("upper", "lower")
+
 
 @dataclass(frozen=True)
 class Reason:
@@ -35,63 +35,75 @@ class Reason:
     why: str
 
 
+@dataclass(frozen=True, eq=False)
+class _HalfCoverage:
+    """How near the keyframes of one half of the body are to every frame."""
+
+    half: HalfName
+    frames: Int[np.ndarray, "K"]
+    distance: Float[np.ndarray, "T K"]
+    """Pose distance, player heights."""
+    beta: float
+
+
 def explain_keyframes(
-    comparison: PoseDistances, keyframes: Keyframes, own: dict[int, str]
+    distances: PoseDistances, keyframes: Keyframes, added: dict[int, str]
 ) -> dict[int, Reason]:
-    """A reason for every keyframe, those that the person added (`own`: frame to half) as well."""
-    shares = {half: _share_out(comparison, keyframes, half, own) for half in ("upper", "lower")}
+    """A reason for every keyframe, also for those that the person added (frame to half)."""
+    coverages = [_cover_half(distances, keyframes, half, added) for half in HALVES]
     reasons = {}
-    for frame in sorted({*keyframes.frames.tolist(), *own}):
-        served = np.zeros(len(comparison.row), dtype=bool)
-        parts = []
-        for half, (frames, apart, beta) in shares.items():
-            if frame not in frames:
+    for frame in sorted({*keyframes.frames.tolist(), *added}):
+        served = np.zeros(len(distances.row), dtype=bool)
+        sentences = ["You added it."] if frame in added else []
+        for coverage in coverages:
+            if frame not in coverage.frames:
                 continue
-            place = int(np.searchsorted(frames, frame))
-            mine = apart.argmin(axis=1) == place
-            alone = (apart[:, place] < beta) & ((apart < beta).sum(axis=1) == 1)
-            served |= mine
-            parts.append(_describe(half, mine, int(alone.sum())))
-        added = "You added it. " if frame in own else ""
-        reasons[frame] = Reason(int(served.sum()), added + " ".join(parts))
+            column = int(np.searchsorted(coverage.frames, frame))
+            nearest = coverage.distance.argmin(axis=1) == column
+            covered = coverage.distance < coverage.beta
+            alone = covered[:, column] & (covered.sum(axis=1) == 1)
+            served |= nearest
+            sentences.append(_describe(coverage.half, nearest, int(alone.sum())))
+        reasons[frame] = Reason(int(served.sum()), " ".join(sentences))
     return reasons
 
 
-def _share_out(
-    comparison: PoseDistances, keyframes: Keyframes, half: HalfName, own: dict[int, str]
-) -> tuple[Int[np.ndarray, "K"], Float[np.ndarray, "T K"], float]:
-    """(keyframes of one half, pose distance of every frame to them, beta)."""
-    asked = getattr(keyframes, half)
-    added = [frame for frame, wanted in own.items() if wanted in (half, "both")]
-    frames = np.union1d(asked.frames, np.array(added, dtype=np.int64))
-    return frames, distances_to(comparison, half, frames), asked.beta
+def _cover_half(
+    distances: PoseDistances, keyframes: Keyframes, half: HalfName, added: dict[int, str]
+) -> _HalfCoverage:
+    chosen = getattr(keyframes, half)
+    own = [frame for frame, wanted in added.items() if wanted in (half, "both")]
+    frames = np.union1d(chosen.frames, np.array(own, dtype=np.int64))
+    return _HalfCoverage(half, frames, distances_to(distances, half, frames), chosen.beta)
 
 
-def _describe(half: HalfName, mine: Bool[np.ndarray, "T"], alone: int) -> str:
-    """One half of the body in a sentence."""
-    if not mine.any():
+def _describe(half: HalfName, nearest: Bool[np.ndarray, "T"], alone: int) -> str:
+    """What a keyframe does for one half of the body, in a sentence."""
+    if not nearest.any():
         return f"Other keyframes show the {half} body as well."
-    first, last = _longest_stretch(mine)
+    first, last = _longest_run(nearest)
     where = f"frame {first}" if first == last else f"frames {first}-{last}"
-    count = int(mine.sum())
+    count = int(nearest.sum())
     frames = "1 frame" if count == 1 else f"{count} frames"
     text = f"Shows the {half} body of {frames} best, most in a row {where}"
     return f"{text}; {alone} of them no other keyframe covers." if alone else f"{text}."
 
 
-def _longest_stretch(flags: Bool[np.ndarray, "T"]) -> tuple[int, int]:
+def _longest_run(flags: Bool[np.ndarray, "T"]) -> tuple[int, int]:
     """First and last frame of the longest run of True."""
     ends = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     first, end = ends[np.diff(ends, axis=1)[:, 0].argmax()]
     return int(first), int(end) - 1
 
 
-COUNT = 5
-"""Suggestions at a time."""
-BOTH = 0.5
+MAX_SUGGESTIONS = 5
+"""At a time: what fits a list without scrolling."""
+BOTH_HALVES_SHARE = 0.5
 """Share of a half's best gain from which it is marked along with the other half."""
-LEAST_GAIN = 0.002
-"""Share of all need that a suggestion takes away at least."""
+MIN_GAIN = 0.002
+"""Share of all uncertainty that a suggestion takes away at least."""
+CLOSER_SHARE = 0.25
+"""Share of its distance by which a frame must come closer to count as helped in the reason."""
 
 
 @dataclass(frozen=True)
@@ -102,100 +114,106 @@ class Suggestion:
     half: Literal["upper", "lower", "both"]
     why: str
     gain: float
-    """Share of what is in need that it would settle, 0-1."""
+    """Share of the uncertainty that it would take away, 0-1."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Need:
-    """How far one half of the body is from annotated poses, and how much that matters."""
+class _HalfUncertainty:
+    """How far one half of the body is from annotated poses, and how uncertain it is there."""
 
-    half: Literal["upper", "lower"]
-    apart: Float[np.ndarray, "M M"]
-    """Pose distances, player heights."""
-    doubt: Float[np.ndarray, "M"]
+    half: HalfName
+    distance: Float[np.ndarray, "M M"]
+    """Between poses, player heights."""
+    uncertainty: Float[np.ndarray, "M"]
     """Summed over the frames that each row stands for."""
     nearest: Float[np.ndarray, "M"]
     """Distance to the nearest annotated pose."""
 
     @property
     def total(self) -> float:
-        """What is in need."""
-        return float(self.doubt @ self.nearest)
+        """Uncertainty times distance, summed."""
+        return float(self.uncertainty @ self.nearest)
 
     def gains(self) -> Float[np.ndarray, "M"]:
-        """What annotating each row would settle, as a share of all need."""
-        closer = np.maximum(self.nearest - self.apart, 0)
-        return closer @ self.doubt / max(self.total, 1e-12)
+        """What annotating each row would take away, as a share of the total."""
+        closer = np.maximum(self.nearest - self.distance, 0)
+        return closer @ self.uncertainty / max(self.total, 1e-12)
 
-    def with_row(self, row: int) -> "_Need":
+    def with_row(self, row: int) -> "_HalfUncertainty":
         """The same once a row is annotated."""
-        return replace(self, nearest=np.minimum(self.nearest, self.apart[row]))
+        return replace(self, nearest=np.minimum(self.nearest, self.distance[row]))
 
 
 def suggest_frames(
-    comparison: PoseDistances,
+    distances: PoseDistances,
     motion: Motion,
     annotations: Annotations,
     taken: frozenset[int] = frozenset(),
-    count: int = COUNT,
+    count: int = MAX_SUGGESTIONS,
 ) -> list[Suggestion]:
     """At most `count` frames, the most helpful first; never one that is `taken` already.
 
     `annotations` may hold more than the motion was made from: what is annotated needs no more help.
     """
-    needs = [_need(comparison, motion, annotations, half) for half in ("upper", "lower")]
-    whole = [need.total for need in needs]
-    open_rows = comparison.clarity[comparison.frames] * ~np.isin(comparison.frames, list(taken))
-    found: list[Suggestion] = []
-    while len(found) < count:
+    halves = [_measure_half(distances, motion, annotations, half) for half in HALVES]
+    totals = [half.total for half in halves]
+    open_rows = distances.clarity[distances.frames] * ~np.isin(distances.frames, list(taken))
+    suggestions: list[Suggestion] = []
+    while len(suggestions) < count:
         gains = [
-            need.gains() * open_rows * (need.total / max(all_, 1e-12)) / len(needs)
-            for need, all_ in zip(needs, whole, strict=True)
+            half.gains() * open_rows * (half.total / max(total, 1e-12)) / len(halves)
+            for half, total in zip(halves, totals, strict=True)
         ]
         row = int(sum(gains).argmax())
-        settled = [float(gain[row]) for gain in gains]
-        if sum(settled) < LEAST_GAIN:
+        gain = [float(one[row]) for one in gains]
+        if sum(gain) < MIN_GAIN:
             break
-        chosen = [share >= BOTH * max(settled) for share in settled]
-        half = "both" if all(chosen) else needs[chosen.index(True)].half
-        frame = int(comparison.frames[row])
-        why = _say_why(comparison, motion, (needs, chosen), row)
-        gain = sum(share for share, take in zip(settled, chosen, strict=True) if take)
-        found.append(Suggestion(frame, half, why, gain))
-        needs = [n.with_row(row) if take else n for n, take in zip(needs, chosen, strict=True)]
+        chosen = [one >= BOTH_HALVES_SHARE * max(gain) for one in gain]
+        marked = [half for half, take in zip(halves, chosen, strict=True) if take]
+        suggestions.append(
+            Suggestion(
+                frame=int(distances.frames[row]),
+                half=marked[0].half if len(marked) == 1 else "both",
+                why=_explain_gain(distances, motion, marked, row),
+                gain=sum(one for one, take in zip(gain, chosen, strict=True) if take),
+            )
+        )
+        halves = [
+            half.with_row(row) if take else half for half, take in zip(halves, chosen, strict=True)
+        ]
         open_rows[row] = 0
-    return found
+    return suggestions
 
 
-def _need(comparison: PoseDistances, motion: Motion, annotations: Annotations, half: str) -> _Need:
+def _measure_half(
+    distances: PoseDistances, motion: Motion, annotations: Annotations, half: HalfName
+) -> _HalfUncertainty:
     members = motion.skeleton.is_lower == (half == "lower")
-    doubt = 1 - motion.confidence[:, members].mean(axis=1)
+    uncertainty = 1 - motion.confidence[:, members].mean(axis=1)
     marked = np.isfinite(annotations.joints[:, members, 0]).mean(axis=1) >= LEAST_MARKED
-    table = comparison.upper if half == "upper" else comparison.lower
-    rows = comparison.row[annotations.frames[marked]]
-    return _Need(
+    table = distances.upper if half == "upper" else distances.lower
+    rows = distances.row[annotations.frames[marked]]
+    return _HalfUncertainty(
         half,
         table,
-        np.bincount(comparison.row, doubt, minlength=len(table)),
+        np.bincount(distances.row, uncertainty, minlength=len(table)),
         table[rows].min(axis=0, initial=float(table.max())),
     )
 
 
-def _say_why(
-    comparison: PoseDistances, motion: Motion, wanted: tuple[list[_Need], list[bool]], row: int
+def _explain_gain(
+    distances: PoseDistances, motion: Motion, halves: list[_HalfUncertainty], row: int
 ) -> str:
-    """Which joints of how many frames it would settle, in a sentence."""
-    needs, chosen = wanted
-    helped = np.zeros(len(comparison.row), dtype=bool)
-    doubt = np.zeros(len(motion.skeleton.names))
-    for need, take in zip(needs, chosen, strict=True):
-        if take:
-            closer = np.maximum(need.nearest - need.apart[row], 0) > 0.25 * need.nearest
-            frames = closer[comparison.row]
-            members = motion.skeleton.is_lower == (need.half == "lower")
-            doubt[members] = (1 - motion.confidence[frames][:, members]).sum(axis=0)
-            helped |= frames
-    worst = [motion.skeleton.names[j].replace("_", " ") for j in np.argsort(-doubt)[:2]]
+    """Which joints of how many frames would be helped, in a sentence."""
+    helped = np.zeros(len(distances.row), dtype=bool)
+    uncertainty = np.zeros(len(motion.skeleton.names))
+    for half in halves:
+        closer = np.maximum(half.nearest - half.distance[row], 0) > CLOSER_SHARE * half.nearest
+        frames = closer[distances.row]
+        members = motion.skeleton.is_lower == (half.half == "lower")
+        uncertainty[members] = (1 - motion.confidence[frames][:, members]).sum(axis=0)
+        helped |= frames
+    worst = [motion.skeleton.names[j].replace("_", " ") for j in np.argsort(-uncertainty)[:2]]
     return (
         f"{int(helped.sum())} frames look more like this one than like any annotated one; "
         f"{worst[0]} and {worst[1]} are the least sure there."

@@ -1,16 +1,10 @@
-"""Annotated figures of one half of the body, made ready to be fitted to a few frames.
+"""Joints of a frame that nobody annotated yet, from the few frames that somebody did.
 
-`matching.propagate` brings figures onto all frames of a video; what helps a person while marking
-needs them on one frame, or on the annotated ones, and at once. So only the frames that are asked
-for are looked at.
-
-Joints of frames that nobody annotated yet, from the few that somebody did.
-
-What `matching.propagate` does for a whole video is done for a single frame here: the annotated
-figures that look most like it are brought onto its edges, limbs of others are tried, the
-combination that leaves the least of the edges unexplained is taken and fitted once more. There is
-no path through time to lean on, so it takes a fraction of a second; each annotated frame makes the
-next ghost better.
+What `propagation` does for a whole video is done for a single frame here: edge templates of the
+most similar annotated frames are registered on its edges, limbs of others are tried, the
+combination that leaves the least of the edges unexplained is taken and registered once more. There
+is no trajectory to be smoothed, so it takes a fraction of a second; each annotated frame makes the
+next suggestion better. Templates fitted to the annotated frames themselves are what `checks` needs.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -50,7 +44,7 @@ from keyrecon.propagation.trajectory_smoothing import (
 from keyrecon.records import Annotations, Preparation
 
 OPTIONS = PropagateOptions()
-HIPS = 0.45
+HIP_POSITION = 0.45
 """Where the hips are on the way from head to mid-feet (Drillis and Contini: .53 of stature)."""
 
 
@@ -84,7 +78,7 @@ def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """Figures of K annotated frames, to be fitted to N frames."""
+    """Edge templates of K annotated frames, to be fitted to N frames."""
 
     templates: EdgeTemplates
     """Rows of `frame_elements` and `feet` are the N frames."""
@@ -92,7 +86,7 @@ class Fitting:
     distance: Float[np.ndarray, "N K"]
     """Pose distance, player heights."""
     shift: Complex[np.ndarray, "N K"]
-    """From each figure to the same figure in each frame, by head or feet."""
+    """From each template to the same pose in each frame, by head or feet."""
     sources: Int[np.ndarray, "K"]
     """Frame numbers."""
     fps: float
@@ -104,32 +98,32 @@ def prepare_fitting(
     joints: Complex[np.ndarray, "T J"],
     frames: Int[np.ndarray, "N"],
 ) -> Fitting:
-    """Dress the annotated figures of a half; `joints` has what the other half gives to it."""
+    """Edge templates of a half; `joints` has what the other half gives to it."""
     preparation, body_frame = scene.preparation, scene.body_frame
     poses = gather_poses(scene.sources, body_frame, half, joints[:, half.joints[half.fixed]])
     edges = tuple(preparation.contours.edges[t] for t in frames)
-    index = index_elements(edges, _some(body_frame, frames))
+    index = index_elements(edges, _select_frames(body_frame, frames))
     distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
     at = scene.at(preparation.track.head if half.name == "upper" else preparation.track.mid_feet)
     shift = at[frames][:, None] - at[poses.frames]
-    templates = _dress(scene, poses, frames)
+    templates = _make_templates(scene, poses, frames)
     fps = preparation.video.fps
     return Fitting(templates, index, distance, shift, poses.frames, fps)
 
 
-def _some(body_frame: BodyFrame, frames: Int[np.ndarray, "N"]) -> BodyFrame:
+def _select_frames(body_frame: BodyFrame, frames: Int[np.ndarray, "N"]) -> BodyFrame:
     return BodyFrame(body_frame.origin[frames], body_frame.height[frames])
 
 
-def _dress(
+def _make_templates(
     scene: SuggestionScene, poses: AnnotatedPoses, frames: Int[np.ndarray, "N"]
 ) -> EdgeTemplates:
-    """Annotated figures, and what is looked at in the frames that are asked for."""
+    """Templates of the annotated frames, and the elements of the frames they are fitted to."""
     edges, half, body_frame = scene.preparation.contours.edges, poses.half, scene.body_frame
     known = replace(poses, frames=np.arange(len(poses.frames)))
     outlines = tuple(edges[t] for t in poses.frames)
     templates = make_edge_templates(
-        outlines, _some(body_frame, poses.frames), known, OPTIONS.elements
+        outlines, _select_frames(body_frame, poses.frames), known, OPTIONS.elements
     )
     wanted = tuple(edges[t] for t in frames)
     templates = replace(
@@ -142,19 +136,21 @@ def _dress(
     return replace(templates, feet=replace(feet, points=feet.points[frames]))
 
 
-def marked_figures(annotations: Annotations, half: BodyHalf) -> Int[np.ndarray, "K"]:
-    """Frames that serve as figures of one half of the body; none until each bone is seen once."""
+def template_frames(annotations: Annotations, half: BodyHalf) -> Int[np.ndarray, "K"]:
+    """Frames that serve as templates of one half; none until each of its bones is marked once."""
     marked = np.isfinite(annotations.joints[:, half.joints, 0])
-    served = marked[:, half.free].mean(axis=1) >= LEAST_MARKED
+    sufficient = marked[:, half.free].mean(axis=1) >= LEAST_MARKED
     bones = half.bones[~half.fixed[half.bones].any(axis=1)]
-    whole = marked[served][:, bones].all(axis=2).any(axis=0).all()
-    return annotations.frames[served & whole]
+    whole = marked[sufficient][:, bones].all(axis=2).any(axis=0).all()
+    return annotations.frames[sufficient & whole]
 
 
-def stand_in(scene: SuggestionScene, joints: Complex[np.ndarray, "T J"], upper: BodyHalf) -> None:
+def fill_in_hips(
+    scene: SuggestionScene, joints: Complex[np.ndarray, "T J"], upper: BodyHalf
+) -> None:
     """Fill in what the lower body gives to the upper one where nothing better is known."""
     track = scene.preparation.track
-    hips = scene.at(track.head + HIPS * (track.mid_feet - track.head))[:, None]
+    hips = scene.at(track.head + HIP_POSITION * (track.mid_feet - track.head))[:, None]
     given = upper.joints[upper.fixed]
     joints[:, given] = np.where(np.isnan(joints[:, given]), hips, joints[:, given])
 
@@ -170,21 +166,21 @@ def take_rows(annotations: Annotations, rows: Bool[np.ndarray, "K"]) -> Annotati
     )
 
 
-SETTLING = tuple(
+FINAL_REGISTRATION = tuple(
     RegistrationStep(radius, SHAPE_PRIOR.length_spread, SHAPE_PRIOR.transverse_spread)
     for radius in SEARCH_RADII
 )
-"""Last fit of the chosen figure, as trajectory smoothing does it for all frames at once."""
-MOST = 10
-"""Annotated figures looked at for each half; with more a ghost gets slower and no better."""
-_PULL = 1 / HYPOTHESIS_SPREAD**2
-"""Weight of the chosen proposal in the last fit."""
-_PER_FIGURE = [field for field in fields(AnnotatedPoses) if field.name != "half"]
+"""Of the chosen pose, as trajectory smoothing does it for all frames at once."""
+MAX_SOURCES = 10
+"""Annotated frames used for each half; with more a suggestion gets slower and no better."""
+HYPOTHESIS_WEIGHT = 1 / HYPOTHESIS_SPREAD**2
+"""Weight of the chosen hypothesis in the final registration."""
+_PER_POSE_FIELDS = [field for field in fields(AnnotatedPoses) if field.name != "half"]
 
 
 @dataclass(frozen=True, eq=False)
 class PoseSuggestion:
-    """Foreseen joints of one frame."""
+    """Suggested joints of one frame."""
 
     joints: Float[np.ndarray, "J 2"]
     """px; NaN where that half of the body has no annotated frame yet."""
@@ -195,13 +191,13 @@ class PoseSuggestion:
 
 
 def choose_sources(preparation: Preparation, annotations: Annotations, frame: int) -> Annotations:
-    """The other annotated frames that look most like `frame`: all that its ghost depends on."""
+    """The annotated frames most similar to `frame`: all that its suggestion depends on."""
     others = take_rows(annotations, annotations.frames != frame)
     near = []
     for half in split_body(annotations.skeleton):
-        figures = marked_figures(others, half)
-        distance = distances_to(preparation.pose_distances, half.name, figures)[frame]
-        near.append(figures[np.argsort(distance, kind="stable")[:MOST]])
+        frames = template_frames(others, half)
+        distance = distances_to(preparation.pose_distances, half.name, frames)[frame]
+        near.append(frames[np.argsort(distance, kind="stable")[:MAX_SOURCES]])
     return take_rows(others, np.isin(others.frames, np.concatenate(near)))
 
 
@@ -209,55 +205,65 @@ def suggest_joints(
     preparation: Preparation,
     sources: Annotations,
     frame: int,
-    held: Float[np.ndarray, "J 2"] | None = None,
+    marks: Float[np.ndarray, "J 2"] | None = None,
 ) -> PoseSuggestion:
-    """Joints of `frame` from annotated frames; what is marked there already is `held`, px."""
+    """Joints of `frame` from annotated frames; `marks` of its own stay (px)."""
     skeleton = sources.skeleton
     scene = scene_of(preparation, sources)
     lower, upper = split_body(skeleton)
     joints = np.full((len(preparation.track.head), len(skeleton.names)), np.nan + 0j)
     joints[sources.frames] = scene.from_pixels(sources.joints, sources.frames)
-    if held is not None:
-        joints[frame] = scene.body_frame.from_pixels(held, frame)
+    if marks is not None:
+        joints[frame] = scene.body_frame.from_pixels(marks, frame)
     confidence, source = np.zeros(joints.shape[1]), np.full(joints.shape[1], -1)
-    beyond = np.setdiff1d(marked_figures(sources, upper), marked_figures(sources, lower))
-    for half, frames in ((lower, np.array([frame, *beyond])), (upper, np.array([frame]))):
-        own = half.joints[half.free]
-        if len(marked_figures(sources, half)):
+    only_upper = np.setdiff1d(template_frames(sources, upper), template_frames(sources, lower))
+    for half, frames in ((lower, np.array([frame, *only_upper])), (upper, np.array([frame]))):
+        members = half.joints[half.free]
+        if len(template_frames(sources, half)):
             fitting = prepare_fitting(scene, half, joints, frames)
-            found, sure, come_from = _suggest_half(fitting, joints[frames][:, half.joints])
-            joints[frames[:, None], own] = found
-            confidence[own], source[own] = sure[0], come_from[0]
+            suggested = _suggest_half(fitting, joints[frames][:, half.joints])
+            joints[frames[:, None], members] = suggested.joints
+            confidence[members] = suggested.confidence[0]
+            source[members] = suggested.source[0]
         if half is lower:
-            stand_in(scene, joints, upper)
+            fill_in_hips(scene, joints, upper)
     pixels = scene.body_frame.to_pixels(joints[frame], frame)
     return PoseSuggestion(np.where(source[:, None] < 0, np.nan, pixels), confidence, source)
 
 
-def _suggest_half(
-    fitting: Fitting, known: Complex[np.ndarray, "N J"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(own joints, confidence, source frame) of one half; `known` joints stay."""
+@dataclass(frozen=True, eq=False)
+class _HalfSuggestion:
+    """The joints that one half of the body has of its own, on N frames."""
+
+    joints: Complex[np.ndarray, "N J"]
+    confidence: Float[np.ndarray, "N J"]
+    source: Int[np.ndarray, "N J"]
+    """Frame that each joint comes from."""
+
+
+def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfSuggestion:
+    """Joints of one half; those that are `known` stay."""
     templates, index = fitting.templates, fitting.index
     fitted = fit_similar(templates, index, fitting.distance, fitting.shift, OPTIONS.similar)
     hypotheses = join_hypotheses(fitted, propose_limbs(templates, index, fitted, LIMB_HYPOTHESES))
-    limbs = _choose(templates, hypotheses, fitting.fps)
+    limbs = _choose_each(templates, hypotheses, fitting.fps)
     chosen = np.where(np.isfinite(known), known, limbs.joints)
-    weight = np.where(np.isfinite(known), FIXED_WEIGHT, _PULL)
+    weight = np.where(np.isfinite(known), FIXED_WEIGHT, HYPOTHESIS_WEIGHT)
     similar = fitted.template[:, 0]
     start = TemplateFits(np.arange(len(known)), similar, chosen)
-    settled = register_templates(
-        templates, index, start, SETTLING, joint_equations(chosen, weight)
+    final = register_templates(
+        templates, index, start, FINAL_REGISTRATION, joint_equations(chosen, weight)
     ).joints
-    confidence = joint_confidence(templates, index, ChosenHypotheses(chosen, similar), settled)
-    own = templates.half.free
-    return settled[:, own], confidence[:, own], fitting.sources[limbs.template[:, own]]
+    confidence = joint_confidence(templates, index, ChosenHypotheses(chosen, similar), final)
+    free = templates.half.free
+    source = fitting.sources[limbs.template[:, free]]
+    return _HalfSuggestion(final[:, free], confidence[:, free], source)
 
 
-def _choose(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
+def _choose_each(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
     """The best hypotheses, each frame by itself."""
-    nobody = replace(
-        templates.poses, **{f.name: getattr(templates.poses, f.name)[:0] for f in _PER_FIGURE}
+    no_poses = replace(
+        templates.poses, **{f.name: getattr(templates.poses, f.name)[:0] for f in _PER_POSE_FIELDS}
     )
     chosen = []
     for n in range(len(hypotheses.template)):
@@ -265,13 +271,13 @@ def _choose(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) ->
             *(getattr(hypotheses, f.name)[n : n + 1] for f in fields(PoseHypotheses))
         )
         feet = templates.feet and replace(templates.feet, points=templates.feet.points[n : n + 1])
-        alone = replace(
+        single = replace(
             templates,
-            poses=nobody,
+            poses=no_poses,
             frame_elements=templates.frame_elements[n : n + 1],
             feet=feet,
         )
-        chosen.append(choose_limbs(alone, one, fps))
+        chosen.append(choose_limbs(single, one, fps))
     return ChosenLimbs(
         np.concatenate([one.joints for one in chosen]),
         np.concatenate([one.template for one in chosen]),

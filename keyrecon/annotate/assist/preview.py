@@ -20,13 +20,13 @@ from keyrecon.segmentation.background_model import sample_frames
 from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
 from keyrecon.tracking import detection as find
 
-SAMPLES = 24
+SAMPLE_COUNT = 24
 """Pictures beside those asked for: enough for the scene behind the player to show everywhere."""
-KEPT_WIDTH = 960
+MAX_WIDTH = 960
 """Pictures are kept at most this wide, px."""
-TINT = (255, 0, 200)
+TINT_COLOR = (255, 0, 200)
 """Laid over pixels that look like a part: no skin, cloth, grass or clay has this colour."""
-OPAQUE = 200
+MAX_ALPHA = 200
 """Alpha where a pixel is surely of the part, of 255."""
 
 
@@ -61,9 +61,9 @@ def cut_strip(video: Video, frames: tuple[int, ...]) -> Strip:
     """The frames asked for and others spread evenly; the whole video is decoded once."""
     if outside := [frame for frame in frames if not 0 <= frame < len(video)]:
         raise KeyreconError(f"Frame {outside[0]} is outside the video of {len(video)} frames.")
-    numbers = np.union1d(np.array(frames, dtype=np.int64), sample_frames(len(video), SAMPLES))
+    numbers = np.union1d(np.array(frames, dtype=np.int64), sample_frames(len(video), SAMPLE_COUNT))
     chosen = video.chosen_frames(set(numbers.tolist()), int(numbers[-1]))
-    width = min(video.width, KEPT_WIDTH)
+    width = min(video.width, MAX_WIDTH)
     pictures = tuple(reduce_picture(picture, width) for picture in chosen)
     whole = {field.name: getattr(video, field.name) for field in fields(Video)}
     time = video.time[numbers]
@@ -78,11 +78,11 @@ class PreviewedParts:
 
     frames: Int[np.ndarray, "N"]
     head: Float[np.ndarray, "N 2"]
-    """px; NaN where it was not seen, as with the feet."""
+    """px; NaN where it was not found, as with the feet."""
     feet: Float[np.ndarray, "N 2 2"]
     box: Float[np.ndarray, "N 4"]
     confidence: float
-    """Share of all pictures of the strip on which head and feet were seen, 0-1."""
+    """Share of all pictures of the strip on which head and feet were found, 0-1."""
 
 
 def find_player(
@@ -91,14 +91,14 @@ def find_player(
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
     track: Track = find.find_player(strip, colors, camera)
     rows = np.searchsorted(strip.numbers, np.unique(frames))
-    seen = track.confidence > 0
-    unseen = ~seen[rows]
+    found = track.confidence > 0
+    missing = ~found[rows]
     return PreviewedParts(
         frames=np.unique(frames),
-        head=np.where(unseen[:, None], np.nan, track.head[rows]),
-        feet=np.where(unseen[:, None, None], np.nan, track.feet[rows]),
+        head=np.where(missing[:, None], np.nan, track.head[rows]),
+        feet=np.where(missing[:, None, None], np.nan, track.feet[rows]),
         box=track.box[rows],
-        confidence=float(seen.mean()),
+        confidence=float(found.mean()),
     )
 
 
@@ -110,6 +110,6 @@ def tint_part(
         raise KeyreconError(f"Nothing was picked as {part}; there are {', '.join(colors.names)}.")
     share = posterior_tables(colors)[colors.names.index(part)][color_bins(to_lab(picture))]
     layer = np.empty((*share.shape, 4), np.uint8)
-    layer[..., :3] = TINT
-    layer[..., 3] = np.rint(OPAQUE * share)
+    layer[..., :3] = TINT_COLOR
+    layer[..., 3] = np.rint(MAX_ALPHA * share)
     return layer

@@ -1,9 +1,9 @@
-"""A project as the annotator thinks about it: what was prepared, and what marks have taught.
+"""What the annotator keeps of a project: results of the stages, and what follows from the marks.
 
-Everything is loaded when it is first asked for and again when its file has changed. Ghosts are kept
-by the marks they depend on, so that an edit makes only those anew that it touches. The size of the
-body is learnt in a thread of its own: an answer about a pose takes the latest there is, and waits
-only for the first.
+Everything is loaded when it is first asked for and again when its file has changed. Suggestions are
+kept by the marks they depend on, so that an edit makes only those anew that it touches. The body is
+estimated in a thread of its own: an answer about a pose takes the latest estimate there is, and
+waits only for the first.
 """
 
 import hashlib
@@ -12,8 +12,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from threading import RLock, Thread
-from typing import Any
+from threading import Lock, RLock, Thread
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -32,22 +32,43 @@ from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick, Prep
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+
+class LatestResult(Generic[Key, Value]):
+    """The result for the key that was asked for last. One thread at a time makes it: who asks for
+    the same meanwhile waits for it, and everybody gets the result for the own key."""
+
+    def __init__(self, make: Callable[..., Value]) -> None:
+        """Keep what `make(key, ...)` returns."""
+        self._make, self._lock = make, Lock()
+        self._kept: tuple[Key, Value] | None = None
+
+    def get(self, key: Key, *inputs: Any) -> Value:
+        """The result for `key`, made from it and from `inputs` that follow from it."""
+        with self._lock:
+            kept = self._kept
+            if kept is None or kept[0] != key:
+                kept = self._kept = key, self._make(key, *inputs)
+            return kept[1]
+
 
 class ProjectCache:
     """One project; safe to ask from several threads."""
 
     def __init__(self, workspace: Workspace) -> None:
-        """Study the project of a workspace."""
+        """Open the project of a workspace."""
         self._workspace = workspace
-        self._loading = RLock()
-        self._learner = ThreadPoolExecutor(1)
+        self._lock = RLock()
+        self._worker = ThreadPoolExecutor(1)
         self._loaded: dict[str, _Loaded] = {}
-        self._ghosts: dict[int, tuple[str, PoseSuggestion]] = {}
-        self._learnt: tuple[str, Future[BodyEstimate]] | None = None
-        self._knowledge: BodyEstimate | None = None
-        self._looks: tuple[str, tuple[Neighbours, ...]] | None = None
-        self._colors: tuple[tuple[Pick, ...], Colors] | None = None
-        self._strip: tuple[tuple[int, ...], Strip, CameraPath] | None = None
+        self._suggestions: dict[int, tuple[str, PoseSuggestion]] = {}
+        self._estimating: tuple[str, Future[BodyEstimate]] | None = None
+        self._body: BodyEstimate | None = None
+        self._neighbours = LatestResult(lambda _, *inputs: find_neighbours(*inputs))
+        self._colors = LatestResult(lambda picks: learn_colors(self.video, picks))
+        self._strip = LatestResult(self._cut_strip)
         # ready when the page asks, and in nobody's way when the server is stopped
         Thread(target=self.preparation, daemon=True).start()
 
@@ -68,18 +89,17 @@ class ProjectCache:
 
     def colors(self, picks: tuple[Pick, ...]) -> Colors:
         """What the picked parts look like."""
-        if self._colors is None or self._colors[0] != picks:
-            self._colors = picks, learn_colors(self.video, picks)
-        return self._colors[1]
+        return self._colors.get(picks)
 
     def strip(self, frames: tuple[int, ...]) -> tuple[Strip, CameraPath]:
         """Pictures of some frames and others around them, and how the camera moves between."""
-        if self._strip is None or self._strip[0] != frames:
-            strip = cut_strip(self.video, frames)
-            self._strip = frames, strip, estimate_camera_motion(strip)
-        return self._strip[1:]
+        return self._strip.get(frames)
 
-    def ghost(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
+    def _cut_strip(self, frames: tuple[int, ...]) -> tuple[Strip, CameraPath]:
+        strip = cut_strip(self.video, frames)
+        return strip, estimate_camera_motion(strip)
+
+    def suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
         """Where the joints of a frame probably are; None while nothing else is annotated."""
         preparation = self.preparation()
         if preparation is None:
@@ -87,72 +107,80 @@ class ProjectCache:
         sources = choose_sources(preparation, annotations, frame)
         if not len(sources.frames):
             return None
-        held = _marks_of(annotations, frame)
-        key = _digest(sources.frames, sources.joints, held)
-        known = self._ghosts.get(frame)
-        if known is None or known[0] != key:
-            known = key, suggest_joints(preparation, sources, frame, held)
-            self._ghosts[frame] = known
-        return known[1]
+        marks = _marks_of(annotations, frame)
+        key = _digest(sources.frames, sources.joints, marks)
+        kept = self._suggestions.get(frame)
+        if kept is None or kept[0] != key:
+            kept = key, suggest_joints(preparation, sources, frame, marks)
+            self._suggestions[frame] = kept
+        return kept[1]
 
-    def any_ghost(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
-        """A ghost of the frame, even if marks were added since it was made: at once, if seen."""
-        known = self._ghosts.get(frame)
-        return self.ghost(annotations, frame) if known is None else known[1]
+    def any_suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
+        """The last suggestion for the frame, at once, even if marks were added since."""
+        kept = self._suggestions.get(frame)
+        return self.suggestion(annotations, frame) if kept is None else kept[1]
 
-    def lookalikes(self, annotations: Annotations) -> tuple[Neighbours, ...]:
-        """What annotated frames say of one another."""
+    def neighbours(self, annotations: Annotations) -> tuple[Neighbours, ...]:
+        """Annotated frames compared with one another."""
         preparation = self.preparation()
-        key = _digest(annotations.frames, annotations.joints)
         if preparation is None:
             return ()
-        if self._looks is None or self._looks[0] != key:
-            self._looks = key, find_neighbours(preparation, annotations)
-        return self._looks[1]
+        key = _digest(annotations.frames, annotations.joints)
+        return self._neighbours.get(key, preparation, annotations)
 
-    def knowledge(self, annotations: Annotations, wait: bool = False) -> BodyEstimate | None:
-        """What is known of the body: the latest, or with `wait` all that these marks tell."""
+    def body(self, annotations: Annotations, wait: bool = False) -> BodyEstimate | None:
+        """The player's body: the latest estimate, or with `wait` that from all these marks."""
         preparation = self.preparation()
         if preparation is None:
             return None
         key = _digest(annotations.frames, annotations.joints, annotations.nearer)
-        with self._loading:
-            if self._learnt is None or self._learnt[0] != key:
-                work = self._learner.submit(self._learn, preparation, annotations)
-                self._learnt = key, work
-                self._learner.submit(self._foresee_halves, annotations, key)
-            work = self._learnt[1]
-        if wait or self._knowledge is None or work.done():
-            self._knowledge = work.result()
-        return self._knowledge
+        with self._lock:
+            if self._estimating is None or self._estimating[0] != key:
+                work = self._worker.submit(self._estimate_body, preparation, annotations)
+                self._estimating = key, work
+                self._worker.submit(self._suggest_other_halves, annotations, key)
+            work, latest = self._estimating[1], self._body
+        if latest is not None and not (wait or work.done()):
+            return latest
+        body = work.result()
+        with self._lock:
+            if self._body is None or self._is_latest(key):
+                self._body = body
+        return body
 
-    def _learn(self, preparation: Preparation, annotations: Annotations) -> BodyEstimate:
-        """From marks, and from such ghosts as there are where a frame shows half of the body."""
-        ghosts = {frame: ghost for frame, (_, ghost) in [*self._ghosts.items()]}
+    def _is_latest(self, key: str) -> bool:
+        """Whether no other marks came since."""
+        estimating = self._estimating
+        return estimating is None or estimating[0] == key
+
+    def _estimate_body(self, preparation: Preparation, annotations: Annotations) -> BodyEstimate:
+        """From marks, and from such suggestions as there are where half of the body is marked."""
+        suggestions = {frame: one for frame, (_, one) in [*self._suggestions.items()]}
         video, track = preparation.video, preparation.track
-        return estimate_body(annotations, ghosts, track.height, video.fps)
+        return estimate_body(annotations, suggestions, track.height, video.fps)
 
-    def _foresee_halves(self, annotations: Annotations, key: str) -> None:
-        """Make the ghosts that are lacking, until there are other marks; then learn anew."""
+    def _suggest_other_halves(self, annotations: Annotations, key: str) -> None:
+        """Make the suggestions that are lacking until there are other marks; then estimate anew."""
         half = ~np.isfinite(annotations.joints[:, :, 0]).all(axis=1)
-        lacking = [t for t in annotations.frames[half].tolist() if t not in self._ghosts]
+        lacking = [t for t in annotations.frames[half].tolist() if t not in self._suggestions]
         for frame in lacking:
-            if self._learnt is None or self._learnt[0] != key:
+            if not self._is_latest(key):
                 return
-            self.ghost(annotations, frame)
-        if lacking:
-            self._learnt = None
+            self.suggestion(annotations, frame)
+        with self._lock:
+            if lacking and self._is_latest(key):
+                self._estimating = None
 
     def _prepared(self) -> Preparation:
         """The stored results of the automatic part, with the keyframes that were asked for."""
         workspace = Workspace(self._workspace.folder)
         options = workspace.options(Options(), Options())
         recall = workspace.stages.recall
-        found = prepare(workspace.video(), workspace.picks(), options, recall)
-        asked = keyframes_from_json(workspace.keyframes_file.read_text())
-        if len(asked.upper.nearest) != len(found.video):
+        preparation = prepare(workspace.video(), workspace.picks(), options, recall)
+        keyframes = keyframes_from_json(workspace.keyframes_file.read_text())
+        if len(keyframes.upper.nearest) != len(preparation.video):
             raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")
-        return replace(found, keyframes=asked)
+        return replace(preparation, keyframes=keyframes)
 
     def _load(self, name: str, files: tuple[Path, ...], read: Callable[[], Any]) -> Any:
         """What `read` gives, read again when a file changes; the last there was if it cannot be.
@@ -160,16 +188,16 @@ class ProjectCache:
         What could not be read is tried again when stage results are added.
         """
         stamps = tuple(_stamp(file) for file in files)
-        at_hand = stamps, _stamp(self._workspace.stages.folder)
-        with self._loading:
-            known = self._loaded.get(name, _Loaded())
-            if None not in stamps and stamps != known.stamps and at_hand != known.failed_with:
+        inputs = stamps, _stamp(self._workspace.stages.folder)
+        with self._lock:
+            loaded = self._loaded.get(name, _Loaded())
+            if None not in stamps and stamps != loaded.stamps and inputs != loaded.failed_with:
                 try:
-                    known = _Loaded(read(), stamps)
+                    loaded = _Loaded(read(), stamps)
                 except KeyreconError:
-                    known = replace(known, failed_with=at_hand)
-                self._loaded[name] = known
-            return known.value
+                    loaded = replace(loaded, failed_with=inputs)
+                self._loaded[name] = loaded
+            return loaded.value
 
 
 @dataclass(frozen=True)

@@ -25,25 +25,26 @@ class LastAddress:
     """Where the page of a project was served last, and what its cookie held."""
 
     port: int = 0
-    session: str | None = None
+    cookie_secret: str | None = None
 
 
 def recall(file: Path) -> LastAddress:
     """What `remember` wrote; nothing where the file is not there or damaged."""
     try:
-        told = json.loads(file.read_text())
-        port, session = int(told["port"]), str(told["session"])
+        noted = json.loads(file.read_text())
+        port, secret = int(noted["port"]), str(noted["session"])
     except (OSError, ValueError, LookupError, TypeError):
         return LastAddress()
-    known = 1024 <= port <= 65535 and len(session) >= SECRET_LENGTH
-    return LastAddress(port, session) if known else LastAddress()
+    known = 1024 <= port <= 65535 and len(secret) >= SECRET_LENGTH
+    return LastAddress(port, secret) if known else LastAddress()
 
 
-def remember(file: Path, door: Credentials) -> None:
+def remember(file: Path, credentials: Credentials) -> None:
     """Note the address for the next start; nobody else may read it."""
     file.parent.mkdir(exist_ok=True)
     file.touch(0o600)
-    write_durably(file, json.dumps({"port": door.port, "session": door.session}))
+    noted = {"port": credentials.port, "session": credentials.cookie_secret}
+    write_durably(file, json.dumps(noted))
 
 
 def listen(host: str, port: int, memory: LastAddress = LastAddress()) -> socket.socket:
@@ -53,12 +54,12 @@ def listen(host: str, port: int, memory: LastAddress = LastAddress()) -> socket.
     """
     if not port and memory.port:
         with suppress(KeyreconError):
-            return _bound(host, memory.port)
-    return _bound(host, port)
+            return _bind(host, memory.port)
+    return _bind(host, port)
 
 
-def _bound(host: str, port: int) -> socket.socket:
-    """Told to be TCP: only then are small answers sent at once (asyncio sets TCP_NODELAY)."""
+def _bind(host: str, port: int) -> socket.socket:
+    """Made for TCP by name: only then are small answers sent at once (asyncio sets TCP_NODELAY)."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     if os.name == "posix":  # elsewhere it would let others take the port
@@ -80,12 +81,14 @@ def make_credentials(
 ) -> Credentials:
     """The fixed list of names under which the server answers, and its secrets."""
     port = listener.getsockname()[1]
-    door = Credentials(tuple(f"{name}:{port}" for name in _names(host)), port)
-    return replace(door, session=memory.session) if memory.session else door
+    credentials = Credentials(tuple(f"{name}:{port}" for name in _host_names(host)), port)
+    if memory.cookie_secret is None:
+        return credentials
+    return replace(credentials, cookie_secret=memory.cookie_secret)
 
 
-def _names(host: str) -> tuple[str, ...]:
-    """How a browser may spell an address, best first."""
+def _host_names(host: str) -> tuple[str, ...]:
+    """How a browser may write an address, best first."""
     if host in ("0.0.0.0", "::"):
         name = socket.gethostname()
         return (name, *_addresses(name), "127.0.0.1", "localhost")

@@ -1,10 +1,16 @@
-"""What the page must know of a project: the video, the skeleton and the keyframes."""
+"""A project as JSON for the page: video, skeleton, keyframes, marks, edits and jobs."""
 
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
 from typing import Any
 
-from keyrecon.annotate.store.cells import Cells, of_kind
+from keyrecon.annotate.server.jobs import Job
+from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_kind, picks_of
+from keyrecon.annotate.store.journal import Entry, JournalState
+from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
 from keyrecon.body import Skeleton
 from keyrecon.io.video import Video
+from keyrecon.io.workspace import Workspace
 from keyrecon.records import Keyframes
 
 Json = dict[str, Any]
@@ -23,7 +29,7 @@ def describe_video(video: Video, name: str) -> Json:
 
 
 def describe_skeleton(skeleton: Skeleton) -> Json:
-    """Joints, limbs named by their outer joint, halves, mirrored pairs, and the guided order."""
+    """Joints, limbs named by their outer joint, halves, mirrored pairs, the order to mark in."""
     names, lower = skeleton.names, skeleton.is_lower
     return {
         "joints": list(names),
@@ -37,7 +43,7 @@ def describe_skeleton(skeleton: Skeleton) -> Json:
             }
             for parent, child in skeleton.bones.tolist()
         ],
-        "order": [names[joint] for joint in guided_order(skeleton)],
+        "order": [names[joint] for joint in marking_order(skeleton)],
         "halves": {
             half: [n for n, low in zip(names, lower, strict=True) if low == (half == "lower")]
             for half in ("upper", "lower")
@@ -46,7 +52,7 @@ def describe_skeleton(skeleton: Skeleton) -> Json:
     }
 
 
-def guided_order(skeleton: Skeleton) -> list[int]:
+def marking_order(skeleton: Skeleton) -> list[int]:
     """Joints from the head down the arms, then down the legs, each limb from the trunk outwards."""
     chains = [
         _chain(skeleton, joint)
@@ -65,52 +71,38 @@ def _chain(skeleton: Skeleton, joint: int) -> list[int]:
     return [joint, *(outer for child in children for outer in _chain(skeleton, child))]
 
 
-def halves_by_frame(keyframes: Keyframes | None) -> dict[int, str]:
-    """Which half of the body each keyframe asks for."""
-    if keyframes is None:
-        return {}
-    upper, lower = ({*half.frames.tolist()} for half in (keyframes.upper, keyframes.lower))
-    return {
-        frame: "both" if frame in upper & lower else "upper" if frame in upper else "lower"
-        for frame in sorted(upper | lower)
-    }
-
-
 def halves_marked(cells: Cells, skeleton: Skeleton) -> dict[int, str]:
     """Which half of the body has marks on each frame that has any."""
-    found: dict[int, str] = {}
+    halves: dict[int, str] = {}
     for _, frame, joint in of_kind(cells, "mark"):
         half = "lower" if skeleton.is_lower[skeleton.index(joint)] else "upper"
-        found[frame] = join_halves(found.get(frame), half)
-    return found
+        halves[frame] = join_halves(halves.get(frame), half)
+    return halves
 
 
 def describe_keyframes(
-    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, known: Json
+    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, details: Json
 ) -> list[Json]:
-    """All frames to annotate: those chosen, the person's own, and others that bear marks."""
-    asked, marked = halves_by_frame(keyframes), halves_marked(cells, skeleton)
-    own = {int(key[1]): half for key, half in of_kind(cells, "own").items()}
-    asked |= {frame: half for frame, half in marked.items() if frame not in asked}
+    """All frames to annotate: those chosen, those a person added, and others that bear marks.
+
+    `details` by frame replace what is said here.
+    """
+    chosen, marked = halves_by_frame(keyframes), halves_marked(cells, skeleton)
+    added = {int(key[1]): half for key, half in of_kind(cells, "own").items()}
+    listed = marked | chosen
     counts = _represented(keyframes)
     return [
         {
             "frame": frame,
-            "half": join_halves(asked.get(frame), own.get(frame)),
+            "half": join_halves(listed.get(frame), added.get(frame)),
             "stands_for": counts.get(frame, 0),
             "why": "",
-            "own": frame in own,
+            "own": frame in added,
             "locked": ("lock", frame) in cells,
-            **known.get(frame, {}),
+            **details.get(frame, {}),
         }
-        for frame in sorted({*asked, *own})
+        for frame in sorted({*listed, *added})
     ]
-
-
-def join_halves(one: str | None, other: str | None) -> str:
-    """What two requests for a frame, not both empty, ask for together."""
-    found = {one, other} - {None}
-    return found.pop() if len(found) == 1 else "both"
 
 
 def _represented(keyframes: Keyframes | None) -> dict[int, int]:
@@ -123,3 +115,66 @@ def _represented(keyframes: Keyframes | None) -> dict[int, int]:
             ((keyframes.upper.nearest == frame) | (keyframes.lower.nearest == frame)).sum()
         )
     return counts
+
+
+def describe_settings(workspace: Workspace) -> Json:
+    """Options of earlier runs that the page asks for; None where none was set."""
+    options = workspace.project.get("options", {})
+    return {
+        "budget": options.get("keyframes", {}).get("budget"),
+        "height": options.get("lift", {}).get("height"),
+    }
+
+
+def describe_state(state: JournalState) -> Json:
+    """Everything that edits change."""
+    cells = state.cells
+    return {
+        "revision": state.revision,
+        "marks": by_frame(cells, "mark"),
+        "nearer": by_frame(cells, "nearer"),
+        "picks": picks_of(cells),
+        "own": by_frame(cells, "own"),
+        "locked": by_frame(cells, "lock"),
+        **describe_stacks(state),
+    }
+
+
+def describe_stacks(state: JournalState) -> Json:
+    """How much can be taken back and done again."""
+    return {"undo": len(state.undoable), "redo": len(state.redoable)}
+
+
+def describe_entries(entries: Iterable[Entry], state: JournalState) -> Json:
+    """Accepted edits, and what can be undone after them, as news."""
+    edits = [
+        {
+            "revision": entry.revision,
+            "id": entry.id,
+            "role": entry.role,
+            "kind": entry.label,
+            "changes": describe_changes(entry.changes),
+        }
+        for entry in entries
+    ]
+    return {"revision": state.revision, "edits": edits, **describe_stacks(state)}
+
+
+def describe_changes(changes: Iterable[Change]) -> list[Json]:
+    """Cells as the page names them."""
+    where: dict[str, Callable[[Any], Json]] = {
+        "mark": lambda key: {"frame": key[1], "joint": key[2]},
+        "nearer": lambda key: {"frame": key[1], "limb": key[2]},
+        "pick": lambda key: {"id": key[1]},
+        "own": lambda key: {"frame": key[1]},
+        "lock": lambda key: {"frame": key[1]},
+    }
+    return [
+        {"kind": key[0], **where[str(key[0])](key), "from": before, "to": after}
+        for key, before, after in changes
+    ]
+
+
+def describe_job(job: Job) -> Json:
+    """How far a job is."""
+    return asdict(job)

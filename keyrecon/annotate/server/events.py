@@ -12,14 +12,14 @@ HEARTBEAT_SECONDS = 10.0
 
 
 class Events:
-    """Hands every piece of news to every listener."""
+    """Sends every piece of news to every open page."""
 
     def __init__(self) -> None:
-        """Begin without listeners."""
+        """Begin without pages."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._queues: set[asyncio.Queue[Json | None]] = set()
 
-    def tell(self, news: Json) -> None:
+    def publish(self, news: Json) -> None:
         """Send news, from any thread."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._put, news)
@@ -33,7 +33,7 @@ class Events:
         self._put(None)
 
     async def stream(self, first: Json) -> AsyncIterator[str]:
-        """The text of an event stream; `first` tells a new page where things stand."""
+        """The text of an event stream; `first` is for the new page itself."""
         self._loop = asyncio.get_running_loop()
         queue: asyncio.Queue[Json | None] = asyncio.Queue()
         self._queues.add(queue)

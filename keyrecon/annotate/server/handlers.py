@@ -1,14 +1,8 @@
-"""What the server answers, one function per route: the project's desk and what was asked go in.
+"""What the server answers, one function per route: session and request in, an answer for JSON out.
 
-What comes out can be written as JSON. The route table itself is in server.py.
-
-A stretch of motion.npz for the player on the page.
-
-Marks from and for other programs, through the page.
-
-A file is looked at first: how many frames and marks are new, and which differ from those in the
-project. Only a second request takes it in, as one edit that can be undone; `keep` leaves marks
-that differ as they are, `replace` takes the file's.
+A file of marks from another program is compared first: how many frames and marks are new, and
+which contradict those in the project. Only a second request takes it in, as one edit that can be
+undone; `keep` leaves marks that contradict as they are, `replace` takes the file's.
 """
 
 from dataclasses import dataclass
@@ -21,21 +15,21 @@ import numpy as np
 from msgspec import Meta, Struct
 from starlette.responses import Response
 
-from keyrecon.annotate.server.frame_cache import encode_png
-from keyrecon.annotate.server.session import (
-    Session,
+from keyrecon.annotate.server.descriptions import (
     describe_changes,
     describe_job,
-    describe_project,
     describe_stacks,
     describe_state,
 )
-from keyrecon.annotate.store.cells import Cells, Change, cells_from_annotations, is_absent, of_kind
-from keyrecon.annotate.store.edits import EditList, Frame, Name, Place, Sign
+from keyrecon.annotate.server.frame_cache import encode_png
+from keyrecon.annotate.server.session import Session, describe_project
+from keyrecon.annotate.store.cells import Cells, Change, cells_from_annotations, of_kind
+from keyrecon.annotate.store.edits import EditList, Frame, Limits, Name, Place, Sign
 from keyrecon.annotate.store.file_sync import picks_from_cells
+from keyrecon.annotate.store.importing import compare_marks
 from keyrecon.annotate.store.journal import Entry
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.annotations import SAME_PX, read_annotations
+from keyrecon.io.formats.annotations import read_annotations
 from keyrecon.io.formats.coco import coco_text
 from keyrecon.io.formats.cvat import cvat_text
 from keyrecon.io.formats.dlc import dlc_text
@@ -68,8 +62,8 @@ class PoseRequest(Struct, forbid_unknown_fields=True):
     nearer: dict[Name, Sign]
 
 
-class StripRequest(Struct, forbid_unknown_fields=True):
-    """Frames to look for the player on."""
+class PreviewRequest(Struct, forbid_unknown_fields=True):
+    """Frames to find the player on."""
 
     frames: Annotated[list[Frame], Meta(min_length=1, max_length=60)]
 
@@ -82,45 +76,45 @@ class JobRequest(Struct, forbid_unknown_fields=True):
 
 
 class ImportRequest(Struct, forbid_unknown_fields=True):
-    """A file of marks; without `accept` it is only looked at."""
+    """A file of marks; without `accept` it is only compared."""
 
     name: Name
     text: str
     accept: bool = False
-    mode: str = "keep"
+    mode: Literal["keep", "replace"] = "keep"
 
 
-def project(desk: Session, asked: ApiRequest) -> Json:
+def project(session: Session, request: ApiRequest) -> Json:
     """Video, skeleton, keyframes; their pictures are made ready."""
-    told = describe_project(desk)
-    desk.stills.prepare(row["frame"] for row in told["keyframes"])
-    return told
+    described = describe_project(session)
+    session.frames.prepare(row["frame"] for row in described["keyframes"])
+    return described
 
 
-def state(desk: Session, asked: ApiRequest) -> Json:
+def state(session: Session, request: ApiRequest) -> Json:
     """Everything that edits change."""
-    return describe_state(desk.store.state)
+    return describe_state(session.store.state)
 
 
-def edits(desk: Session, asked: ApiRequest) -> Json:
+def edits(session: Session, request: ApiRequest) -> Json:
     """Accept edits; when this is answered they are durable."""
-    body: EditList = asked.body
-    results, now = desk.store.submit(body.edits), desk.store.state
+    body: EditList = request.body
+    results, now = session.store.submit(body.edits), session.store.state
     return {"revision": now.revision, "results": results, **describe_stacks(now)}
 
 
-def undo(desk: Session, asked: ApiRequest) -> Json:
+def undo(session: Session, request: ApiRequest) -> Json:
     """Take back the last edit."""
-    return _turned(desk, desk.store.undo(asked.body.id))
+    return _describe_turn(session, session.store.undo(request.body.id))
 
 
-def redo(desk: Session, asked: ApiRequest) -> Json:
+def redo(session: Session, request: ApiRequest) -> Json:
     """Do again what was taken back last."""
-    return _turned(desk, desk.store.redo(asked.body.id))
+    return _describe_turn(session, session.store.redo(request.body.id))
 
 
-def _turned(desk: Session, entry: Entry | None) -> Json:
-    now = desk.store.state
+def _describe_turn(session: Session, entry: Entry | None) -> Json:
+    now = session.store.state
     return {
         "revision": now.revision,
         **describe_stacks(now),
@@ -129,82 +123,81 @@ def _turned(desk: Session, entry: Entry | None) -> Json:
     }
 
 
-def pose_suggestion(desk: Session, asked: ApiRequest) -> Json:
+def pose_suggestion(session: Session, request: ApiRequest) -> Json:
     """Where the joints of a frame probably are."""
-    ask = desk.assistant.ghost
-    return ask(desk.store.annotations(), asked.path["frame"]) if ask else {}
+    suggest = session.assistant.suggestion
+    return suggest(session.store.annotations(), request.path["frame"]) if suggest else {}
 
 
-def pose(desk: Session, asked: ApiRequest) -> Json:
+def pose(session: Session, request: ApiRequest) -> Json:
     """A frame's body in space."""
-    ask, body = desk.assistant.pose, asked.body
+    estimate, body = session.assistant.pose, request.body
     marks = {name: [float(x) for x in place] for name, place in body.marks.items()}
     signs = {name: sign for name, sign in body.nearer.items() if sign}
-    return ask(desk.store.annotations(), body.frame, marks, signs) if ask else {}
+    return estimate(session.store.annotations(), body.frame, marks, signs) if estimate else {}
 
 
-def checks(desk: Session, asked: ApiRequest) -> list[Json]:
+def checks(session: Session, request: ApiRequest) -> list[Json]:
     """Marks to look at again."""
-    ask = desk.assistant.checks
-    return ask(desk.store.annotations()) if ask else []
+    check = session.assistant.checks
+    return check(session.store.annotations()) if check else []
 
 
-def suggestions(desk: Session, asked: ApiRequest) -> list[Json]:
+def next_frames(session: Session, request: ApiRequest) -> list[Json]:
     """Frames where one more annotation would help."""
-    ask, cells = desk.assistant.suggest, desk.store.state.cells
-    keyframes = desk.keyframes.current()
+    suggest, cells = session.assistant.next_frames, session.store.state.cells
+    keyframes = session.keyframes.current()
     taken = {int(key[1]) for key in of_kind(cells, "own", "lock")}
     taken |= set(keyframes.frames.tolist()) if keyframes else set()
-    return ask(desk.store.annotations(), frozenset(taken)) if ask else []
+    return suggest(session.store.annotations(), frozenset(taken)) if suggest else []
 
 
-def preview(desk: Session, asked: ApiRequest) -> Json:
+def preview(session: Session, request: ApiRequest) -> Json:
     """Head and feet found on some frames."""
-    ask, picks = desk.assistant.preview, picks_from_cells(desk.store.state.cells)
-    return ask(tuple(picks), tuple(asked.body.frames)) if ask else {}
+    find_player, picks = session.assistant.preview, picks_from_cells(session.store.state.cells)
+    return find_player(tuple(picks), tuple(request.body.frames)) if find_player else {}
 
 
-def backprojection(desk: Session, asked: ApiRequest) -> Response:
+def backprojection(session: Session, request: ApiRequest) -> Response:
     """How much each pixel looks like a part, to be laid over the picture."""
-    ask, picks = desk.assistant.backprojection, picks_from_cells(desk.store.state.cells)
-    if ask is None:
+    tint, picks = session.assistant.backprojection, picks_from_cells(session.store.state.cells)
+    if tint is None:
         return Response(status_code=204)
-    picture = ask(tuple(picks), asked.path["frame"], asked.query.get("part", "head"))
+    picture = tint(tuple(picks), request.path["frame"], request.query.get("part", "head"))
     return Response(encode_png(picture), media_type="image/png")
 
 
-def jobs(desk: Session, asked: ApiRequest) -> list[Json]:
+def jobs(session: Session, request: ApiRequest) -> list[Json]:
     """All jobs since the start."""
-    return [describe_job(job) for job in desk.jobs.listed()]
+    return [describe_job(job) for job in session.jobs.listed()]
 
 
-def begin_job(desk: Session, asked: ApiRequest) -> Json:
+def begin_job(session: Session, request: ApiRequest) -> Json:
     """Start work."""
-    return {"job": describe_job(desk.jobs.start(asked.body.kind, asked.body.options))}
+    return {"job": describe_job(session.jobs.start(request.body.kind, request.body.options))}
 
 
-def cancel_job(desk: Session, asked: ApiRequest) -> Json:
+def cancel_job(session: Session, request: ApiRequest) -> Json:
     """End work; what is finished of it stays."""
-    return {"job": describe_job(desk.jobs.cancel(asked.path["job"]))}
+    return {"job": describe_job(session.jobs.cancel(request.path["job"]))}
 
 
-def motion(desk: Session, asked: ApiRequest) -> Json:
+def motion(session: Session, request: ApiRequest) -> Json:
     """A stretch of the result."""
-    return motion_stretch(desk.workspace.motion_file, asked.query)
+    return _motion_stretch(session.workspace.motion_file, request.query)
 
 
-def import_file(desk: Session, asked: ApiRequest) -> Json:
-    """Look at a file of marks, or take it in."""
-    body: ImportRequest = asked.body
-    return import_marks(desk, (body.name, body.text), body.mode if body.accept else None)
+def import_file(session: Session, request: ApiRequest) -> Json:
+    """Compare a file of marks with the project, or take it in."""
+    return _import_marks(session, request.body)
 
 
-def export_file(desk: Session, asked: ApiRequest) -> Any:
+def export_file(session: Session, request: ApiRequest) -> Any:
     """The marks in another program's format."""
-    return export_marks(desk, asked.path["format"])
+    return _export_marks(session, request.path["format"])
 
 
-def motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
+def _motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
     """Frames from..to-1 of the motion; {} before there is one."""
     if not file.is_file():
         return {}
@@ -244,76 +237,44 @@ WRITERS = {
 }
 
 
-@dataclass(frozen=True)
-class Compared:
-    """What a file would change."""
-
-    new: tuple[Change, ...]
-    """Marks and signs where there were none."""
-    differing: tuple[Change, ...]
-    """Marks and signs that contradict those in the project."""
-
-
-def import_marks(desk: Session, file: tuple[str, str], mode: str | None) -> dict[str, Any]:
-    """Compare a file (name, text) with the project; take it in if a mode is given."""
-    if mode not in (None, "keep", "replace"):
-        raise KeyreconError(f"The mode is 'keep' or 'replace', not '{mode}'.")
-    found = _read_marks(desk, *file)
-    compared = compare(desk.store.state.cells, found)
-    if mode:
-        taken = compared.new + (compared.differing if mode == "replace" else ())
-        desk.store.apply("import", taken)
+def _import_marks(session: Session, body: ImportRequest) -> Json:
+    """Compare a file with the project; take it in if it is accepted."""
+    imported = _read_marks(session.limits, body.name, body.text)
+    comparison = compare_marks(session.store.state.cells, imported)
+    if body.accept:
+        session.store.apply("import", comparison.changes(replace=body.mode == "replace"))
+    new = dict.fromkeys(change.key for change in comparison.new)
     return {
-        "revision": desk.store.state.revision,
-        "frames": sorted({int(key[1]) for key in found}),
-        "new": len(of_kind(dict.fromkeys(c.key for c in compared.new), "mark")),
-        "signs": len(of_kind(dict.fromkeys(c.key for c in compared.new), "nearer")),
-        "conflicts": [_conflict(change) for change in compared.differing],
+        "revision": session.store.state.revision,
+        "frames": sorted({int(key[1]) for key in imported}),
+        "new": len(of_kind(new, "mark")),
+        "signs": len(of_kind(new, "nearer")),
+        "conflicts": [_describe_conflict(change) for change in comparison.conflicts],
     }
 
 
-def compare(cells: Cells, found: Cells) -> Compared:
-    """Sort what a file holds into new and differing."""
-    changes = [Change(key, cells.get(key), value) for key, value in sorted(found.items())]
-    return Compared(
-        tuple(c for c in changes if c.before is None),
-        tuple(c for c in changes if c.before is not None and not _same(c)),
-    )
-
-
-def _same(change: Change) -> bool:
-    """Whether two values are one, rounded by some format that may not know hidden joints."""
-    if change.key[0] == "nearer":
-        return change.before == change.after
-    if is_absent(change.before) or is_absent(change.after):
-        return is_absent(change.before) and is_absent(change.after)
-    pairs = zip(change.before[:2], change.after[:2], strict=True)
-    return all(abs(a - b) <= SAME_PX for a, b in pairs)
-
-
-def _conflict(change: Change) -> dict[str, Any]:
+def _describe_conflict(change: Change) -> Json:
     kind, frame, name = change.key
     return {"frame": frame, "kind": kind, "joint": name, "old": change.before, "new": change.after}
 
 
-def _read_marks(desk: Session, name: str, text: str) -> Cells:
+def _read_marks(limits: Limits, name: str, text: str) -> Cells:
     """The readers take files, so the text becomes one for a moment; its name is never a path."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "file"
         path.write_text(text, encoding="utf-8")
         try:
-            limits = desk.limits
-            found = read_annotations(path, limits.skeleton, limits.n_frames, limits.size)
+            marks = read_annotations(path, limits.skeleton, limits.n_frames, limits.size)
         except KeyreconError as fault:
             raise KeyreconError(str(fault).replace(str(path), name)) from fault
-    return cells_from_annotations(found)
+    return cells_from_annotations(marks)
 
 
-def export_marks(desk: Session, form: str) -> Response:
+def _export_marks(session: Session, form: str) -> Response:
     """The marks as a file to be kept."""
     if form not in WRITERS:
         raise KeyreconError(f"There is no format '{form}'; there are {', '.join(WRITERS)}.")
     write, name, kind = WRITERS[form]
-    text = write(desk.store.annotations(), desk.limits.size)
+    text = write(session.store.annotations(), session.limits.size)
     disposition = f'attachment; filename="{name}"'
     return Response(text, media_type=kind, headers={"Content-Disposition": disposition})

@@ -21,8 +21,8 @@ from keyrecon.progress import Progress
 Item = TypeVar("Item")
 Command = Callable[[dict[str, Any], Progress], str]
 """Does the work with the options that the page gave; importable, because it is done elsewhere."""
-TELL_SECONDS = 0.1
-"""How often progress is told."""
+PROGRESS_SECONDS = 0.1
+"""How often progress is reported."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Job:
 class Jobs:
     """The jobs of one project, one at a time."""
 
-    def __init__(self, commands: Mapping[str, Command], tell: Callable[[Job], None]) -> None:
-        """Offer `commands` by kind; `tell` hears of every step of a job."""
-        self._commands, self._tell = commands, tell
+    def __init__(self, commands: Mapping[str, Command], publish: Callable[[Job], None]) -> None:
+        """Offer `commands` by kind; `publish` is called with every step of a job."""
+        self._commands, self._publish = commands, publish
         self._lock = Lock()
         self._jobs: dict[int, Job] = {}
         self._process: Any = None
@@ -69,7 +69,7 @@ class Jobs:
             )
             self._process.start()
         theirs.close()
-        Thread(target=self._follow, args=(job, ours), daemon=True).start()
+        Thread(target=self._receive, args=(job, ours), daemon=True).start()
         return job
 
     def cancel(self, number: int) -> Job:
@@ -81,7 +81,7 @@ class Jobs:
                 self._jobs[number] = replace(self._jobs[number], state="cancelled")
                 self._process.terminate()
             job = self._jobs[number]
-        self._tell(job)
+        self._publish(job)
         return job
 
     def close(self) -> None:
@@ -89,8 +89,8 @@ class Jobs:
         for job in self.listed():
             self.cancel(job.id)
 
-    def _follow(self, job: Job, connection: Connection) -> None:
-        """Hear what the process tells until it ends."""
+    def _receive(self, job: Job, connection: Connection) -> None:
+        """Take in what the process reports until it ends."""
         last = job
         with suppress(EOFError):
             while True:
@@ -105,13 +105,13 @@ class Jobs:
             if self._jobs[job.id].state != "running":
                 return
             self._jobs[job.id] = job
-        self._tell(job)
+        self._publish(job)
 
 
 _spawning = multiprocessing.get_context("spawn")
 
 
-def _work(command: Command, options: dict[str, Any], told: Connection) -> None:
+def _work(command: Command, options: dict[str, Any], reports: Connection) -> None:
     """What the process does."""
 
     def progress(
@@ -120,13 +120,13 @@ def _work(command: Command, options: dict[str, Any], told: Connection) -> None:
         total = len(items) if total is None and hasattr(items, "__len__") else total
         before = 0.0
         for done, item in enumerate(items):
-            if time.monotonic() - before > TELL_SECONDS:
+            if time.monotonic() - before > PROGRESS_SECONDS:
                 before = time.monotonic()
-                told.send({"text": description, "done": done, "total": total})
+                reports.send({"text": description, "done": done, "total": total})
             yield item
 
     with suppress(BrokenPipeError):
         try:
-            told.send({"state": "done", "text": command(options, progress)})
+            reports.send({"state": "done", "text": command(options, progress)})
         except KeyreconError as fault:
-            told.send({"state": "failed", "text": str(fault)})
+            reports.send({"state": "failed", "text": str(fault)})

@@ -1,7 +1,7 @@
-"""The annotator's server: the route table, and what turns a question into an answer.
+"""The annotator's server: the route table, and what turns a request into an answer.
 
-Routes lead to plain functions (questions.py), which run in worker threads; bodies are parsed
-against a declared type before. Everything goes through the guard first.
+Routes lead to plain functions (handlers.py), which run in worker threads; bodies are parsed
+against a declared type before. Everything goes through the security middleware first.
 """
 
 import asyncio
@@ -40,11 +40,11 @@ class ApiRoute:
 
     method: str
     path: str
-    answer: Callable[..., Any]
+    handler: Callable[..., Any]
     body: type | None = None
     alone: bool = False
-    """Whether one question at a time is answered. The others wait outside the worker threads, so
-    that slow help never keeps an edit waiting."""
+    """Whether one request at a time is answered. The others wait outside the worker threads, so
+    that a slow answer never keeps an edit waiting."""
 
 
 ROUTES = (
@@ -56,8 +56,8 @@ ROUTES = (
     ApiRoute("GET", "/api/suggestion/{frame:int}", handlers.pose_suggestion, alone=True),
     ApiRoute("POST", "/api/pose", handlers.pose, handlers.PoseRequest, alone=True),
     ApiRoute("GET", "/api/checks", handlers.checks, alone=True),
-    ApiRoute("GET", "/api/next_frames", handlers.suggestions, alone=True),
-    ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.StripRequest, alone=True),
+    ApiRoute("GET", "/api/next_frames", handlers.next_frames, alone=True),
+    ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.PreviewRequest, alone=True),
     ApiRoute("GET", "/api/backprojection/{frame:int}", handlers.backprojection, alone=True),
     ApiRoute("GET", "/api/jobs", handlers.jobs),
     ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
@@ -68,10 +68,10 @@ ROUTES = (
 )
 
 
-def make_app(desk: Session, door: Credentials) -> ASGIApp:
-    """The application behind its guard."""
+def make_app(session: Session, credentials: Credentials) -> ASGIApp:
+    """The application behind its security middleware."""
     app = Starlette(
-        routes=make_routes(desk, read_page()),
+        routes=make_routes(session, read_page()),
         exception_handlers={
             NotSaved: lambda _, fault: _error(507, str(fault)),
             KeyreconError: lambda _, fault: _error(400, str(fault)),
@@ -80,24 +80,24 @@ def make_app(desk: Session, door: Credentials) -> ASGIApp:
         },
     )
     app.router.redirect_slashes = False
-    return SecurityMiddleware(app, door)
+    return SecurityMiddleware(app, credentials)
 
 
-def make_routes(desk: Session, files: dict[str, Response]) -> list[Route]:
+def make_routes(session: Session, files: dict[str, Response]) -> list[Route]:
     """All routes there are."""
 
     async def events(request: Request) -> Response:
-        first = {"revision": desk.store.state.revision}
-        return StreamingResponse(desk.events.stream(first), media_type="text/event-stream")
+        first = {"revision": session.store.state.revision}
+        return StreamingResponse(session.events.stream(first), media_type="text/event-stream")
 
-    async def still(request: Request) -> Response:
-        return await _still(desk, request)
+    async def frame(request: Request) -> Response:
+        return await _frame(session, request)
 
     return [
         *(Route(path, _static(answer), methods=["GET"]) for path, answer in files.items()),
         Route("/api/events", events, methods=["GET"]),
-        Route("/api/frame/{frame:int}", still, methods=["GET"]),
-        *(Route(way.path, _endpoint(desk, way), methods=[way.method]) for way in ROUTES),
+        Route("/api/frame/{frame:int}", frame, methods=["GET"]),
+        *(Route(one.path, _endpoint(session, one), methods=[one.method]) for one in ROUTES),
     ]
 
 
@@ -123,14 +123,14 @@ def _static(answer: Response) -> Callable[[Request], Any]:
     return endpoint
 
 
-def _endpoint(desk: Session, way: ApiRoute) -> Callable[[Request], Any]:
-    """An endpoint that parses what was asked, answers in a worker thread, and writes JSON."""
-    limiter = CapacityLimiter(1) if way.alone else None
+def _endpoint(session: Session, route: ApiRoute) -> Callable[[Request], Any]:
+    """An endpoint that parses the body, answers in a worker thread, and writes JSON."""
+    limiter = CapacityLimiter(1) if route.alone else None
 
     async def endpoint(request: Request) -> Response:
-        body = _parsed(await request.body(), way.body) if way.body else None
+        body = _parsed(await request.body(), route.body) if route.body else None
         asked = handlers.ApiRequest(request.path_params, dict(request.query_params), body)
-        answer = await run_sync(way.answer, desk, asked, limiter=limiter)
+        answer = await run_sync(route.handler, session, asked, limiter=limiter)
         return answer if isinstance(answer, Response) else _json(answer)
 
     return endpoint
@@ -152,14 +152,14 @@ def _error(status: int, text: str) -> Response:
     return _json({"error": text}, status)
 
 
-async def _still(desk: Session, request: Request) -> Response:
+async def _frame(session: Session, request: Request) -> Response:
     """A frame as JPEG. With the right ?v= the browser may keep it for good: another project may
     have the same port later, and then `v` differs."""
-    width, stills = request.query_params.get("width", ""), desk.stills
+    width, frames = request.query_params.get("width", ""), session.frames
     if width and not (width.isascii() and width.isdecimal() and len(width) < 6):
         raise KeyreconError("'width' is a number of pixels.")
-    picture = stills.still(request.path_params["frame"], int(width or 0) or None)
-    lasting = request.query_params.get("v") == stills.identity
+    picture = frames.jpeg(request.path_params["frame"], int(width or 0) or None)
+    lasting = request.query_params.get("v") == frames.identity
     control = "private, max-age=31536000, immutable" if lasting else "no-store"
     data = await asyncio.wrap_future(picture)
     return Response(data, media_type="image/jpeg", headers={"Cache-Control": control})

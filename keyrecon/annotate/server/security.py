@@ -18,7 +18,7 @@ from starlette.middleware.body_limit import RequestBodyLimitMiddleware
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-MOST_BYTES = 16 << 20
+MAX_BODY_BYTES = 16 << 20
 """Largest body: an imported file of some ten thousand frames, bytes."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -36,14 +36,14 @@ SAFE_METHODS = ("GET", "HEAD")
 
 @dataclass(frozen=True)
 class Credentials:
-    """The address of one server and the secrets that open it."""
+    """The address of one server and the secrets that give access to it."""
 
     hosts: tuple[str, ...]
     """host:port as a browser writes them."""
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     """Part of the address that is printed."""
-    session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+    cookie_secret: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     """What the cookie holds."""
 
     @property
@@ -65,25 +65,27 @@ class Credentials:
 class SecurityMiddleware:
     """Lets only good requests through to the application, and marks every answer."""
 
-    def __init__(self, app: ASGIApp, door: Credentials, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(
+        self, app: ASGIApp, credentials: Credentials, max_bytes: int = MAX_BODY_BYTES
+    ) -> None:
         """Stand before `app`."""
-        self._app = RequestBodyLimitMiddleware(app, most_bytes)
-        self._door = door
+        self._app = RequestBodyLimitMiddleware(app, max_bytes)
+        self._credentials = credentials
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request or pass it on."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
         elif scope["type"] == "http":
-            answer = self._answer(scope)
+            answer = self._refusal_or_welcome(scope)
             await (answer or self._app)(scope, receive, _with_headers(send))
         else:
             await send({"type": "websocket.close", "code": 1008})
 
-    def _answer(self, scope: Scope) -> Response | None:
+    def _refusal_or_welcome(self, scope: Scope) -> Response | None:
         """A refusal, or the cookie for the right token; None lets the request through."""
-        headers, door = Headers(scope=scope), self._door
-        if headers.getlist("host") not in [[host] for host in door.hosts]:
+        headers, credentials = Headers(scope=scope), self._credentials
+        if headers.getlist("host") not in [[host] for host in credentials.hosts]:
             return _refuse(421, "This is not the address of this server.")
         if refusal := self._refuse_foreign(scope["method"], headers):
             return refusal
@@ -98,19 +100,23 @@ class SecurityMiddleware:
 
     def _refuse_foreign(self, method: str, headers: Headers) -> Response | None:
         origins, safe = headers.getlist("origin"), method in SAFE_METHODS
-        own = [[origin] for origin in self._door.origins]
-        if origins not in ([*own, []] if safe else own):
+        allowed = [[origin] for origin in self._credentials.origins]
+        if origins not in ([*allowed, []] if safe else allowed):
             return _refuse(403, "Requests of other sites are not answered.")
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
             return _refuse(403, "Requests of other sites are not answered.")
         return None
 
     def _welcome(self, token: str) -> Response:
-        if not secrets.compare_digest(token.encode(), self._door.token.encode()):
+        if not secrets.compare_digest(token.encode(), self._credentials.token.encode()):
             return _refuse(403, "This address is out of date; open the one printed last.")
         answer = RedirectResponse("/", status_code=303)
         answer.set_cookie(
-            self._door.cookie, self._door.session, httponly=True, samesite="strict", path="/"
+            self._credentials.cookie,
+            self._credentials.cookie_secret,
+            httponly=True,
+            samesite="strict",
+            path="/",
         )
         return answer
 
@@ -119,9 +125,9 @@ class SecurityMiddleware:
             cookies = SimpleCookie("; ".join(headers.getlist("cookie")))
         except CookieError:
             return False
-        given = cookies.get(self._door.cookie)
-        return given is not None and secrets.compare_digest(
-            given.value.encode(), self._door.session.encode()
+        cookie = cookies.get(self._credentials.cookie)
+        return cookie is not None and secrets.compare_digest(
+            cookie.value.encode(), self._credentials.cookie_secret.encode()
         )
 
 
@@ -130,7 +136,7 @@ def _refuse(status: int, text: str) -> JSONResponse:
 
 
 def _with_headers(send: Send) -> Any:
-    async def marked(message: Message) -> None:
+    async def send_marked(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in ANSWER_HEADERS.items():
@@ -138,4 +144,4 @@ def _with_headers(send: Send) -> Any:
             headers.setdefault("Cache-Control", "no-store")
         await send(message)
 
-    return marked
+    return send_marked

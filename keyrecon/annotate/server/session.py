@@ -1,27 +1,32 @@
-"""All that the server works with for one project, and what its state looks like to the page."""
+"""All that the server works with for one project, and what watches the project's files."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
+from threading import Event, Thread
 from typing import Any
 
+from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.server.descriptions import (
+    describe_entries,
+    describe_job,
     describe_keyframes,
+    describe_settings,
     describe_skeleton,
     describe_video,
-    halves_by_frame,
 )
 from keyrecon.annotate.server.events import Events
 from keyrecon.annotate.server.frame_cache import FrameCache
-from keyrecon.annotate.server.jobs import Command, Job, Jobs
-from keyrecon.annotate.store.assistant import Assistant
-from keyrecon.annotate.store.cells import Change, by_frame, picks_of
+from keyrecon.annotate.server.jobs import Command, Jobs
+from keyrecon.annotate.store.cells import by_frame, picks_of
 from keyrecon.annotate.store.edits import Limits
-from keyrecon.annotate.store.journal import Entry, JournalState
-from keyrecon.annotate.store.kept_keyframes import KeptKeyframes
+from keyrecon.annotate.store.kept_keyframes import KeptKeyframes, halves_by_frame
 from keyrecon.annotate.store.store import Store
+from keyrecon.errors import KeyreconError
 from keyrecon.io.workspace import Workspace
 
 Json = dict[str, Any]
+WATCH_SECONDS = 1.0
+"""How often the files are looked at: three are asked for their time, which costs nothing."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +36,16 @@ class Session:
     workspace: Workspace
     limits: Limits
     store: Store
-    stills: FrameCache
+    frames: FrameCache
     jobs: Jobs
     events: Events
     keyframes: KeptKeyframes
     assistant: Assistant
 
     def close(self) -> None:
-        """Put everything away."""
+        """End its threads and let go of its files."""
         self.jobs.close()
-        self.stills.close()
+        self.frames.close()
         self.store.close()
 
 
@@ -51,100 +56,79 @@ def open_session(
     video = workspace.video()
     limits = Limits(workspace.skeleton, len(video), (video.width, video.height))
     store, events = Store(workspace, limits), Events()
-    store.listen(lambda entries: events.tell(describe_entries(entries, store.state)))
+    store.listen(lambda entries: events.publish(describe_entries(entries, store.state)))
     return Session(
         workspace=workspace,
         limits=limits,
         store=store,
-        stills=FrameCache(video, workspace.folder / "cache" / "stills"),
-        jobs=Jobs(commands, lambda job: events.tell({"job": describe_job(job)})),
+        frames=FrameCache(video, workspace.folder / "cache" / "stills"),
+        jobs=Jobs(commands, lambda job: events.publish({"job": describe_job(job)})),
         events=events,
         keyframes=KeptKeyframes(workspace, store),
         assistant=assistant,
     )
 
 
-def describe_project(desk: Session) -> Json:
+def describe_project(session: Session) -> Json:
     """What does not change from one edit to the next."""
-    keyframes, cells = desk.keyframes.current(), desk.store.state.cells
-    own = {int(frame): half for frame, half in by_frame(cells, "own").items()}
-    known = desk.assistant.keyframes(own) if desk.assistant.keyframes and keyframes else {}
-    skeleton = desk.limits.skeleton
+    keyframes, cells = session.keyframes.current(), session.store.state.cells
+    added = {int(frame): half for frame, half in by_frame(cells, "own").items()}
+    explain, skeleton = session.assistant.keyframes, session.limits.skeleton
+    explained = explain(added) if explain and keyframes else {}
+    name = session.workspace.folder.resolve().name
     return {
-        **describe_video(desk.stills.video, desk.workspace.folder.resolve().name),
+        **describe_video(session.frames.video, name),
         **describe_skeleton(skeleton),
-        "id": f"{desk.workspace.folder.resolve().name}-{desk.stills.identity}",
-        "version": desk.stills.identity,
-        "keyframes": describe_keyframes(keyframes, cells, skeleton, known.get("frames", {})),
-        "height_px": known.get("height_px"),
-        "settings": describe_settings(Workspace(desk.workspace.folder)),
+        "id": f"{name}-{session.frames.identity}",
+        "version": session.frames.identity,
+        "keyframes": describe_keyframes(keyframes, cells, skeleton, explained.get("frames", {})),
+        "height_px": explained.get("height_px"),
+        "settings": describe_settings(Workspace(session.workspace.folder)),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),
-            "motion": desk.workspace.motion_file.is_file(),
-            "assistant": bool(known),
+            "motion": session.workspace.motion_file.is_file(),
+            "assistant": bool(explained),
         },
     }
 
 
-def describe_settings(workspace: Workspace) -> Json:
-    """Options of earlier runs that the page asks for; None where none was set."""
-    options = workspace.project.get("options", {})
-    return {
-        "budget": options.get("keyframes", {}).get("budget"),
-        "height": options.get("lift", {}).get("height"),
-    }
+class ProjectWatch:
+    """Checks an open project's files, and publishes what other programs changed."""
 
+    def __init__(self, session: Session) -> None:
+        """Begin to watch."""
+        self._session, self._ended = session, Event()
+        self._stamps = self._file_stamps()
+        self._trouble: str | None = None
+        self._thread = Thread(target=self._run, name="watch", daemon=True)
+        self._thread.start()
 
-def describe_state(state: JournalState) -> Json:
-    """Everything that edits change."""
-    cells = state.cells
-    return {
-        "revision": state.revision,
-        "marks": by_frame(cells, "mark"),
-        "nearer": by_frame(cells, "nearer"),
-        "picks": picks_of(cells),
-        "own": by_frame(cells, "own"),
-        "locked": by_frame(cells, "lock"),
-        **describe_stacks(state),
-    }
+    def close(self) -> None:
+        """Stop watching."""
+        self._ended.set()
+        self._thread.join()
 
+    def _run(self) -> None:
+        while not self._ended.wait(WATCH_SECONDS):
+            self.check()
 
-def describe_stacks(state: JournalState) -> Json:
-    """How much can be taken back and done again."""
-    return {"undo": len(state.undoable), "redo": len(state.redoable)}
+    def check(self) -> None:
+        """Take in what changed. What stands in the way is published once, and when it is gone."""
+        trouble = None
+        try:
+            self._session.store.refresh()
+            self._session.keyframes.current()
+        except KeyreconError as fault:
+            trouble = str(fault)
+        if trouble != self._trouble:
+            self._trouble = trouble
+            self._session.events.publish({"trouble": trouble})
+        if (stamps := self._file_stamps()) != self._stamps:
+            self._stamps = stamps
+            self._session.events.publish({"project": True})
 
-
-def describe_entries(entries: Iterable[Entry], state: JournalState) -> Json:
-    """Accepted edits, and what can be undone after them, as news."""
-    told = [
-        {
-            "revision": entry.revision,
-            "id": entry.id,
-            "role": entry.role,
-            "kind": entry.label,
-            "changes": describe_changes(entry.changes),
-        }
-        for entry in entries
-    ]
-    return {"revision": state.revision, "edits": told, **describe_stacks(state)}
-
-
-def describe_changes(changes: Iterable[Change]) -> list[Json]:
-    """Cells as the page names them."""
-    where: dict[str, Callable[[Any], Json]] = {
-        "mark": lambda key: {"frame": key[1], "joint": key[2]},
-        "nearer": lambda key: {"frame": key[1], "limb": key[2]},
-        "pick": lambda key: {"id": key[1]},
-        "own": lambda key: {"frame": key[1]},
-        "lock": lambda key: {"frame": key[1]},
-    }
-    return [
-        {"kind": key[0], **where[str(key[0])](key), "from": before, "to": after}
-        for key, before, after in changes
-    ]
-
-
-def describe_job(job: Job) -> Json:
-    """How far a job is."""
-    return asdict(job)
+    def _file_stamps(self) -> list[int]:
+        """When keyframes and motion were made."""
+        files = (self._session.workspace.keyframes_file, self._session.workspace.motion_file)
+        return [file.stat().st_mtime_ns if file.exists() else 0 for file in files]

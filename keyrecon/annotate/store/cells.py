@@ -6,9 +6,10 @@ A cell is named by a tuple and holds a plain value; a cell that is not there is 
     ("nearer", frame, limb)   1 the child end is nearer the camera, -1 farther
     ("pick", id)              {"frame", "part", "x", "y"}, a click on a colour
     ("own", frame)            "upper", "lower" or "both": a keyframe that the person added
+                              (kinds are the words of the journal on the disk, and stay)
     ("lock", frame)           True: a keyframe that no new choice may drop
 
-A change tells what stood in a cell and what shall stand there. That makes three things one line
+A change says what stood in a cell and what shall stand there. That makes three things one line
 each: to apply it, to take it back, and to see that somebody else was faster.
 
 The sheet's marks as `Annotations`, which the rest of keyrecon reads, and back.
@@ -53,7 +54,9 @@ def invert_changes(changes: Iterable[Change]) -> tuple[Change, ...]:
     return tuple(Change(key, after, before) for key, before, after in reversed([*changes]))
 
 
-def settle(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...] | None:
+def resolve_changes(
+    cells: Mapping[Key, Value], changes: Iterable[Change]
+) -> tuple[Change, ...] | None:
     """The changes one after the other, as one change for each cell that becomes another.
 
     None if a cell holds neither what its change expects nor what it wants: someone was faster.
@@ -63,11 +66,11 @@ def settle(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Chang
         if now.get(key, cells.get(key)) not in (before, after):
             return None
         now[key] = after
-    told = (Change(key, cells.get(key), after) for key, after in now.items())
-    return tuple(change for change in told if change.before != change.after)
+    resolved = (Change(key, cells.get(key), after) for key, after in now.items())
+    return tuple(change for change in resolved if change.before != change.after)
 
 
-def effective(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...]:
+def effective_changes(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Change, ...]:
     """The changes that do something, with what really stood there before."""
     now = ((key, cells.get(key), after) for key, _, after in changes)
     return tuple(Change(*change) for change in now if change[1] != change[2])
@@ -76,14 +79,14 @@ def effective(cells: Mapping[Key, Value], changes: Iterable[Change]) -> tuple[Ch
 def difference(before: Mapping[Key, Value], after: Mapping[Key, Value]) -> tuple[Change, ...]:
     """The changes that lead from one sheet to another."""
     keys = sorted({*before, *after}, key=repr)
-    found = (Change(key, before.get(key), after.get(key)) for key in keys)
-    return tuple(change for change in found if change.before != change.after)
+    changes = (Change(key, before.get(key), after.get(key)) for key in keys)
+    return tuple(change for change in changes if change.before != change.after)
 
 
 def changed_keys(before: Mapping[Key, Value], after: Mapping[Key, Value]) -> set[Key]:
     """Cells that hold another object; values that no edit touched are the same object still."""
-    set_anew = {key for key, value in after.items() if before.get(key) is not value}
-    return set_anew | (before.keys() - after.keys())
+    replaced = {key for key, value in after.items() if before.get(key) is not value}
+    return replaced | (before.keys() - after.keys())
 
 
 def of_kind(cells: Mapping[Key, Value], *kinds: str) -> Cells:
@@ -93,19 +96,19 @@ def of_kind(cells: Mapping[Key, Value], *kinds: str) -> Cells:
 
 def by_frame(cells: Mapping[Key, Value], kind: str) -> dict[str, Any]:
     """Cells of one kind as {frame: {name: value}} or {frame: value}, frames as text for JSON."""
-    found: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for (_, frame, *name), value in of_kind(cells, kind).items():
         if name:
-            found.setdefault(str(frame), {})[name[0]] = value
+            table.setdefault(str(frame), {})[name[0]] = value
         else:
-            found[str(frame)] = value
-    return found
+            table[str(frame)] = value
+    return table
 
 
 def picks_of(cells: Mapping[Key, Value]) -> list[dict[str, Any]]:
     """The picks with their ids, in order of frame."""
-    found = ({"id": key[1], **value} for key, value in of_kind(cells, "pick").items())
-    return sorted(found, key=lambda pick: (pick["frame"], pick["part"], pick["x"], pick["y"]))
+    picks = ({"id": key[1], **value} for key, value in of_kind(cells, "pick").items())
+    return sorted(picks, key=lambda pick: (pick["frame"], pick["part"], pick["x"], pick["y"]))
 
 
 def marked_frames(cells: Mapping[Key, Value]) -> Iterator[int]:
@@ -131,19 +134,19 @@ def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> 
 
 
 ABSENT = (0, 0, 0)
-"""The mark of a joint that is absent, as a file tells it."""
+"""The mark of a joint that is absent, as a file has it."""
 
 
 def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
     """Marks and signs of all frames that have any, and the joints said to be absent."""
-    told = {
+    placed = {
         key: value for key, value in of_kind(cells, *FILE_CELLS).items() if not is_absent(value)
     }
-    frames = sorted({key[1] for key in told})
+    frames = sorted({key[1] for key in placed})
     row = {frame: k for k, frame in enumerate(frames)}
     limbs = [skeleton.names[child] for _, child in skeleton.bones.tolist()]
-    marks = _table(of_kind(told, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
-    signs = _table(of_kind(told, "nearer"), row, limbs, [0.0])
+    marks = _table(of_kind(placed, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
+    signs = _table(of_kind(placed, "nearer"), row, limbs, [0.0])
     return Annotations(
         skeleton,
         np.array(frames, dtype=np.int64),
@@ -183,8 +186,8 @@ def cells_from_annotations(annotations: Annotations) -> Cells:
 
 def written_cells(cells: Cells) -> Cells:
     """The cells as annotations.json holds them: without the place where an absent joint was."""
-    found = of_kind(cells, *FILE_CELLS)
-    return {key: [*ABSENT] if is_absent(value) else value for key, value in found.items()}
+    written = of_kind(cells, *FILE_CELLS)
+    return {key: [*ABSENT] if is_absent(value) else value for key, value in written.items()}
 
 
 def is_absent(value: Value) -> bool:

@@ -36,7 +36,7 @@ class MarkEdit(Edit, frozen=True, tag="mark"):
 
 
 class MarksEdit(Edit, frozen=True, tag="marks"):
-    """Several joints on one frame: a ghost accepted, left and right swapped."""
+    """Several joints on one frame: a suggestion accepted, left and right swapped."""
 
     frame: Frame
     to: dict[Name, Place | None]
@@ -68,7 +68,7 @@ class PickEdit(Edit, frozen=True, tag="pick"):
     was: PickPlace | None = field(name="from")
 
 
-class OwnEdit(Edit, frozen=True, tag="own"):
+class OwnKeyframeEdit(Edit, frozen=True, tag="own"):
     """A keyframe that the person adds or takes away again."""
 
     frame: Frame
@@ -84,7 +84,7 @@ class LockEdit(Edit, frozen=True, tag="lock"):
     was: bool = field(name="from")
 
 
-Part = MarkEdit | MarksEdit | NearerEdit | PickEdit | OwnEdit | LockEdit
+Part = MarkEdit | MarksEdit | NearerEdit | PickEdit | OwnKeyframeEdit | LockEdit
 
 
 class GroupEdit(Edit, frozen=True, tag="group"):
@@ -131,7 +131,7 @@ def _cells(edit: AnyEdit) -> list[tuple[Key, Value, Value]]:
             return [(("nearer", frame, n), edit.was.get(n), edit.to.get(n)) for n in names]
         case PickEdit():
             return _pick_cells(edit)
-        case OwnEdit(frame=frame):
+        case OwnKeyframeEdit(frame=frame):
             return [(("own", frame), edit.was, edit.to)]
         case LockEdit(frame=frame):
             return [(("lock", frame), edit.was or None, edit.to or None)]

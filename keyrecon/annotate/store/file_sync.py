@@ -4,10 +4,8 @@ The journal is what is true; the files are what other programs read and may chan
 edit, and once a second, a file that is not as we left it is read and its difference from what we
 had written is taken in as one more edit, so that `keyrecon import` and an editor count like
 another page. Which version we had written is noted in the same transaction as the edits: the
-`wanted` one, and the one `shown` until then. A kill between the two leaves the older file, which
-is known by its digest and simply brought up to date.
-
-How the sheet looks as annotations.json and picks.json.
+`wanted` one, and the one that was `written` until then. A kill between the two leaves the older
+file, which is known by its digest and simply brought up to date.
 """
 
 import hashlib
@@ -60,7 +58,7 @@ class FileForm:
     """Whether other programs may keep things there that the sheet does not know."""
     read: Callable[[Cells], Cells]
     """What the file holds; of equal values the keys of the cells given are used."""
-    lasts: Callable[[Value], bool]
+    survives: Callable[[Value], bool]
     """Whether a value stays though another program left it out, because few programs know it."""
 
 
@@ -78,11 +76,11 @@ class FileSync:
     def __init__(self, form: FileForm, note: str | None) -> None:
         """Begin with what the journal noted about the file."""
         self.form = form
-        told = json.loads(note) if note else {}
-        self.shown: Version = tuple(told.get("shown", UNKNOWN))
-        self.wanted: Version = tuple(told.get("wanted", UNKNOWN))
+        noted = json.loads(note) if note else {}
+        self.written: Version = tuple(noted.get("shown", UNKNOWN))
+        self.wanted: Version = tuple(noted.get("wanted", UNKNOWN))
         self._text: str | None = None
-        self._seen: Signature = None
+        self._signature: Signature = None
         self._outside: tuple[str, Cells] | None = None
 
     @property
@@ -95,7 +93,7 @@ class FileSync:
         """Whether the journal has never written this file."""
         return self.wanted == UNKNOWN
 
-    def is_shown(self) -> bool:
+    def is_written(self) -> bool:
         """Whether the file already is what it should be, to the letter."""
         return _digest(self.form.path.read_bytes()) == self.wanted[1]
 
@@ -105,33 +103,34 @@ class FileSync:
         Raises NotSaved for a file that cannot be read: nothing is written over it.
         """
         signature = _signature(self.form.path)
-        if signature is None or signature == self._seen:
+        if signature is None or signature == self._signature:
             return ()
         digest = _digest(self.form.path.read_bytes())
-        ours = {version[1]: version for version in (self.shown, self.wanted)}
+        ours = {version[1]: version for version in (self.written, self.wanted)}
         changes: tuple[Change, ...] = ()
         if digest in ours:
-            self.shown = ours[digest]
+            self.written = ours[digest]
         else:
             changes = self._read(digest, current, at)
-        self._seen = signature
+        self._signature = signature
         return changes
 
     def _read(self, digest: str, current: Cells, at: Callable[[int], Cells]) -> tuple[Change, ...]:
         try:
-            found = self.form.read(current)
+            cells = self.form.read(current)
         except KeyreconError as fault:
             raise NotSaved(f"{self.name} cannot be read ({fault}). {self._remedy}") from fault
-        known = {version[0] for version in (self.wanted, self.shown) if version != UNKNOWN} or {0}
-        bases = [self.form.pick_out(at(revision)) for revision in known]
-        self.shown, self._outside = UNKNOWN, (digest, found)
-        changes = min((difference(base, found) for base in bases), key=len)
-        return tuple(c for c in changes if c.after is not None or not self.form.lasts(c.before))
+        ours = [version for version in (self.wanted, self.written) if version != UNKNOWN]
+        revisions = {revision for revision, _ in ours} or {0}
+        bases = [self.form.pick_out(at(revision)) for revision in revisions]
+        self.written, self._outside = UNKNOWN, (digest, cells)
+        changes = min((difference(base, cells) for base in bases), key=len)
+        return tuple(c for c in changes if c.after is not None or not self.form.survives(c.before))
 
     def accept(self, cells: Cells) -> None:
         """Leave the file as another program wrote it if it says the same as the sheet."""
         if self._outside is not None and self._outside[1] == self.form.pick_out(cells):
-            self.shown = self.wanted = (self.wanted[0], self._outside[0])
+            self.written = self.wanted = (self.wanted[0], self._outside[0])
         self._outside = None
 
     @property
@@ -152,7 +151,7 @@ class FileSync:
 
     def note(self, plan: SyncPlan) -> str:
         """What the journal shall know once the plan is accepted."""
-        return json.dumps({"shown": self.shown, "wanted": plan.version})
+        return json.dumps({"shown": self.written, "wanted": plan.version})
 
     def adopt(self, plan: SyncPlan) -> None:
         """The plan is in the journal; `catch_up` carries it out."""
@@ -160,14 +159,14 @@ class FileSync:
 
     def catch_up(self, cells: Cells) -> None:
         """Write the file where it does not show what it should; NotSaved if that fails."""
-        if self.is_new or (self.shown[1] == self.wanted[1] and self.form.path.exists()):
+        if self.is_new or (self.written[1] == self.wanted[1] and self.form.path.exists()):
             return
         try:
             write_durably(self.form.path, self._text or self.form.write(cells))
         except KeyreconError as fault:
             raise NotSaved(str(fault)) from fault
-        self.shown, self._text = self.wanted, None
-        self._seen = _signature(self.form.path)
+        self.written, self._text = self.wanted, None
+        self._signature = _signature(self.form.path)
 
 
 def _signature(path: Path) -> Signature:
@@ -213,7 +212,7 @@ class MarksWriter:
         frames = {key[1] for key in changed_keys(self._cells, cells) if key[0] in FILE_CELLS}
         keys = ((kind, frame, name) for frame in frames for kind, name in self._places)
         marks = annotations_from_cells({k: cells[k] for k in keys if k in cells}, skeleton)
-        kept = {frame: told for frame, told in self._lines.items() if frame not in frames}
+        kept = {frame: lines for frame, lines in self._lines.items() if frame not in frames}
         self._lines = kept | coco_lines(marks, size)
         self._cells = cells
         return text_of_lines(self._lines, skeleton)
@@ -241,9 +240,9 @@ def picks_from_cells(cells: Cells) -> list[Pick]:
 def _read_picks(path: Path, cells: Cells) -> Cells:
     """The file has no ids: clicks that are known keep theirs, others are named by content."""
     known = {tuple(value.values()): key for key, value in of_kind(cells, "pick").items()}
-    found: Cells = {}
+    cells_read: Cells = {}
     for pick in read_picks(path):
         place = {"frame": pick.frame, "part": pick.part, "x": pick.x, "y": pick.y}
         name = f"{pick.part}-{pick.frame}-{pick.x:g}-{pick.y:g}"
-        found[known.get(tuple(place.values()), ("pick", name))] = place
-    return found
+        cells_read[known.get(tuple(place.values()), ("pick", name))] = place
+    return cells_read

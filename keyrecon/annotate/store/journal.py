@@ -29,7 +29,7 @@ from keyrecon.errors import KeyreconError
 
 Role = Literal["edit", "undo", "redo", "fixed"]
 Stack = tuple[int, ...]
-MOST_UNDOABLE = 1000
+MAX_UNDOABLE = 1000
 """Edits that can be taken back; the journal itself keeps all."""
 
 
@@ -72,7 +72,7 @@ def advance(state: JournalState, entries: Iterable[Entry]) -> JournalState:
 def _move(undoable: Stack, redoable: Stack, entry: Entry) -> tuple[Stack, Stack]:
     """Both stacks after an entry."""
     if entry.role == "edit":
-        return (*undoable[-MOST_UNDOABLE:], entry.revision), ()
+        return (*undoable[-MAX_UNDOABLE:], entry.revision), ()
     if entry.role == "undo":
         return undoable[:-1], (*redoable, entry.of)
     if entry.role == "redo":
@@ -189,5 +189,5 @@ class Journal:
 
 
 def _entry(revision: int, id_: str, role: str, of: int | None, label: str, changes: str) -> Entry:
-    told = tuple(Change(tuple(key), old, new) for key, old, new in json.loads(changes))
-    return Entry(revision, id_, role, of, label, told)
+    parsed = tuple(Change(tuple(key), old, new) for key, old, new in json.loads(changes))
+    return Entry(revision, id_, role, of, label, parsed)

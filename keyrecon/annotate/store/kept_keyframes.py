@@ -7,7 +7,6 @@ one of the person's own.
 
 import json
 
-from keyrecon.annotate.server.descriptions import halves_by_frame, join_halves
 from keyrecon.annotate.store.cells import Change, by_frame, marked_frames
 from keyrecon.annotate.store.store import Store
 from keyrecon.io.formats.keyframes import keyframes_from_json
@@ -31,22 +30,39 @@ class KeptKeyframes:
         status = self._file.stat()
         signature = (status.st_mtime_ns, status.st_size)
         if self._read is None or self._read[0] != signature:
-            found = keyframes_from_json(self._file.read_text())
-            self._keep_worked_on(halves_by_frame(found))
-            self._read = (signature, found)
+            keyframes = keyframes_from_json(self._file.read_text())
+            self._keep_worked_on(halves_by_frame(keyframes))
+            self._read = (signature, keyframes)
         return self._read[1]
 
     def _keep_worked_on(self, chosen: dict[int, str]) -> None:
-        noted = self._store.note("keyframes")
-        before = {int(frame): half for frame, half in json.loads(noted or "{}").items()}
+        note = self._store.note("keyframes")
+        before = {int(frame): half for frame, half in json.loads(note or "{}").items()}
         if before == chosen:
             return
         cells = self._store.state.cells
-        valued = {*marked_frames(cells), *map(int, by_frame(cells, "lock"))}
+        worked_on = {*marked_frames(cells), *map(int, by_frame(cells, "lock"))}
         keep = [
             Change(("own", frame), None, half)
             for frame, half in before.items()
-            if frame in valued and ("own", frame) not in cells
+            if frame in worked_on and ("own", frame) not in cells
             if join_halves(chosen.get(frame), half) != chosen.get(frame)
         ]
         self._store.apply("keep", keep, role="fixed", notes={"keyframes": json.dumps(chosen)})
+
+
+def halves_by_frame(keyframes: Keyframes | None) -> dict[int, str]:
+    """Which half of the body is to be marked on each keyframe."""
+    if keyframes is None:
+        return {}
+    upper, lower = ({*half.frames.tolist()} for half in (keyframes.upper, keyframes.lower))
+    return {
+        frame: "both" if frame in upper & lower else "upper" if frame in upper else "lower"
+        for frame in sorted(upper | lower)
+    }
+
+
+def join_halves(one: str | None, other: str | None) -> str:
+    """What two requests for a frame, not both empty, ask for together."""
+    halves = {one, other} - {None}
+    return halves.pop() if len(halves) == 1 else "both"

@@ -1,11 +1,9 @@
-"""Which edits of a page are accepted: those whose cells still hold what the page believed.
-
-The one place where a person's decisions are kept, changed, undone and never lost.
+"""The one place where a person's decisions are kept, changed, undone and never lost.
 
 An edit is accepted only if the cells still hold what the page believed; then it goes into the
 journal (see journal.py), then the files that show the state are replaced, and only then is it
 acknowledged. A failure on the way raises NotSaved: the page keeps the edit and sends it again,
-and its id makes sure that it counts once. Listeners hear of every accepted entry.
+and its id makes sure that it counts once. Listeners are called with every accepted entry.
 """
 
 import uuid
@@ -23,9 +21,9 @@ from keyrecon.annotate.store.cells import (
     annotations_from_cells,
     apply_in_place,
     check_fit,
-    effective,
+    effective_changes,
     invert_changes,
-    settle,
+    resolve_changes,
 )
 from keyrecon.annotate.store.edits import AnyEdit, Limits, changes_of
 from keyrecon.annotate.store.file_sync import FileSync, annotations_form, picks_form
@@ -75,12 +73,12 @@ def _accept_one(edit: AnyEdit, cells: Cells, limits: Limits) -> tuple[Result, Dr
         changes = changes_of(edit, limits)
     except KeyreconError as fault:
         return {"ok": False, "status": 400, "error": str(fault)}, None
-    told = settle(cells, changes)
-    if told is None:
+    resolved = resolve_changes(cells, changes)
+    if resolved is None:
         current = {str(change.key[-1]): cells.get(change.key) for change in changes}
         return {"ok": False, "status": 409, "current": current}, None
     label = type(edit).__struct_config__.tag
-    return {"ok": True}, Draft(edit.id, label, told) if told else None
+    return {"ok": True}, Draft(edit.id, label, resolved) if resolved else None
 
 
 Listener = Callable[[Sequence[Entry]], None]
@@ -99,13 +97,13 @@ class Store:
         self._listeners: list[Listener] = []
         self._lock = RLock()
         with ExitStack() as held:
-            held.callback(_hold(workspace).release)
+            held.callback(_lock_project(workspace).release)
             self._journal = Journal(workspace.folder / "annotate.sqlite")
             held.callback(self._journal.close)
             self.state = advance(JournalState(), self._journal.entries())
             check_fit(self.state.cells, limits.skeleton, limits.n_frames)
             forms = (annotations_form(workspace, limits), picks_form(workspace))
-            self._mirrors = [FileSync(form, self._journal.note(form.path.name)) for form in forms]
+            self._files = [FileSync(form, self._journal.note(form.path.name)) for form in forms]
             self.refresh()
             self._held = held.pop_all()
 
@@ -122,7 +120,7 @@ class Store:
         self._change(lambda _: ())
 
     def submit(self, edits: Iterable[AnyEdit]) -> list[dict[str, Any]]:
-        """Accept what fits; tells for each edit whether it was accepted, or what stands there."""
+        """Accept what fits; for each edit whether it was accepted, or what stands there."""
         results: list[dict[str, Any]] = []
         listed = [*edits]
 
@@ -146,8 +144,9 @@ class Store:
         listed = [*changes]
 
         def draft(state: JournalState) -> list[Draft]:
-            told = effective(state.cells, listed)
-            return [Draft(f"{label}-{uuid.uuid4().hex}", label, told, role)] if told else []
+            effective = effective_changes(state.cells, listed)
+            draft_id = f"{label}-{uuid.uuid4().hex}"
+            return [Draft(draft_id, label, effective, role)] if effective else []
 
         self._change(draft, notes)
 
@@ -158,21 +157,21 @@ class Store:
 
     def undo(self, edit_id: str) -> Entry | None:
         """Take back the last edit; None when there is none. An id that was used does nothing."""
-        return self._turn(edit_id, "undo")
+        return self._step(edit_id, "undo")
 
     def redo(self, edit_id: str) -> Entry | None:
         """Do again what was taken back last."""
-        return self._turn(edit_id, "redo")
+        return self._step(edit_id, "redo")
 
-    def _turn(self, edit_id: str, role: Role) -> Entry | None:
+    def _step(self, edit_id: str, role: Role) -> Entry | None:
         def draft(state: JournalState) -> list[Draft]:
             stack = state.undoable if role == "undo" else state.redoable
             if not stack or self._journal.knows(edit_id):
                 return []
             entry = self._journal.entry(stack[-1])
             wanted = invert_changes(entry.changes) if role == "undo" else entry.changes
-            ours = [c for c in wanted if state.cells.get(c.key) == c.before]
-            return [Draft(edit_id, entry.label, tuple(ours), role, entry.revision)]
+            possible = [c for c in wanted if state.cells.get(c.key) == c.before]
+            return [Draft(edit_id, entry.label, tuple(possible), role, entry.revision)]
 
         return next(iter(self._change(draft)), None)
 
@@ -182,30 +181,30 @@ class Store:
         notes: Mapping[str, str] | None = None,
     ) -> list[Entry]:
         """Everything that changes the state goes through here, one at a time."""
-        told: list[Entry] = []
+        entries: list[Entry] = []
         with self._lock, self._workspace.exclusive():
             before = self.state.revision
             try:
-                for mirror in self._mirrors:
-                    self._take_in(mirror)
-                told = self._commit(draft(self.state), notes)
-                for mirror in self._mirrors:
-                    mirror.catch_up(self.state.cells)
+                for file in self._files:
+                    self._take_in(file)
+                entries = self._commit(draft(self.state), notes)
+                for file in self._files:
+                    file.catch_up(self.state.cells)
             finally:
-                self._tell(before)
-        return told
+                self._notify(before)
+        return entries
 
-    def _take_in(self, mirror: FileSync) -> None:
-        first = mirror.is_new
-        changes = effective(
-            self.state.cells, mirror.outside_changes(self.state.cells, self._cells_at)
-        )
+    def _take_in(self, file: FileSync) -> None:
+        """Accept what another program changed in a file as one more edit."""
+        first = file.is_new
+        outside = file.outside_changes(self.state.cells, self._cells_at)
+        changes = effective_changes(self.state.cells, outside)
         if changes:
             role: Role = "fixed" if first else "edit"
             self._commit([Draft(f"file-{uuid.uuid4().hex}", "file", changes, role)])
-        if changes and first and mirror.form.may_hold_more and not mirror.is_shown():
-            self._workspace.put_aside(mirror.form.path)
-        mirror.accept(self.state.cells)
+        if changes and first and file.form.may_hold_more and not file.is_written():
+            self._workspace.put_aside(file.form.path)
+        file.accept(self.state.cells)
 
     def _commit(
         self, drafts: Iterable[Draft], notes: Mapping[str, str] | None = None
@@ -219,13 +218,13 @@ class Store:
             return []
         state = advance(self.state, entries)
         touched = {c.key[0] for entry in entries for c in entry.changes}
-        concerned = [m for m in self._mirrors if touched & {*m.form.kinds}]
-        plans = [(m, plan) for m in concerned if (plan := m.plan(state.cells, state.revision))]
-        shown = {mirror.name: mirror.note(plan) for mirror, plan in plans}
-        self._journal.append(entries, {**shown, **(notes or {})})
+        concerned = [f for f in self._files if touched & {*f.form.kinds}]
+        plans = [(f, plan) for f in concerned if (plan := f.plan(state.cells, state.revision))]
+        file_notes = {file.name: file.note(plan) for file, plan in plans}
+        self._journal.append(entries, {**file_notes, **(notes or {})})
         self.state = state
-        for mirror, plan in plans:
-            mirror.adopt(plan)
+        for file, plan in plans:
+            file.adopt(plan)
         return entries
 
     def _cells_at(self, revision: int) -> Cells:
@@ -233,7 +232,7 @@ class Store:
             return self.state.cells
         return advance(JournalState(), self._journal.entries(revision)).cells
 
-    def _tell(self, since: int) -> None:
+    def _notify(self, since: int) -> None:
         if self.state.revision > since:
             new = [self._journal.entry(n) for n in range(since + 1, self.state.revision + 1)]
             for listener in self._listeners:
@@ -245,7 +244,7 @@ class Store:
             self._held.close()
 
 
-def _hold(workspace: Workspace) -> FileLock:
+def _lock_project(workspace: Workspace) -> FileLock:
     """The lock that only one server of a project can have; gone when its process ends."""
     try:
         return hold_lock(workspace.folder / ".annotate.lock", seconds=0.0)

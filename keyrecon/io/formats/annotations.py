@@ -1,6 +1,5 @@
-"""Marks from whatever program a person used; the kind of file is told by its content.
-
-Add annotations to annotations without losing any: conflicts are told, never settled here.
+"""Marks from whatever program a person used, the kind of file recognised by its content; and sets
+of marks added to one another or reduced to what was asked for.
 """
 
 from dataclasses import replace
@@ -44,22 +43,6 @@ def read_annotations(
         f"{path} holds no annotations that keyrecon knows; use COCO keypoints JSON, DeepLabCut's "
         "CollectedData CSV or CVAT XML 1.1."
     )
-
-
-SAME_PX = 0.51
-"""Marks closer than this on both axes are the same mark, rounded by some format."""
-
-
-def find_conflicts(old: Annotations, new: Annotations) -> list[str]:
-    """Marks that stand in both and differ, as 'frame 12 left_knee'."""
-    conflicts = []
-    for frame in np.intersect1d(old.frames, new.frames):
-        before = old.joints[np.searchsorted(old.frames, frame)]
-        after = new.joints[np.searchsorted(new.frames, frame)]
-        differ = (np.abs(before - after) > SAME_PX).any(axis=1)  # NaN compares false
-        conflicts += [f"frame {frame} {old.skeleton.names[j]}" for j in np.flatnonzero(differ)]
-    contradicted = {*old.absent} & _placed(new) | {*new.absent} & _placed(old)
-    return conflicts + [f"frame {frame} {name}" for frame, name in sorted(contradicted)]
 
 
 def _placed(annotations: Annotations) -> set[tuple[int, str]]:

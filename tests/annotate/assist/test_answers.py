@@ -66,63 +66,63 @@ def plain(answer):
 
 def test_before_the_automatic_part_there_is_nothing_to_say(untouched):
     helper = make_assistant(Workspace(untouched.folder))
-    assert helper.keyframes({}) == helper.ghost(annotated(), 3) == {}
+    assert helper.keyframes({}) == helper.suggestion(annotated(), 3) == {}
     assert helper.pose(annotated(), 3, marked(3), {}) == {}
-    assert helper.checks(annotated(3)) == helper.suggest(annotated(3), frozenset()) == []
+    assert helper.checks(annotated(3)) == helper.next_frames(annotated(3), frozenset()) == []
 
 
 def test_each_keyframe_tells_where_the_player_is_and_what_it_stands_for(prepared):
-    told = plain(prepared.keyframes({7: "upper"}))
-    assert told["height_px"] == pytest.approx(HEIGHT, rel=0.06)
-    assert told["frames"]["7"]["why"].startswith("You added it.")
-    for frame, row in told["frames"].items():
+    answer = plain(prepared.keyframes({7: "upper"}))
+    assert answer["height_px"] == pytest.approx(HEIGHT, rel=0.06)
+    assert answer["frames"]["7"]["why"].startswith("You added it.")
+    for frame, row in answer["frames"].items():
         x0, y0, x1, y1 = row["box"]
         x, y = HEADS[int(frame)]
         assert x0 < x < x1
         assert y0 < y < y1
         assert row["why"]
-    assert sum(row["stands_for"] for row in told["frames"].values()) >= COUNT
+    assert sum(row["stands_for"] for row in answer["frames"].values()) >= COUNT
 
 
 def test_the_ghost_of_a_frame_is_where_the_player_is(prepared):
-    assert prepared.ghost(annotated(), 30) == {}
-    told = plain(prepared.ghost(annotated(5, 20, 50), 35))
-    off = [np.hypot(*(np.array(told["joints"][n][:2]) - p[:2])) for n, p in marked(35).items()]
+    assert prepared.suggestion(annotated(), 30) == {}
+    answer = plain(prepared.suggestion(annotated(5, 20, 50), 35))
+    off = [np.hypot(*(np.array(answer["joints"][n][:2]) - p[:2])) for n, p in marked(35).items()]
     assert max(off) < 0.08 * HEIGHT
-    assert set(told["from"]) <= {5, 20, 50}
-    assert all(0 <= confidence <= 1 for *_, confidence in told["joints"].values())
+    assert set(answer["from"]) <= {5, 20, 50}
+    assert all(0 <= confidence <= 1 for *_, confidence in answer["joints"].values())
 
 
 def test_a_pose_follows_the_marks_and_keeps_the_signs_that_were_given(prepared):
-    told = plain(prepared.pose(annotated(5, 20), 35, marked(35), {"left_wrist": 1}))
-    assert set(told["points3d"]) == set(LSP14.names)
-    assert told["foreseen"] == []
-    assert told["limbs"]["left_wrist"] == {"sign": 1, "certainty": 1.0, "given": True}
-    assert told["alternatives"][0]["points3d"] == told["points3d"]
-    assert all(other["nearer"]["left_wrist"] == 1 for other in told["alternatives"])
+    answer = plain(prepared.pose(annotated(5, 20), 35, marked(35), {"left_wrist": 1}))
+    assert set(answer["points3d"]) == set(LSP14.names)
+    assert answer["predicted"] == []
+    assert answer["limbs"]["left_wrist"] == {"sign": 1, "certainty": 1.0, "given": True}
+    assert answer["alternatives"][0]["points3d"] == answer["points3d"]
+    assert all(other["nearer"]["left_wrist"] == 1 for other in answer["alternatives"])
 
 
 def test_joints_not_marked_yet_are_foreseen_in_space_too(prepared):
     few = {name: marked(35)[name] for name in ("neck", "head_top")}
-    told = plain(prepared.pose(annotated(5, 20), 35, few, {}))
-    assert set(told["points3d"]) == set(LSP14.names)
-    assert set(told["foreseen"]) == set(LSP14.names) - set(few)
+    answer = plain(prepared.pose(annotated(5, 20), 35, few, {}))
+    assert set(answer["points3d"]) == set(LSP14.names)
+    assert set(answer["predicted"]) == set(LSP14.names) - set(few)
 
 
 def test_a_limb_that_is_too_long_is_told_with_the_pose(prepared):
     marks = marked(35)
     marks["left_wrist"] = [marks["left_elbow"][0] + 40, marks["left_elbow"][1], 2.0]
-    told = prepared.pose(annotated(5, 20), 35, marks, {})
-    assert list(told["stretched"]) == ["left_wrist"]
-    assert told["stretched"]["left_wrist"] > 2
+    answer = prepared.pose(annotated(5, 20), 35, marks, {})
+    assert list(answer["stretched"]) == ["left_wrist"]
+    assert answer["stretched"]["left_wrist"] > 2
 
 
 def test_true_marks_are_not_suspected_and_a_forgotten_joint_is(prepared):
     annotations = annotated(5, 20, 35, 50)
     assert plain(prepared.checks(annotations)) == []
     annotations.joints[1, LSP14.index("left_knee")] = np.nan
-    (told,) = plain(prepared.checks(annotations))
-    assert (told["frame"], told["joint"], told["kind"]) == (20, "left_knee", "missing")
+    (answer,) = plain(prepared.checks(annotations))
+    assert (answer["frame"], answer["joint"], answer["kind"]) == (20, "left_knee", "missing")
     assert prepared.checks(replace(annotations, absent=((20, "left_knee"),))) == []
 
 
@@ -134,19 +134,19 @@ def test_help_comes_while_the_first_frames_are_being_marked(prepared):
         annotations.joints[1, order[count:]] = np.nan
         named = {LSP14.names[j]: marked(20)[LSP14.names[j]] for j in order[:count]}
         assert prepared.pose(annotations, 20, named, {})["points3d"]
-        assert 20 in {told["frame"] for told in prepared.checks(annotations)}
-        assert prepared.ghost(annotations, 40)["joints"]
+        assert 20 in {answer["frame"] for answer in prepared.checks(annotations)}
+        assert prepared.suggestion(annotations, 40)["joints"]
 
 
 def test_without_a_result_nothing_is_suggested(prepared):
-    assert prepared.suggest(annotated(5, 20), frozenset()) == []
+    assert prepared.next_frames(annotated(5, 20), frozenset()) == []
 
 
 def test_picks_find_head_and_feet_on_the_frames_asked_for(prepared):
-    told = plain(prepared.preview(picks(COUNT), (40, 10)))
-    assert [row["frame"] for row in told["frames"]] == [10, 40]
-    assert told["confidence"] > 0.9
-    for row in told["frames"]:
+    answer = plain(prepared.preview(picks(COUNT), (40, 10)))
+    assert [row["frame"] for row in answer["frames"]] == [10, 40]
+    assert answer["confidence"] > 0.9
+    for row in answer["frames"]:
         head = HEADS[row["frame"]]
         assert np.linalg.norm(np.array(row["head"]) - head) < 0.05 * HEIGHT
         middle = np.mean(row["feet"], axis=0)

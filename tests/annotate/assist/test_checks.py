@@ -1,4 +1,4 @@
-"""Marks that look wrong, told in the order of suspicion."""
+"""Marks that look wrong, in the order of suspicion."""
 
 from dataclasses import replace
 
@@ -30,8 +30,8 @@ def careful():
 
 
 def checked(preparation, annotations):
-    knowledge = estimate_body(annotations, {}, preparation.track.height, 50.0)
-    return find_checks(annotations, knowledge.size, find_neighbours(preparation, annotations))
+    body = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    return find_checks(annotations, body.size, find_neighbours(preparation, annotations))
 
 
 def changed(annotations, **places):
@@ -73,8 +73,8 @@ def test_a_forearm_twice_as_long_as_it_can_be_is_told(careful):
     preparation, annotations = careful
     elbow, wrist = place(annotations, "right_elbow"), place(annotations, "right_wrist")
     moved = changed(annotations, right_wrist=elbow + 2.2 * (wrist - elbow))
-    knowledge = estimate_body(moved, {}, preparation.track.height, 50.0)
-    first = find_checks(moved, knowledge.size, ())[0]
+    body = estimate_body(moved, {}, preparation.track.height, 50.0)
+    first = find_checks(moved, body.size, ())[0]
     assert (first.kind, first.frame, first.joint) == ("long", ROW, "right_wrist")
 
 

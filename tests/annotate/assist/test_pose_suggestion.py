@@ -1,4 +1,4 @@
-"""Joints foreseen on frames that nobody annotated, and what annotated frames say of each other."""
+"""Joints predicted on frames that nobody annotated, and what annotated frames say of each other."""
 
 from dataclasses import replace
 
@@ -31,9 +31,11 @@ def game():
     return scene(playing(), (0, 8, 16))
 
 
-def away(game, ghost, frame):
+def away(game, suggestion, frame):
     preparation, truth = game
-    return np.linalg.norm(ghost.joints - truth[frame], axis=1) / preparation.track.height[frame]
+    return (
+        np.linalg.norm(suggestion.joints - truth[frame], axis=1) / preparation.track.height[frame]
+    )
 
 
 def foresee(game, frames, frame):
@@ -43,10 +45,10 @@ def foresee(game, frames, frame):
 
 
 def test_a_pose_between_annotated_ones_is_foreseen(game):
-    ghost = foresee(game, (0, 3, 6, 9, 12, 15), 10)
-    assert away(game, ghost, 10).max() < 0.04
-    assert np.median(away(game, ghost, 10)) < 0.01
-    assert np.isin(ghost.source, (0, 3, 6, 9, 12, 15)).all()
+    suggestion = foresee(game, (0, 3, 6, 9, 12, 15), 10)
+    assert away(game, suggestion, 10).max() < 0.04
+    assert np.median(away(game, suggestion, 10)) < 0.01
+    assert np.isin(suggestion.source, (0, 3, 6, 9, 12, 15)).all()
 
 
 def test_the_more_is_annotated_the_better_the_ghosts(game):
@@ -61,19 +63,19 @@ def test_a_half_that_nobody_marked_has_no_ghost(game):
     preparation, truth = game
     annotations = marks(truth, (0, 6))
     joints = np.where(LSP14.is_lower[:, None], np.nan, annotations.joints)
-    ghost = suggest_joints(preparation, replace(annotations, joints=joints), 8)
-    assert np.isnan(ghost.joints[LSP14.is_lower]).all()
-    assert np.isfinite(ghost.joints[~LSP14.is_lower]).all()
-    assert (ghost.source[LSP14.is_lower] == -1).all()
+    suggestion = suggest_joints(preparation, replace(annotations, joints=joints), 8)
+    assert np.isnan(suggestion.joints[LSP14.is_lower]).all()
+    assert np.isfinite(suggestion.joints[~LSP14.is_lower]).all()
+    assert (suggestion.source[LSP14.is_lower] == -1).all()
 
 
 def test_a_half_of_which_a_joint_was_never_marked_has_no_ghost_yet(game):
     preparation, truth = game
     annotations = marks(truth, (0, 6))
     annotations.joints[:, LSP14.index("left_elbow")] = np.nan
-    ghost = suggest_joints(preparation, annotations, 8)
-    assert np.isnan(ghost.joints[~LSP14.is_lower]).all()
-    assert np.isfinite(ghost.joints[LSP14.is_lower]).all()
+    suggestion = suggest_joints(preparation, annotations, 8)
+    assert np.isnan(suggestion.joints[~LSP14.is_lower]).all()
+    assert np.isfinite(suggestion.joints[LSP14.is_lower]).all()
 
 
 def test_a_frame_is_never_foreseen_from_its_own_marks(game):
@@ -88,8 +90,8 @@ def test_what_is_marked_on_the_frame_already_stays_where_it_is(game):
     held = np.full((14, 2), np.nan)
     held[wrist] = truth[10, wrist] + [9.0, -7.0]
     sources = choose_sources(preparation, marks(truth, (0, 6, 12)), 10)
-    ghost = suggest_joints(preparation, sources, 10, held)
-    np.testing.assert_allclose(ghost.joints[wrist], held[wrist], atol=0.1)
+    suggestion = suggest_joints(preparation, sources, 10, held)
+    np.testing.assert_allclose(suggestion.joints[wrist], held[wrist], atol=0.1)
 
 
 def test_true_marks_agree_with_one_another_and_a_moved_one_does_not(game):
@@ -101,7 +103,7 @@ def test_true_marks_agree_with_one_another_and_a_moved_one_does_not(game):
     for moved in (annotations, replace(annotations, joints=joints)):
         _, upper = find_neighbours(preparation, moved)
         place = upper.members.tolist().index(wrist)
-        nearest = np.diagonal(upper.away, axis1=2, axis2=3)[:, :, place].min(axis=1)
+        nearest = np.diagonal(upper.distance, axis1=2, axis2=3)[:, :, place].min(axis=1)
         assert (np.delete(nearest, 4) < 0.05).all()
     assert nearest[4] > 0.1
 

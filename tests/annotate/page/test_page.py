@@ -22,7 +22,7 @@ from page_project import (
 from keyrecon.annotate.assist.answers import describe_pose
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.project_cache import ProjectCache
-from keyrecon.annotate.store.assistant import Assistant
+from keyrecon.annotate.assistant import Assistant
 from keyrecon.body import LSP14
 from keyrecon.io.formats.coco import read_coco
 
@@ -53,7 +53,7 @@ def context(chromium):
 def person(context, folder):
     """Somebody at the page of a new project, whom nothing may have disturbed."""
     with serving(folder) as server:
-        person = Person(context, server.door.address)
+        person = Person(context, server.credentials.address)
         person.server = server
         yield person
         context.close()
@@ -132,14 +132,14 @@ def test_edits_kept_in_the_browser_outlive_the_page(person, folder, context):
     person.await_text("#saving", "Not saved: 1")
     person.page.close()
     person.server.start()
-    again = Person(context, person.server.door.address)
+    again = Person(context, person.server.credentials.address)
     again.await_saved()
     again.await_text("#joints", "visible")
     assert np.isfinite(marks_on_file(folder).joints[0, LSP14.index(joint)]).all()
 
 
 def test_two_pages_see_each_other_and_overwrite_nothing(person, context, folder):
-    other = Person(context, person.server.door.address)
+    other = Person(context, person.server.credentials.address)
     for one in (person, other):
         one.open(10)
     person.click(place_of(10, "head_top"))
@@ -217,23 +217,23 @@ def test_a_picture_zoomed_at_the_pointer_is_still_marked_right(person, folder):
     assert far(marks[LSP14.index("head_top")], place_of(10, "head_top")) < 0.3
 
 
-def ghost_assistant(errors):
+def suggesting_assistant(errors):
     """A suggestion from the truth, off by `errors` (px) where they are given."""
 
-    def ghost(annotations, frame):
+    def suggestion(annotations, frame):
         joints = {
             name: [*(place_of(frame, name) + errors.get(name, 0.0)).tolist(), 0.8]
             for name in LSP14.names
         }
         return {"joints": joints, "from": [3], "nearer": {}}
 
-    return Assistant(ghost=ghost)
+    return Assistant(suggestion=suggestion)
 
 
 def test_a_suggestion_costs_one_action_and_one_more_per_joint_that_is_off(context, folder):
     wrong = {"left_wrist": 25.0, "right_knee": -18.0}
-    with serving(folder, ghost_assistant(wrong)) as server:
-        person = Person(context, server.door.address)
+    with serving(folder, suggesting_assistant(wrong)) as server:
+        person = Person(context, server.credentials.address)
         person.open(10)
         person.await_text("#prompt-text", "suggestion for 14 joints")
         for joint, error in wrong.items():
@@ -294,28 +294,28 @@ def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
     person.await_text("#pick-text", "Click the middle of the head")
 
 
-class Onlooker(ProjectCache):
+class MarksOnly(ProjectCache):
     """Knows the player's height, and nothing else before it is marked."""
 
     def __init__(self):
-        """There is nothing prepared to study."""
+        """Nothing is prepared."""
 
-    def knowledge(self, annotations, wait=False):
+    def body(self, annotations, wait=False):
         return estimate_body(annotations, {}, np.full(FRAMES, 0.9 * STATURE * PIXELS), FPS)
 
-    def any_ghost(self, annotations, frame):
+    def any_suggestion(self, annotations, frame):
         return None
 
 
 def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, folder):
     """Pointing at a limb costs nothing: what is turned is turned by a key."""
     truth = true_signs(POINTS3D[70])
-    with serving(folder, Assistant(pose=partial(describe_pose, Onlooker()))) as server:
-        person = Person(context, server.door.address)
+    with serving(folder, Assistant(pose=partial(describe_pose, MarksOnly()))) as server:
+        person = Person(context, server.credentials.address)
         person.open(70)
         person.mark_joints(partial(place_of, 70))
         person.await_text("#prompt-text", "Which ends are nearer")
-        person.settle_depths(truth, partial(place_of, 70))
+        person.give_depths(truth, partial(place_of, 70))
         person.await_text("#prompt-text", "done|Next|All keyframes")
         person.await_saved()
         context.close()
@@ -329,7 +329,7 @@ def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, fol
 
 def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
     with serving(folder, commands={"run": count_slowly}) as server:
-        person = Person(context, server.door.address)
+        person = Person(context, server.credentials.address)
         person.open(40)
         person.mark_joints(partial(place_of, 40))
         person.press("Alt+3")

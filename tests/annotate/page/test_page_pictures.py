@@ -31,7 +31,7 @@ def visit(chromium):
     context, people = chromium.new_context(viewport=SCREEN), []
 
     def go(server):
-        people.append(Person(context, server.door.address))
+        people.append(Person(context, server.credentials.address))
         return people[0]
 
     yield go
@@ -52,6 +52,6 @@ def test_a_frame_that_cannot_be_shown_is_told_once(tmp_path, video, visit, monke
         raise KeyreconError("frame 40 cannot be decoded; the file is damaged there")
 
     with serving(make_project(tmp_path / "p", video)) as server:
-        monkeypatch.setattr(type(server.desk.stills.video), "frames", broken)
+        monkeypatch.setattr(type(server.session.frames.video), "frames", broken)
         person = visit(server)
         person.await_text("#notice-text", "cannot be decoded; the file is damaged there")

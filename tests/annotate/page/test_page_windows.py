@@ -48,7 +48,7 @@ def server(tmp_path_factory):
 @pytest.mark.parametrize("size", WINDOWS, ids=lambda size: "x".join(map(str, size)))
 def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, size):
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
-    person = Person(context, server.door.address)
+    person = Person(context, server.credentials.address)
     found = {}
     for key, page in (("Alt+1", "pick"), ("Alt+2", "keyframes"), ("Alt+3", "motion")):
         person.press(key)

@@ -8,64 +8,64 @@ from annotator_edits import mark, submit
 
 
 def test_marks_go_out_and_come_back_in_every_format(opened):
-    desk = opened()
-    submit(desk.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
+    session = opened()
+    submit(session.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
     for form in ("coco", "dlc", "cvat"):
-        text = ask(desk, "GET", f"/api/export/{form}").content.decode()
-        told = ask(desk, "POST", "/api/import", {"name": form, "text": text}).json()
-        assert (told["frames"], told["new"], told["conflicts"]) == ([3, 7], 0, [])
-    assert ask(desk, "GET", "/api/export/doc").status == 400
+        text = ask(session, "GET", f"/api/export/{form}").content.decode()
+        answer = ask(session, "POST", "/api/import", {"name": form, "text": text}).json()
+        assert (answer["frames"], answer["new"], answer["conflicts"]) == ([3, 7], 0, [])
+    assert ask(session, "GET", "/api/export/doc").status == 400
 
 
 def test_an_absent_joint_goes_out_and_is_neither_new_nor_contradicted_when_it_comes_back(opened):
-    desk = opened()
-    submit(desk.store, mark(3, "neck", [10, 20, 0]), mark(3, "head_top", [0, 0, 0]))
-    text = ask(desk, "GET", "/api/export/coco").content.decode()
-    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
-    assert (told["frames"], told["new"], told["conflicts"]) == ([3], 0, [])
-    desk.store.undo("u")
-    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
-    assert (told["new"], told["conflicts"]) == (1, [])
-    submit(desk.store, mark(3, "head_top", [5, 6, 2]))
-    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
-    assert [conflict["joint"] for conflict in told["conflicts"]] == ["head_top"]
+    session = opened()
+    submit(session.store, mark(3, "neck", [10, 20, 0]), mark(3, "head_top", [0, 0, 0]))
+    text = ask(session, "GET", "/api/export/coco").content.decode()
+    answer = ask(session, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert (answer["frames"], answer["new"], answer["conflicts"]) == ([3], 0, [])
+    session.store.undo("u")
+    answer = ask(session, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert (answer["new"], answer["conflicts"]) == (1, [])
+    submit(session.store, mark(3, "head_top", [5, 6, 2]))
+    answer = ask(session, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert [conflict["joint"] for conflict in answer["conflicts"]] == ["head_top"]
 
 
-def coco_with(desk, *edits):
+def coco_with(session, *edits):
     """The text of a COCO file with these marks alone."""
-    before = desk.store.state.revision
-    submit(desk.store, *edits)
-    text = ask(desk, "GET", "/api/export/coco").content.decode()
-    while desk.store.state.revision < before + 2 * len(edits):
-        desk.store.undo(f"undo {desk.store.state.revision}")
+    before = session.store.state.revision
+    submit(session.store, *edits)
+    text = ask(session, "GET", "/api/export/coco").content.decode()
+    while session.store.state.revision < before + 2 * len(edits):
+        session.store.undo(f"undo {session.store.state.revision}")
     return text
 
 
 @pytest.mark.parametrize("mode", ["keep", "replace"])
 def test_conflicts_are_shown_before_anything_changes_and_then_settled_as_told(opened, mode):
-    desk = opened()
-    text = coco_with(desk, mark(3, "neck", [50, 20, 2]), mark(4, "neck", [1, 2, 2]))
-    submit(desk.store, mark(3, "neck", [10, 20, 2]))
-    before = desk.store.state
-    told = ask(desk, "POST", "/api/import", {"name": "a.json", "text": text}).json()
-    assert told["conflicts"] == [
+    session = opened()
+    text = coco_with(session, mark(3, "neck", [50, 20, 2]), mark(4, "neck", [1, 2, 2]))
+    submit(session.store, mark(3, "neck", [10, 20, 2]))
+    before = session.store.state
+    answer = ask(session, "POST", "/api/import", {"name": "a.json", "text": text}).json()
+    assert answer["conflicts"] == [
         {"frame": 3, "kind": "mark", "joint": "neck", "old": [10, 20, 2], "new": [50, 20, 2]}
     ]
-    assert told["new"] == 1
-    assert desk.store.state == before
+    assert answer["new"] == 1
+    assert session.store.state == before
     question = {"name": "a.json", "text": text, "accept": True, "mode": mode}
-    assert ask(desk, "POST", "/api/import", question).status == 200
+    assert ask(session, "POST", "/api/import", question).status == 200
     wanted = [10, 20, 2] if mode == "keep" else [50, 20, 2]
-    assert desk.store.state.cells["mark", 3, "neck"] == wanted
-    assert desk.store.state.cells["mark", 4, "neck"] == [1, 2, 2]
-    desk.store.undo("u")
-    assert desk.store.state.cells == before.cells
+    assert session.store.state.cells["mark", 3, "neck"] == wanted
+    assert session.store.state.cells["mark", 4, "neck"] == [1, 2, 2]
+    session.store.undo("u")
+    assert session.store.state.cells == before.cells
 
 
 def test_a_file_of_another_kind_is_refused_under_its_own_name(opened):
-    desk = opened()
+    session = opened()
     for text in ("", "hello", "{", '{"images": 3}', "<annotations>", "scorer,a\n", "\u0000"):
-        answer = ask(desk, "POST", "/api/import", {"name": "../../marks.txt", "text": text})
+        answer = ask(session, "POST", "/api/import", {"name": "../../marks.txt", "text": text})
         assert answer.status == 400
         assert answer.json()["error"].startswith("../../marks.txt ")
 
@@ -96,12 +96,12 @@ def spoil(text, rng):
 
 @pytest.mark.parametrize("form", ["coco", "dlc", "cvat"])
 def test_a_spoilt_file_is_read_or_refused_and_changes_nothing(opened, form):
-    desk, rng = opened(), random.Random(form)
-    submit(desk.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
-    text = ask(desk, "GET", f"/api/export/{form}").content.decode()
-    before, statuses = desk.store.state, set()
+    session, rng = opened(), random.Random(form)
+    submit(session.store, mark(3, "neck", [10.25, 20.5, 2]), mark(7, "left_hip", [30, 40, 1]))
+    text = ask(session, "GET", f"/api/export/{form}").content.decode()
+    before, statuses = session.store.state, set()
     for _ in range(60):
         question = {"name": "a", "text": spoil(text, rng)}
-        statuses.add(ask(desk, "POST", "/api/import", question).status)
+        statuses.add(ask(session, "POST", "/api/import", question).status)
     assert statuses == {200, 400}
-    assert desk.store.state == before
+    assert session.store.state == before

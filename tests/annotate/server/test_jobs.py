@@ -1,4 +1,4 @@
-"""Long work for the page: told of, cancelled, begun again."""
+"""Long work for the page: reported, cancelled, begun again."""
 
 import time
 

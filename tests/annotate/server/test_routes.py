@@ -5,16 +5,16 @@ import json
 import threading
 
 import numpy as np
-from annotator import DOOR, HEADERS, ask, call, run_apart
+from annotator import CREDENTIALS, HEADERS, ask, call, run_apart
 from annotator_edits import edit, mark, submit
 from small_motion import make_motion
 
-from keyrecon.annotate.server.descriptions import guided_order
+from keyrecon.annotate.assistant import Assistant
+from keyrecon.annotate.server.descriptions import marking_order
 from keyrecon.annotate.server.events import Events
 from keyrecon.annotate.server.routes import make_app
-from keyrecon.annotate.store.assistant import Assistant
+from keyrecon.annotate.server.session import ProjectWatch
 from keyrecon.annotate.store.cells import by_frame
-from keyrecon.annotate.store.watch import Watch
 from keyrecon.body import LSP14
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.formats.motion_file import write_motion
@@ -32,16 +32,16 @@ def write_keyframes(folder, upper, lower, n_frames=50):
     (folder / "keyframes.json").write_text(keyframes_to_json(chosen))
 
 
-def test_the_project_tells_the_page_all_it_must_know(opened, folder):
+def test_the_project_is_described_to_the_page(opened, folder):
     write_keyframes(folder, [10, 30], [30, 40])
-    desk = opened()
+    session = opened()
     submit(
-        desk.store, edit("own", frame=20, to="upper"), edit("lock", frame=30, was=False, to=True)
+        session.store, edit("own", frame=20, to="upper"), edit("lock", frame=30, was=False, to=True)
     )
-    told = ask(desk, "GET", "/api/project").json()
-    assert (told["n_frames"], told["width"], told["height"]) == (50, 128, 64)
-    assert told["limbs"][0].keys() == {"name", "parent", "child", "half"}
-    rows = {row["frame"]: row for row in told["keyframes"]}
+    answer = ask(session, "GET", "/api/project").json()
+    assert (answer["n_frames"], answer["width"], answer["height"]) == (50, 128, 64)
+    assert answer["limbs"][0].keys() == {"name", "parent", "child", "half"}
+    rows = {row["frame"]: row for row in answer["keyframes"]}
     assert [(f, row["half"], row["own"], row["locked"]) for f, row in rows.items()] == [
         (10, "upper", False, False),
         (20, "upper", True, False),
@@ -51,45 +51,45 @@ def test_the_project_tells_the_page_all_it_must_know(opened, folder):
     assert rows[10]["stands_for"] == 21  # frames 0 to 20 are nearest to it
 
 
-def test_the_guided_order_goes_from_the_head_along_the_limbs():
-    names = [LSP14.names[joint] for joint in guided_order(LSP14)]
+def test_the_marking_order_goes_from_the_head_along_the_limbs():
+    names = [LSP14.names[joint] for joint in marking_order(LSP14)]
     assert sorted(names) == sorted(LSP14.names)
     assert names[:5] == ["head_top", "neck", "right_shoulder", "right_elbow", "right_wrist"]
     assert names[-3:] == ["left_hip", "left_knee", "left_ankle"]
 
 
 def test_edits_and_undo_through_the_page(opened):
-    desk = opened()
-    answer = ask(desk, "POST", "/api/edits", {"edits": [mark(3, "neck", [10, 20, 2])]}).json()
+    session = opened()
+    answer = ask(session, "POST", "/api/edits", {"edits": [mark(3, "neck", [10, 20, 2])]}).json()
     assert answer["results"][0]["ok"]
-    assert ask(desk, "GET", "/api/state").json()["marks"] == {"3": {"neck": [10, 20, 2]}}
-    undone = ask(desk, "POST", "/api/undo", {"id": "u"}).json()
+    assert ask(session, "GET", "/api/state").json()["marks"] == {"3": {"neck": [10, 20, 2]}}
+    undone = ask(session, "POST", "/api/undo", {"id": "u"}).json()
     assert undone["changes"] == [
         {"kind": "mark", "frame": 3, "joint": "neck", "from": [10, 20, 2], "to": None}
     ]
-    assert ask(desk, "POST", "/api/undo", {"id": "u2"}).json()["edit"] is None
+    assert ask(session, "POST", "/api/undo", {"id": "u2"}).json()["edit"] is None
 
 
 def test_what_is_not_saved_is_answered_so_and_accepted_when_it_is_sent_again(opened, folder):
-    desk = opened()
-    submit(desk.store, mark(3, "neck", [10, 20, 2]))
+    session = opened()
+    submit(session.store, mark(3, "neck", [10, 20, 2]))
     (folder / "annotations.json").write_text("half a fi")
     late = {"edits": [mark(4, "neck", [10, 20, 2])]}
-    answer = ask(desk, "POST", "/api/edits", late)
+    answer = ask(session, "POST", "/api/edits", late)
     assert answer.status == 507
     assert "cannot be read" in answer.json()["error"]
     (folder / "annotations.json").unlink()
-    assert ask(desk, "POST", "/api/edits", late).json()["results"][0]["ok"]
-    assert len(desk.store.state.cells) == 2
+    assert ask(session, "POST", "/api/edits", late).json()["results"][0]["ok"]
+    assert len(session.store.state.cells) == 2
 
 
 def test_without_an_assistant_its_questions_have_empty_answers(opened):
-    desk = opened()
-    assert ask(desk, "GET", "/api/suggestion/3").json() == {}
-    assert ask(desk, "GET", "/api/checks").json() == []
-    assert ask(desk, "GET", "/api/next_frames").json() == []
-    assert ask(desk, "POST", "/api/picks/preview", {"frames": [1]}).json() == {}
-    assert ask(desk, "GET", "/api/backprojection/3").status == 204
+    session = opened()
+    assert ask(session, "GET", "/api/suggestion/3").json() == {}
+    assert ask(session, "GET", "/api/checks").json() == []
+    assert ask(session, "GET", "/api/next_frames").json() == []
+    assert ask(session, "POST", "/api/picks/preview", {"frames": [1]}).json() == {}
+    assert ask(session, "GET", "/api/backprojection/3").status == 204
 
 
 def test_the_assistant_hears_what_is_marked_and_taken(opened, folder):
@@ -104,15 +104,15 @@ def test_the_assistant_hears_what_is_marked_and_taken(opened, folder):
         heard["taken"] = taken
         return []
 
-    desk = opened(Assistant(checks=checks, suggest=suggest))
-    submit(desk.store, mark(3, "neck", [1, 2, 2]), mark(3, "left_hip", [0, 0, 0]))
-    submit(desk.store, edit("own", frame=20, to="both"))
-    assert ask(desk, "GET", "/api/checks").json() == [{"frame": 3, "suspicion": None}]
-    ask(desk, "GET", "/api/next_frames")
+    session = opened(Assistant(checks=checks, next_frames=suggest))
+    submit(session.store, mark(3, "neck", [1, 2, 2]), mark(3, "left_hip", [0, 0, 0]))
+    submit(session.store, edit("own", frame=20, to="both"))
+    assert ask(session, "GET", "/api/checks").json() == [{"frame": 3, "suspicion": None}]
+    ask(session, "GET", "/api/next_frames")
     assert heard == {"marks": [3], "absent": ((3, "left_hip"),), "taken": {10, 20}}
 
 
-def test_help_that_takes_long_keeps_no_edit_waiting(opened):
+def test_an_assistant_that_takes_long_keeps_no_edit_waiting(opened):
     held, asked = threading.Event(), []
 
     def checks(annotations):
@@ -120,8 +120,8 @@ def test_help_that_takes_long_keeps_no_edit_waiting(opened):
         assert held.wait(20)
         return []
 
-    desk = opened(Assistant(checks=checks))
-    app = make_app(desk, DOOR)
+    session = opened(Assistant(checks=checks))
+    app = make_app(session, CREDENTIALS)
 
     async def many():
         questions = [
@@ -142,12 +142,12 @@ def test_help_that_takes_long_keeps_no_edit_waiting(opened):
 
 def test_a_new_choice_of_keyframes_drops_none_that_was_worked_on_or_locked(opened, folder):
     write_keyframes(folder, [5, 10, 30], [30, 40])
-    desk = opened()
-    submit(desk.store, mark(10, "neck", [10, 20, 2]))
-    submit(desk.store, edit("lock", frame=40, was=False, to=True))
-    submit(desk.store, mark(30, "left_hip", [10, 20, 2]))
+    session = opened()
+    submit(session.store, mark(10, "neck", [10, 20, 2]))
+    submit(session.store, edit("lock", frame=40, was=False, to=True))
+    submit(session.store, mark(30, "left_hip", [10, 20, 2]))
     write_keyframes(folder, [12, 30], [31])
-    rows = {row["frame"]: row for row in ask(desk, "GET", "/api/project").json()["keyframes"]}
+    rows = {row["frame"]: row for row in ask(session, "GET", "/api/project").json()["keyframes"]}
     assert rows.keys() == {10, 12, 30, 31, 40}
     assert (rows[10]["half"], rows[10]["own"]) == ("upper", True)
     assert (rows[30]["half"], rows[30]["own"]) == ("both", True)  # now asked for the upper body
@@ -158,20 +158,20 @@ def test_a_new_choice_of_keyframes_drops_none_that_was_worked_on_or_locked(opene
 
 def test_a_frame_that_bears_marks_is_listed_even_if_nobody_asked_for_it(opened, folder):
     write_keyframes(folder, [10], [10])
-    desk = opened()
-    submit(desk.store, mark(20, "neck", [10, 20, 2]), mark(20, "left_hip", [10, 20, 2]))
-    rows = {row["frame"]: row for row in ask(desk, "GET", "/api/project").json()["keyframes"]}
+    session = opened()
+    submit(session.store, mark(20, "neck", [10, 20, 2]), mark(20, "left_hip", [10, 20, 2]))
+    rows = {row["frame"]: row for row in ask(session, "GET", "/api/project").json()["keyframes"]}
     assert (rows[20]["half"], rows[20]["own"], rows[20]["stands_for"]) == ("both", False, 0)
 
 
 def test_the_motion_is_read_in_stretches_once_it_is_made(opened, folder):
-    desk, motion = opened(), make_motion(frames=50)
-    assert ask(desk, "GET", "/api/motion?from=0&to=5").json() == {}
+    session, motion = opened(), make_motion(frames=50)
+    assert ask(session, "GET", "/api/motion?from=0&to=5").json() == {}
     write_motion(folder / "motion.npz", motion)
-    answer = ask(desk, "GET", "/api/motion?from=45&to=60").json()
+    answer = ask(session, "GET", "/api/motion?from=45&to=60").json()
     assert (answer["from"], answer["to"], len(answer["points3d"])) == (45, 50, 5)
     assert np.abs(np.array(answer["points2d"]) - motion.points2d[45:]).max() <= 0.05
-    assert ask(desk, "GET", "/api/motion?from=x").status == 400
+    assert ask(session, "GET", "/api/motion?from=x").status == 400
 
 
 def test_every_open_page_hears_the_news():
@@ -179,7 +179,7 @@ def test_every_open_page_hears_the_news():
         events = Events()
         pages = [events.stream({"revision": 0}) for _ in range(2)]
         first = [await anext(page) for page in pages]
-        threading.Thread(target=events.tell, args=({"revision": 1},)).start()
+        threading.Thread(target=events.publish, args=({"revision": 1},)).start()
         later = [await anext(page) for page in pages]
         events.close()
         rest = [[text async for text in page] for page in pages]
@@ -191,16 +191,16 @@ def test_every_open_page_hears_the_news():
     assert rest == [[], []]
 
 
-def test_what_stands_in_the_way_is_told_once_and_when_it_is_gone(opened, folder, monkeypatch):
-    desk = opened()
-    submit(desk.store, mark(3, "neck", [10, 20, 2]))
+def test_what_stands_in_the_way_is_reported_once_and_when_it_is_gone(opened, folder, monkeypatch):
+    session = opened()
+    submit(session.store, mark(3, "neck", [10, 20, 2]))
     heard = []
-    monkeypatch.setattr(Events, "tell", lambda self, news: heard.append(news))
-    watch = Watch(desk)
+    monkeypatch.setattr(Events, "publish", lambda self, news: heard.append(news))
+    watch = ProjectWatch(session)
     watch.close()
     (folder / "annotations.json").write_text("half a fi")
     for _ in range(3):
-        watch.look()
+        watch.check()
     (folder / "annotations.json").unlink()
-    watch.look()
+    watch.check()
     assert [bool(news["trouble"]) for news in heard] == [True, False]

@@ -4,10 +4,10 @@ import itertools
 import json
 
 import pytest
-from annotator import DOOR, HEADERS, new_project, open_project, request, run_apart
+from annotator import CREDENTIALS, HEADERS, new_project, open_project, request, run_apart
 
 from keyrecon.annotate.server import routes as server
-from keyrecon.annotate.server.security import MOST_BYTES
+from keyrecon.annotate.server.security import MAX_BODY_BYTES
 
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE")
 BAD_HOSTS = (
@@ -19,31 +19,36 @@ BAD_ORIGINS = (
     *("http://127.0.0.1:8001", "http://localhost.evil.com:8000", "", "http://127.0.0.1:8000/"),
 )
 BAD_COOKIES = (
-    *("", f"{DOOR.cookie}=", f"{DOOR.cookie}=guess", f"{DOOR.cookie}={DOOR.token}"),
     *(
-        f"other={DOOR.session}",
-        f"{DOOR.cookie}={DOOR.session}x",
-        f"{DOOR.cookie}={DOOR.session[:-1]}",
+        "",
+        f"{CREDENTIALS.cookie}=",
+        f"{CREDENTIALS.cookie}=guess",
+        f"{CREDENTIALS.cookie}={CREDENTIALS.token}",
+    ),
+    *(
+        f"other={CREDENTIALS.cookie_secret}",
+        f"{CREDENTIALS.cookie}={CREDENTIALS.cookie_secret}x",
+        f"{CREDENTIALS.cookie}={CREDENTIALS.cookie_secret[:-1]}",
     ),
 )
-"""The token opens the door but is not the key that is carried around."""
+"""The token of the address gives the cookie and does not take its place."""
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory, write_numbered):
+def session(tmp_path_factory, write_numbered):
     folder = tmp_path_factory.mktemp("guarded") / "p"
     new_project(folder, write_numbered("v.mp4", list(range(0, 240, 12))))
-    desk = open_project(folder)
-    yield desk
-    desk.close()
+    session = open_project(folder)
+    yield session
+    session.close()
 
 
 @pytest.fixture(scope="module")
-def routes(desk):
+def routes(session):
     """(method, address) of every route, from the table itself."""
     filled = {"{frame:int}": "3", "{job:int}": "1", "{format}": "coco"}
     table = []
-    for route in server.make_routes(desk, server.read_page()):
+    for route in server.make_routes(session, server.read_page()):
         path = route.path
         for gap, value in filled.items():
             path = path.replace(gap, value)
@@ -54,9 +59,9 @@ def routes(desk):
 
 
 @pytest.fixture(scope="module")
-def ask(desk):
+def ask(session):
     """Ask with exactly these headers; returns the answer."""
-    app = server.make_app(desk, DOOR)
+    app = server.make_app(session, CREDENTIALS)
 
     def send(method, path, headers=HEADERS, body=b""):
         return request(app, method, path, headers, body)
@@ -168,18 +173,18 @@ BODIES = {
     '{"more": 1}': 400,
     '{"frames": [1e99]}': 400,
     '\ufeff{"edits": []}': 400,
-    '"' + "x" * (MOST_BYTES + 1) + '"': 413,
+    '"' + "x" * (MAX_BODY_BYTES + 1) + '"': 413,
 }
 
 
-def test_no_body_of_another_form_gets_in(ask, routes, desk):
-    before = desk.store.state
+def test_no_body_of_another_form_gets_in(ask, routes, session):
+    before = session.store.state
     for (method, path), body in itertools.product(routes, BODIES):
         if method == "POST":
             answer = ask(method, path, body=body.encode())
             assert answer.status == BODIES[body], (path, body[:40])
             assert answer.json()["error"]
-    assert desk.store.state == before
+    assert session.store.state == before
 
 
 @pytest.mark.parametrize(
@@ -198,15 +203,21 @@ def test_forms_of_other_sites_are_no_json(ask, routes, kind):
 def test_the_token_gives_the_cookie_once_more_for_each_page(ask):
     bare = {"host": HEADERS["host"]}
     for _ in range(2):
-        answer = ask("GET", f"/?token={DOOR.token}", bare)
+        answer = ask("GET", f"/?token={CREDENTIALS.token}", bare)
         assert (answer.status, answer.headers["location"]) == (303, "/")
         cookie = answer.headers["set-cookie"]
         assert "HttpOnly" in cookie
         assert "samesite=strict" in cookie.lower()
-        assert DOOR.token not in cookie
-    for token in ("", "guess", DOOR.session, DOOR.token[:-1], DOOR.token + "%C3%A9"):
+        assert CREDENTIALS.token not in cookie
+    for token in (
+        "",
+        "guess",
+        CREDENTIALS.cookie_secret,
+        CREDENTIALS.token[:-1],
+        CREDENTIALS.token + "%C3%A9",
+    ):
         assert ask("GET", f"/?token={token}", bare).status == 403
-    assert ask("GET", f"/api/state?token={DOOR.token}", bare).status == 403
+    assert ask("GET", f"/api/state?token={CREDENTIALS.token}", bare).status == 403
 
 
 def test_every_answer_forbids_what_the_page_does_not_need(ask, routes):
@@ -220,7 +231,7 @@ def test_every_answer_forbids_what_the_page_does_not_need(ask, routes):
         assert "access-control-allow-origin" not in answer.headers
 
 
-def test_sockets_are_closed_at_once(desk):
+def test_sockets_are_closed_at_once(session):
     sent = []
 
     async def send(message):
@@ -228,12 +239,12 @@ def test_sockets_are_closed_at_once(desk):
 
     headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
     scope = {"type": "websocket", "path": "/api/events", "headers": headers}
-    run_apart(server.make_app(desk, DOOR)(scope, None, send))
+    run_apart(server.make_app(session, CREDENTIALS)(scope, None, send))
     assert sent == [{"type": "websocket.close", "code": 1008}]
 
 
-def test_an_unforeseen_fault_shows_nothing_of_the_inside(ask, desk, monkeypatch):
-    monkeypatch.setattr(desk.jobs, "listed", lambda: 1 / 0)
+def test_an_unforeseen_fault_shows_nothing_of_the_inside(ask, session, monkeypatch):
+    monkeypatch.setattr(session.jobs, "listed", lambda: 1 / 0)
     answer = ask("GET", "/api/jobs")
     assert answer.status == 500
     assert b"ZeroDivision" not in answer.content

@@ -214,11 +214,11 @@ def test_a_place_that_is_no_number_is_refused(number):
 
 
 def test_what_was_accepted_is_told_to_every_listener(open_store):
-    store, told = open_store(), []
-    store.listen(told.extend)
+    store, answer = open_store(), []
+    store.listen(answer.extend)
     submit(store, mark(3, "neck", [10, 20, 2]), mark(3, "neck", [99, 20, 2]))
     store.undo("u")
-    assert [(entry.role, entry.changes[0].after) for entry in told] == [
+    assert [(entry.role, entry.changes[0].after) for entry in answer] == [
         ("edit", [10, 20, 2]),
         ("undo", None),
     ]

@@ -4,7 +4,6 @@ import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.io.formats.annotations import (
-    find_conflicts,
     marks_asked_for,
     merge_annotations,
     missing_marks,
@@ -36,22 +35,15 @@ def test_unmarked_joints_erase_nothing():
     assert merged.joints[0, 5, 0] == 1
 
 
-def test_only_marks_that_differ_are_conflicts():
-    assert find_conflicts(marks([3], 1.0), marks([3], 1.2)) == []
-    assert find_conflicts(marks([3], 1.0), marks([3], 9.0, joints=[0])) == ["frame 3 right_ankle"]
-    assert find_conflicts(marks([3], 1.0), marks([4], 9.0)) == []
-
-
-def test_what_a_person_looked_for_in_vain_stays_so_until_it_is_placed():
+def test_an_absent_joint_stays_absent_until_it_is_placed():
     old = replace(marks([3], 1.0, joints=[4]), absent=((3, "neck"), (5, "neck")))
     added = merge_annotations(old, marks([3], 2.0, joints=[6]))
     assert added.absent == old.absent
     placed = marks([3], 2.0, joints=[LSP14.index("neck")])
-    assert find_conflicts(old, placed) == find_conflicts(placed, old) == ["frame 3 neck"]
     assert merge_annotations(old, placed).absent == ((5, "neck"),)
-    sought = merge_annotations(placed, old)
-    assert sought.absent == old.absent
-    assert np.isnan(sought.joints[0, LSP14.index("neck")]).all()
+    taken_back = merge_annotations(placed, old)
+    assert taken_back.absent == old.absent
+    assert np.isnan(taken_back.joints[0, LSP14.index("neck")]).all()
 
 
 def test_a_half_of_which_nothing_is_to_be_seen_lacks_nothing():

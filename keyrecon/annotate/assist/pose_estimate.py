@@ -2,8 +2,8 @@
 
 Taylor's reconstruction leaves the sign of every bone's depth open. Sign vectors of the trunk, and
 of each limb given the trunk, are weighed by what bodies do (`lifting.anatomy`) and by the keyframes
-whose signs a person settled, where they look alike in the picture. The least cost is the pose
-shown; sums over exp(-cost) tell how sure each sign is; the next cheapest poses that differ to the
+whose signs a person gave, where they look alike in the picture. The least cost is the pose
+shown; sums over exp(-cost) say how certain each sign is; the next cheapest poses that differ to the
 eye are the alternatives. Signs that the person gave hold.
 """
 
@@ -21,19 +21,19 @@ from keyrecon.lifting.priors.anatomy import anatomy_of
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
 
-ALTERNATIVES = 3
+MAX_ALTERNATIVES = 3
 """Other poses offered at most."""
-PLAUSIBLE = 6.0
-"""Cost above the best at which a pose is not worth offering, nats: odds of 400 to 1."""
-DIFFERENT = 0.12
-"""Poses look different when a joint's depth differs by this, body heights: a forearm's length."""
-SINGLE = replace(DepthSignOptions(), exemplars=1.0, annotated=100.0)
+MAX_EXTRA_COST = 6.0
+"""Cost above the best up to which a pose is offered, nats: odds of 400 to 1."""
+MIN_DEPTH_CHANGE = 0.12
+"""Of some joint, for a pose to look different, body heights: a forearm's length."""
+SINGLE_FRAME = replace(DepthSignOptions(), exemplars=1.0, annotated=100.0)
 """A picture by itself counts once, and what the person says holds."""
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
-    """One frame's joints: marked, or foreseen where they are not marked."""
+class FrameObservation:
+    """One frame's joints: marked, or suggested where they are not marked."""
 
     joints: Float[np.ndarray, "J 2"]
     """Body heights; NaN where nothing is known."""
@@ -54,14 +54,14 @@ class Alternative:
 
 
 @dataclass(frozen=True, eq=False)
-class PoseReading:
+class PoseEstimate:
     """What is known of the pose of one frame."""
 
     points3d: Float[np.ndarray, "J 3"]
     """Body heights, camera axes, the root at depth 0; NaN where the joint is unknown."""
     nearer: Int[np.ndarray, "B"]
     """Sign of every bone, given or chosen."""
-    sure: Float[np.ndarray, "B"]
+    certainty: Float[np.ndarray, "B"]
     """0 a coin toss, 1 certain; 1 where the person gave the sign, 0 where an end is unknown."""
     stretch: Float[np.ndarray, "B"]
     """Shown length over the bone's length; much above 1 it cannot be. NaN where unknown."""
@@ -69,7 +69,7 @@ class PoseReading:
 
 
 @dataclass(frozen=True, eq=False)
-class _Costs:
+class _SignCosts:
     """Cost of the trunk's states and of each limb's states given the trunk's, nats."""
 
     groups: tuple[tuple[int, ...], ...]
@@ -85,53 +85,59 @@ class _Costs:
         return sign
 
 
-def read_pose(
-    sighting: Sighting, size: BodySize, skeleton: Skeleton, votes: ExemplarPrior | None = None
-) -> PoseReading:
-    """The most plausible pose, how sure its signs are, and what else it could be.
+def estimate_pose(
+    observation: FrameObservation,
+    size: BodySize,
+    skeleton: Skeleton,
+    exemplars: ExemplarPrior | None = None,
+) -> PoseEstimate:
+    """The most plausible pose, how certain its signs are, and what else it could be.
 
-    `votes` holds keyframes whose signs are known (not this one). A limb of which a joint is unknown
-    stays undecided, and all signs do until the trunk is known.
+    `exemplars` holds keyframes whose signs are known (not this one). A limb of which a joint is
+    unknown stays undecided, and all signs do until the trunk is known.
     """
-    ends = sighting.joints[skeleton.bones]
+    ends = observation.joints[skeleton.bones]
     known = np.isfinite(ends).all(axis=(1, 2))
-    shown = foreshorten_bones(sighting.joints[None], sighting.spread[None], size.lengths, skeleton)
+    shown = foreshorten_bones(
+        observation.joints[None], observation.spread[None], size.lengths, skeleton
+    )
     shown = replace(shown, depth=shown.depth * known)
-    costs = _weigh(shown, sighting.nearer, known, (size, skeleton, votes))
-    ranked = sorted(_vary(costs), key=lambda pose: pose[0])
-    sign = costs.signs(ranked[0][1])
-    given = sighting.nearer != 0
-    return PoseReading(
-        points3d=_points(sighting, shown.depth[0] * sign, skeleton),
+    costs = _cost_signs(shown, observation.nearer, known, size, skeleton, exemplars)
+    ranked = sorted(_enumerate_poses(costs), key=lambda pose: pose.cost)
+    sign = costs.signs(ranked[0].states)
+    given = observation.nearer != 0
+    return PoseEstimate(
+        points3d=_points(observation, shown.depth[0] * sign, skeleton),
         nearer=-sign,
-        sure=np.where(given, 1.0, _sureness(costs, sign) * known),
+        certainty=np.where(given, 1.0, _sign_certainty(costs, sign) * known),
         stretch=np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) / size.lengths,
-        alternatives=tuple(_differing(sighting, shown.depth[0], (costs, ranked), skeleton)),
+        alternatives=tuple(_differing(observation, shown.depth[0], costs, ranked, skeleton)),
     )
 
 
-def _weigh(
+def _cost_signs(
     shown: ForeshortenedBones,
     nearer: Int[np.ndarray, "B"],
     known: Bool[np.ndarray, "B"],
-    context: tuple[BodySize, Skeleton, ExemplarPrior | None],
-) -> _Costs:
+    size: BodySize,
+    skeleton: Skeleton,
+    exemplars: ExemplarPrior | None,
+) -> _SignCosts:
     """Costs of all states; where joints are unknown only what the person said counts."""
-    size, skeleton, votes = context
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = sign_costs(shown, nearer[None], size.breadths, skeleton, SINGLE)
+    trunk, limbs = sign_costs(shown, nearer[None], size.breadths, skeleton, SINGLE_FRAME)
     groups = (anatomy.trunk, *(limb.bones for limb in anatomy.limbs))
-    free = [SINGLE.annotated * _contradicts(bones, nearer) for bones in groups]
+    free = [SINGLE_FRAME.annotated * _contradicts(bones, nearer) for bones in groups]
     if not known[list(anatomy.trunk)].all():
-        return _Costs(groups, free[0], tuple(cost[None] + 0 * trunk.T for cost in free[1:]))
+        return _SignCosts(groups, free[0], tuple(cost[None] + 0 * trunk.T for cost in free[1:]))
     each = []
-    for bones, cost, unjudged in zip(groups[1:], limbs, free[1:], strict=True):
-        judged = known[list(bones)].all()
-        vote = votes.cost(bones, shown, SINGLE) if votes and judged else 0.0
-        each.append(cost[0] + vote if judged else unjudged + 0 * cost[0])
-    if votes and anatomy.trunk:
-        trunk = trunk + votes.cost(anatomy.trunk, shown, SINGLE)
-    return _Costs(groups, trunk[0], tuple(each))
+    for bones, cost, contradiction in zip(groups[1:], limbs, free[1:], strict=True):
+        complete = known[list(bones)].all()
+        prior = exemplars.cost(bones, shown, SINGLE_FRAME) if exemplars and complete else 0.0
+        each.append(cost[0] + prior if complete else contradiction + 0 * cost[0])
+    if exemplars and anatomy.trunk:
+        trunk = trunk + exemplars.cost(anatomy.trunk, shown, SINGLE_FRAME)
+    return _SignCosts(groups, trunk[0], tuple(each))
 
 
 def _contradicts(bones: tuple[int, ...], nearer: Int[np.ndarray, "B"]) -> Float[np.ndarray, "S"]:
@@ -139,58 +145,66 @@ def _contradicts(bones: tuple[int, ...], nearer: Int[np.ndarray, "B"]) -> Float[
     return (sign_states(len(bones)) * nearer[list(bones)] > 0).sum(axis=1).astype(float)
 
 
-def _vary(costs: _Costs) -> Iterator[tuple[float, tuple[int, ...]]]:
+@dataclass(frozen=True)
+class _RankedPose:
+    """States of the trunk and of each limb, and their cost, nats."""
+
+    cost: float
+    states: tuple[int, ...]
+
+
+def _enumerate_poses(costs: _SignCosts) -> Iterator[_RankedPose]:
     """For every state of the trunk its cheapest limbs, and these with one limb changed."""
     for s, trunk in enumerate(costs.trunk.tolist()):
         best = [int(limb[s].argmin()) for limb in costs.limbs]
         total = trunk + sum(float(limb[s].min()) for limb in costs.limbs)
-        yield total, (s, *best)
+        yield _RankedPose(total, (s, *best))
         for place, limb in enumerate(costs.limbs):
             for state in set(range(limb.shape[1])) - {best[place]}:
                 changed = (s, *best[:place], state, *best[place + 1 :])
-                yield total + float(limb[s, state] - limb[s].min()), changed
+                yield _RankedPose(total + float(limb[s, state] - limb[s].min()), changed)
 
 
-def _sureness(costs: _Costs, sign: Int[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
+def _sign_certainty(costs: _SignCosts, sign: Int[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
     """|2 p - 1| of each sign's probability p over all poses."""
     likely = [np.exp(limb.min(axis=1, keepdims=True) - limb) for limb in costs.limbs]
     best = costs.trunk + sum(limb.min(axis=1) for limb in costs.limbs)
     trunk = np.exp(best.min() - best) * np.prod([limb.sum(axis=1) for limb in likely], axis=0)
     trunk = trunk / trunk.sum()
     shares = [trunk, *(trunk @ (limb / limb.sum(axis=1, keepdims=True)) for limb in likely)]
-    sure = np.zeros(len(sign))
+    certainty = np.zeros(len(sign))
     for bones, share in zip(costs.groups, shares, strict=True):
         agree = sign_states(len(bones)) == sign[list(bones)]
-        sure[list(bones)] = np.abs(2 * (share[:, None] * agree).sum(axis=0) - 1)
-    return sure
+        certainty[list(bones)] = np.abs(2 * (share[:, None] * agree).sum(axis=0) - 1)
+    return certainty
 
 
 def _points(
-    sighting: Sighting, depth: Float[np.ndarray, "B"], skeleton: Skeleton
+    observation: FrameObservation, depth: Float[np.ndarray, "B"], skeleton: Skeleton
 ) -> Float[np.ndarray, "J 3"]:
     """Joints where the picture has them, depths added up from the root."""
     along = skeleton.ancestry @ depth
-    along = np.where(np.isfinite(sighting.joints[:, 0]), along, np.nan)
-    middle = np.nanmean(sighting.joints, axis=0) if np.isfinite(along).any() else np.zeros(2)
-    return np.column_stack([sighting.joints - middle, along])
+    along = np.where(np.isfinite(observation.joints[:, 0]), along, np.nan)
+    middle = np.nanmean(observation.joints, axis=0) if np.isfinite(along).any() else np.zeros(2)
+    return np.column_stack([observation.joints - middle, along])
 
 
 def _differing(
-    sighting: Sighting,
+    observation: FrameObservation,
     depth: Float[np.ndarray, "B"],
-    poses: tuple[_Costs, list[tuple[float, tuple[int, ...]]]],
+    costs: _SignCosts,
+    ranked: list[_RankedPose],
     skeleton: Skeleton,
 ) -> Iterator[Alternative]:
     """The cheapest poses of which each looks different from all before it."""
-    costs, ranked = poses
-    ways, least = skeleton.ancestry, ranked[0][0]
-    seen = [ways @ (depth * costs.signs(ranked[0][1]))]
-    for cost, states in ranked[1:]:
-        if cost - least > PLAUSIBLE or len(seen) > ALTERNATIVES:
+    chains, least = skeleton.ancestry, ranked[0].cost
+    offered = [chains @ (depth * costs.signs(ranked[0].states))]
+    for pose in ranked[1:]:
+        if pose.cost - least > MAX_EXTRA_COST or len(offered) > MAX_ALTERNATIVES:
             return
-        sign = costs.signs(states)
-        along = ways @ (depth * sign)
-        if min(np.abs(along - other).max() for other in seen) > DIFFERENT:
-            seen.append(along)
-            points = _points(sighting, depth * sign, skeleton)
-            yield Alternative(-sign, points, cost - least)
+        sign = costs.signs(pose.states)
+        along = chains @ (depth * sign)
+        if min(np.abs(along - other).max() for other in offered) > MIN_DEPTH_CHANGE:
+            offered.append(along)
+            points = _points(observation, depth * sign, skeleton)
+            yield Alternative(-sign, points, pose.cost - least)

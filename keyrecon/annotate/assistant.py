@@ -1,7 +1,7 @@
-"""What the page shows that must be computed; filled in by keyrecon.assist.
+"""What the page shows that must be computed; filled in by keyrecon.annotate.assist.
 
 The server knows these functions only by their signatures. A field left None means that there is
-no such help, and its route answers with nothing. Results are ready for JSON (no NaN). The
+no such function, and its route answers with nothing. Results are ready for JSON (no NaN). The
 server calls them in worker threads, one call of each kind at a time; KeyreconError is shown.
 """
 
@@ -20,17 +20,17 @@ Signs = dict[str, int]
 
 @dataclass(frozen=True)
 class Assistant:
-    """Help that can be asked for."""
+    """What can be computed while a person marks."""
 
     keyframes: Callable[[dict[int, str]], Json] | None = None
-    """Own frames -> {"frames": {frame: {"stands_for", "why"}}, "height_px"}."""
-    ghost: Callable[[Annotations, int], Json] | None = None
+    """Added keyframes -> {"frames": {frame: {"stands_for", "why"}}, "height_px"}."""
+    suggestion: Callable[[Annotations, int], Json] | None = None
     """Where the joints of a frame probably are, from the frames annotated so far."""
     pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None
     """A frame's body in space from its marks and signs, and the most plausible alternatives."""
     checks: Callable[[Annotations], list[Json]] | None = None
-    """Marks to look at again, most suspicious first."""
-    suggest: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
+    """Marks that look wrong, most suspicious first."""
+    next_frames: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
     """Frames where one more annotation would help most, none of those taken already."""
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
     """Head and feet found on a few frames with these picks."""
