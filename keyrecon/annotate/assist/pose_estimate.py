@@ -2,8 +2,8 @@
 
 Taylor's reconstruction leaves the sign of every bone's depth open. Sign vectors of the trunk, and
 of each limb given the trunk, are weighed by what bodies do (`lifting.anatomy`) and by the keyframes
-whose signs a person gave, where they look alike in the picture. The least cost is the pose
-shown; sums over exp(-cost) say how certain each sign is; the next cheapest poses that differ to the
+whose signs a person gave, where they look alike in the picture. The cheapest pose is the
+estimate; sums over exp(-cost) say how certain each sign is; the next cheapest poses that differ to the
 eye are the alternatives. Signs that the person gave hold.
 """
 
@@ -50,7 +50,7 @@ class Alternative:
     nearer: Int[np.ndarray, "B"]
     points3d: Float[np.ndarray, "J 3"]
     cost: float
-    """Above that of the pose shown, nats."""
+    """Above that of the most plausible pose, nats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,25 +98,27 @@ def estimate_pose(
     """
     ends = observation.joints[skeleton.bones]
     known = np.isfinite(ends).all(axis=(1, 2))
-    shown = foreshorten_bones(
+    foreshortened = foreshorten_bones(
         observation.joints[None], observation.spread[None], size.lengths, skeleton
     )
-    shown = replace(shown, depth=shown.depth * known)
-    costs = _cost_signs(shown, observation.nearer, known, size, skeleton, exemplars)
+    foreshortened = replace(foreshortened, depth=foreshortened.depth * known)
+    costs = _cost_signs(foreshortened, observation.nearer, known, size, skeleton, exemplars)
     ranked = sorted(_enumerate_poses(costs), key=lambda pose: pose.cost)
     sign = costs.signs(ranked[0].states)
     given = observation.nearer != 0
     return PoseEstimate(
-        points3d=_points(observation, shown.depth[0] * sign, skeleton),
+        points3d=_points(observation, foreshortened.depth[0] * sign, skeleton),
         nearer=-sign,
         certainty=np.where(given, 1.0, _sign_certainty(costs, sign) * known),
         stretch=np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) / size.lengths,
-        alternatives=tuple(_differing(observation, shown.depth[0], costs, ranked, skeleton)),
+        alternatives=tuple(
+            _differing(observation, foreshortened.depth[0], costs, ranked, skeleton)
+        ),
     )
 
 
 def _cost_signs(
-    shown: ForeshortenedBones,
+    foreshortened: ForeshortenedBones,
     nearer: Int[np.ndarray, "B"],
     known: Bool[np.ndarray, "B"],
     size: BodySize,
@@ -125,7 +127,7 @@ def _cost_signs(
 ) -> _SignCosts:
     """Costs of all states; where joints are unknown only what the person said counts."""
     anatomy = anatomy_of(skeleton)
-    trunk, limbs = sign_costs(shown, nearer[None], size.breadths, skeleton, SINGLE_FRAME)
+    trunk, limbs = sign_costs(foreshortened, nearer[None], size.breadths, skeleton, SINGLE_FRAME)
     groups = (anatomy.trunk, *(limb.bones for limb in anatomy.limbs))
     free = [SINGLE_FRAME.annotated * _contradicts(bones, nearer) for bones in groups]
     if not known[list(anatomy.trunk)].all():
@@ -133,10 +135,12 @@ def _cost_signs(
     each = []
     for bones, cost, contradiction in zip(groups[1:], limbs, free[1:], strict=True):
         complete = known[list(bones)].all()
-        prior = exemplars.cost(bones, shown, SINGLE_FRAME) if exemplars and complete else 0.0
+        prior = (
+            exemplars.cost(bones, foreshortened, SINGLE_FRAME) if exemplars and complete else 0.0
+        )
         each.append(cost[0] + prior if complete else contradiction + 0 * cost[0])
     if exemplars and anatomy.trunk:
-        trunk = trunk + exemplars.cost(anatomy.trunk, shown, SINGLE_FRAME)
+        trunk = trunk + exemplars.cost(anatomy.trunk, foreshortened, SINGLE_FRAME)
     return _SignCosts(groups, trunk[0], tuple(each))
 
 
