@@ -1,10 +1,10 @@
 """The 3D pose of one keyframe while it is being marked.
 
 Taylor's reconstruction leaves the sign of every bone's depth open. Sign vectors of the trunk, and
-of each limb given the trunk, are weighed by what bodies do (`lifting.anatomy`) and by the keyframes
-whose signs a person gave, where they look alike in the picture. The cheapest pose is the
-estimate; sums over exp(-cost) say how certain each sign is; the next cheapest poses that differ to the
-eye are the alternatives. Signs that the person gave hold.
+of each limb given the trunk, cost what is unusual for bodies (`lifting.priors.anatomy`) and unlike
+the keyframes whose signs a person gave, where they look alike in the picture. The cheapest pose is
+the estimate; sums over exp(-cost) say how certain each sign is; the next cheapest poses that differ
+to the eye are the alternatives. Signs that the person gave hold.
 """
 
 from collections.abc import Iterator
@@ -64,7 +64,7 @@ class PoseEstimate:
     certainty: Float[np.ndarray, "B"]
     """0 a coin toss, 1 certain; 1 where the person gave the sign, 0 where an end is unknown."""
     stretch: Float[np.ndarray, "B"]
-    """Shown length over the bone's length; much above 1 it cannot be. NaN where unknown."""
+    """Length in the picture over the bone's length; well above 1 it cannot be. NaN where unknown."""
     alternatives: tuple[Alternative, ...]
 
 
