@@ -64,7 +64,7 @@ class PoseEstimate:
     certainty: Float[np.ndarray, "B"]
     """0 a coin toss, 1 certain; 1 where the person gave the sign, 0 where an end is unknown."""
     stretch: Float[np.ndarray, "B"]
-    """Length in the picture over the bone's length; well above 1 it cannot be. NaN where unknown."""
+    """Length in the picture over the bone's length; cannot be well above 1. NaN: unknown."""
     alternatives: tuple[Alternative, ...]
 
 
