@@ -1,8 +1,8 @@
 """How much the result hangs on each number that somebody set.
 
     python benchmarks/sensitivity.py [--work DIR] [--mocap DIR] [--videos DIR] [--frames N]
-        [--only CLIP ...] [--package FOLDER ...] [--constants NAME ...] [--clicks] [--workers N]
-        [--out CSV] [--plan | --summary]
+        [--only CLIP ...] [--package FOLDER ...] [--constants NAME ...] [--factors X ...]
+        [--clicks] [--workers N] [--out CSV] [--plan | --summary]
 
 Every tuned number (see tuned_numbers.py) by +-25 % on the rendered sequences and on the real clips
 whose marks are kept: change of carried PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs
@@ -178,9 +178,9 @@ def foresee(base: Base, first: str) -> float:
     return START + sum(base.seconds[s] for s in stages[stages.index(first) :])
 
 
-def changes_of(number: TunedNumber, first: str) -> Iterator[Change]:
-    """A number by a quarter less and more."""
-    for factor in FACTORS:
+def changes_of(number: TunedNumber, first: str, factors: Iterable[float]) -> Iterator[Change]:
+    """A number times each factor."""
+    for factor in factors:
         new = [vary(value, factor) for value in number.values]
         yield Change(
             number.key, f"x{factor}", first, number.line, shorten(number.values), shorten(new),
@@ -222,7 +222,9 @@ def plan(bench: Bench, clips: list[str]) -> tuple[list[tuple[str, Change]], list
         if first is None or not using:
             unused.append(number)
             continue
-        todo += [(clip, change) for change in changes_of(number, first) for clip in using]
+        todo += [
+            (clip, change) for change in changes_of(number, first, words.factors) for clip in using
+        ]
     if words.clicks:
         rendered = set(clips) & set(RENDERED)  # a real clip's marks cannot be clicked again
         todo += [
@@ -315,6 +317,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names of sequences and real clips")
     parser.add_argument("--package", nargs="*", choices=FOLDERS)
     parser.add_argument("--constants", nargs="*", help="NAME, Record.field or file:name")
+    parser.add_argument("--factors", nargs="*", type=float, default=FACTORS)
     parser.add_argument("--clicks", action="store_true", help="move picks, too")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("benchmarks/work/sensitivity.csv"))
@@ -330,9 +333,9 @@ def main() -> None:
             print(f"{clip:<20}{change.first:<12}{change.number} {change.old} -> {change.new}")
     elif not words.summary:
         measure_all(bench, todo)
-    asked = {(clip, change.number) for clip, change in todo}
+    asked = {(clip, change.number, change.change) for clip, change in todo}
     rows = [r for r in bench.rows if r.code == bench.code and r.frames == bench.frames]
-    print_summary([r for r in rows if (r.clip, r.number) in asked], unused)
+    print_summary([r for r in rows if (r.clip, r.number, r.change) in asked], unused)
 
 
 if __name__ == "__main__":
