@@ -40,14 +40,14 @@ def learn_from_files(
 ) -> DepthModel:
     """A depth model of the captures in files and folders, and of the built-in tennis."""
     files = find_captures(paths)
-    captures = [_read(file) for file in files]
+    captures = [read_poses(file) for file in files]
     captures += [play_tennis(MotionOptions(fps=RATE, seed=seed)) for seed in range(PLAYED)]
     names = ", ".join(file.stem for file in files)
     provenance = f"learnt from {len(files)} captures ({names}) and the built-in tennis"
     return train_depth_model(captures, provenance, options, progress)
 
 
-def _read(file: Path) -> Float[np.ndarray, "_ 14 3"]:
+def read_poses(file: Path) -> Float[np.ndarray, "_ 14 3"]:
     """Joints of a capture, `RATE` poses a second."""
     capture = read_capture(file)
     last = len(capture.joints) / capture.fps - TRIM

@@ -134,7 +134,7 @@ def leg_cost(
 ) -> Float[np.ndarray, "..."]:
     """Knees bend backwards; the rest is habit. `side` is 1 for the right leg, -1 for the left."""
     bend = (np.cross(thigh, shank) * hips).sum(-1)
-    axes = _square_axes(hips, up, side)
+    axes = limb_axes(hips, up, side)
     return hinge(bend + 0.05, 0.1) + posture_cost(thigh, shank, axes, "leg")
 
 
@@ -146,10 +146,10 @@ def arm_cost(
     side: int,
 ) -> Float[np.ndarray, "..."]:
     """Habit alone: shoulder and elbow together leave an arm nearly free."""
-    return posture_cost(upper, forearm, _square_axes(shoulders, up, side), "arm")
+    return posture_cost(upper, forearm, limb_axes(shoulders, up, side), "arm")
 
 
-def _square_axes(
+def limb_axes(
     across: Float[np.ndarray, "*#n 3"], up: Float[np.ndarray, "*#n 3"], side: int
 ) -> tuple[Float[np.ndarray, "*#n 3"], ...]:
     """Outward on one side, up, forward; at right angles."""
