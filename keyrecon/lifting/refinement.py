@@ -55,8 +55,8 @@ class RefineOptions:
     """How far a bone may turn away from the slerped key poses at no great cost, radians."""
     step: float = 0.2
     """lambda of Fig. 9."""
-    descents: int = 40
-    """Iterations of Fig. 9; more of them drain the depth."""
+    descents: int = 3000
+    """Iterations of Fig. 9 at most; it stops where it has converged."""
     sigma: float = 0.5
     """Standard deviation of the low-pass of Fig. 9, frames."""
 

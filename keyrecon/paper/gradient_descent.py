@@ -1,13 +1,33 @@
-"""The manifold of valid motions (Section 6.2): constant bone lengths and smooth paths.
+"""Projected gradient descent as printed (Section 6.2, Eq. 5 and 6, Fig. 9).
 
-Each constraint is a `Projection`, positions -> positions. A second projection of the lengths
-leaves the motion alone. Repeated inside the descent the low-pass bites harder than once: with
-step lambda the loop's gain is lambda H / (1 - (1 - lambda) H), so its -3 dB point lies where a
-single pass still has H = 0.707 / (lambda + 0.707 (1 - lambda)), 0.923 for lambda = 0.2.
+Joints move towards the observed ones, then onto the manifold of valid motions: constant bone
+lengths and smooth paths. Each constraint is a `Projection`, positions -> positions. A second
+projection of the lengths leaves the motion alone. Repeated inside the descent the low-pass bites
+harder than once: with step lambda the loop's gain is lambda H / (1 - (1 - lambda) H), so its -3 dB
+point lies where a single pass still has H = 0.707 / (lambda + 0.707 (1 - lambda)), 0.923 for
+lambda = 0.2. The low-pass acts on the depth too, where no data pull: the longer the descent, the
+flatter the motion.
 
-Projected gradient descent as printed in the paper (Fig. 9).
+Section  | what is open              | chosen                          | why
+-------- | ------------------------- | ------------------------------- | -------------------------
+Eq. 6    | joints that are missing   | they do not pull                | "revert to the smooth
+         |                           |                                 | interpolation" (Section 7)
+Fig. 9/1 | one similarity or one per | translation per frame, one      | a player moves about and
+         | frame                     | rotation in the image; scale of | the camera pans; one turn
+         |                           | each frame from limb lengths    | of the camera
+Fig. 9/3 | the gradient's factor 2   | E with a factor one half        | with it 0 < lambda <= 1
+         |                           |                                 | ends on the data
+Fig. 9/4 | how lengths are reset     | from the root to the leaves     | keeps all directions
+Fig. 9/4 | the low-pass              | Gaussian, 0.5 frames, no phase  | not named in the text
+Fig. 9/4 | which comes first         | lengths, then low-pass, and     | the order of the text; the
+         |                           | lengths once more at the end    | result has exact lengths
+Fig. 9/5 | when it has converged     | rms change below 1e-5 body      | a fiftieth of a millimetre
+         |                           | heights                         |
+7        | how outliers are detected | spikes against the initial      | "discontinuities in the 3D
+         |                           | motion, before the descent      | motion"
 """
 
+import logging
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -15,6 +35,11 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import Skeleton
+
+logger = logging.getLogger(__name__)
+
+CONVERGED = 1e-5
+"""Rms change of all coordinates in one iteration, body heights: a fiftieth of a millimetre."""
 
 Projection = Callable[[Float[np.ndarray, "T J 3"]], Float[np.ndarray, "T J 3"]]
 
@@ -55,17 +80,18 @@ def descend(
 ) -> Float[np.ndarray, "T J 3"]:
     """Steps 3 to 5: move joints towards the observed ones, then onto the constraints, again.
 
-    Eq. 6 with a factor one half, so that a step of 1 lands on the data; missing joints (NaN)
-    do not pull, and nothing pulls along the depth. Positions in units of length.
+    Missing joints (NaN) do not pull, and nothing pulls along the depth. Positions in units of
+    length. Says so where it has not converged after `rounds` iterations.
     """
     points = start
     for _ in range(rounds):
-        pull = np.nan_to_num(points[..., :2] - observed)
-        moved = np.concatenate([points[..., :2] - step * pull, points[..., 2:]], axis=-1)
+        gradient = np.nan_to_num(points[..., :2] - observed)
+        moved = np.concatenate([points[..., :2] - step * gradient, points[..., 2:]], axis=-1)
         for project in projections:
             moved = project(moved)
         change = np.sqrt(((moved - points) ** 2).mean())
         points = moved
-        if change < 1e-5:
-            break
+        if change < CONVERGED:
+            return points
+    logger.warning("The descent has not converged after %d iterations.", rounds)
     return points

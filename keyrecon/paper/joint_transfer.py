@@ -1,20 +1,33 @@
-"""Refinement of joints by appearance and apparent limb lengths: a tree of patches.
+"""The paper's way to the joints of a frame (Section 5).
 
-Around every estimate lies a grid of places. A place is good where the picture looks like the
-keyframe around the joint (normalised cross-correlation, the patch turned by the limb's change of
-direction) and near the estimate; two places are good together where the limb between them has the
-keyframe's length times the common change of scale of all limbs. The best choice for all joints of
-a tree is found exactly, from the leaves to the root (Felzenszwalb and Huttenlocher, IJCV 61, 2005).
+The keyframe assigned to the frame is aligned with it and corresponded with it edge element by edge
+element (`keyrecon.keyframes.edge_distance.match_edges`). The elements in the vicinity of a joint
+define its translation. Appearance and the keyframe's ratios of apparent limb lengths then refine
+the estimates: around every estimate lies a grid of positions; a position is good where the picture
+is like the keyframe around the joint and near the estimate; two positions are good together where
+the limb between them has the keyframe's length times the common change of scale of all limbs. The
+best choice for all joints of a tree is found exactly, from the leaves to the root (Felzenszwalb and
+Huttenlocher, IJCV 61, 2005).
 
-The paper's way to the joints of a frame (Section 5).
-
-The keyframe assigned to the frame is aligned with it by head or feet and corresponded with it edge
-element by edge element (`distance.match_edges`). The elements around a joint define its
-translation: the geometric median of theirs, near ones counting more. Where too few of them find a
-match the joint is missing, and so is a joint that is hidden in the keyframe. Appearance and the
-keyframe's apparent limb lengths then refine the estimates (`patches.py`).
-
-Each half of the body has its own keyframes, so a bone between two halves is not compared.
+Section | what is open                 | chosen                         | why
+------- | ---------------------------- | ------------------------------ | --------------------------
+5       | how a keyframe is aligned    | head (upper) or mid-feet       | as its pose distance is
+        |                              | (lower), scaled by height      | (Section 4.2)
+5       | the vicinity of a joint      | .12 player heights, weights    | about a thigh's width
+        |                              | fall off with a spread of .06  |
+5       | the translation from several | weighted geometric median      | wrong matches in a minority
+        | correspondences              |                                | do not move it
+5       | too few correspondences      | the joint is missing           | Section 6.2 has missing
+        |                              |                                | estimates
+5       | joints hidden in a keyframe  | missing                        | "due to self-occlusion",
+        |                              |                                | Section 6.2
+5       | appearance of a joint        | normalised cross-correlation   | invariant to lighting
+        |                              | of a patch turned with the limb|
+5       | how limb length ratios are   | Gaussian of their logarithm on | exact optimum of both;
+        | enforced                     | a tree of joints               | [14] gives no numbers
+5       | bones between the halves     | not compared                   | each half has keyframes of
+        |                              |                                | its own (Section 4.3)
+5       | frames far from any keyframe | limb lengths twice as free     | theirs is another pose
 """
 
 from collections.abc import Iterator
@@ -30,23 +43,23 @@ from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Edges, HalfKeyframes, HalfName, JointTracks, Preparation
 
-DETAIL = 125
+PIXELS_PER_HEIGHT = 125
 """Pixels per player height in the pictures compared: one pixel is one step of the grid."""
 SEARCH_RADIUS = 7
 """Steps of the grid to each side: .056 player heights."""
-PATCH = 13
+PATCH_SIZE = 13
 """Side of a patch, px: a tenth of a player height, wider than a forearm."""
 APPEARANCE_WEIGHT = 1.0
 """Weight of appearance."""
 LENGTH_SPREAD = 0.12
 """Spread of the logarithm of a limb's relative length; twice that far from any keyframe."""
-PLACE_SPREAD = (0.015, 0.06)
+POSITION_SPREAD = (0.015, 0.06)
 """Least and largest spread of an estimate, player heights."""
 
 
 @dataclass(frozen=True, eq=False)
 class PatchSource:
-    """A grey picture in which the player has roughly `DETAIL` pixels."""
+    """A grey picture in which the player has roughly `PIXELS_PER_HEIGHT` pixels."""
 
     grey: UInt8[np.ndarray, "h w"]
     shrink: float
@@ -59,7 +72,9 @@ class PatchSource:
     @staticmethod
     def width_for(video: Video, height: Float[np.ndarray, "T"]) -> int:
         """Width to reduce the video to; never enlarged."""
-        return min(video.width, round(video.width * 1.25 * DETAIL / float(np.median(height))))
+        return min(
+            video.width, round(video.width * 1.25 * PIXELS_PER_HEIGHT / float(np.median(height)))
+        )
 
     def around(self, origin: Float[np.ndarray, "2"]) -> "PatchSource":
         """The same with another origin."""
@@ -69,7 +84,7 @@ class PatchSource:
         self, center: Float[np.ndarray, "2"], size: int, turn: float = 0.0
     ) -> UInt8[np.ndarray, "s s"]:
         """Square of `size` px around a point in player coordinates, turned by `turn` rad."""
-        scale = self.height * self.shrink / DETAIL
+        scale = self.height * self.shrink / PIXELS_PER_HEIGHT
         middle = (self.origin + center * self.height + 0.5) * self.shrink - 0.5
         cosine, sine = scale * np.cos(turn), scale * np.sin(turn)
         matrix = np.array([[cosine, sine, 0], [-sine, cosine, 0]])
@@ -98,68 +113,68 @@ class JointSearch:
 def refine_joints(
     keyframe: PatchSource,
     frame: PatchSource,
-    sought: JointSearch,
+    search: JointSearch,
     bones: Int[np.ndarray, "B 2"],
     origin: Float[np.ndarray, "2"],
 ) -> Float[np.ndarray, "J 2"]:
     """Joints in px of the video; NaN where the estimate is missing."""
     frame = frame.around(origin)
-    there = np.isfinite(sought.estimate).all(axis=1)
+    there = np.isfinite(search.estimate).all(axis=1)
     bones = bones[there[bones].all(axis=1)]
     if not there.any():
-        return np.full(sought.estimate.shape, np.nan)
+        return np.full(search.estimate.shape, np.nan)
     offsets = _grid()
     cost = {
-        int(j): _place_cost(keyframe, frame, sought, int(j), _turn(sought, bones, int(j)))
+        int(j): _position_cost(keyframe, frame, search, int(j), _turn(search, bones, int(j)))
         for j in np.flatnonzero(there)
     }
-    best = _best_places(cost, sought, bones, offsets)
-    found = np.full(sought.estimate.shape, np.nan)
+    best = _best_positions(cost, search, bones, offsets)
+    refined = np.full(search.estimate.shape, np.nan)
     for j, place in best.items():
-        found[j] = sought.estimate[j] + offsets[place]
-    return origin + found * frame.height
+        refined[j] = search.estimate[j] + offsets[place]
+    return origin + refined * frame.height
 
 
 def _grid() -> Float[np.ndarray, "G 2"]:
     y, x = np.mgrid[-SEARCH_RADIUS : SEARCH_RADIUS + 1, -SEARCH_RADIUS : SEARCH_RADIUS + 1]
-    return np.stack([x.ravel(), y.ravel()], axis=1) / DETAIL
+    return np.stack([x.ravel(), y.ravel()], axis=1) / PIXELS_PER_HEIGHT
 
 
-def _turn(sought: JointSearch, bones: Int[np.ndarray, "B 2"], joint: int) -> float:
+def _turn(search: JointSearch, bones: Int[np.ndarray, "B 2"], joint: int) -> float:
     """Change of direction of the limb that ends at a joint, or else of one that starts there."""
     ending = bones[bones[:, 1] == joint]
     limbs = ending if len(ending) else bones[bones[:, 0] == joint]
     if not len(limbs):
         return 0.0
     parent, child = limbs[0]
-    before, now = (p[child] - p[parent] for p in (sought.model, sought.estimate))
+    before, now = (p[child] - p[parent] for p in (search.model, search.estimate))
     return float(np.arctan2(now[1], now[0]) - np.arctan2(before[1], before[0]))
 
 
-def _place_cost(
-    keyframe: PatchSource, frame: PatchSource, sought: JointSearch, joint: int, turn: float
+def _position_cost(
+    keyframe: PatchSource, frame: PatchSource, search: JointSearch, joint: int, turn: float
 ) -> Float[np.ndarray, "G"]:
-    """Cost of each place of the grid by looks and by distance from the estimate."""
-    patch = keyframe.cut(sought.model[joint], PATCH, turn)
-    around = frame.cut(sought.estimate[joint], PATCH + 2 * SEARCH_RADIUS)
+    """Cost of each position of the grid by appearance and by distance from the estimate."""
+    patch = keyframe.cut(search.model[joint], PATCH_SIZE, turn)
+    around = frame.cut(search.estimate[joint], PATCH_SIZE + 2 * SEARCH_RADIUS)
     alike = cv2.matchTemplate(around, patch, cv2.TM_CCOEFF_NORMED).ravel()
     alike = np.nan_to_num(np.clip(alike, -1, 1), posinf=0, neginf=0)
-    spread = np.clip(sought.spread[joint], *PLACE_SPREAD)
+    spread = np.clip(search.spread[joint], *POSITION_SPREAD)
     return APPEARANCE_WEIGHT * (1 - alike) + (_grid() ** 2).sum(axis=1) / (2 * spread**2)
 
 
-def _best_places(
+def _best_positions(
     cost: dict[int, Float[np.ndarray, "G"]],
-    sought: JointSearch,
+    search: JointSearch,
     bones: Int[np.ndarray, "B 2"],
     offsets: Float[np.ndarray, "G 2"],
 ) -> dict[int, int]:
-    """Cheapest place of every joint, exactly; `bones` lead outwards from the roots."""
-    wanted = _wanted_lengths(sought, bones)
-    spread = LENGTH_SPREAD * (1 if sought.represented else 2)
+    """Cheapest position of every joint, exactly; `bones` lead outwards from the roots."""
+    targets = _target_lengths(search, bones)
+    spread = LENGTH_SPREAD * (1 if search.represented else 2)
     total, choice = dict(cost), {}
-    for (parent, child), length in reversed(list(zip(bones.tolist(), wanted, strict=True))):
-        bone = sought.estimate[child] - sought.estimate[parent]
+    for (parent, child), length in reversed(list(zip(bones.tolist(), targets, strict=True))):
+        bone = search.estimate[child] - search.estimate[parent]
         ends = bone + offsets[None] - offsets[:, None]
         ratio = np.log(np.maximum((ends**2).sum(axis=2), 1e-8) / length**2) / 2
         sums = total[child] + ratio**2 / (2 * spread**2)
@@ -172,24 +187,24 @@ def _best_places(
     return best
 
 
-def _wanted_lengths(sought: JointSearch, bones: Int[np.ndarray, "B 2"]) -> Float[np.ndarray, "B"]:
+def _target_lengths(search: JointSearch, bones: Int[np.ndarray, "B 2"]) -> Float[np.ndarray, "B"]:
     """The keyframe's limb lengths times the median change of all of them."""
     if not len(bones):
         return np.zeros(0)
     before, now = (
         np.maximum(np.linalg.norm(p[bones[:, 1]] - p[bones[:, 0]], axis=1), 0.01)
-        for p in (sought.model, sought.estimate)
+        for p in (search.model, search.estimate)
     )
     return before * np.median(now / before)
 
 
-AROUND = 0.12
-"""Elements this close to a joint move it, player heights: about a thigh's width."""
-NEAR = 0.06
+VICINITY_RADIUS = 0.12
+"""Elements this close to a joint define its translation, player heights: about a thigh's width."""
+VICINITY_SPREAD = 0.06
 """Spread of the weight of elements around a joint, player heights."""
-LEAST_ELEMENTS, LEAST_SHARE = 5, 0.3
+MIN_ELEMENTS, MIN_MATCHED_SHARE = 5, 0.3
 """Matched elements, and weighted share of the elements around, below which a joint is missing."""
-ROUNDS = 20
+WEISZFELD_ITERATIONS = 20
 """Of Weiszfeld's iteration, which has converged to a hundredth of the spread by then."""
 
 
@@ -200,7 +215,7 @@ class TransferModel:
     edges: Edges
     joints: Float[np.ndarray, "J 2"]
     """Player heights; NaN where missing or hidden."""
-    scenery: PatchSource
+    picture: PatchSource
 
 
 def transfer_joints(
@@ -216,8 +231,8 @@ def transfer_joints(
     joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
     source = np.zeros(shape, dtype=np.int64)
     bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
-    frames = progress(_sceneries(preparation), "carrying joints", shape[0])
-    for t, scenery in enumerate(frames):
+    frames = progress(_grey_pictures(preparation), "propagating joints", shape[0])
+    for t, picture in enumerate(frames):
         for name, members in (("upper", ~is_lower), ("lower", is_lower)):
             keyframes = getattr(preparation.keyframes, name)
             source[t, members] = keyframes.nearest[t]
@@ -225,13 +240,13 @@ def transfer_joints(
             if model is None:
                 continue
             edges = align_edges(preparation.contours.edges[t], preparation.track, t, name)
-            sought, share = _shift_joints(model, edges, bool(keyframes.represented[t]))
-            found = refine_joints(
-                model.scenery, scenery, sought, bones, _anchor(preparation, t, name)
+            search, share = _shift_joints(model, edges, bool(keyframes.represented[t]))
+            refined = refine_joints(
+                model.picture, picture, search, bones, _anchor(preparation, t, name)
             )
-            joints[t, members] = found[members]
+            joints[t, members] = refined[members]
             likeness = np.exp(-keyframes.distance[t] / keyframes.beta)
-            confidence[t, members] = np.where(np.isnan(found[:, 0]), 0, share * likeness)[members]
+            confidence[t, members] = np.where(np.isnan(refined[:, 0]), 0, share * likeness)[members]
     return JointTracks(joints, confidence, source)
 
 
@@ -240,7 +255,7 @@ def _anchor(preparation: Preparation, frame: int, name: HalfName) -> Float[np.nd
     return (preparation.track.head if name == "upper" else preparation.track.mid_feet)[frame]
 
 
-def _sceneries(preparation: Preparation) -> Iterator[PatchSource]:
+def _grey_pictures(preparation: Preparation) -> Iterator[PatchSource]:
     """Grey pictures of all frames in one size of the player."""
     video = preparation.video
     width = PatchSource.width_for(video, preparation.track.height)
@@ -256,8 +271,8 @@ def _gather_models(
     width = PatchSource.width_for(video, preparation.track.height)
     for row, frame in enumerate(annotations.frames.tolist()):
         height = float(preparation.track.height[frame])
-        scenery = crop_patches(video.frame(frame, width), video.width, height)
-        seen = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
+        picture = crop_patches(video.frame(frame, width), video.width, height)
+        visible = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
         for name in ("upper", "lower"):
             half: HalfKeyframes = getattr(preparation.keyframes, name)
             if frame not in half.frames:
@@ -265,26 +280,26 @@ def _gather_models(
             origin = _anchor(preparation, frame, name)
             edges = align_edges(preparation.contours.edges[frame], preparation.track, frame, name)
             members = annotations.skeleton.is_lower == (name == "lower")
-            joints = np.where(members[:, None], (seen - origin) / height, np.nan)
-            models[name, frame] = TransferModel(edges, joints, scenery.around(origin))
+            joints = np.where(members[:, None], (visible - origin) / height, np.nan)
+            models[name, frame] = TransferModel(edges, joints, picture.around(origin))
     return models
 
 
 def _shift_joints(
     model: TransferModel, edges: Edges, represented: bool
 ) -> tuple[JointSearch, Float[np.ndarray, "J"]]:
-    """(estimates from local translation, share of the elements around that found a match)."""
+    """(estimates from local translation, share of the elements around that are matched)."""
     match, _ = match_edges(model.edges, edges)
-    found = match >= 0
+    matched = match >= 0
     moved = edges.points[match] - model.edges.points if len(edges.points) else np.zeros((0, 2))
     joints = np.full(model.joints.shape, np.nan)
-    spread, share = np.full(len(joints), NEAR), np.zeros(len(joints))
+    spread, share = np.full(len(joints), VICINITY_SPREAD), np.zeros(len(joints))
     for j in np.flatnonzero(np.isfinite(model.joints[:, 0])):
         away = np.linalg.norm(model.edges.points - model.joints[j], axis=1)
-        weight = np.where(away < AROUND, np.exp(-0.5 * (away / NEAR) ** 2), 0)
-        share[j] = weight[found].sum() / max(weight.sum(), 1e-9)
-        used = found & (weight > 0)
-        if used.sum() < LEAST_ELEMENTS or share[j] < LEAST_SHARE:
+        weight = np.where(away < VICINITY_RADIUS, np.exp(-0.5 * (away / VICINITY_SPREAD) ** 2), 0)
+        share[j] = weight[matched].sum() / max(weight.sum(), 1e-9)
+        used = matched & (weight > 0)
+        if used.sum() < MIN_ELEMENTS or share[j] < MIN_MATCHED_SHARE:
             share[j] = 0
             continue
         shift = geometric_median(moved[used], weight[used])
@@ -298,7 +313,7 @@ def geometric_median(
 ) -> Float[np.ndarray, "2"]:
     """Point with the least weighted sum of distances (Weiszfeld 1937)."""
     center = np.average(points, axis=0, weights=weight)
-    for _ in range(ROUNDS):
+    for _ in range(WEISZFELD_ITERATIONS):
         near = weight / np.maximum(np.linalg.norm(points - center, axis=1), 1e-4)
         center = near @ points / near.sum()
     return center
