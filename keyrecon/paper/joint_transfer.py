@@ -15,8 +15,8 @@ Section | what is open                 | chosen                         | why
         |                              | (lower), scaled by height      | (Section 4.2)
 5       | the vicinity of a joint      | .12 player heights, weights    | about a thigh's width
         |                              | fall off with a spread of .06  |
-5       | the translation from several | weighted geometric median      | wrong matches in a minority
-        | correspondences              |                                | do not move it
+5       | the translation from several | weighted geometric median      | a minority of wrong ones
+        | correspondences              |                                | does not move it
 5       | too few correspondences      | the joint is missing           | Section 6.2 has missing
         |                              |                                | estimates
 5       | joints hidden in a keyframe  | missing                        | "due to self-occlusion",
