@@ -36,7 +36,7 @@ from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 sys.path.append(str(Path(__file__).parent.parent / "tests" / "support"))
 from page_driver import SCREEN, Person, browser, serving
 
-SEEN = 0.02
+MAX_SUGGESTION_ERROR = 0.02
 """A suggestion is corrected where it is off by more than this share of the player's height."""
 LARGE = (1920, 1080)
 """Picture that switching between keyframes is timed with, px."""
@@ -91,19 +91,19 @@ def begin(demo: Path, name: str) -> Path:
 
 
 def mark_by_clicks(person: Person, frame: int, answers: Answers) -> Work:
-    """Every joint by a click, every depth settled; suggestions are not looked at."""
+    """Every joint by a click, every depth given; suggestions are not used."""
     person.open(frame)
     return finish(person, frame, answers, (person.clicks, person.drags, person.keys))
 
 
-def correct_suggestion(person: Person, frame: int, answers: Answers, seen: float) -> Work:
-    """Joints that are off by more than `seen` px are dragged, the rest is taken."""
+def correct_suggestion(person: Person, frame: int, answers: Answers, max_error: float) -> Work:
+    """Joints that are off by more than `max_error` px are dragged, the rest is taken."""
     person.open(frame)
     before = person.clicks, person.drags, person.keys
     offered = person.suggestion(frame)
     for joint, (x, y, _) in offered.items():
         place = answers.place(frame, joint)
-        if np.hypot(x - place[0], y - place[1]) > seen:
+        if np.hypot(x - place[0], y - place[1]) > max_error:
             person.drag((x, y), place)
     if offered:
         person.take_suggestion()
@@ -123,9 +123,9 @@ def finish(person: Person, frame: int, answers: Answers, before: tuple[int, int,
 def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work], list[float]]:
     """Mark the keyframes of a project through its page; work by keyframe, pose answers in ms.
 
-    Nobody looks at the lists of checks meanwhile, so they are not computed.
+    The lists of checks are not open meanwhile, so they are not computed.
     """
-    assistant = replace(make_assistant(Workspace(folder)), checks=None, suggest=None)
+    assistant = replace(make_assistant(Workspace(folder)), checks=None, next_frames=None)
     with browser() as chromium, serving(folder, assistant) as server:
         person = Person(chromium.new_context(viewport=SCREEN), server.credentials.address)
         work = [way(person, frame) for frame in show(frames, "Marking keyframes", len(frames))]
@@ -195,7 +195,7 @@ def on_both_ends(marks: Annotations) -> Annotations:
 def compare(demo: Path, answers: Answers, truth: Path) -> None:
     """Mark through the page and without it; print work and accuracy."""
     frames, facts = answers.marks.frames.tolist(), read_truth(truth)
-    tall = SEEN * float(np.median(np.ptp(facts["points2d"][..., 1], axis=1)))
+    tall = MAX_SUGGESTION_ERROR * float(np.median(np.ptp(facts["points2d"][..., 1], axis=1)))
     video = open_video(demo / "sequence" / "video.mp4")
     size = video.width, video.height
     imported = begin(demo, "imported")
@@ -203,7 +203,7 @@ def compare(demo: Path, answers: Answers, truth: Path) -> None:
     clicked, corrected = begin(demo, "clicked"), begin(demo, "corrected")
     by_clicks, poses = mark_all(clicked, frames, partial(mark_by_clicks, answers=answers))
     by_taking, _ = mark_all(
-        corrected, frames, partial(correct_suggestion, answers=answers, seen=tall)
+        corrected, frames, partial(correct_suggestion, answers=answers, max_error=tall)
     )
     print(f"\n{'per keyframe':<26}{'joints':>9}{'clicks':>9}{'drags':>9}{'keys':>9}"
           f"{'placing':>9}{'depth':>9}{'worst':>9}")  # fmt: skip

@@ -59,21 +59,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--demo", type=Path, default=Path("demo"), help="folder of keyrecon demo")
     parser.add_argument("--out", type=Path, default=Path("annotations/pictures"))
-    answer = parser.parse_args()
-    answers, folder = known_answers(answer.demo), begin(answer.demo, "tennis")
-    video = open_video(answer.demo / "sequence" / "video.mp4")
+    arguments = parser.parse_args()
+    answers, folder = known_answers(arguments.demo), begin(arguments.demo, "tennis")
+    video = open_video(arguments.demo / "sequence" / "video.mp4")
     size = video.width, video.height
     write_coco(folder / "annotations.json", first_third(answers.marks), size)
-    write_motion(folder / "motion.npz", read_motion(answer.demo / "project" / "motion.npz"))
+    write_motion(folder / "motion.npz", read_motion(arguments.demo / "project" / "motion.npz"))
     with browser() as chromium, serving(folder, make_assistant(Workspace(folder))) as server:
         context = chromium.new_context(viewport=SCREEN)
         person = Person(context, server.credentials.address)
-        show_keyframe(person, answers, int(answers.marks.frames[7]), answer.out)
+        show_keyframe(person, answers, int(answers.marks.frames[7]), arguments.out)
         for key, page, name in (("Alt+1", "pick", "colours"), ("Alt+3", "motion", "motion")):
             person.press(key)
             person.page.wait_for_selector(f"#{page}-picture[data-frame]")
             person.page.wait_for_timeout(4000)
-            photograph(person, answer.out, name)
+            photograph(person, arguments.out, name)
         context.close()
 
 

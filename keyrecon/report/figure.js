@@ -4,7 +4,7 @@ import { byId, data, unpack, count, frame, followers, restyled } from "./cursor.
 import { createFigure3d } from "./figure3d.js";
 
 const SIDES = ["left", "right", "trunk"];
-const LOOK = {
+const STYLE = {
   start: { yaw: 0.6, pitch: 0.3 },
   fit: (width, height) => Math.min(width, height * 1.1) / 1.55,
   grid: { lines: 4, step: 1 / 6 },
@@ -60,7 +60,7 @@ function scene() {
 
 const figure = createFigure3d(byId("figure-canvas"), {
   scene,
-  look: LOOK,
+  style: STYLE,
   buttons: document.querySelectorAll("[data-yaw]"),
 });
 followers.push(figure.redraw);

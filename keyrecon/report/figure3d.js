@@ -41,7 +41,7 @@ export function createProjection(view, { center, unit, scale, size }) {
   };
 }
 
-// The view after a turn: nobody looks at the figure upside down.
+// The view after a turn: the figure is never upside down.
 export const turned = (view, yaw, pitch) => ({
   ...view,
   yaw: view.yaw + yaw,
@@ -157,10 +157,10 @@ function drawBones(pen, bones, { boneWidth, marksEnds }, zoom) {
 //   center   the point that stays in the middle; level: y of the ground; unit: the body's height
 //   trunk    keys around the trunk, head: its lower and upper key; both may be empty
 //   other    a second pose to compare with: {points, color, width, alpha}, or null
-// `look` is what differs between pages: start (yaw, pitch), fit(width, height) in body heights, grid
+// `style` is what differs between pages: start (yaw, pitch), fit(width, height) in body heights, grid
 // {lines, step} in body heights, boneWidth (px), marksEnds, and whether a plain wheel scrolls the page.
-export function createFigure3d(canvas, { scene, look, buttons }) {
-  let view = { ...look.start, zoom: 1 },
+export function createFigure3d(canvas, { scene, style, buttons }) {
+  let view = { ...style.start, zoom: 1 },
     waiting = false;
 
   function draw() {
@@ -169,7 +169,7 @@ export function createFigure3d(canvas, { scene, look, buttons }) {
     if (!now) return;
     const project = createProjection(view, {
       ...now,
-      scale: (look.fit(width, height) / now.unit) * view.zoom,
+      scale: (style.fit(width, height) / now.unit) * view.zoom,
       size: [width, height],
     });
     const onGround = (key) => {
@@ -177,14 +177,14 @@ export function createFigure3d(canvas, { scene, look, buttons }) {
       return point && project([point[0], now.level, point[2]]);
     };
     pen.lineCap = pen.lineJoin = "round";
-    drawGrid(pen, project, now, { ...look.grid, step: look.grid.step * now.unit });
-    drawFlat(pen, now.bones, onGround, { color: cssColor("shadow"), width: look.shadowWidth });
+    drawGrid(pen, project, now, { ...style.grid, step: style.grid.step * now.unit });
+    drawFlat(pen, now.bones, onGround, { color: cssColor("shadow"), width: style.shadowWidth });
     if (now.other) {
       const there = (key) => now.other.points[key] && project(now.other.points[key]);
       drawFlat(pen, now.bones, there, now.other);
     }
     if (now.trunk.length) drawVolumes(pen, project, now, view.zoom);
-    drawBones(pen, sortBones(now, project), look, view.zoom);
+    drawBones(pen, sortBones(now, project), style, view.zoom);
   }
 
   // At most once for every picture on the screen.
@@ -210,7 +210,7 @@ export function createFigure3d(canvas, { scene, look, buttons }) {
   canvas.addEventListener(
     "wheel",
     (event) => {
-      if (look.wheelScrolls && !event.ctrlKey) return;
+      if (style.wheelScrolls && !event.ctrlKey) return;
       event.preventDefault();
       change(zoomed(view, Math.exp(-event.deltaY * ZOOM_PER_PIXEL)));
     },

@@ -164,7 +164,7 @@ def measure_excess(
 ) -> Float[np.ndarray, "*n B"]:
     """By how many deviations of clicks bones are too long; negative where they are not.
 
-    `stretch` is the shown length over the possible one, `lengths` are in body heights.
+    `stretch` is the length in the picture over the possible one, `lengths` are in body heights.
     """
     return (stretch - 1) * lengths / (np.sqrt(2) * LengthOptions.click_noise)
 
@@ -172,8 +172,8 @@ def measure_excess(
 def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
     skeleton = annotations.skeleton
     ends = annotations.joints[:, skeleton.bones]
-    shown = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    stretch = shown / size.scale[annotations.frames][:, None] / size.lengths
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    stretch = length / size.scale[annotations.frames][:, None] / size.lengths
     excess = np.nan_to_num(measure_excess(stretch, size.lengths))
     for row, bone in np.argwhere(excess > 0):
         parent, child = (skeleton.names[j] for j in skeleton.bones[bone])

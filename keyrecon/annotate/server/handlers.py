@@ -138,7 +138,7 @@ def pose(session: Session, request: ApiRequest) -> Json:
 
 
 def checks(session: Session, request: ApiRequest) -> list[Json]:
-    """Marks to look at again."""
+    """Marks that look wrong."""
     check = session.assistant.checks
     return check(session.store.annotations()) if check else []
 

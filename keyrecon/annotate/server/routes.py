@@ -106,12 +106,12 @@ def read_page() -> dict[str, Response]:
 
     Each has a route of its own, and there is no other way to a file.
     """
-    found = [path for path in sorted(PAGE.rglob("*")) if path.suffix in TYPES]
+    page = [path for path in sorted(PAGE.rglob("*")) if path.suffix in TYPES]
     files = {
         f"/{path.relative_to(PACKAGE).as_posix()}": Response(
             path.read_bytes(), media_type=TYPES[path.suffix]
         )
-        for path in (*found, *SHARED)
+        for path in (*page, *SHARED)
     }
     return {"/": files.pop("/annotate/page/index.html"), **files}
 
@@ -129,8 +129,8 @@ def _endpoint(session: Session, route: ApiRoute) -> Callable[[Request], Any]:
 
     async def endpoint(request: Request) -> Response:
         body = _parsed(await request.body(), route.body) if route.body else None
-        asked = handlers.ApiRequest(request.path_params, dict(request.query_params), body)
-        answer = await run_sync(route.handler, session, asked, limiter=limiter)
+        parsed = handlers.ApiRequest(request.path_params, dict(request.query_params), body)
+        answer = await run_sync(route.handler, session, parsed, limiter=limiter)
         return answer if isinstance(answer, Response) else _json(answer)
 
     return endpoint

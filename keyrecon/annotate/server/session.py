@@ -26,7 +26,7 @@ from keyrecon.io.workspace import Workspace
 
 Json = dict[str, Any]
 WATCH_SECONDS = 1.0
-"""How often the files are looked at: three are asked for their time, which costs nothing."""
+"""How often the files are checked: the times of three files, which costs nothing."""
 
 
 @dataclass(frozen=True)

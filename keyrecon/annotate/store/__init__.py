@@ -1,1 +1,1 @@
-"""Every decision of a person, durable, undoable, and mirrored into files that others read."""
+"""Every decision of a person, durable, undoable, and shown in files that others read."""

@@ -1,6 +1,6 @@
 """The keyframes that were chosen, and what happens when a new choice replaces them.
 
-A person's work must not slip out of sight because the program chose again: a keyframe that is
+A person's work must not disappear from the list because the program chose again: a keyframe that is
 locked or bears marks, and that the new choice leaves out or asks less of, stays in the list as
 one of the person's own.
 """

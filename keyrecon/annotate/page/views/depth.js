@@ -6,7 +6,7 @@ import { label, whyNoAssistant } from "../state/workflow.js";
 import { byId, make, setText, toggle } from "./dom.js";
 
 const EMPTY = "The body in space appears here as joints are placed.";
-const LOOK = {
+const STYLE = {
   start: { yaw: 0.6, pitch: 0.25 },
   fit: (width, height) => Math.min(width, height) / 1.35,
   grid: { lines: 3, step: 1 / 4 },
@@ -47,7 +47,7 @@ export function createPoseFigure(canvas, model) {
   }
   const figure = createFigure3d(canvas, {
     scene,
-    look: LOOK,
+    style: STYLE,
     buttons: canvas.parentElement.querySelectorAll("[data-yaw]"),
   });
 
