@@ -9,7 +9,7 @@ player's swing alone. A person is imitated who clicks six points in the first fr
 gives the true stature and knows nothing of the camera.
 
 Rows of the table: the mean motion as it is placed at the start; joints alone; joints and club;
-everything; everything with the club looked for again, which is what `keyrecon golf fit` gives; the
+everything; everything with guided club detection, which is what `keyrecon golf fit` gives; the
 paper's sliding windows; and four annotated keyframes besides. A club counts as visible where at
 least half of its shaft stands out from what is behind it, and seems at least a third as long as the
 longest it seems in the film: one that points at the camera has no angle.
@@ -26,19 +26,21 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from keyrecon.app.golf import GolfOptions, fit_observations, refine_fit
+from keyrecon.app.golf import GolfFit, refine_fit
 from keyrecon.app.golf_training import read_swings
 from keyrecon.body import LSP14
-from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.clicks import ClickedPose, GolfClicks, clicked_pose
 from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
-from keyrecon.golf.observe.observation import ObservationOptions, observe_swing
+from keyrecon.golf.observation import ObservationOptions, observe_swing
 from keyrecon.golf.prior.captured_swing import change_swing
 from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
 from keyrecon.golf.prior.training import TrainOptions, collect_swings, learn_motion
 from keyrecon.golf.prior.variation import tilt_arms
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, Swing, SwingMarks
+from keyrecon.golf.swing_fit import GolfOptions, fit_observations
 from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
 from keyrecon.io.frame_reader import reduce_picture
+from keyrecon.io.held_video import hold_frames
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.io.video import Video, open_video
 from keyrecon.metrics import evaluate_motion, read_truth
@@ -132,17 +134,17 @@ def learn_without(player: int, swings: tuple[Swing, ...], out: Path) -> MotionMo
     return read_motion_model(file)
 
 
-def look(video: Video, clicks: GolfClicks, model: MotionModel, folder: Path) -> Observations:
-    """What is seen in a video, kept beside it."""
-    file = folder / "seen.npz"
+def observe(video: Video, pose: ClickedPose, model: MotionModel, folder: Path) -> Observations:
+    """What is observed in a video, kept beside it."""
+    file = folder / "observations.npz"
     if not file.is_file():
         began = time.perf_counter()
-        save_record(file, observe_swing(video, clicks, model.keys, ObservationOptions()))
+        save_record(file, observe_swing(video, pose, model.keys, ObservationOptions()))
         (folder / "seconds.txt").write_text(f"{time.perf_counter() - began:.1f}")
     return load_record(file)
 
 
-POINTS = WeightOptions(foreground=0.0, away=0.0, matches=0.0)
+POINTS = WeightOptions(foreground=0.0, silhouette=0.0, matches=0.0)
 WAYS = {
     "joints alone": GolfOptions(fit=FitOptions(weights=replace(POINTS, club=0.0))),
     "joints and club": GolfOptions(fit=FitOptions(weights=POINTS)),
@@ -164,13 +166,13 @@ class Result:
     seconds: float
 
 
-def judge(
+def measure(
     fitted: FittedSwing, truth: dict[str, np.ndarray], fps: float, seconds: float = 0.0
 ) -> Result:
     """Errors against the truth."""
     scores = evaluate_motion(fitted.motion, truth)
     apart = (fitted.keys - truth["keys"]) * 60 / fps
-    off = club_angle(fitted.club_seen, truth["club2d"])[club_visible(truth)]
+    off = club_angle(fitted.club2d, truth["club2d"])[club_visible(truth)]
     return Result(
         scores.pa_mpjpe, scores.n_mpjpe, tuple(apart.round(1)), float((off < 5).mean()), seconds
     )
@@ -182,16 +184,16 @@ def club_visible(truth: dict[str, np.ndarray]) -> np.ndarray:
     return (truth["club_visible"] >= 0.5) & (length > length.max() / 3)
 
 
-def tell_club(seen: np.ndarray, fitted: np.ndarray, truth: dict[str, np.ndarray]) -> str:
-    """How well the club was seen in the frames in which it is visible."""
+def describe_club(detected: np.ndarray, fitted: np.ndarray, truth: dict[str, np.ndarray]) -> str:
+    """How well the club was detected in the frames in which it is visible."""
     visible = club_visible(truth)
-    off = club_angle(seen, truth["club2d"])[visible]
+    off = club_angle(detected, truth["club2d"])[visible]
     either = np.where(np.isfinite(off), off, club_angle(fitted, truth["club2d"])[visible])
-    found = np.isfinite(off)
+    known = np.isfinite(off)
     return (
-        f"visible in {visible.mean():.0%} of the frames; of these seen {found.mean():.0%}, within "
-        f"5 degrees {(off < 5).mean():.0%} ({(off[found] < 5).mean():.0%} of the seen), seen or "
-        f"else fitted {(either < 5).mean():.0%}"
+        f"visible in {visible.mean():.0%} of the frames; of these detected {known.mean():.0%}, "
+        f"within 5 degrees {(off < 5).mean():.0%} ({(off[known] < 5).mean():.0%} of the detected), "
+        f"detected or else fitted {(either < 5).mean():.0%}"
     )
 
 
@@ -205,36 +207,38 @@ def club_angle(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 def fit_all(scene: Scene, swings: tuple[Swing, ...], out: Path) -> Iterator[tuple[str, Result]]:
     """All rows of a scene."""
     folder = film(scene, swings, out)
-    truth, video = read_truth(folder / "truth.npz"), open_video(folder / "video.mp4")
+    truth, video = read_truth(folder / "truth.npz"), hold_frames(open_video(folder / "video.mp4"))
     model = learn_without(scene.player, swings, out)
     clicks = click(truth, scene, (video.width, video.height), SCENES.index(scene))
-    seen = look(video, clicks, model, folder)
+    observations = observe(video, clicked_pose(clicks), model, folder)
     print(
-        f"{scene.name}: {len(video)} frames, looked at in {(folder / 'seconds.txt').read_text()} s"
+        f"{scene.name}: {len(video)} frames, observed in {(folder / 'seconds.txt').read_text()} s"
     )
     fits: dict[str, FittedSwing] = {}
     still = GolfOptions(fit=replace(FitOptions(), steps=0))
     for name, options in {"mean motion at the start": still, **WAYS}.items():
         began = time.perf_counter()
-        fits[name] = fit_observations(seen, clicks, model, video, options)
-        yield name, judge(fits[name], truth, scene.fps, time.perf_counter() - began)
-    began, name = time.perf_counter(), "and the club seen again"
-    fits[name], again = refine_fit(fits["everything"], seen, clicks, model, video)
-    yield name, judge(fits[name], truth, scene.fps, time.perf_counter() - began)
-    marked = replace(again, marks=annotate(truth, SCENES.index(scene)))
+        fits[name] = fit_observations(observations, video, model, options)
+        yield name, measure(fits[name], truth, scene.fps, time.perf_counter() - began)
+    began, name = time.perf_counter(), "and guided detection"
+    refined = refine_fit(GolfFit(fits["everything"], observations), video, model)
+    fits[name], guided = refined.fitted, refined.observations
+    yield name, measure(fits[name], truth, scene.fps, time.perf_counter() - began)
+    marked = replace(guided, marks=annotate(truth, SCENES.index(scene)))
     began, with_marks = time.perf_counter(), "and four keyframes"
-    fits[with_marks] = fit_observations(marked, clicks, model, video)
-    yield with_marks, judge(fits[with_marks], truth, scene.fps, time.perf_counter() - began)
-    print(f"  club at first: {tell_club(seen.club, fits['everything'].club_seen, truth)}")
-    print(f"  club again: {tell_club(again.club, fits[name].club_seen, truth)}")
-    write_ablation(folder / "ablation.jpg", video, fits, again)
+    fits[with_marks] = fit_observations(marked, video, model)
+    yield with_marks, measure(fits[with_marks], truth, scene.fps, time.perf_counter() - began)
+    first = describe_club(observations.club, fits["everything"].club2d, truth)
+    print(f"  club at first: {first}")
+    print(f"  club guided: {describe_club(guided.club, fits[name].club2d, truth)}")
+    write_ablation(folder / "ablation.jpg", video, fits, guided)
 
 
-SHOWN = ("mean motion at the start", "joints alone", "everything", "and the club seen again")
+SHOWN = ("mean motion at the start", "joints alone", "everything", "and guided detection")
 
 
 def write_ablation(
-    path: Path, video: Video, fits: dict[str, FittedSwing], seen: Observations
+    path: Path, video: Video, fits: dict[str, FittedSwing], observations: Observations
 ) -> None:
     """The golfer at the key postures, fitted in several ways: one way per row."""
     frames = np.clip(fits[SHOWN[-1]].keys.round().astype(int), 0, len(video) - 1).tolist()
@@ -244,7 +248,7 @@ def write_ablation(
     (x0, y0), (x1, y1) = np.maximum(low - room, 0).astype(int), (high + room).astype(int)
     rows = []
     for name in SHOWN:
-        drawn = [draw_golfer(video.frame(t), fits[name], seen.camera, t)[y0:y1, x0:x1]
+        drawn = [draw_golfer(video.frame(t), fits[name], observations.camera, t)[y0:y1, x0:x1]
                  for t in frames]  # fmt: skip
         row = np.hstack([reduce_picture(picture, PICTURE) for picture in drawn])
         rows.append(cv2.putText(row, name, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255,) * 3, 2))
@@ -261,11 +265,11 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--mocap", type=Path, default=MOCAP)
     parser.add_argument("--only", nargs="*")
-    told = parser.parse_args()
-    swings = read_swings([told.mocap])
+    arguments = parser.parse_args()
+    swings = read_swings([arguments.mocap])
     together: dict[str, list[Result]] = {}
-    for scene in [s for s in SCENES if not told.only or s.name in told.only]:
-        for name, result in fit_all(scene, swings, told.out):
+    for scene in [s for s in SCENES if not arguments.only or s.name in arguments.only]:
+        for name, result in fit_all(scene, swings, arguments.out):
             together.setdefault(name, []).append(result)
             print_row(name, [result])
     print(f"\nMean of {len(next(iter(together.values())))} scenes")

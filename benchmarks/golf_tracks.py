@@ -1,4 +1,4 @@
-"""How well ankles, knees and the head are followed through rendered swings, by several trackers.
+"""How well ankles, knees and the head are tracked through rendered swings, by several trackers.
 
 Run: python benchmarks/golf_tracks.py SCENE [SCENE ...]
 
@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from keyrecon.body import LSP14
-from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.clicks import GolfClicks, clicked_pose
 from keyrecon.golf.observe.appearance_tracker import track_patch
 from keyrecon.golf.observe.foreground import Foreground, separate_player
 from keyrecon.io.frame_reader import read_small
@@ -46,31 +46,31 @@ def measure(folder: Path) -> dict[str, np.ndarray]:
     places, visible = truth["points2d"], truth["visible"]
     clicked = {name: tuple(places[0, LSP14.index(name)].tolist()) for name in JOINTS}
     clicked["root"] = tuple(places[0, [2, 3]].mean(axis=0).tolist())
-    clicks = GolfClicks(0, (video.width, video.height), clicked)
-    foreground = separate_player(video, clicks)
+    pose = clicked_pose(GolfClicks(0, (video.width, video.height), clicked))
+    foreground = separate_player(video, pose)
     pictures = list(read_small(video, foreground.likely.shape[2]))
-    found: dict[str, list[np.ndarray]] = {name: [] for name in TRACKERS}
+    measured: dict[str, list[np.ndarray]] = {name: [] for name in TRACKERS}
     for joint in JOINTS:
         index = LSP14.index(joint)
-        offset = clicks.head - clicks.place(joint) if joint == "head_top" else np.zeros(2)
-        start = (clicks.place(joint) + offset) * foreground.shrink
+        offset = pose.head - pose.place(joint) if joint == "head_top" else np.zeros(2)
+        start = (pose.place(joint) + offset) * foreground.shrink
         for name, track in TRACKERS.items():
             path = track(pictures, foreground, start, video.fps) / foreground.shrink - offset
-            apart = np.linalg.norm(path - places[:, index], axis=1) / clicks.height
-            found[name].append(100 * apart[visible[:, index]])
-    return {name: np.concatenate(errors) for name, errors in found.items()}
+            apart = np.linalg.norm(path - places[:, index], axis=1) / pose.height
+            measured[name].append(100 * apart[visible[:, index]])
+    return {name: np.concatenate(errors) for name, errors in measured.items()}
 
 
-def follow_wsl(
+def track_by_wsl(
     pictures: list[np.ndarray], foreground: Foreground, start: np.ndarray, fps: float
 ) -> np.ndarray:
     """The tracker of the product."""
     lab = [to_lab(p) for p in pictures]
-    scales = (foreground.height * foreground.shrink, fps)
-    return track_patch(lab, list(foreground.likely), start, scales).places
+    height = foreground.height * foreground.shrink
+    return track_patch(lab, list(foreground.likely), start, height, fps).places
 
 
-def follow_lucas_kanade(
+def track_by_lucas_kanade(
     pictures: list[np.ndarray], foreground: Foreground, start: np.ndarray, fps: float
 ) -> np.ndarray:
     """Pyramidal Lucas-Kanade from frame to frame."""
@@ -83,7 +83,7 @@ def follow_lucas_kanade(
     return np.concatenate(path).astype(float)
 
 
-def follow_csrt(
+def track_by_csrt(
     pictures: list[np.ndarray], foreground: Foreground, start: np.ndarray, fps: float
 ) -> np.ndarray:
     """CSRT (Lukezic et al., CVPR 2017); a lost box stays where it was."""
@@ -93,13 +93,13 @@ def follow_csrt(
     tracker.init(pictures[0], box)
     path = [start]
     for picture in pictures[1:]:
-        seen, box = tracker.update(picture)
-        path.append(np.array(box[:2]) + np.array(box[2:]) / 2 if seen else path[-1])
+        tracked, box = tracker.update(picture)
+        path.append(np.array(box[:2]) + np.array(box[2:]) / 2 if tracked else path[-1])
     return np.array(path)
 
 
 TRACKERS: dict[str, Callable[..., np.ndarray]] = {
-    "WSL": follow_wsl, "Lucas-Kanade": follow_lucas_kanade, "CSRT": follow_csrt,
+    "WSL": track_by_wsl, "Lucas-Kanade": track_by_lucas_kanade, "CSRT": track_by_csrt,
 }  # fmt: skip
 
 if __name__ == "__main__":

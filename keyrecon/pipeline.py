@@ -213,8 +213,8 @@ def reconstruct(
             tracks,
             annotations,
             models.swing,
-            (height, (video.width, video.height)),
-            video.time,
+            height,
+            video,
             options=options.swing,
             progress=progress,
         )

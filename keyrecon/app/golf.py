@@ -1,67 +1,87 @@
-"""`keyrecon golf fit`: from a video and a few clicks to a motion, an overlay and a report."""
+"""`keyrecon golf fit`: from a video and a few clicks to a project with motion, overlay and report.
+
+The project folder holds project.toml and cache/ like any other (`io.workspace`), and besides
+
+    golf_clicks.json   what a person clicked
+    motion.npz, overlay.mp4, report.html
+
+so that an interrupted fit goes on where it stopped, and one that is repeated is done at once.
+"""
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import GolfClicks
-from keyrecon.golf.fit.fitting import FitOptions, fit_sliding_windows, fit_swing, refit_swing
-from keyrecon.golf.fit.initial_pose import estimate_initial_pose, start_state
-from keyrecon.golf.fit.mirror import mirror_clicks, mirror_observations
-from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
-from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.observe.guided_club_detection import (
-    GuidedDetectionOptions,
-    detect_club_guided,
-    median_picture,
+from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
+from keyrecon.golf.observation import observe_swing
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.swing_fit import (
+    GolfOptions,
+    finish_fit,
+    fit_guided,
+    fit_observations,
 )
-from keyrecon.golf.observe.observation import ObservationOptions, observe_swing
-from keyrecon.golf.observe.swing_events import (
-    SwingEventOptions,
-    detect_swing_events,
-    interpolate_times,
-)
-from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
+from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
-from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.held_video import hold_frames
 from keyrecon.io.video import Video, open_video
+from keyrecon.io.workspace import Workspace
 from keyrecon.numerics.geometry import warp_points
+from keyrecon.pipeline import Keep, call_stage
 from keyrecon.progress import Progress, silent
+from keyrecon.records import CameraPath
 from keyrecon.report.golf_page import write_golf_report
 from keyrecon.report.golf_pictures import write_golf_overlay
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 
-SHAKE = 0.04
+CLICKS_FILE = "golf_clicks.json"
+OVERLAY_FILE = "overlay.mp4"
+LARGEST_SHIFT = 0.04
 """Share of the picture's width by which a standing camera may seem to move: a player who fills
 the picture and a hand on the tripod move it by half of that."""
 
 
-@dataclass(frozen=True)
-class GolfOptions:
-    """From a video to a fitted swing."""
+@dataclass(frozen=True, eq=False)
+class GolfFit:
+    """A fitted swing and what it was fitted to."""
 
-    method: Literal["swing", "windows"] = "swing"
-    """'swing' fits all frames at once; 'windows' slides over three frames as in the paper."""
-    look: ObservationOptions = field(default_factory=ObservationOptions)
-    """What is followed in the video."""
-    fit: FitOptions = field(default_factory=FitOptions)
-    """How the model is fitted to it."""
-    again: int = 2
-    """How many times the club is looked for again where the fitted swing expects it."""
-    second_look: GuidedDetectionOptions = field(default_factory=GuidedDetectionOptions)
-    """How it is looked for then."""
-    rests: SwingEventOptions = field(default_factory=SwingEventOptions)
-    """When hands rest."""
-    proportions: ProportionOptions = field(default_factory=ProportionOptions)
-    """How annotated keyframes tell the player's proportions."""
-    slowmo: float = 1.0
-    """How many times slower than real the video plays."""
+    fitted: FittedSwing
+    observations: Observations
+
+
+def fit_file(
+    video_file: Path,
+    clicks_file: Path,
+    folder: Path,
+    prior: Path = BUILT_IN_SWING_PRIOR,
+    slow_motion: float = 1.0,
+    force: bool = False,
+    options: GolfOptions = GolfOptions(),
+    progress: Progress = silent,
+) -> str:
+    """Fit a swing in a project folder; returns what to print. `force` makes every stage again."""
+    began = time.perf_counter()
+    clicks, model = read_clicks(clicks_file), read_motion_model(prior)
+    video = open_video(video_file, slow_motion=slow_motion)
+    check_clicks(clicks, len(video), (video.width, video.height))
+    workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
+    options = workspace.options(options, GolfOptions())
+    video = hold_frames(workspace.video())
+    workspace.remember(options, GolfOptions())
+    fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress)
+    if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
+        write_results(workspace, video, fit, model, progress)
+    spent = time.perf_counter() - began
+    return (
+        f"{describe_tempo(fit.fitted, video.fps)}\n"
+        f"{folder}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
+        f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
+    )
 
 
 def fit_video(
@@ -69,109 +89,148 @@ def fit_video(
     clicks: GolfClicks,
     model: MotionModel,
     options: GolfOptions = GolfOptions(),
+    keep: Keep = call_stage,
     progress: Progress = silent,
-) -> tuple[FittedSwing, Observations]:
-    """Look at a swing, fit the model to it, and look again with what the fit has shown."""
-    observations = observe_swing(video, clicks, model.keys, options.look, progress)
-    fitted = fit_observations(observations, clicks, model, video, options)
-    return refine_fit(fitted, observations, clicks, model, video, options)
+) -> GolfFit:
+    """Observe a swing, fit the model to it, and detect the club again where the fit expects it.
+
+    Raises KeyreconError where the camera moves, or no player or no swing is observed.
+    """
+    require_still_camera(keep("camera", estimate_camera_motion, video, progress=progress), video)
+    observations = keep(
+        "observe",
+        observe_swing,
+        video,
+        clicked_pose(clicks),
+        model.keys,
+        options=options.observation,
+        progress=progress,
+    )
+    return fit_observed(video, observations, model, options, keep, progress)
+
+
+def fit_observed(
+    video: Video,
+    observations: Observations,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+) -> GolfFit:
+    """The same from observations."""
+    fitted = keep(
+        "fit", fit_observations, observations, video, model, options=options, progress=progress
+    )
+    return refine_fit(GolfFit(fitted, observations), video, model, options, keep)
 
 
 def refine_fit(
-    fitted: FittedSwing,
-    observations: Observations,
-    clicks: GolfClicks,
-    model: MotionModel,
+    first: GolfFit,
     video: Video,
+    model: MotionModel,
     options: GolfOptions = GolfOptions(),
-) -> tuple[FittedSwing, Observations]:
-    """The club looked for again where it is expected by now, and the fit with it, in turns.
-
-    In turns, too, the hands tell when the swing begins and ends, better than club or fit do.
-    """
-    seen, looks = observations, options.again if options.method == "swing" else 0
-    plate = median_picture(video) if looks else None
-    for _ in range(looks):
-        seen = detect_club_guided(
-            observations, video, plate, fitted, clicks.height, options.second_look
+    keep: Keep = call_stage,
+) -> GolfFit:
+    """Rounds of guided club detection and fitting after a first fit."""
+    fitted, observations = first.fitted, first.observations
+    for number in range(options.guided_rounds if options.method == "swing" else 0):
+        guided = keep(
+            f"guided_{number + 1}",
+            fit_guided,
+            first.observations,
+            fitted,
+            video,
+            model,
+            options=options,
         )
-        keys = detect_swing_events(video, seen.foreground, fitted, clicks.height, options.rests)
-        keys[1:3] = observations.keys[1:3]  # told by the club alone: a fit must not guide itself
-        seen = replace(seen, keys=keys, mu=interpolate_times(keys, model.keys, len(video)))
-        fitted = fit_observations(seen, clicks, model, video, options, fitted.state)
-    keys = detect_swing_events(video, seen.foreground, fitted, clicks.height, options.rests)
-    return replace(fitted, keys=keys), seen
+        fitted, observations = guided.fitted, guided.update(first.observations)
+    fitted = keep("result", finish_fit, observations, fitted, video, options=options.events)
+    return GolfFit(fitted, observations)
 
 
-def fit_observations(
-    observations: Observations,
-    clicks: GolfClicks,
-    model: MotionModel,
-    video: Video,
-    options: GolfOptions = GolfOptions(),
-    before: SwingState | None = None,
-) -> FittedSwing:
-    """Fit the model to what was seen, from scratch or going on from a state found `before`.
-
-    Left-handers are mirrored on the way in and out; states are those of right-handers.
-    """
-    seen, clicked = observations, dict(clicks.joints)
-    if clicks.left_handed:
-        seen, clicked = mirror_observations(seen, video.width), mirror_clicks(clicked, video.width)
-    body = size_body(clicks.stature)
-    placed = estimate_initial_pose(clicked, float(seen.mu[clicks.frame]), seen.camera, model, body)
-    start = start_state(placed, seen.mu)
-    if before is not None:
-        found = refit_swing(seen, model, body, (start, before), video.fps, options.fit)
-    else:
-        fit = fit_swing if options.method == "swing" else fit_sliding_windows
-        found = fit(seen, model, body, start, video.fps, options.fit)
-    if seen.marks is not None and options.method == "swing":
-        settings = options.fit, options.proportions
-        found = refit_proportions(found, seen, start, video.fps, settings)
-    return describe_fit(*found, observations, video.time, clicks.frame)
-
-
-def fit_file(
-    video_file: Path,
-    clicks_file: Path,
-    out: Path,
-    prior: Path = BUILT_IN_SWING_PRIOR,
-    options: GolfOptions = GolfOptions(),
-    progress: Progress = silent,
-) -> str:
-    """Fit a swing and write motion.npz, overlay.mp4 and report.html; returns what to tell."""
-    began = time.perf_counter()
-    clicks, model = read_clicks(clicks_file), read_motion_model(prior)
-    video = open_video(video_file, slow_motion=options.slowmo)
-    require_still_camera(video, progress)
-    fitted, observations = fit_video(video, clicks, model, options, progress)
-    out.mkdir(parents=True, exist_ok=True)
-    write_motion(out / "motion.npz", fitted.motion)
-    write_golf_overlay(out / "overlay.mp4", video, fitted, observations.camera, progress)
-    write_golf_report(out / "report.html", fitted, observations, model, video)
-    spent = time.perf_counter() - began
-    return (
-        f"{tell_tempo(fitted, video.fps)}\n"
-        f"{out}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
-        f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
-    )
-
-
-def require_still_camera(video: Video, progress: Progress = silent) -> None:
+def require_still_camera(camera: CameraPath, video: Video) -> None:
     """Raises KeyreconError where the camera moves: the model stands in one place before it."""
-    to_middle = estimate_camera_motion(video, progress=progress).to_reference
     corners = np.array([(0.0, 0.0), (video.width, 0.0), (0.0, video.height)])
-    moved = np.linalg.norm(warp_points(to_middle[:, None], corners[None]) - corners, axis=2)
+    warped = warp_points(camera.to_reference[:, None], corners[None])
+    moved = np.linalg.norm(warped - corners, axis=2)
     usual = float(np.percentile(moved.max(axis=1), 90))
-    if usual > SHAKE * video.width:
+    if usual > LARGEST_SHIFT * video.width:
         raise KeyreconError(
             f"The camera moves: the scene shifts by {usual:.0f} px and more. A golf fit needs a "
             "camera that stands still; film from a tripod or stabilise the video first."
         )
 
 
-def tell_tempo(fitted: FittedSwing, fps: float) -> str:
+def open_golf_project(
+    folder: Path, video: Video, clicks_file: Path, slow_motion: float = 1.0, force: bool = False
+) -> Workspace:
+    """The project of a video in a folder, made if need be, with a copy of the clicks.
+
+    Raises KeyreconError where the folder holds another project.
+    """
+    if (folder / "project.toml").is_file():
+        workspace = Workspace(folder, force)
+        _require_same_video(workspace, video, slow_motion)
+        if not (folder / workspace.project["video"]["path"]).is_file():
+            workspace.relink(video.path)
+        _keep_clicks(folder / CLICKS_FILE, clicks_file)
+        return workspace
+    make_folder(folder)
+    _keep_clicks(folder / CLICKS_FILE, clicks_file)
+    trim = {"slow_motion": None if slow_motion == 1 else slow_motion}
+    Workspace.create(folder, video, video.path, trim)
+    return Workspace(folder, force)
+
+
+def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) -> None:
+    """Raises KeyreconError where a project is not that of a golf fit of this video."""
+    folder, kept = workspace.folder, workspace.project["video"]
+    if video.fingerprint != kept["fingerprint"]:
+        raise KeyreconError(
+            f"{folder} is the project of another video ({Path(kept['path']).name}); name another "
+            "folder for this one with --out."
+        )
+    if not (folder / CLICKS_FILE).is_file():
+        raise KeyreconError(
+            f"{folder} is a project with keyframes, not a golf fit; name another folder with --out."
+        )
+    earlier = kept.get("slow_motion", 1.0)
+    if slow_motion not in (1.0, earlier):
+        raise KeyreconError(
+            f"{folder} was made with --slowmo {earlier:g}; name another folder with --out for "
+            f"--slowmo {slow_motion:g}."
+        )
+
+
+def _keep_clicks(kept: Path, clicks_file: Path) -> None:
+    """Copy the clicks; other ones that were there stay beside them."""
+    content = clicks_file.read_bytes()
+    before = kept.read_bytes() if kept.is_file() else content
+    if before != content:
+        number = len(list(kept.parent.glob(f"{kept.stem}.old-*{kept.suffix}"))) + 1
+        write_durably(kept.with_name(f"{kept.stem}.old-{number}{kept.suffix}"), before)
+    write_durably(kept, content)
+
+
+def write_results(
+    workspace: Workspace, video: Video, fit: GolfFit, model: MotionModel, progress: Progress
+) -> None:
+    """Overlay and report, and last the motion, whose presence tells that all are written."""
+    folder = workspace.folder
+    write_golf_overlay(folder / OVERLAY_FILE, video, fit.fitted, fit.observations.camera, progress)
+    write_golf_report(workspace.report_file, fit.fitted, fit.observations, model, video)
+    write_motion(workspace.motion_file, fit.fitted.motion)
+
+
+def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:
+    """Whether the results of this very fit lie in the project already."""
+    files = (workspace.motion_file, workspace.report_file, workspace.folder / OVERLAY_FILE)
+    return all(file.is_file() for file in files) and np.array_equal(
+        read_motion(workspace.motion_file).points3d, fitted.motion.points3d
+    )
+
+
+def describe_tempo(fitted: FittedSwing, fps: float) -> str:
     """Key postures and tempo in words."""
     start, top, hit, finish = fitted.keys
     up, down = (top - start) / fps, (hit - top) / fps

@@ -9,8 +9,8 @@ from tyro.extras import SubcommandApp
 from keyrecon.app import golf as golf_job
 from keyrecon.app import golf_training as mocap_swings
 from keyrecon.app.console import show
-from keyrecon.app.golf import GolfOptions
 from keyrecon.golf.prior.training import TrainOptions
+from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR
 
 golf = SubcommandApp()
@@ -24,7 +24,7 @@ def train_(
 ) -> None:
     """Learn a swing prior from motion capture and print what it is worth.
 
-    Prints the variance explained and the error of swings left out, for each number of components.
+    Prints the variance explained and the cross-validation error, for each number of components.
 
     Args:
         swings: .bvh, .amc (with its .asf) or .c3d files, or folders of them, one swing each.
@@ -39,17 +39,22 @@ def fit(
     clicks: Path,
     out: Path = Path("swing"),
     prior: Path = BUILT_IN_SWING_PRIOR,
+    slowmo: float = 1.0,
+    force: bool = False,
     options: Annotated[GolfOptions, arg(name="")] = GolfOptions(),
 ) -> None:
     """Fit the swing prior to a video filmed by one camera that stands still.
 
-    Writes OUT/motion.npz, overlay.mp4 and report.html.
+    Makes the project folder OUT and writes motion.npz, overlay.mp4 and report.html into it. An
+    interrupted fit goes on where it stopped, and `keyrecon export OUT` writes other formats.
 
     Args:
         video: A whole swing, from the address to the finish.
         clicks: JSON file with a few joints clicked in one frame, and the player's height.
-        out: Folder for the results; made if need be.
+        out: Project folder; made if need be.
         prior: A swing prior of `keyrecon golf train`.
-        options: How the video is looked at and the prior fitted.
+        slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
+        force: Make every stage again.
+        options: How the video is observed and the prior fitted.
     """
-    print(golf_job.fit_file(video, clicks, out, prior, options, show))
+    print(golf_job.fit_file(video, clicks, out, prior, slowmo, force, options, show))

@@ -31,7 +31,7 @@ RATE = 120.0
 SECONDS = (0.85, 0.30, 0.60)
 """Upswing, downswing and follow-through of a usual full swing."""
 STYLE, SEED = 0.7, 4
-"""Standard deviation of the alphas, and what draws them."""
+"""Standard deviation of the coefficients, and the seed that draws them."""
 TOES = 0.1
 """From ankle to toes, statures."""
 CLICKED = ("head_top", "right_knee", "left_knee", "right_ankle", "left_ankle")
@@ -56,24 +56,25 @@ def run_golf_demo(out: Path, progress: Progress, say: Callable[[str], None]) -> 
 
 def draw_swing(model: MotionModel, seed: int) -> Swing:
     """A swing of the prior in a style drawn by a seed."""
-    alpha = np.random.default_rng([seed, 9]).normal(0, STYLE, len(model.components))
+    coefficients = np.random.default_rng([seed, 9]).normal(0, STYLE, len(model.components))
     times = np.concatenate([[0.0], np.cumsum(SECONDS)])
     frames = np.arange(round(times[-1] * RATE) + 1)
-    mu = np.interp(frames / RATE, times, model.keys)
-    return play_model(model, mu, alpha, (times * RATE).round().astype(int))
+    phase = np.interp(frames / RATE, times, model.keys)
+    return play_model(model, phase, coefficients, (times * RATE).round().astype(int))
 
 
 def play_model(
     model: MotionModel,
-    mu: Float[np.ndarray, "T"],
-    alpha: Float[np.ndarray, "C"],
+    phase: Float[np.ndarray, "T"],
+    coefficients: Float[np.ndarray, "C"],
     keys: np.ndarray,
 ) -> Swing:
     """The motion of a model in swing axes as a captured swing."""
     body = size_body(STATURE)
-    frames = len(mu)
-    state = SwingState(alpha, mu, np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3)))
-    pose = place_body(body, posture_at(model, mu, alpha), state)
+    frames = len(phase)
+    axes = np.tile(np.eye(3), (frames, 1, 1))
+    state = SwingState(coefficients, phase, axes, np.zeros((frames, 3)))
+    pose = place_body(body, posture_at(model, phase, coefficients), state)
     feet = [NAMES.index("right_foot"), NAMES.index("left_foot")]
     toes = pose.origins[:, feet] - TOES * STATURE * pose.rotations[:, feet][..., 2]
     return Swing(

@@ -12,17 +12,23 @@ from jaxtyping import Float
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.records import Camera, InitialJoints
 
 NEEDED = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
 """Without these nothing can be started; `root` may be given as both hips."""
 STATURE = 1.75
-"""Metres, where the file does not tell."""
+"""Metres, where the file does not tell. A wrong one scales the motion; angles hardly depend on it,
+and the paper used a rough estimate too (Section 5.2)."""
+FOCAL = 1.2
+"""Focal length where nobody knows it, picture widths: between a phone's (0.7 to 0.8) and a camera
+that was zoomed in from behind the range."""
 HEAD_DEPTH = 0.06
-"""From the top of the head to its centre, player heights."""
+"""From the top of the head to its centre, player heights: half of a head's, an eighth."""
 SHOULDERS = 0.2
-"""Height of the middle between the shoulders, share of the way from the head's top to the feet."""
+"""Height of the middle between the shoulders, share of the way from the head's top to the feet:
+roughly the shoulder line of `keyrecon.body`."""
 SHORTEST_PLAYER = 60.0
-"""px from the head to the ankles: below it neither club nor limbs can be seen."""
+"""px from the head to the ankles: below it a shaft, 10 mm, is a third of a pixel."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +50,35 @@ class GolfClicks:
     principal: tuple[float, float] | None = None
     """px; None for the middle of the picture."""
 
+
+@dataclass(frozen=True, eq=False)
+class ClickedPose:
+    """The player in the clicked frame, as the stages need it."""
+
+    joints: InitialJoints
+    hidden: tuple[str, ...]
+    """Joints that are not tracked."""
+    size: tuple[int, int]
+    """Width and height of the pictures, px."""
+    left_handed: bool
+    stature: float
+    """Metres."""
+    camera: Camera
+
+    def has(self, name: str) -> bool:
+        """Whether a joint was clicked, or follows from others."""
+        return name in self.joints.names or name == "root"
+
     def place(self, name: str) -> Float[np.ndarray, "2"]:
         """Where a joint was clicked; `root` also from both hips."""
-        if name == "root" and name not in self.joints:
+        if name == "root" and name not in self.joints.names:
             return (self.place("right_hip") + self.place("left_hip")) / 2
-        return np.array(self.joints[name], float)
+        return self.joints.places[self.joints.names.index(name)]
+
+    @property
+    def frame(self) -> int:
+        """The clicked frame."""
+        return self.joints.frame
 
     @property
     def feet(self) -> Float[np.ndarray, "2"]:
@@ -59,7 +89,7 @@ class GolfClicks:
     def head(self) -> Float[np.ndarray, "2"]:
         """Centre of the head, px: below its top, towards the neck or the root."""
         top = self.place("head_top")
-        below = self.place("neck" if "neck" in self.joints else "root") - top
+        below = self.place("neck" if self.has("neck") else "root") - top
         return top + HEAD_DEPTH * self.height * below / np.linalg.norm(below)
 
     @property
@@ -72,6 +102,22 @@ class GolfClicks:
     def height(self) -> float:
         """From the top of the head to between the ankles, px."""
         return float(np.linalg.norm(self.place("head_top") - self.feet))
+
+
+def clicked_pose(clicks: GolfClicks) -> ClickedPose:
+    """The pose that was clicked, before a camera as far as it is known."""
+    width, height = clicks.size
+    principal = clicks.principal or ((width - 1) / 2, (height - 1) / 2)
+    return ClickedPose(
+        joints=InitialJoints(
+            clicks.frame, tuple(clicks.joints), np.array(list(clicks.joints.values()), float)
+        ),
+        hidden=clicks.hidden,
+        size=clicks.size,
+        left_handed=clicks.left_handed,
+        stature=clicks.stature,
+        camera=Camera(clicks.focal or FOCAL * width, np.array(principal, float)),
+    )
 
 
 def check_clicks(clicks: GolfClicks, n_frames: int, size: tuple[int, int]) -> None:
@@ -108,16 +154,16 @@ def check_joints(clicks: GolfClicks, origin: str) -> None:
                 f"{origin}: the click on {name} at ({x:g}, {y:g}) is outside the picture of "
                 f"{clicks.size[0]} x {clicks.size[1]} px."
             )
-    _check_posture(clicks, origin)
+    _check_posture(clicked_pose(clicks), origin)
 
 
-def _check_posture(clicks: GolfClicks, origin: str) -> None:
-    if clicks.height < SHORTEST_PLAYER:
+def _check_posture(pose: ClickedPose, origin: str) -> None:
+    if pose.height < SHORTEST_PLAYER:
         raise KeyreconError(
-            f"{origin}: head and ankles are only {clicks.height:.0f} px apart; the player must be "
+            f"{origin}: head and ankles are only {pose.height:.0f} px apart; the player must be "
             f"at least {SHORTEST_PLAYER:.0f} px tall. Check the clicks or crop the video."
         )
-    head, root, feet = clicks.place("head_top")[1], clicks.place("root")[1], clicks.feet[1]
+    head, root, feet = pose.place("head_top")[1], pose.place("root")[1], pose.feet[1]
     if not head < root < feet:
         raise KeyreconError(
             f"{origin}: the head, the root and the ankles must be clicked from top to bottom, but "

@@ -56,7 +56,7 @@ class MotionModel:
     mean: Float[np.ndarray, "N D"]
     """D = 3 P + 3: rotation vectors, then the pelvis's place."""
     components: Float[np.ndarray, "C N D"]
-    """Scaled by their standard deviation: every alpha has unit variance."""
+    """Scaled by their standard deviation: every coefficient has unit variance."""
     keys: Float[np.ndarray, "4"]
     """Normalised times of the key postures, from 0 to 1."""
     explained: Float[np.ndarray, "C"]
@@ -74,7 +74,7 @@ class Posture:
     place: Float[np.ndarray, "T 3"]
     """Pelvis in swing axes, statures."""
     turn_rates: Float[np.ndarray, "T P 3 K"]
-    """Rotation velocity in the parent's axes by alpha_1 ... alpha_m and mu; K = m + 1."""
+    """Rotation velocity in the parent's axes by alpha_1 ... alpha_m and phase; K = m + 1."""
     place_rates: Float[np.ndarray, "T 3 K"]
 
 
@@ -86,7 +86,7 @@ class Body:
     offsets: Float[np.ndarray, "P 3"]
     """Origin of each segment in its parent's axes."""
     joint_segment: Int[np.ndarray, "14"]
-    """Segment that carries each joint of LSP14."""
+    """Segment that each joint of LSP14 moves with."""
     joint_place: Float[np.ndarray, "14 3"]
     """Joints in the axes of their segment."""
     club: float
@@ -107,15 +107,27 @@ class Capsules:
 
 @dataclass(frozen=True, eq=False)
 class SwingState:
-    """All that is unknown of a filmed swing: S of Eq. 5."""
+    """All that is unknown of a filmed swing: S of CVPR 2005, Eq. 3."""
 
-    alpha: Float[np.ndarray, "C"]
-    mu: Float[np.ndarray, "T"]
-    """Normalised time of every frame, 0-1."""
+    coefficients: Float[np.ndarray, "C"]
+    """alpha of the paper: weights of the components."""
+    phase: Float[np.ndarray, "T"]
+    """mu of the paper: normalised time of every frame, 0-1."""
     rotation: Float[np.ndarray, "T 3 3"]
     """From swing axes to camera axes; with `position` G_t of the paper."""
     position: Float[np.ndarray, "T 3"]
     """Origin of the swing axes in the camera's, metres."""
+    frame_coefficients: Float[np.ndarray, "T C"] | None = None
+    """Coefficients of every frame, where they are not common to all: the paper's windows."""
+
+
+@dataclass(frozen=True, eq=False)
+class SwingFit:
+    """A motion model, a body, and the state in which both together are a swing."""
+
+    model: MotionModel
+    body: Body
+    state: SwingState
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +138,17 @@ class RootPose:
     """Metres."""
     rotations: Float[np.ndarray, "T P 3 3"]
     """Segment axes to camera axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class InitialJoints:
+    """Joints of one frame, from which the player's place is estimated."""
+
+    frame: int
+    names: tuple[str, ...]
+    """Joints of LSP14, and `root` for the middle between the hips."""
+    places: Float[np.ndarray, "n 2"]
+    """px"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +172,14 @@ class SwingMarks:
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """What was seen in the video, px; NaN where nothing was."""
+    """What was observed in the video, px; NaN where nothing was."""
 
     camera: Camera
+    initial: InitialJoints
+    height: float
+    """Of the player in the initial frame, px."""
+    stature: float
+    """Of the player, metres."""
     joints: Float[np.ndarray, "T 14 2"]
     """In the order of LSP14."""
     spread: Float[np.ndarray, "T 14"]
@@ -165,12 +193,12 @@ class Observations:
     hidden or outside of the picture."""
     foreground: tuple[Float[np.ndarray, "_ 2"], ...]
     """Samples of the player's mask, one array per frame."""
-    away: tuple[Float[np.ndarray, "_ _"], ...]
-    """Distance to the mask in px at a quarter of the resolution, one per frame; may be empty."""
+    silhouette_distance: Float[np.ndarray, "F y x"]
+    """Distance to the mask in px at a quarter of the resolution; F = T, or 0 without masks."""
     matches: Matches
     keys: Float[np.ndarray, "4"]
     """Frames of the key postures."""
-    mu: Float[np.ndarray, "T"]
+    phase: Float[np.ndarray, "T"]
     """First guess of the normalised time."""
     left_handed: bool
     marks: SwingMarks | None = None
@@ -179,24 +207,24 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Errors of one kind, and how each changes with the point it hangs on."""
+    """Residuals of one type of observation, and how each changes with the point it hangs on."""
 
     values: Float[np.ndarray, "n"]
     """px or metres, one unit per record."""
     frame: Int[np.ndarray, "n"]
     segment: Int[np.ndarray, "n"]
-    """The segment that carries the point."""
+    """The segment that the point moves with."""
     point: Float[np.ndarray, "n 3"]
     """Camera axes, metres."""
     gradient: Float[np.ndarray, "n 3"]
     """Change of the value by the point."""
     group: Int[np.ndarray, "n"]
-    """Rows with one number are one error with several coordinates; robust weights go by it."""
+    """Rows with one number are one residual with several coordinates; robust weights go by it."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedSwing:
-    """A swing found in a video."""
+    """A swing fitted to a video."""
 
     motion: Motion
     state: SwingState
@@ -207,7 +235,7 @@ class FittedSwing:
     """On the segments of `pose`."""
     club: Float[np.ndarray, "T 2 3"]
     """Grip and head in camera axes, metres."""
-    club_seen: Float[np.ndarray, "T 2 2"]
+    club2d: Float[np.ndarray, "T 2 2"]
     """The same in the picture, px."""
     keys: Float[np.ndarray, "4"]
     """Frames in which the fitted motion passes the key postures."""

@@ -22,6 +22,7 @@ from keyrecon.numerics.banded_least_squares import (
     solve_banded,
 )
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,28 +64,38 @@ class Smoothness:
     bones: Float[np.ndarray, "B"]
 
 
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """All terms at a motion, and their sum with the smoothness."""
+
+    lines: Sequence[Linear]
+    cost: float
+
+
+DAMPING = Damping(start=1e-3, increase=10.0, decrease=5.0, largest=1e3)
+"""Marquardt's factor 10 (1963) for a step taken back; the others chosen on rendered sequences, see
+benchmarks/sensitivity.py."""
+
+
 def solve(
     start: MotionState, terms: Sequence[Term], smoothness: Smoothness, rounds: int, tolerance: float
 ) -> MotionState:
     """Lower the sum of all terms until a step gains less than the share `tolerance`."""
-    state, damping = start, 1e-3
-    lines = [term(state) for term in terms]
-    cost = _cost(state, lines, smoothness)
-    for _ in range(rounds):
-        step = _step(state, lines, smoothness, damping)
-        tried = _move(state, step)
-        tried_lines = [term(tried) for term in terms]
-        tried_cost = _cost(tried, tried_lines, smoothness)
-        if tried_cost >= cost:
-            damping *= 10
-            if damping > 1e3:
-                break
-            continue
-        gain = (cost - tried_cost) / max(cost, 1e-12)
-        state, lines, cost, damping = tried, tried_lines, tried_cost, max(damping / 5, 1e-6)
-        if gain < tolerance:
-            break
-    return state
+
+    def evaluate(state: MotionState) -> Evaluation:
+        lines = [term(state) for term in terms]
+        return Evaluation(lines, _cost(state, lines, smoothness))
+
+    def step(state: MotionState, here: Evaluation, damping: float) -> MotionState:
+        return _move(state, _step(state, here.lines, smoothness, damping))
+
+    def accepts(before: float, after: float) -> bool:
+        return after < before
+
+    def converged(before: float, after: float) -> bool:
+        return (before - after) / max(before, 1e-12) < tolerance
+
+    return minimise(start, evaluate, step, accepts, converged, DAMPING, rounds)
 
 
 def tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3 2"]:

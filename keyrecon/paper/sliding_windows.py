@@ -1,55 +1,136 @@
-"""The fit as printed: windows of three frames slide over the video (CVPR 2005, Section 4).
+"""The fit as printed: windows of three frames slide over the video (CVPR 2005, Sections 4 and 5.1).
 
-The unknowns of a window are S = [alpha, mu_1..mu_f, G_1..G_f]. G is the player's root itself: its
-motion is not part of the model. What is expected of a window comes from the one before: frames
-that it shares keep their estimate, alphas stay. Printed is that the new frame goes on at the last
-speed of mu and G; errors of these speeds add up until the windows run away. Ours goes on at the
-pace of the first guess of mu and at half the speed of G (`inertia` 1 and `pace` "last" as printed).
+Equations are numbered as in CVPR 2005; TR is the same authors' report IC/2004/90. The unknowns of a
+window are S = [alpha_1..alpha_m, mu_1..mu_f, G_1..G_f] (Eq. 3): coefficients common to the window,
+and normalised time and root pose of every frame. Minimised is
+
+    F = sum_i w_type(i) |Obs_type(i)(x_i, S)|^2
+        + w_G |G_t - G^_t|^2 + w_mu (mu_t - mu^_t)^2 + w_alpha sum_i (alpha_i - alpha^_i)^2  (Eq. 4)
+
+with plain squares, observations of the foreground (4.1), of joints and hands (4.2) and of matched
+points (4.3), and the predictions G^_t = G_(t-1) + dG_(t-1) and mu^_t = mu_(t-1) + dmu_(t-1).
+
+Where the text leaves a choice:
+
+Where       | what is open               | chosen                        | why
+------------|----------------------------|-------------------------------|--------------------------
+Section 3   | the database               | two swings and variations     | CMU's ten are not shipped
+Section 3   | coordinates of the angles  | rotation vectors              | no wrap-around
+Section 3   | mu between two samples     | Catmull-Rom, not linear       | a continuous derivative
+Section 3   | mu outside of [0, 1)       | the player stands still       | nothing is learnt there
+Eq. 2       | m                          | 4                             | TR, Section 3
+Section 4   | f; how far groups slide    | 3; by one frame               | 5.1; "sliding groups"
+Section 4   | what decides a frame       | the last group that has it    | it begins from the others
+Section 4   | the minimiser              | Levenberg-Marquardt           | "hill-climbing"
+Eq. 4       | squares in E_D             | squares, as in CVPR           | TR omits them, a slip
+Eq. 4       | t of both predictions      | every frame of the group      | one formula for all t
+Eq. 4       | what they start from       | the group before              | "in the previous set"
+Eq. 4       | those of the first group   | G of frame 0, guessed mu      | no speed is observed yet
+Eq. 4       | alpha^                     | the group before, 0 at first  | Section 5.1
+Eq. 4       | distance of two root poses | m and rad, one like the other | limbs are about a metre
+Eq. 4       | w_type                     | equal traces of J'J           | "commensurate"
+Eq. 4       | w_G, w_mu, w_alpha         | see `WindowOptions`           | not printed
+Section 4.1 | the body; samples          | capsules; a grid in the mask  | not printed
+Section 4.1 | the background             | GrabCut, then a median        | no empty scene is filmed
+Section 4.2 | hands from the club        | grip: the shaft's hand end    | both hands hold it
+Section 4.2 | WSL's image filters        | Lab colours                   | see `appearance_tracker`
+Section 4.3 | samples                    | of the mask, once             | shared with our fit
+Section 4.3 | correlation                | Lucas-Kanade, both ways       | the same, in sub-pixels
+Section 5.1 | the spline of mu           | monotone (PCHIP)              | a free one overshoots
+Section 5.1 | where mu begins            | spline if new, else estimate  | "initialize", then refine
+Section 5.1 | where G begins             | prediction if new             | nothing else is known
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from keyrecon.golf.fit.fitting import measure_influence
 from keyrecon.golf.fit.parameterisation import ROOT, SplineBasis, window_basis
-from keyrecon.golf.fit.regularisation import Rows, expect_alphas, stack_rows
+from keyrecon.golf.fit.regularisation import Rows, coefficient_rows, stack_rows
+from keyrecon.golf.fit.residuals import (
+    build_capsules,
+    foreground_residuals,
+    match_residuals,
+    pair_rows,
+    project,
+)
 from keyrecon.golf.fit.solver import Problem, Regulariser, ResidualBlock, solve
-from keyrecon.golf.prior.kinematics import place_body
-from keyrecon.golf.prior.motion_model import posture_at
-from keyrecon.golf.records import Body, Matches, MotionModel, Observations, SwingMarks, SwingState
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.skeleton import CLUB
+from keyrecon.golf.records import (
+    Body,
+    Matches,
+    MotionModel,
+    Observations,
+    Residuals,
+    RootPose,
+    SwingFit,
+    SwingState,
+)
 from keyrecon.progress import Progress, silent
 
 
 @dataclass(frozen=True)
 class WindowOptions:
-    """Sliding windows; standard deviations stand for the printed weights w_G, w_mu, w_alpha."""
+    """Sliding windows; standard deviations stand for the weights w_G, w_mu and w_alpha.
+
+    Their values are not printed. Tried on a rendered swing of benchmarks/golf.py, b-faceon-30:
+    those below gave a PA-MPJPE of 73 mm; twice as much for the root, 75; three times as much for
+    the coefficients and half as much for joints, 85; half as much for phase and joints, 99; half
+    for root and phase with three times for the coefficients and twice for joints, 344: there the
+    predictions outweigh the picture, and errors of the speeds add up until the windows run away.
+    """
 
     frames: int = 3
     """f: frames of a window."""
     components: int = 4
-    """m: alphas."""
-    turn: float = 0.10
-    """Radians by which the root turns otherwise than at its last speed."""
-    shift: float = 0.03
-    """Metres by which it shifts otherwise."""
-    mu: float = 0.01
-    """Normalised time by which a frame is off the last pace."""
-    alpha: float = 0.3
-    """Change of every alpha from window to window."""
-    inertia: float = 0.5
-    """Share of the root's last speed at which the next frame is expected; 1 as printed."""
-    pace: Literal["guess", "last"] = "guess"
-    """Whether mu goes on at the pace of its first guess, or at its last one as printed."""
+    """m: coefficients."""
+    root: float = 0.1
+    """Metres by which the root is off its prediction; radians likewise."""
+    phase: float = 0.02
+    """Normalised time by which a frame is off its prediction."""
+    coefficients: float = 0.1
+    """Change of every coefficient from window to window."""
+    joint: float = 0.01
+    """Player heights by which tracked joints are off."""
     steps: int = 12
     """Steps of the solver for each window."""
 
 
-def free_root(model: MotionModel) -> MotionModel:
-    """The model without the motion of the root, as in the paper."""
+def fit_sliding_windows(
+    observations: Observations,
+    initial: SwingFit,
+    options: WindowOptions = WindowOptions(),
+    progress: Progress = silent,
+) -> SwingFit:
+    """The whole motion from windows; `initial` has phases guessed and the root right in frame 0."""
+    pose = fitted_pose(initial)
+    model, body = _free_root(initial.model), initial.body
+    phase = initial.state.phase
+    frames, size = len(phase), min(options.frames, len(phase))
+    number = min(options.components, len(model.components))
+    root = replace(initial.state, rotation=pose.rotations[:, 0], position=pose.origins[:, 0])
+    weights = _commensurate_weights(observations, SwingFit(model, body, root), options)
+    basis = window_basis(number, size)
+    estimate = _stand_still(root, number)
+    for first in progress(range(frames - size + 1), "Fitting windows", frames - size + 1):
+        window = slice(first, first + size)
+        expected = predict_window(estimate, window, phase)
+        begin = _begin(estimate, expected, window, phase)
+        blocks = _blocks(_cut_observations(observations, window), body, weights)
+        regulariser = _regulariser(basis, expected, options)
+        best = solve(Problem(model, body, basis, blocks, regulariser), begin, options.steps)
+        estimate = _enter(estimate, best, window)
+    return SwingFit(model, body, estimate)
+
+
+def _free_root(model: MotionModel) -> MotionModel:
+    """The model without the motion of the root: G is the root itself."""
     centre, mean, components = model.centre.copy(), model.mean.copy(), model.components.copy()
     centre[0] = np.eye(3)
     for values in (mean, components):
@@ -58,112 +139,150 @@ def free_root(model: MotionModel) -> MotionModel:
     return replace(model, centre=centre, mean=mean, components=components)
 
 
-def root_of(state: SwingState, model: MotionModel, body: Body) -> SwingState:
-    """The state with G at the pelvis, for a model with a free root."""
-    posture = posture_at(model, state.mu, state.alpha)
-    pose = place_body(body, posture, state)
-    return replace(state, rotation=pose.rotations[:, 0], position=pose.origins[:, 0])
+def _stand_still(root: SwingState, number: int) -> SwingState:
+    """The root of frame 0 in all frames, and the mean motion."""
+    frames = len(root.phase)
+    return SwingState(
+        coefficients=np.zeros(number),
+        phase=root.phase,
+        rotation=np.tile(root.rotation[0], (frames, 1, 1)),
+        position=np.tile(root.position[0], (frames, 1)),
+        frame_coefficients=np.zeros((frames, number)),
+    )
 
 
-def slide_windows(
-    start: SwingState,
-    body: Body,
-    model: MotionModel,
-    kinds_of: Callable[[slice], Sequence[ResidualBlock]],
-    options: WindowOptions = WindowOptions(),
-    progress: Progress = silent,
+def predict_window(
+    estimate: SwingState, window: slice, guess: Float[np.ndarray, "T"]
 ) -> SwingState:
-    """The whole motion from windows; `start` has mu guessed and the root right in frame 0.
+    """mu^, G^ and alpha^ of a window: each frame goes on at the speed of the two before it."""
+    phase, rotation, position = (
+        values[window].copy() for values in (guess, estimate.rotation, estimate.position)
+    )
+    if window.start:
+        for row, t in enumerate(range(window.start, window.stop)):
+            last, before = t - 1, max(t - 2, 0)
+            now, then = (Rotation.from_matrix(estimate.rotation[k]) for k in (last, before))
+            rotation[row] = (now * then.inv() * now).as_matrix()
+            position[row] = 2 * estimate.position[last] - estimate.position[before]
+            phase[row] = 2 * estimate.phase[last] - estimate.phase[before]
+    return SwingState(estimate.coefficients, phase, rotation, position)
 
-    `model` has a free root, and `kinds_of` gives the observations of some frames.
-    """
-    frames, size = len(start.mu), min(options.frames, len(start.mu))
-    found = replace(
-        start, alpha=np.zeros(min(options.components, len(model.components))), mu=start.mu.copy(),
-        rotation=start.rotation.copy(), position=start.position.copy(),
+
+def _begin(
+    estimate: SwingState, expected: SwingState, window: slice, guess: Float[np.ndarray, "T"]
+) -> SwingState:
+    """Where the descent begins: a new frame at guess and prediction, others at their estimates."""
+    phase, rotation, position = (
+        values[window].copy() for values in (estimate.phase, estimate.rotation, estimate.position)
+    )
+    phase[-1], rotation[-1], position[-1] = (
+        guess[window.stop - 1], expected.rotation[-1], expected.position[-1],
     )  # fmt: skip
-    span = window_basis(len(found.alpha), size)
-    for first in progress(range(frames - size + 1), "Fitting windows", frames - size + 1):
-        if first:
-            _go_on(found, first + size - 1, start.mu, options)
-        chosen = slice(first, first + size)
-        expected = _cut(found, chosen)
-        guess = replace(expected, mu=0.5 * (expected.mu + start.mu[chosen]))
-        expect = _expect(span, expected, options)
-        best = solve(Problem(model, body, span, kinds_of(chosen), expect), guess, options.steps)
-        found = replace(found, alpha=best.alpha)
-        for values, new in zip(_arrays(found), _arrays(best), strict=True):
-            values[chosen] = new
-    return replace(found, mu=np.clip(np.maximum.accumulate(found.mu), 0, 1))
+    return SwingState(estimate.coefficients, phase, rotation, position)
 
 
-def _arrays(state: SwingState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return state.mu, state.rotation, state.position
+def _enter(estimate: SwingState, best: SwingState, window: slice) -> SwingState:
+    """The estimate with the frames of a window as it was fitted."""
+    rows = np.arange(window.start, window.stop)
+    phase, rotation, position, coefficients = (
+        values.copy()
+        for values in (
+            estimate.phase, estimate.rotation, estimate.position, estimate.frame_coefficients,
+        )
+    )  # fmt: skip
+    phase[rows], rotation[rows], position[rows] = best.phase, best.rotation, best.position
+    coefficients[rows] = best.coefficients
+    return SwingState(best.coefficients, phase, rotation, position, coefficients)
 
 
-def _cut(state: SwingState, chosen: slice) -> SwingState:
-    return SwingState(state.alpha, *(values[chosen].copy() for values in _arrays(state)))
-
-
-def _go_on(
-    found: SwingState, frame: int, guess: Float[np.ndarray, "T"], options: WindowOptions
-) -> None:
-    """Enter a frame that goes on from the two before it."""
-    last, before = frame - 1, frame - 2
-    now, then = (Rotation.from_matrix(found.rotation[t]) for t in (last, before))
-    turn = Rotation.from_rotvec(options.inertia * (now * then.inv()).as_rotvec())
-    shift = options.inertia * (found.position[last] - found.position[before])
-    found.rotation[frame] = (turn * now).as_matrix()
-    found.position[frame] = found.position[last] + shift
-    pace = guess[frame] - guess[last]
-    if options.pace == "last":
-        pace = found.mu[last] - found.mu[before]
-    found.mu[frame] = min(found.mu[last] + pace, 1.0)
-
-
-def _expect(span: SplineBasis, expected: SwingState, options: WindowOptions) -> Regulariser:
-    """E_D of Eq. 7 with its squares: alpha, mu and G close to what is expected of them."""
-    weight = 1 / np.repeat([options.turn, options.shift], 3)
-    frames = len(expected.mu)
-    first = span.alphas + frames
+def _regulariser(basis: SplineBasis, expected: SwingState, options: WindowOptions) -> Regulariser:
+    """The last three terms of Eq. 4."""
+    frames = len(expected.phase)
 
     def expect(state: SwingState) -> Rows:
         turn = state.rotation @ np.swapaxes(expected.rotation, 1, 2)
         off = np.hstack(
             [Rotation.from_matrix(turn).as_rotvec(), state.position - expected.position]
         )
-        slopes = np.zeros((frames * (ROOT + 1), span.size))
-        slopes[:frames, span.alphas : first] = np.eye(frames) / options.mu
-        slopes[frames:, first:] = np.diag(np.tile(weight, frames))
-        values = np.concatenate([(state.mu - expected.mu) / options.mu, (off * weight).ravel()])
+        slopes = np.zeros((frames * (ROOT + 1), basis.size))
+        slopes[:frames, basis.phase_columns] = np.eye(frames) / options.phase
+        slopes[frames:, basis.root_columns] = np.eye(ROOT * frames) / options.root
+        ahead = (state.phase - expected.phase) / options.phase
+        values = np.concatenate([ahead, off.ravel() / options.root])
         return stack_rows(
-            [expect_alphas(state, span, expected.alpha, options.alpha), Rows(values, slopes)]
+            [
+                coefficient_rows(state, basis, expected.coefficients, options.coefficients),
+                Rows(values, slopes),
+            ]
         )
 
     return expect
 
 
-def cut_observations(observations: Observations, chosen: slice) -> Observations:
-    """What was seen in some consecutive frames; matches between these frames only."""
-    matches = observations.matches
-    inside = (matches.frame >= chosen.start) & (matches.frame < chosen.stop - 1)
-    return replace(
-        observations,
-        joints=observations.joints[chosen],
-        spread=observations.spread[chosen],
-        club=observations.club[chosen],
-        club_spread=observations.club_spread[chosen],
-        club_along=observations.club_along[chosen],
-        foreground=observations.foreground[chosen],
-        away=observations.away[chosen],
-        matches=Matches(
-            matches.frame[inside] - chosen.start, matches.start[inside], matches.end[inside]
-        ),
-        mu=observations.mu[chosen],
-        marks=None if observations.marks is None else _cut_marks(observations.marks, chosen),
+@dataclass(frozen=True)
+class TypeWeights:
+    """w_type of Eq. 4."""
+
+    foreground: float
+    joints: float
+    matches: float
+
+
+def _blocks(
+    observations: Observations, body: Body, weights: TypeWeights
+) -> Sequence[ResidualBlock]:
+    """The types of observation of Sections 4.1 to 4.3, with plain squares."""
+    capsules = build_capsules(body)
+    foreground = partial(foreground_residuals, observations, capsules)
+    joints = partial(projection_residuals, observations, body)
+    matches = partial(match_residuals, observations, capsules)
+    return [
+        ResidualBlock(foreground, weights.foreground, np.inf),
+        ResidualBlock(joints, weights.joints, np.inf),
+        ResidualBlock(matches, weights.matches, np.inf),
+    ]
+
+
+def _commensurate_weights(
+    observations: Observations, root: SwingFit, options: WindowOptions
+) -> TypeWeights:
+    """Weights at which all types of observation have the same influence at the start."""
+    blocks = _blocks(observations, root.body, TypeWeights(1.0, 1.0, 1.0))
+    foreground, joints, matches = (measure_influence(block, root) for block in blocks)
+    scale = (options.joint * observations.height) ** -2
+    return TypeWeights(
+        scale * joints / foreground if foreground else 0.0,
+        scale,
+        scale * joints / matches if matches else 0.0,
     )
 
 
-def _cut_marks(marks: SwingMarks, chosen: slice) -> SwingMarks:
-    inside = (marks.frames >= chosen.start) & (marks.frames < chosen.stop)
-    return SwingMarks(marks.frames[inside] - chosen.start, marks.joints[inside])
+def projection_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
+    """Projected minus tracked joints and hands, px (Section 4.2)."""
+    frame, joint = np.nonzero(np.isfinite(observations.joints).all(axis=2))
+    held = np.flatnonzero(np.isfinite(observations.club[:, 0]).all(axis=1))
+    points = np.concatenate([find_joints(body, pose)[frame, joint], find_club(body, pose)[held, 0]])
+    tracked = np.concatenate([observations.joints[frame, joint], observations.club[held, 0]])
+    segment = np.concatenate([body.joint_segment[joint], np.full(len(held), CLUB)])
+    pixels, slope = project(points, observations.camera)
+    return pair_rows(pixels - tracked, slope, points, np.concatenate([frame, held]), segment)
+
+
+def _cut_observations(observations: Observations, window: slice) -> Observations:
+    """What was observed in a window; matches between its frames only."""
+    matches = observations.matches
+    inside = (matches.frame >= window.start) & (matches.frame < window.stop - 1)
+    return replace(
+        observations,
+        joints=observations.joints[window],
+        spread=observations.spread[window],
+        club=observations.club[window],
+        club_spread=observations.club_spread[window],
+        club_along=observations.club_along[window],
+        foreground=observations.foreground[window],
+        silhouette_distance=observations.silhouette_distance[window],
+        phase=observations.phase[window],
+        matches=Matches(
+            matches.frame[inside] - window.start, matches.start[inside], matches.end[inside]
+        ),
+    )

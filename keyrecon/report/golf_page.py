@@ -26,24 +26,24 @@ from keyrecon.report.page import POLICY
 from keyrecon.report.scripts import bundle_scripts
 
 KEY_NAMES = ("Beginning", "Top", "Hit", "Finish")
-MOST_ALPHAS = 12
-"""Components shown: those of the largest variance come first."""
+MOST_COEFFICIENTS = 12
+"""Coefficients drawn: those of the largest variance come first."""
 
 
 def time_chart(fitted: FittedSwing, observations: Observations, model: MotionModel) -> go.Figure:
     """Normalised time against the frame (Fig. 9): first guess from the club, and fitted."""
-    frames = np.arange(len(fitted.state.mu))
+    frames = np.arange(len(fitted.state.phase))
     figure = stack_charts(("Normalised time",), len(frames))
     figure.add_scatter(
         x=frames,
-        y=observations.mu.round(4),
+        y=observations.phase.round(4),
         name="guess from the club",
         mode="lines",
         line={"width": 1.2, "dash": "dot", "color": "var(--muted)"},
     )
     figure.add_scatter(
         x=frames,
-        y=fitted.state.mu.round(4),
+        y=fitted.state.phase.round(4),
         name="fitted",
         mode="lines",
         line={"width": 2, "color": "var(--accent)"},
@@ -84,10 +84,10 @@ def turn_chart(measures: SwingMeasures, keys: np.ndarray) -> go.Figure:
 
 
 def style_bars(fitted: FittedSwing) -> go.Figure:
-    """The alphas: how this swing differs from the mean one, in standard deviations."""
-    alpha = fitted.state.alpha[:MOST_ALPHAS]
+    """The coefficients: how this swing differs from the mean one, in standard deviations."""
+    coefficients = fitted.state.coefficients[:MOST_COEFFICIENTS]
     figure = go.Figure(
-        go.Bar(x=[f"alpha {i}" for i in range(1, len(alpha) + 1)], y=alpha.round(3),
+        go.Bar(x=[f"component {i + 1}" for i in range(len(coefficients))], y=coefficients.round(3),
                marker={"color": "var(--accent)"},
                hovertemplate="%{x}: %{y:.2f} standard deviations<extra></extra>")
     )  # fmt: skip
@@ -176,13 +176,13 @@ def _strip(fitted: FittedSwing, observations: Observations, video: Video) -> str
         f"<span>{frame}</span></div>"
         for frame, uri in overlay_strip(video, fitted, observations)
     )
-    about = note("Judge the fit here: the primitives should lie on the player in every frame.")
+    about = note("Check the fit here: the primitives should lie on the player in every frame.")
     return section("fit", "The fit through the swing", about, f'<div class="strip">{stills}</div>')
 
 
 def _paths(fitted: FittedSwing, observations: Observations, video: Video) -> str:
     about = note(
-        "Lines are the fitted paths of club head (vermillion) and hands (blue), dots what was seen."
+        "Lines are the fitted paths of club head (vermillion) and hands (blue), dots detections."
     )
     picture = _image(path_picture(video, fitted, observations), "Paths of club and hands")
     return section("paths", "Club and hands", about, f"<figure>{picture}</figure>")

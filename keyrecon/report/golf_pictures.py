@@ -57,7 +57,7 @@ def draw_golfer(
     layer = picture.copy()
     _draw_discs(layer, discs, fitted.capsules)
     drawn = cv2.addWeighted(layer, 0.6, picture, 0.4, 0)
-    _draw_club(drawn, fitted.club_seen[frame])
+    _draw_club(drawn, fitted.club2d[frame])
     return drawn
 
 
@@ -149,7 +149,7 @@ def path_picture(video: Video, fitted: FittedSwing, observations: Observations) 
     drawn = video.frame(hit).copy()
     swing = slice(max(0, int(fitted.keys[0])), int(np.ceil(fitted.keys[3])) + 1)
     for end, color in ((1, CLUB), (0, HANDS)):
-        _draw_path(drawn, fitted.club_seen[swing, end], color)
+        _draw_path(drawn, fitted.club2d[swing, end], color)
         for point in observations.club[swing, end]:
             if np.isfinite(point).all():
                 cv2.circle(drawn, _pixel(point), 3, color, -1, cv2.LINE_AA)

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import GolfClicks, check_clicks
+from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.io.formats.clicks import read_clicks, write_clicks
 
 JOINTS = {
@@ -33,7 +33,7 @@ def test_the_root_lies_between_both_hips(tmp_path):
     joints = {name: place for name, place in JOINTS.items() if name != "root"}
     joints |= {"right_hip": (80, 160), "left_hip": (100, 160)}
     clicks = read_clicks(file_of(tmp_path, joints=joints))
-    assert clicks.place("root").tolist() == [90, 160]
+    assert clicked_pose(clicks).place("root").tolist() == [90, 160]
 
 
 @pytest.mark.parametrize(

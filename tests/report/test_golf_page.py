@@ -34,7 +34,7 @@ def turning(shoulders, hips, aside=0.0):
         pose=RootPose(np.zeros((FRAMES, 16, 3)), np.tile(np.eye(3), (FRAMES, 16, 1, 1))),
         capsules=build_capsules(body),
         club=np.zeros((FRAMES, 2, 3)),
-        club_seen=np.zeros((FRAMES, 2, 2)),
+        club2d=np.zeros((FRAMES, 2, 2)),
         keys=np.array([0.0, 18.0, 24.0, 30.0]),
     )
 

@@ -1,10 +1,10 @@
-"""A swing whose every number is known, and what a perfect or a noisy tracker would see of it."""
+"""A swing whose every number is known, and what a perfect or a noisy tracker would observe."""
 
 import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.records import Matches, Observations
+from keyrecon.golf.records import InitialJoints, Matches, Observations
 
 TRACKED = [LSP14.index(f"{s}_{n}") for s in ("right", "left") for n in ("ankle", "knee", "wrist")]
 TRACKED.append(LSP14.index("head_top"))
@@ -37,15 +37,18 @@ def observe(joints, club, camera, noise, seed=0):
     nothing = tuple(np.zeros((0, 2)) for _ in range(frames))
     return Observations(
         camera=camera,
+        initial=InitialJoints(0, (), np.zeros((0, 2))),
+        height=300.0,
+        stature=1.8,
         joints=seen,
         spread=np.full((frames, 14), 3.0),
         club=ends + rng.normal(0, noise, ends.shape),
         club_spread=np.full(frames, 4.0),
         club_along=np.full((frames, 2), 16.0),
         foreground=nothing,
-        away=(),
+        silhouette_distance=np.zeros((0, 2, 2)),
         matches=Matches(np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2))),
         keys=np.arange(4.0),
-        mu=np.zeros(frames),
+        phase=np.zeros(frames),
         left_handed=False,
     )

@@ -1,1 +1,1 @@
-"""The swing model fitted to what was seen, by least squares (CVPR 2005, Sections 4 and 5)."""
+"""The swing model fitted to observations, by least squares (CVPR 2005, Sections 4 and 5)."""

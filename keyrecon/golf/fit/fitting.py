@@ -1,24 +1,31 @@
-"""Fit the motion model to what was seen of a whole swing.
+"""Fit the motion model to what was observed of a whole swing.
 
-The paper slides windows of three frames (`windows`); all frames of a swing share their alphas, so
-one problem over the whole swing is better conditioned and is the default. It goes from coarse to
-fine: first where the player stands, with the mean motion; then everything.
+The paper slides windows of three frames (`keyrecon.paper.sliding_windows`); all frames of a swing
+share their coefficients, so one problem over the whole swing is better conditioned and is the
+default. It goes from coarse to fine: first where the player stands, with the mean motion; then
+everything.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.golf.fit.parameterisation import SplineBasis, constant_basis, swing_basis
+from keyrecon.golf.fit.parameterisation import (
+    KnotSpacing,
+    SplineBasis,
+    constant_basis,
+    swing_basis,
+)
 from keyrecon.golf.fit.regularisation import (
     PriorOptions,
     Rows,
-    expect_alphas,
-    expect_level,
-    expect_stillness,
-    expect_times,
+    coefficient_rows,
+    level_rows,
+    phase_rows,
+    root_rows,
     stack_rows,
 )
 from keyrecon.golf.fit.residuals import (
@@ -28,7 +35,7 @@ from keyrecon.golf.fit.residuals import (
     joint_residuals,
     mark_residuals,
     match_residuals,
-    silhouette_distance_residuals,
+    silhouette_residuals,
 )
 from keyrecon.golf.fit.solver import (
     Problem,
@@ -41,29 +48,22 @@ from keyrecon.golf.fit.solver import (
 from keyrecon.golf.observe.swing_events import keep_order
 from keyrecon.golf.prior.kinematics import place_body, pose_rates
 from keyrecon.golf.prior.motion_model import posture_at
-from keyrecon.golf.records import Body, MotionModel, Observations, SwingState
-from keyrecon.paper.sliding_windows import (
-    WindowOptions,
-    cut_observations,
-    free_root,
-    root_of,
-    slide_windows,
-)
+from keyrecon.golf.records import Body, Observations, SwingFit, SwingState
 
 
 @dataclass(frozen=True)
 class WeightOptions:
-    """How much each kind of observation counts against the joints; 0 leaves it out."""
+    """How much each type of observation counts against the joints; 0 leaves it out."""
 
     joints: float = 1.0
-    """Tracked joints; their errors are in standard deviations."""
+    """Tracked joints; their residuals are in standard deviations."""
     club: float = 1.0
     """Ends of the club, in standard deviations."""
     marks: float = 1.0
-    """Joints that a person marked; every marked frame counts as a look of its own."""
+    """Joints that a person marked; every marked frame counts as independent of all others."""
     foreground: float = 0.5
     """Lines of sight through the player's mask, made commensurate with the joints."""
-    away: float = 0.15
+    silhouette: float = 0.15
     """Limbs that project outside of the mask, made commensurate with the joints."""
     matches: float = 0.5
     """Surface points matched between consecutive frames, made commensurate with the joints."""
@@ -74,11 +74,11 @@ class FitOptions:
     """How a swing is fitted."""
 
     components: int = 40
-    """Alphas used at most; the paper used 4 of its 10 swings."""
+    """Components used at most; the paper used 4 of its 10 swings."""
     weights: WeightOptions = field(default_factory=WeightOptions)
     """Observations."""
     priors: PriorOptions = field(default_factory=PriorOptions)
-    """Expectations."""
+    """Regularisation."""
     robust: float = 3.0
     """Standard deviations beyond which a joint or club end counts less."""
     time_knots: float = 0.1
@@ -87,185 +87,172 @@ class FitOptions:
     """Seconds between knots of the player's place and turn."""
     steps: int = 25
     """Steps of the solver at most."""
-    windows: WindowOptions = field(default_factory=WindowOptions)
-    """The paper's sliding windows, where they are asked for."""
 
 
-OBSERVATION_KINDS = 3.0
-"""Independent looks at the player per second: trackers drift and proportions are wrong for a third
-of a second or longer, so that more frames do not make these errors smaller."""
-FAR_SIGHT, FAR_AWAY, FAR_MATCH = 0.06, 12.0, 3.0
-"""Errors beyond which a line of sight (m), a limb off the mask (px) and a match (px) count less."""
-FIRST = 6
-"""Alphas that move before all do: the largest styles first."""
+INDEPENDENT_PER_SECOND = 3.0
+"""Independent observations of a joint per second: trackers drift and proportions are wrong for a
+third of a second or longer, so that more frames do not make these errors smaller. Chosen on
+rendered swings; see benchmarks/golf.py."""
+ROBUST_FOREGROUND, ROBUST_SILHOUETTE, ROBUST_MATCH = 0.06, 12.0, 3.0
+"""Residuals beyond which a line of sight (m: the radius of a thigh), a limb off the mask (px) and a
+match (px: the accuracy of Lucas-Kanade on cloth) count less. Chosen on rendered swings; see
+benchmarks/golf.py."""
+FIRST_COMPONENTS = 6
+"""Coefficients that move before all do, the largest styles first. Chosen on rendered swings; see
+benchmarks/golf.py."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """A step from coarse to fine."""
+
+    basis: SplineBasis
+    robust: float
+    """Factor on the size of residuals that count less: far starts need more tolerance."""
 
 
 def fit_swing(
-    observations: Observations,
-    model: MotionModel,
-    body: Body,
-    start: SwingState,
-    fps: float,
-    options: FitOptions = FitOptions(),
-) -> tuple[MotionModel, Body, SwingState]:
-    """The swing that explains what was seen, from a rough start; and what it is made of."""
-    frames, alphas = len(start.mu), _count_alphas(model, options)
-    knots = _knots(fps, options)
-    stages = [
-        (constant_basis(0, frames), 10.0),
-        (swing_basis(min(alphas, FIRST), frames, knots), 3.0),
-        (swing_basis(alphas, frames, knots), 1.0),
+    observations: Observations, initial: SwingFit, fps: float, options: FitOptions = FitOptions()
+) -> SwingFit:
+    """The swing that explains the observations, from a rough start with the mean motion."""
+    frames = len(initial.state.phase)
+    number, knots = min(options.components, len(initial.model.components)), _knots(fps, options)
+    levels = [
+        _Level(constant_basis(0, frames), 10.0),
+        _Level(swing_basis(min(number, FIRST_COMPONENTS), frames, knots), 3.0),
+        _Level(swing_basis(number, frames, knots), 1.0),
     ]
-    state = replace(start, alpha=np.zeros(alphas))
-    kinds = _weigh_kinds(observations, model, body, start, (fps, options))
-    return model, body, _descend((model, body, kinds), stages, (state, start.mu), (fps, options))
+    blocks = _weighted_blocks(observations, initial, fps, options)
+    state = replace(initial.state, coefficients=np.zeros(number))
+    return _descend(initial, state, blocks, levels, fps, options)
 
 
 def refit_swing(
     observations: Observations,
-    model: MotionModel,
-    body: Body,
-    states: tuple[SwingState, SwingState],
+    initial: SwingFit,
+    previous: SwingState,
     fps: float,
     options: FitOptions = FitOptions(),
-) -> tuple[MotionModel, Body, SwingState]:
-    """The same from the rough start and the swing that was fitted before more was seen."""
-    start, before = states
-    stages = [(swing_basis(len(before.alpha), len(start.mu), _knots(fps, options)), 1.0)]
-    kinds = _weigh_kinds(observations, model, body, start, (fps, options))
-    return model, body, _descend((model, body, kinds), stages, (before, start.mu), (fps, options))
+) -> SwingFit:
+    """The same, going on from the state that was fitted before there were more observations."""
+    basis = swing_basis(len(previous.coefficients), len(initial.state.phase), _knots(fps, options))
+    blocks = _weighted_blocks(observations, initial, fps, options)
+    return _descend(initial, previous, blocks, [_Level(basis, 1.0)], fps, options)
 
 
-def _count_alphas(model: MotionModel, options: FitOptions) -> int:
-    return min(options.components, len(model.components))
+def _knots(fps: float, options: FitOptions) -> KnotSpacing:
+    return KnotSpacing(options.time_knots * fps, options.root_knots * fps)
 
 
-def _knots(fps: float, options: FitOptions) -> tuple[float, float]:
-    """Frames between the knots of normalised time and of the root."""
-    return options.time_knots * fps, options.root_knots * fps
-
-
-def _weigh_kinds(
-    observations: Observations,
-    model: MotionModel,
-    body: Body,
-    start: SwingState,
-    settings: tuple[float, FitOptions],
+def _weighted_blocks(
+    observations: Observations, initial: SwingFit, fps: float, options: FitOptions
 ) -> list[ResidualBlock]:
-    """All kinds of observations, frames counted as far as they are independent looks."""
-    fps, options = settings
-    kinds = choose_kinds(observations, model, body, start, options)
-    share = min(1.0, OBSERVATION_KINDS / fps)
-    marks = partial(mark_residuals, observations, body)
-    return [replace(kind, weight=kind.weight * share) for kind in kinds] + [
+    """All types of observations, frames counted as far as they are independent."""
+    blocks = residual_blocks(observations, initial, options)
+    share = min(1.0, INDEPENDENT_PER_SECOND / fps)
+    marks = partial(mark_residuals, observations, initial.body)
+    return [replace(block, weight=block.weight * share) for block in blocks] + [
         ResidualBlock(marks, options.weights.marks, options.robust)
     ]
 
 
 def _descend(
-    setting: tuple[MotionModel, Body, list[ResidualBlock]],
-    stages: list[tuple[SplineBasis, float]],
-    states: tuple[SwingState, Float[np.ndarray, "T"]],
-    settings: tuple[float, FitOptions],
-) -> SwingState:
-    """Solve stage by stage from a state; `states` also has the guessed times."""
-    (model, body, kinds), (state, guess), (fps, options) = setting, states, settings
-    for span, robust in stages:
-        expect = _whole_swing(span, guess, options.priors, fps)
-        wide = [replace(kind, robust=robust * kind.robust) for kind in kinds]
-        state = solve(Problem(model, body, span, wide, expect), state, options.steps)
-        state = replace(state, mu=keep_order(state.mu))
-    return state
-
-
-def fit_sliding_windows(
-    observations: Observations,
-    model: MotionModel,
-    body: Body,
-    start: SwingState,
+    initial: SwingFit,
+    state: SwingState,
+    blocks: Sequence[ResidualBlock],
+    levels: Sequence[_Level],
     fps: float,
-    options: FitOptions = FitOptions(),
-) -> tuple[MotionModel, Body, SwingState]:
-    """The fit as printed: windows of three frames, a free root, few components."""
-    free = free_root(model)
-    begin = root_of(replace(start, alpha=np.zeros(options.windows.components)), model, body)
-    kinds = choose_kinds(observations, free, body, begin, options)
-    weight = {kind.observe.func: kind.weight for kind in kinds}
-
-    def kinds_of(chosen: slice) -> list[ResidualBlock]:
-        own = choose_kinds(cut_observations(observations, chosen), free, body, None, options)
-        return [replace(kind, weight=weight[kind.observe.func]) for kind in own]
-
-    return free, body, slide_windows(begin, body, free, kinds_of, options.windows)
-
-
-def choose_kinds(
-    observations: Observations,
-    model: MotionModel,
-    body: Body,
-    start: SwingState | None,
     options: FitOptions,
+) -> SwingFit:
+    """Solve level by level from a state; phases are guessed by the initial one."""
+    model, body = initial.model, initial.body
+    for level in levels:
+        regulariser = _whole_swing(level.basis, initial.state.phase, options.priors, fps)
+        wide = [replace(block, robust=level.robust * block.robust) for block in blocks]
+        problem = Problem(model, body, level.basis, wide, regulariser)
+        state = solve(problem, state, options.steps)
+        state = replace(state, phase=keep_order(state.phase))
+    return SwingFit(model, body, state)
+
+
+def residual_blocks(
+    observations: Observations, initial: SwingFit, options: FitOptions
 ) -> list[ResidualBlock]:
-    """Kinds of observation that count; made commensurate at the start, where there is one."""
-    weights = options.weights
-    points = [
-        ResidualBlock(partial(joint_residuals, observations, body), weights.joints, options.robust),
-        ResidualBlock(partial(club_residuals, observations, body), weights.club, options.robust),
+    """Types of observation that count, those of the surface made commensurate with the points."""
+    points = point_blocks(observations, initial.body, options)
+    reference = sum(block.weight * measure_influence(block, initial) for block in points)
+    return points + [
+        _make_commensurate(block, reference, initial)
+        for block in surface_blocks(observations, initial.body, options)
     ]
-    capsules = build_capsules(body)
-    surfaces = [
-        ResidualBlock(
-            partial(foreground_residuals, observations, capsules), weights.foreground, FAR_SIGHT
-        ),
-        ResidualBlock(
-            partial(silhouette_distance_residuals, observations, capsules), weights.away, FAR_AWAY
-        ),
-        ResidualBlock(partial(match_residuals, observations, capsules), weights.matches, FAR_MATCH),
-    ]
-    points = [kind for kind in points if kind.weight]
-    surfaces = [kind for kind in surfaces if kind.weight]
-    if start is None:
-        return points + surfaces
-    reference = sum(kind.weight * _influence(kind, model, body, start) for kind in points)
-    return points + [_make_commensurate(k, reference, model, body, start) for k in surfaces]
 
 
-def _make_commensurate(
-    kind: ResidualBlock, reference: float, model: MotionModel, body: Body, start: SwingState
-) -> ResidualBlock:
-    """The kind with its weight as a share of the influence of the points."""
-    own = _influence(kind, model, body, start)
-    return replace(kind, weight=kind.weight * reference / own if own else 0.0)
+def point_blocks(
+    observations: Observations, body: Body, options: FitOptions
+) -> list[ResidualBlock]:
+    """Joints and club, in standard deviations."""
+    weights, robust = options.weights, options.robust
+    blocks = [
+        ResidualBlock(partial(joint_residuals, observations, body), weights.joints, robust),
+        ResidualBlock(partial(club_residuals, observations, body), weights.club, robust),
+    ]
+    return [block for block in blocks if block.weight]
+
+
+def surface_blocks(
+    observations: Observations, body: Body, options: FitOptions
+) -> list[ResidualBlock]:
+    """Mask and matched points; their weights are shares of the influence of the points."""
+    weights, capsules = options.weights, build_capsules(body)
+    foreground = partial(foreground_residuals, observations, capsules)
+    silhouette = partial(silhouette_residuals, observations, capsules)
+    matches = partial(match_residuals, observations, capsules)
+    blocks = [
+        ResidualBlock(foreground, weights.foreground, ROBUST_FOREGROUND),
+        ResidualBlock(silhouette, weights.silhouette, ROBUST_SILHOUETTE),
+        ResidualBlock(matches, weights.matches, ROBUST_MATCH),
+    ]
+    return [block for block in blocks if block.weight]
+
+
+def _make_commensurate(block: ResidualBlock, reference: float, initial: SwingFit) -> ResidualBlock:
+    """The block with its weight as a share of the influence of the points (Section 4)."""
+    influence = measure_influence(block, initial)
+    return replace(block, weight=block.weight * reference / influence if influence else 0.0)
 
 
 def _whole_swing(
-    span: SplineBasis, guess: Float[np.ndarray, "T"], options: PriorOptions, fps: float
+    basis: SplineBasis, guess: Float[np.ndarray, "T"], options: PriorOptions, fps: float
 ) -> Regulariser:
-    """Expectations over a whole swing."""
+    """What is expected of a whole swing."""
 
     def expect(state: SwingState) -> Rows:
+        mean = np.zeros(basis.n_coefficients)
         return stack_rows(
             [
-                expect_alphas(state, span, np.zeros(span.alphas), options.alpha),
-                expect_times(state, span, guess, options, fps),
-                expect_stillness(state, span, options, fps),
-                expect_level(state, span, options),
+                coefficient_rows(state, basis, mean, options.coefficients),
+                phase_rows(state, basis, guess, options, fps),
+                root_rows(state, basis, options, fps),
+                level_rows(state, basis, options),
             ]
         )
 
     return expect
 
 
-_SOME = 4
-_TYPICAL = np.array([1.0] * _SOME + [0.01] + [0.03] * 3 + [0.02] * 3)
-"""Steps of alpha, mu, turn (rad) and shift (m) that count as equally large."""
+INFLUENCE_COMPONENTS = 4
+"""Components whose influence is compared: m of the paper."""
+TYPICAL_STEPS = np.array([1.0] * INFLUENCE_COMPONENTS + [0.01] + [0.03] * 3 + [0.02] * 3)
+"""Steps of coefficients (their standard deviation), phase, turn (rad) and shift (m) that count as
+equally large: each moves a hand by some centimetres."""
 
 
-def _influence(kind: ResidualBlock, model: MotionModel, body: Body, state: SwingState) -> float:
-    """Trace of J^T J in typical steps of the unknowns, robustly weighted."""
-    posture = posture_at(model, state.mu, np.zeros(_SOME))
-    pose = place_body(body, posture, state)
-    rows = kind.observe(pose)
-    slopes = chain_rule(rows, pose, pose_rates(body, posture, state, pose)) * _TYPICAL
-    share, _ = robust_weights(rows, 10 * kind.robust)
-    return float(((slopes**2).sum(axis=1) * share).sum())
+def measure_influence(block: ResidualBlock, fit: SwingFit) -> float:
+    """Trace of J^T J of a block in typical steps of the unknowns, robustly weighted."""
+    posture = posture_at(fit.model, fit.state.phase, np.zeros(INFLUENCE_COMPONENTS))
+    pose = place_body(fit.body, posture, fit.state)
+    rows = block.residuals(pose)
+    rates = pose_rates(fit.body, posture, fit.state, pose)
+    slopes = chain_rule(rows, pose, rates) * TYPICAL_STEPS
+    weights = robust_weights(rows, 10 * block.robust).weights
+    return float(((slopes**2).sum(axis=1) * weights).sum())

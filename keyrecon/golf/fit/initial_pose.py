@@ -1,11 +1,11 @@
-"""Where the player stands in the picture, from the clicks of one frame (CVPR 2005, Section 5.1).
+"""Where the player stands in the picture, from the joints of one frame (CVPR 2005, Section 5.1).
 
-With the mean motion at the normalised time of the clicked frame, only G is unknown: six numbers
-from six or more joints. The camera may look from any side, so the fit starts from several headings
-and keeps the best one.
+With the mean motion at the normalised time of that frame, only the root pose G is unknown: six
+numbers from six or more joints. The camera may look from any side, so the fit starts from several
+headings and keeps the best one.
 """
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -16,60 +16,87 @@ from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
-from keyrecon.golf.records import Body, Camera, MotionModel, SwingState
+from keyrecon.golf.records import (
+    Body,
+    Camera,
+    InitialJoints,
+    MotionModel,
+    Observations,
+    SwingFit,
+    SwingState,
+)
 
 HEADINGS = 12
-"""Sides of the player that are tried."""
+"""Sides of the player that are tried. Chosen on rendered swings; see benchmarks/golf.py."""
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 """Swing axes as a level camera behind the player sees them."""
-LEAN = 0.06
-"""Radians by which a camera is usually off the level."""
-CLICK = 8.0
-"""px by which a click, or the mean player's joint, is usually off."""
+LEAN_SPREAD = 0.06
+"""Radians by which a camera is usually off the level. Chosen on rendered swings; see
+benchmarks/golf.py."""
+JOINT_SPREAD = 8.0
+"""px by which a click, or the mean player's joint, is usually off: a click by 2 to 3, a player's
+proportions by 4 % of a limb. Chosen on rendered swings; see benchmarks/golf.py."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where the swing axes lie in camera axes."""
+
+    rotation: Float[np.ndarray, "3 3"]
+    position: Float[np.ndarray, "3"]
+    """Metres."""
+
+
+def initial_fit(observations: Observations, model: MotionModel, body: Body) -> SwingFit:
+    """The mean motion by a player who stands where the initial joints are."""
+    phase = float(observations.phase[observations.initial.frame])
+    place = estimate_initial_pose(observations.initial, phase, observations.camera, model, body)
+    return SwingFit(model, body, repeat_pose(place, observations.phase))
 
 
 def estimate_initial_pose(
-    clicked: Mapping[str, tuple[float, float]],
-    mu: float,
-    camera: Camera,
-    model: MotionModel,
-    body: Body,
-) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
-    """Rotation and position of the swing axes in camera axes.
-
-    `clicked` has joints of LSP14 and possibly `root`, the middle between the hips.
-    """
-    still = SwingState(np.zeros(0), np.array([mu]), np.eye(3)[None], np.zeros((1, 3)))
-    joints = find_joints(body, place_body(body, posture_at(model, still.mu, still.alpha), still))[0]
-    hips = joints[[LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=0)
-    points = np.array([hips if n == "root" else joints[LSP14.index(n)] for n in clicked])
-    pixels = np.array(list(clicked.values()), float)
+    joints: InitialJoints, phase: float, camera: Camera, model: MotionModel, body: Body
+) -> Placement:
+    """Where the player stands who has these joints at a normalised time of the mean motion."""
+    points, pixels = _mean_points(joints.names, phase, model, body), joints.places
     tall = np.ptp(pixels[:, 1]) / max(np.ptp(points[:, 1]), 1e-6)
     depth = camera.focal / max(tall, 1e-6)
     middle = (pixels.mean(axis=0) - camera.principal) * depth / camera.focal
 
     def errors(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
         turned = Rotation.from_rotvec(unknown[:3]).as_matrix() @ base
-        seen, _ = project(points @ turned.T + unknown[3:], camera)
+        projected, _ = project(points @ turned.T + unknown[3:], camera)
         up = turned[:, 1]
-        return np.concatenate([((seen - pixels) / CLICK).ravel(), up[[0, 2]] / LEAN])
+        off = ((projected - pixels) / JOINT_SPREAD).ravel()
+        return np.concatenate([off, up[[0, 2]] / LEAN_SPREAD])
 
-    best = None
+    best, least = None, np.inf
     for heading in np.linspace(0, 2 * np.pi, HEADINGS, endpoint=False):
         base = LEVEL @ Rotation.from_euler("y", heading).as_matrix()
         start = np.append(middle, depth) - base @ points.mean(axis=0)
-        found = least_squares(errors, np.concatenate([np.zeros(3), start]), args=(base,),
-                              loss="soft_l1", max_nfev=60)  # fmt: skip
-        if best is None or found.cost < best[0]:
-            best = found.cost, Rotation.from_rotvec(found.x[:3]).as_matrix() @ base, found.x[3:]
-    return best[1], best[2]
+        fit = least_squares(errors, np.concatenate([np.zeros(3), start]), args=(base,),
+                            loss="soft_l1", max_nfev=60)  # fmt: skip
+        if best is None or fit.cost < least:
+            turn = Rotation.from_rotvec(fit.x[:3]).as_matrix()
+            best, least = Placement(turn @ base, fit.x[3:]), fit.cost
+    return best
 
 
-def start_state(
-    placed: tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]], mu: Float[np.ndarray, "T"]
-) -> SwingState:
-    """The mean motion by a player who stands where he was clicked."""
-    frames = len(mu)
+def _mean_points(
+    names: tuple[str, ...], phase: float, model: MotionModel, body: Body
+) -> Float[np.ndarray, "n 3"]:
+    """Joints of the mean motion in swing axes."""
+    still = SwingState(np.zeros(0), np.array([phase]), np.eye(3)[None], np.zeros((1, 3)))
+    posture = posture_at(model, still.phase, still.coefficients)
+    joints = find_joints(body, place_body(body, posture, still))[0]
+    hips = joints[[LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=0)
+    return np.array([hips if n == "root" else joints[LSP14.index(n)] for n in names])
+
+
+def repeat_pose(place: Placement, phase: Float[np.ndarray, "T"]) -> SwingState:
+    """The mean motion at some normalised times, in one place for all frames."""
+    frames = len(phase)
     return SwingState(
-        np.zeros(0), mu, np.tile(placed[0], (frames, 1, 1)), np.tile(placed[1], (frames, 1))
-    )
+        np.zeros(0), phase, np.tile(place.rotation, (frames, 1, 1)),
+        np.tile(place.position, (frames, 1)),
+    )  # fmt: skip

@@ -1,12 +1,12 @@
-"""The unknowns of a fit as one vector, and how much of each every frame sees.
+"""The unknowns of a fit as one vector, and what each frame depends on.
 
-S = [alpha, mu, G] of Eq. 5. Over a few frames mu and G have a value per frame, as printed; over a
-whole swing they are what B-splines add to the current estimate, which keeps their number
-independent of the frame rate. `SplineBasis` holds the two bases; with identities it is the paper's
-form.
+S = [coefficients, phase, G] (CVPR 2005, Eq. 3). Over a few frames phase and root pose G have a
+value per frame, as printed; over a whole swing they are what B-splines add to the current
+estimate, which keeps their number independent of the frame rate. `SplineBasis` holds the two
+bases; with identities it is the paper's form.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -21,48 +21,61 @@ ROOT = 6
 
 @dataclass(frozen=True, eq=False)
 class SplineBasis:
-    """How corrections of mu and G spread over the frames."""
+    """How corrections of phase and G spread over the frames."""
 
-    alphas: int
-    mu: Float[np.ndarray, "T A"]
+    n_coefficients: int
+    """How many of the coefficients are unknowns."""
+    phase: Float[np.ndarray, "T A"]
     root: Float[np.ndarray, "T B"]
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.alphas + self.mu.shape[1] + ROOT * self.root.shape[1]
+        return self.n_coefficients + self.phase.shape[1] + ROOT * self.root.shape[1]
 
-    def split(
-        self, step: Float[np.ndarray, "S"]
-    ) -> tuple[Float[np.ndarray, "m"], Float[np.ndarray, "T"], Float[np.ndarray, "T 6"]]:
-        """Corrections of alpha, of mu and of G in every frame."""
-        by_root = step[self.alphas + self.mu.shape[1] :].reshape(-1, ROOT)
-        by_mu = step[self.alphas : self.alphas + self.mu.shape[1]]
-        return step[: self.alphas], self.mu @ by_mu, self.root @ by_root
+    @property
+    def phase_columns(self) -> slice:
+        """Where the unknowns of the phase stand."""
+        return slice(self.n_coefficients, self.n_coefficients + self.phase.shape[1])
+
+    @property
+    def root_columns(self) -> slice:
+        """Where the unknowns of G stand."""
+        return slice(self.n_coefficients + self.phase.shape[1], self.size)
 
     def frame_unknowns(self, frame: int) -> Float[np.ndarray, "L S"]:
-        """What alpha, mu and G of one frame are made of; L = alphas + 1 + 6."""
-        rows = np.zeros((self.alphas + 1 + ROOT, self.size))
-        rows[: self.alphas, : self.alphas] = np.eye(self.alphas)
-        first = self.alphas + self.mu.shape[1]
-        rows[self.alphas, self.alphas : first] = self.mu[frame]
-        rows[self.alphas + 1 :, first:] = np.kron(self.root[frame], np.eye(ROOT))
+        """What coefficients, phase and G of one frame are made of; L = m + 1 + 6."""
+        number = self.n_coefficients
+        rows = np.zeros((number + 1 + ROOT, self.size))
+        rows[:number, :number] = np.eye(number)
+        rows[number, self.phase_columns] = self.phase[frame]
+        rows[number + 1 :, self.root_columns] = np.kron(self.root[frame], np.eye(ROOT))
         return rows
 
 
-def window_basis(alphas: int, frames: int) -> SplineBasis:
+@dataclass(frozen=True)
+class KnotSpacing:
+    """Frames between knots of splines."""
+
+    phase: float
+    root: float
+
+
+def window_basis(n_coefficients: int, frames: int) -> SplineBasis:
     """A value per frame, as in the paper's windows."""
-    return SplineBasis(alphas, np.eye(frames), np.eye(frames))
+    return SplineBasis(n_coefficients, np.eye(frames), np.eye(frames))
 
 
-def constant_basis(alphas: int, frames: int) -> SplineBasis:
+def constant_basis(n_coefficients: int, frames: int) -> SplineBasis:
     """Normalised times as they are, and one place of the player for all frames."""
-    return SplineBasis(alphas, np.zeros((frames, 0)), np.ones((frames, 1)))
+    return SplineBasis(n_coefficients, np.zeros((frames, 0)), np.ones((frames, 1)))
 
 
-def swing_basis(alphas: int, frames: int, spacing: tuple[float, float]) -> SplineBasis:
-    """Splines over a whole swing; `spacing` is frames between knots of mu and of G."""
-    return SplineBasis(alphas, *(_splines(frames, s) for s in spacing))
+def swing_basis(n_coefficients: int, frames: int, spacing: KnotSpacing) -> SplineBasis:
+    """Splines over a whole swing."""
+    return SplineBasis(
+        n_coefficients, _splines(frames, spacing.phase), _splines(frames, spacing.root)
+    )
 
 
 def _splines(frames: int, spacing: float) -> Float[np.ndarray, "T B"]:
@@ -76,13 +89,15 @@ def _splines(frames: int, spacing: float) -> Float[np.ndarray, "T B"]:
     return BSpline.design_matrix(np.arange(frames, dtype=float), knots, 3).toarray()
 
 
-def move_state(state: SwingState, span: SplineBasis, step: Float[np.ndarray, "S"]) -> SwingState:
+def move_state(state: SwingState, basis: SplineBasis, step: Float[np.ndarray, "S"]) -> SwingState:
     """The state after a step; G turns about the origin of the swing axes."""
-    by_alpha, by_mu, by_root = span.split(step)
-    alpha = state.alpha.copy()
-    alpha[: span.alphas] += by_alpha
+    by_root = basis.root @ step[basis.root_columns].reshape(-1, ROOT)
+    coefficients = state.coefficients.copy()
+    coefficients[: basis.n_coefficients] += step[: basis.n_coefficients]
     turn = Rotation.from_rotvec(by_root[:, :3]).as_matrix()
-    return replace(
-        state, alpha=alpha, mu=state.mu + by_mu, rotation=turn @ state.rotation,
+    return SwingState(
+        coefficients=coefficients,
+        phase=state.phase + basis.phase @ step[basis.phase_columns],
+        rotation=turn @ state.rotation,
         position=state.position + by_root[:, 3:],
-    )  # fmt: skip
+    )

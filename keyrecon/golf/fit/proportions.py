@@ -12,29 +12,27 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.golf.fit.fitting import FitOptions, refit_swing
-from keyrecon.golf.fit.residuals import MARK, MODEL_ERROR, project
-from keyrecon.golf.prior.kinematics import find_joints, hang_segments, place_body
-from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.fit.residuals import MARK_SPREAD, MODEL_ERROR, project
+from keyrecon.golf.prior.kinematics import find_joints, fitted_pose, hang_segments
 from keyrecon.golf.prior.skeleton import NAMES, PARENTS
 from keyrecon.golf.records import (
     Body,
     Camera,
-    MotionModel,
     Observations,
     RootPose,
+    SwingFit,
     SwingMarks,
-    SwingState,
 )
 
 PARTS = ("pelvis", "trunk", "head", "clavicle", "upper_arm", "forearm", "thigh", "shank")
 """Left and right are alike."""
 STEPS = 4
-"""Of Gauss and Newton, at most needed for perspective."""
+"""Of Gauss and Newton: marks are linear in the lengths but for perspective, so few suffice."""
 
 
 @dataclass(frozen=True)
 class ProportionOptions:
-    """How a player's proportions are found."""
+    """How a player's proportions are estimated."""
 
     spread: float = 0.06
     """Share by which a part is usually longer or shorter than average: players differ by .04, and
@@ -44,20 +42,22 @@ class ProportionOptions:
 
 
 def refit_proportions(
-    found: tuple[MotionModel, Body, SwingState],
-    seen: Observations,
-    start: SwingState,
+    fit: SwingFit,
+    observations: Observations,
+    initial: SwingFit,
     fps: float,
-    settings: tuple[FitOptions, ProportionOptions],
-) -> tuple[MotionModel, Body, SwingState]:
+    fit_options: FitOptions,
+    options: ProportionOptions,
+) -> SwingFit:
     """A fitted swing with the proportions that its marks tell, and the fit with them, in turns."""
-    (model, average, state), (fit, options) = found, settings
+    average = fit.body
     for _ in range(options.rounds):
-        _, body, state = found
-        pose = place_body(body, posture_at(model, state.mu, state.alpha), state)
-        body = fit_proportions(average, pose, seen.marks, seen.camera, options)
-        found = refit_swing(seen, model, body, (start, state), fps, fit)
-    return found
+        pose = fitted_pose(fit)
+        body = fit_proportions(
+            average, pose, observations.marks, observations.camera, options.spread
+        )
+        fit = refit_swing(observations, replace(initial, body=body), fit.state, fps, fit_options)
+    return fit
 
 
 def fit_proportions(
@@ -65,11 +65,13 @@ def fit_proportions(
     pose: RootPose,
     marks: SwingMarks,
     camera: Camera,
-    options: ProportionOptions = ProportionOptions(),
+    spread: float = ProportionOptions.spread,
 ) -> Body:
-    """The average body with the lengths at which a pose meets the marks best."""
+    """The average body with the lengths at which a pose meets the marks best.
+
+    `spread` is the share by which a part is usually longer or shorter than average.
+    """
     rotations, roots = pose.rotations[marks.frames], pose.origins[marks.frames, 0]
-    known = np.isfinite(marks.joints)
     factors, shift = np.ones(len(PARTS)), np.zeros_like(roots)
     for _ in range(STEPS):
         joints = _joints(scale_body(body, factors), roots + shift, rotations)
@@ -80,7 +82,7 @@ def fit_proportions(
             ],
             axis=3,
         )
-        step = _solve(joints, by_part, (marks, known, camera), (factors, options.spread))
+        step = _solve(joints, by_part, marks.joints, camera, factors, spread)
         factors, shift = factors + step[: len(PARTS)], shift + step[len(PARTS) :].reshape(-1, 3)
     return scale_body(body, factors)
 
@@ -107,21 +109,22 @@ def _joints(
 def _solve(
     joints: Float[np.ndarray, "K 14 3"],
     by_part: Float[np.ndarray, "K 14 3 n"],
-    seen: tuple[SwingMarks, np.ndarray, Camera],
-    expected: tuple[Float[np.ndarray, "n"], float],
+    marked: Float[np.ndarray, "K 14 2"],
+    camera: Camera,
+    factors: Float[np.ndarray, "n"],
+    spread: float,
 ) -> Float[np.ndarray, "m"]:
     """Change of the parts' factors, then of the root's place in every marked frame."""
-    (marks, known, camera), (factors, spread) = seen, expected
     frames, parts = len(joints), len(factors)
     pixels, slope = project(joints.reshape(-1, 3), camera)
-    off = np.hypot(MARK, MODEL_ERROR * slope[:, 0, 0])
+    off = np.hypot(MARK_SPREAD, MODEL_ERROR * slope[:, 0, 0])
     rows = np.zeros((len(pixels), 2, parts + 3 * frames))
     rows[..., :parts] = slope @ by_part.reshape(-1, 3, parts)
     frame = np.repeat(np.arange(frames), joints.shape[1])
     for axis in range(3):
         rows[np.arange(len(pixels)), :, parts + 3 * frame + axis] = slope[..., axis]
-    rows, values = rows / off[:, None, None], (marks.joints.reshape(-1, 2) - pixels) / off[:, None]
-    kept = known.reshape(-1)
+    rows, values = rows / off[:, None, None], (marked.reshape(-1, 2) - pixels) / off[:, None]
+    kept = np.isfinite(marked).reshape(-1)
     near = np.eye(parts, parts + 3 * frames) / spread
     return np.linalg.lstsq(
         np.concatenate([rows.reshape(len(kept), -1)[kept], near]),

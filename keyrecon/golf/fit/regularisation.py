@@ -1,9 +1,9 @@
-"""What is expected of alpha, mu and G before the picture is looked at (E_D of Eq. 7).
+"""What is expected of coefficients, phase and root pose G without any picture (IC/2004/90, Eq. 7).
 
-Each term is a set of rows: an error in its standard deviations and its slope by the unknowns.
-In windows mu and G are compared to their prediction from the frames before, as printed. Over a
-whole swing the same knowledge reads: mu keeps close to its first guess and to an even pace, G
-hardly moves since the pelvis's path is part of the learnt motion, and the camera stands level.
+Each term is a set of rows: a residual in its standard deviations and its slope by the unknowns. In
+the paper's windows phase and G are compared to their prediction from the frames before. Over a
+whole swing the same knowledge reads: the phase keeps close to its first guess and to an even pace,
+G hardly moves since the pelvis's path is part of the learnt motion, and the camera stands level.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ from keyrecon.golf.records import SwingState
 
 @dataclass(frozen=True)
 class PriorOptions:
-    """Standard deviations of what is expected."""
+    """Standard deviations of what is expected; chosen on rendered swings (benchmarks/golf.py)."""
 
-    alpha: float = 1.0
-    """Of every alpha; 1 is the spread of the database."""
+    coefficients: float = 1.0
+    """Of every coefficient; 1 is the spread of the database."""
     timing: float = 0.08
     """Seconds by which the first guess of the normalised time is early or late."""
     rest: float = 0.005
@@ -43,27 +43,30 @@ class PriorOptions:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Errors in standard deviations, and their slopes by the unknowns."""
+    """Residuals in standard deviations, and their slopes by the unknowns."""
 
     values: Float[np.ndarray, "n"]
     slopes: Float[np.ndarray, "n S"]
 
 
-def expect_alphas(state: SwingState, span: SplineBasis, mean: np.ndarray, spread: float) -> Rows:
-    """alpha_i - expected alpha_i."""
-    slopes = np.zeros((span.alphas, span.size))
-    slopes[:, : span.alphas] = np.eye(span.alphas) / spread
-    return Rows((state.alpha[: span.alphas] - mean[: span.alphas]) / spread, slopes)
+def coefficient_rows(
+    state: SwingState, basis: SplineBasis, mean: Float[np.ndarray, "m"], spread: float
+) -> Rows:
+    """Coefficients close to some mean."""
+    number = basis.n_coefficients
+    slopes = np.zeros((number, basis.size))
+    slopes[:, :number] = np.eye(number) / spread
+    return Rows((state.coefficients[:number] - mean[:number]) / spread, slopes)
 
 
-def expect_times(
+def phase_rows(
     state: SwingState,
-    span: SplineBasis,
+    basis: SplineBasis,
     guess: Float[np.ndarray, "T"],
     options: PriorOptions,
     fps: float,
 ) -> Rows:
-    """mu close to its guess, and at its pace; weighed so that the frame rate does not matter.
+    """The phase close to its guess, and at its pace, whatever the frame rate.
 
     A guess that comes too early is wrong by the pace of the swing at that time.
     """
@@ -73,27 +76,25 @@ def expect_times(
     near = np.diag(1 / ((rest + options.timing * pace) * np.sqrt(fps)))
     bend = np.diff(np.eye(frames), n=2, axis=0) * fps**2 / (options.pace * np.sqrt(fps))
     rows = np.concatenate([near, bend])
-    return Rows(rows @ (state.mu - guess), _on_mu(span, rows))
+    return Rows(rows @ (state.phase - guess), _on_phase(basis, rows))
 
 
-def expect_stillness(
-    state: SwingState, span: SplineBasis, options: PriorOptions, fps: float
-) -> Rows:
-    """G of the next frame - G, which grows like a random walk."""
+def root_rows(state: SwingState, basis: SplineBasis, options: PriorOptions, fps: float) -> Rows:
+    """Steps of G from frame to frame: it moves like a random walk."""
     turn = state.rotation[1:] @ np.swapaxes(state.rotation[:-1], 1, 2)
     moved = np.hstack([Rotation.from_matrix(turn).as_rotvec(), np.diff(state.position, axis=0)])
     weight = np.sqrt(fps) / np.repeat([options.turn, options.shift], 3)
-    step = np.diff(span.root, axis=0)
-    slopes = np.zeros((len(step), ROOT, span.size))
-    slopes[..., span.size - ROOT * span.root.shape[1] :] = np.einsum(
-        "tb,ij->tibj", step, np.diag(weight)
-    ).reshape(len(step), ROOT, -1)
-    return Rows((moved * weight).ravel(), slopes.reshape(-1, span.size))
+    step = np.diff(basis.root, axis=0)
+    slopes = np.zeros((len(step), ROOT, basis.size))
+    slopes[..., basis.root_columns] = np.einsum("tb,ij->tibj", step, np.diag(weight)).reshape(
+        len(step), ROOT, -1
+    )
+    return Rows((moved * weight).ravel(), slopes.reshape(-1, basis.size))
 
 
-def expect_level(state: SwingState, span: SplineBasis, options: PriorOptions) -> Rows:
+def level_rows(state: SwingState, basis: SplineBasis, options: PriorOptions) -> Rows:
     """The player's up points up in the picture: roll is small, pitch less so."""
-    frames = len(state.mu)
+    frames = len(state.phase)
     up = state.rotation[:, :, 1]
     weight = np.array([1 / options.roll, 1 / options.pitch]) / np.sqrt(frames)
     # d up = turn x up: its x and z parts.
@@ -101,17 +102,17 @@ def expect_level(state: SwingState, span: SplineBasis, options: PriorOptions) ->
     turned = np.stack(
         [np.stack([zero, up[:, 2], -up[:, 1]], 1), np.stack([up[:, 1], -up[:, 0], zero], 1)], 1
     )
-    slopes = np.zeros((frames, 2, span.size))
+    slopes = np.zeros((frames, 2, basis.size))
     by_root = np.concatenate([turned * weight[:, None], np.zeros((frames, 2, 3))], axis=2)
-    slopes[..., span.size - ROOT * span.root.shape[1] :] = np.einsum(
-        "tb,tij->tibj", span.root, by_root
-    ).reshape(frames, 2, -1)
-    return Rows((up[:, [0, 2]] * weight).ravel(), slopes.reshape(-1, span.size))
+    slopes[..., basis.root_columns] = np.einsum("tb,tij->tibj", basis.root, by_root).reshape(
+        frames, 2, -1
+    )
+    return Rows((up[:, [0, 2]] * weight).ravel(), slopes.reshape(-1, basis.size))
 
 
-def _on_mu(span: SplineBasis, rows: Float[np.ndarray, "n T"]) -> Float[np.ndarray, "n S"]:
-    slopes = np.zeros((len(rows), span.size))
-    slopes[:, span.alphas : span.alphas + span.mu.shape[1]] = rows @ span.mu
+def _on_phase(basis: SplineBasis, rows: Float[np.ndarray, "n T"]) -> Float[np.ndarray, "n S"]:
+    slopes = np.zeros((len(rows), basis.size))
+    slopes[:, basis.phase_columns] = rows @ basis.phase
     return slopes
 
 

@@ -1,18 +1,15 @@
-"""The body as volumetric primitives: tapered capsules on the segments (CVPR 2005, Fig. 1).
+"""Residuals of a body's pose in the picture (CVPR 2005, Section 4), and the body's surface.
 
-Radii are those of an adult in clothes and scale with stature; breadths of chest and pelvis are made
-of two capsules side by side.
+The body is made of volumetric primitives, tapered capsules on the segments (Fig. 1). Radii are
+those of an adult in clothes and scale with stature; breadths of chest and pelvis are made of two
+capsules side by side.
 
-Errors of joints and of the club in the picture (CVPR 2005, Section 4.2).
+Joints and club (Section 4.2). The distance of a projected joint to where it was tracked is taken as
+two coordinates: the same square, and smooth at zero. The club pulls by its two ends, each across
+and along the shaft: where the shaft lies is surer than where it ends.
 
-The distance of a projected joint to where it was tracked is taken as two coordinates: the same
-square, and smooth at zero. The club pulls by its two ends, each across and along the shaft: where
-the shaft lies is surer than where it ends.
-
-Errors of the body's surface in the picture (CVPR 2005, Sections 4.1 and 4.3).
-
-The surface is that of tapered capsules, points a + q d with radius r(q), q from 0 to 1. A line of
-sight through the camera's centre with unit direction v passes them at the distance
+The surface (Sections 4.1 and 4.3) consists of points a + q d with radius r(q), q from 0 to 1. A
+line of sight through the camera's centre with unit direction v passes them at the distance
 
     e(q) - r(q),        e(q) = |P (a + q d)|,        P = I - v v',
 
@@ -20,8 +17,10 @@ least where its slope by q vanishes or at an end. There it does not change with 
 so its slope by the pose is that of a point fixed to the axis (envelope theorem). The foreground
 pulls the nearest capsule over every pixel of the mask that no capsule covers; the reverse, a part
 of the body outside of the mask, pulls by the mask's distance transform. Matched points of two
-frames are carried by the surface that the first one lies on.
+frames move with the surface that the first one lies on.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -40,7 +39,8 @@ from keyrecon.golf.records import (
 )
 from keyrecon.numerics.geometry import unit_vectors
 
-# segment, start and end (x, along, z in statures; along: share of the segment), radii in statures
+# segment, start and end (x, along, z in statures; along: share of the segment), radii in statures,
+# by eye on the figures of captured swings and of benchmarks/golf.py
 _TRUNK = (
     ("trunk", (0.045, 0.30, 0.0), (0.070, 0.86, 0.0), (0.070, 0.066)),
     ("trunk", (-0.045, 0.30, 0.0), (-0.070, 0.86, 0.0), (0.070, 0.066)),
@@ -89,11 +89,20 @@ def _trunk_point(name: str, point: tuple[float, float, float]) -> np.ndarray:
 
 MODEL_ERROR = 0.03
 """Metres by which joints of the model miss the player's even at best: his proportions and what is
-called a joint differ. Added to the tracker's error, it keeps the fit from explaining them away."""
+called a joint differ. Added to the tracker's error, it keeps the fit from explaining them away.
+Chosen on rendered swings; see benchmarks/golf.py."""
+MARK_SPREAD = 3.0
+"""Standard deviation of a person's mark, px: two people who mark the same joint differ by that."""
+NEAREST = 0.1
+"""Metres before the camera within which nothing is filmed."""
+AXIS_PLACES = (0.1, 0.5, 0.9)
+"""Places along a capsule's axis that should lie in the mask: both ends, off the joints where
+capsules overlap, and the middle."""
+SILHOUETTE_STEP = 4
+"""Pixels of the video per pixel of the distance transforms: a distance changes by no more than its
+step, so a coarse grid read between its pixels loses nothing of note."""
 
-
-MARK = 3.0
-"""Standard deviation of a person's mark, px."""
+Vectors = Float[np.ndarray, "n 3"]
 
 
 def joint_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
@@ -116,25 +125,25 @@ def mark_residuals(observations: Observations, body: Body, pose: RootPose) -> Re
     frame = marks.frames[row]
     points = find_joints(body, pose)[frame, joint]
     pixels, slope = project(points, observations.camera)
-    spread = _total_spread(np.full(len(row), MARK), slope)
+    spread = _total_spread(np.full(len(row), MARK_SPREAD), slope)
     values = (pixels - marks.joints[row, joint]) / spread[:, None]
     return pair_rows(values, slope / spread[:, None, None], points,
                      frame, body.joint_segment[joint])  # fmt: skip
 
 
 def club_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
-    """Projected minus seen ends of the club, across and along the shaft, standard deviations."""
+    """Projected minus observed ends of the club, in standard deviations across and along it."""
     frame = np.flatnonzero(np.isfinite(observations.club).all(axis=(1, 2)))
     points = find_club(body, pose)[frame].reshape(-1, 3)
-    seen = observations.club[frame]
+    ends = observations.club[frame]
     pixels, slope = project(points, observations.camera)
-    along = unit_vectors(seen[:, 1] - seen[:, 0], 1e-9)
+    along = unit_vectors(ends[:, 1] - ends[:, 0], 1e-9)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     axes = np.repeat(np.stack([across, along], axis=1), 2, axis=0)
     spreads = np.repeat(observations.club_spread[frame], 2), observations.club_along[frame].ravel()
     total = np.stack([_total_spread(spread, slope) for spread in spreads], axis=1)
     axes = axes / total[..., None]
-    values = np.einsum("nij,nj->ni", axes, pixels - seen.reshape(-1, 2))
+    values = np.einsum("nij,nj->ni", axes, pixels - ends.reshape(-1, 2))
     return pair_rows(values, axes @ slope, points, np.repeat(frame, 2),
                      np.full(len(points), CLUB))  # fmt: skip
 
@@ -158,10 +167,6 @@ def project(
     return camera.focal * flat + camera.principal, slope
 
 
-NEAREST = 0.1
-"""Metres before the camera within which nothing is filmed."""
-
-
 def pair_rows(
     values: Float[np.ndarray, "n 2"],
     gradient: Float[np.ndarray, "n 2 3"],
@@ -176,49 +181,44 @@ def pair_rows(
     )  # fmt: skip
 
 
-Rows = Float[np.ndarray, "n 3"]
-AXIS = (0.1, 0.5, 0.9)
-"""Places along a capsule's axis that should lie in the mask."""
-SILHOUETTE_SCALE = 4
-"""Pixels of the video per pixel of the distance transforms."""
-
-
 def foreground_residuals(
     observations: Observations, capsules: Capsules, pose: RootPose
 ) -> Residuals:
     """Distance from lines of sight through the mask to the body, metres; only those that miss."""
     frame = np.repeat(np.arange(len(pose.origins)), [len(f) for f in observations.foreground])
     pixels = np.concatenate([*observations.foreground, np.zeros((0, 2))])
-    starts, ends = _place_capsules(capsules, pose)
-    ways = sight_lines(pixels, observations.camera)
-    q, distance = pass_capsules((ways, frame), starts, ends, capsules.radii)
-    nearest = distance.argmin(axis=1)
-    rows = np.flatnonzero(distance.min(axis=1) > 0)
+    lines = SightLines(sight_directions(pixels, observations.camera), frame)
+    axes = place_capsules(capsules, pose)
+    passing = pass_capsules(lines, axes)
+    nearest = passing.distance.argmin(axis=1)
+    rows = np.flatnonzero(passing.distance.min(axis=1) > 0)
     frame, nearest = frame[rows], nearest[rows]
-    share = q[rows, nearest][:, None]
-    point = (1 - share) * starts[frame, nearest] + share * ends[frame, nearest]
-    across = _reject(point, ways[rows])
+    share = passing.place[rows, nearest][:, None]
+    point = (1 - share) * axes.starts[frame, nearest] + share * axes.ends[frame, nearest]
+    across = _reject(point, lines.directions[rows])
     return Residuals(
-        distance[rows, nearest], frame, capsules.segment[nearest], point,
+        passing.distance[rows, nearest], frame, capsules.segment[nearest], point,
         unit_vectors(across, 0.0), np.arange(len(rows)),
     )  # fmt: skip
 
 
-def silhouette_distance_residuals(
+def silhouette_residuals(
     observations: Observations, capsules: Capsules, pose: RootPose
 ) -> Residuals:
     """How far axes of the capsules project from the mask, px; only those outside of it."""
-    if not observations.away:
+    if not len(observations.silhouette_distance):
         return _no_residuals()
-    starts, ends = _place_capsules(capsules, pose)
-    share = np.array(AXIS)[:, None]
-    points = (1 - share) * starts[:, :, None] + share * ends[:, :, None]
-    frames, number = points.shape[0], points.shape[1] * len(AXIS)
+    axes = place_capsules(capsules, pose)
+    share = np.array(AXIS_PLACES)[:, None]
+    points = (1 - share) * axes.starts[:, :, None] + share * axes.ends[:, :, None]
+    frames, number = points.shape[0], points.shape[1] * len(AXIS_PLACES)
     frame = np.repeat(np.arange(frames), number)
-    segment = np.tile(np.repeat(capsules.segment, len(AXIS)), frames)
+    segment = np.tile(np.repeat(capsules.segment, len(AXIS_PLACES)), frames)
     points = points.reshape(-1, 3)
     pixels, slope = project(points, observations.camera)
-    values, gradient = _look_up(observations.away, pixels.reshape(frames, number, 2))
+    values, gradient = _interpolate(
+        observations.silhouette_distance, pixels.reshape(frames, number, 2)
+    )
     rows = np.flatnonzero(values > 0)
     return Residuals(
         values[rows], frame[rows], segment[rows], points[rows],
@@ -227,27 +227,61 @@ def silhouette_distance_residuals(
 
 
 def match_residuals(observations: Observations, capsules: Capsules, pose: RootPose) -> Residuals:
-    """Where the surface carries a matched point minus where it was found, px.
+    """Where a matched point moves with the surface minus where it was matched, px.
 
     The point on the surface counts as constant while the pose changes.
     """
     matches = observations.matches
-    starts, ends = _place_capsules(capsules, pose)
-    ways = sight_lines(matches.start, observations.camera)
-    at = matches.frame
-    q, distance = pass_capsules((ways, at), starts, ends, capsules.radii)
-    hit, depth = _first_hit((ways, at), (starts, ends), q, distance, capsules.radii)
-    rows = np.flatnonzero(np.isfinite(depth))
-    at, segment = at[rows], capsules.segment[hit[rows]]
-    surface = depth[rows, None] * ways[rows] - pose.origins[at, segment]
+    axes, at = place_capsules(capsules, pose), matches.frame
+    lines = SightLines(sight_directions(matches.start, observations.camera), at)
+    hits = _first_hits(lines, axes, pass_capsules(lines, axes))
+    rows = np.flatnonzero(np.isfinite(hits.depth))
+    at, segment = at[rows], capsules.segment[hits.capsule[rows]]
+    surface = hits.depth[rows, None] * lines.directions[rows] - pose.origins[at, segment]
     local = np.einsum("nji,nj->ni", pose.rotations[at, segment], surface)
-    carried = np.einsum("nij,nj->ni", pose.rotations[at + 1, segment], local)
-    points = pose.origins[at + 1, segment] + carried
+    moved = np.einsum("nij,nj->ni", pose.rotations[at + 1, segment], local)
+    points = pose.origins[at + 1, segment] + moved
     pixels, slope = project(points, observations.camera)
     return pair_rows(pixels - matches.end[rows], slope, points, at + 1, segment)
 
 
-def sight_lines(pixels: Float[np.ndarray, "n 2"], camera: Camera) -> Rows:
+@dataclass(frozen=True, eq=False)
+class SightLines:
+    """Lines of sight from the camera's centre, in the order of their frames."""
+
+    directions: Vectors
+    frame: Int[np.ndarray, "n"]
+
+
+@dataclass(frozen=True, eq=False)
+class CapsuleAxes:
+    """All capsules in camera axes."""
+
+    starts: Float[np.ndarray, "T Q 3"]
+    ends: Float[np.ndarray, "T Q 3"]
+    radii: Float[np.ndarray, "Q 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class Passing:
+    """Where lines of sight pass capsules."""
+
+    place: Float[np.ndarray, "n Q"]
+    """q: share of the way along each axis at which the surface is nearest."""
+    distance: Float[np.ndarray, "n Q"]
+    """From there to the surface, metres; negative inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Hits:
+    """What lines of sight meet first."""
+
+    capsule: Int[np.ndarray, "n"]
+    depth: Float[np.ndarray, "n"]
+    """Along the line, metres; infinite where it meets nothing."""
+
+
+def sight_directions(pixels: Float[np.ndarray, "n 2"], camera: Camera) -> Vectors:
     """Unit directions from the camera's centre through pixels."""
     ways = np.concatenate(
         [(pixels - camera.principal) / camera.focal, np.ones((len(pixels), 1))], axis=1
@@ -255,39 +289,44 @@ def sight_lines(pixels: Float[np.ndarray, "n 2"], camera: Camera) -> Rows:
     return unit_vectors(ways)
 
 
-def pass_capsules(
-    lines: tuple[Rows, Int[np.ndarray, "n"]],
-    starts: Float[np.ndarray, "T Q 3"],
-    ends: Float[np.ndarray, "T Q 3"],
-    radii: Float[np.ndarray, "Q 2"],
-) -> tuple[Float[np.ndarray, "n Q"], Float[np.ndarray, "n Q"]]:
+def place_capsules(capsules: Capsules, pose: RootPose) -> CapsuleAxes:
+    """Both ends of all capsules of a pose."""
+    origin, turn = pose.origins[:, capsules.segment], pose.rotations[:, capsules.segment]
+    return CapsuleAxes(
+        origin + (turn @ capsules.start[..., None])[..., 0],
+        origin + (turn @ capsules.end[..., None])[..., 0],
+        capsules.radii,
+    )
+
+
+def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
     """Where along each axis a line of sight is nearest to the surface, and how near it is there.
 
-    `lines` are directions and their frames, in order. With e^2 = h^2 + g u^2, u counted from where
-    the axis is nearest to the line, the slope of e - r vanishes at u = k h / sqrt(g (g - k^2)), k
-    the change of the radius along the axis. All squares follow from how far both vectors go along
-    the line.
+    With e^2 = h^2 + g u^2, u counted from where the axis is nearest to the line, the slope of e - r
+    vanishes at u = k h / sqrt(g (g - k^2)), k the change of the radius along the axis. All squares
+    follow from how far both vectors go along the line.
     """
-    frame, axes = lines[1], ends - starts
-    first, along = _along(lines, starts), _along(lines, axes)
-    g = np.maximum(_dot(axes, axes)[frame] - along**2, 1e-12)
-    slope = _dot(starts, axes)[frame] - first * along
+    frame, starts, radii = lines.frame, axes.starts, axes.radii
+    ways = axes.ends - starts
+    first, along = _along(lines, starts), _along(lines, ways)
+    g = np.maximum(_dot(ways, ways)[frame] - along**2, 1e-12)
+    slope = _dot(starts, ways)[frame] - first * along
     square = _dot(starts, starts)[frame] - first**2
     h = np.sqrt(np.maximum(square - slope**2 / g, 0.0))
     k = radii[:, 1] - radii[:, 0]
     slant = k * h / np.sqrt(g * np.maximum(g - k**2, 1e-12))
     q = np.clip(slant - slope / g, 0.0, 1.0)
     reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
-    return q, reach - (radii[:, 0] + q * k)
+    return Passing(q, reach - (radii[:, 0] + q * k))
 
 
-def _along(
-    lines: tuple[Rows, Int[np.ndarray, "n"]], vectors: Float[np.ndarray, "T Q 3"]
-) -> Float[np.ndarray, "n Q"]:
+def _along(lines: SightLines, vectors: Float[np.ndarray, "T Q 3"]) -> Float[np.ndarray, "n Q"]:
     """How far the vectors of each line's frame go along it."""
-    ways, frame = lines
-    bounds = np.searchsorted(frame, np.arange(len(vectors) + 1))
-    parts = [ways[a:b] @ own.T for a, b, own in zip(bounds, bounds[1:], vectors, strict=False)]
+    bounds = np.searchsorted(lines.frame, np.arange(len(vectors) + 1))
+    parts = [
+        lines.directions[a:b] @ of_frame.T
+        for a, b, of_frame in zip(bounds, bounds[1:], vectors, strict=False)
+    ]
     return np.concatenate(parts)
 
 
@@ -297,52 +336,35 @@ def _dot(
     return np.einsum("tqi,tqi->tq", one, other)
 
 
-def _first_hit(
-    lines: tuple[Rows, Int[np.ndarray, "n"]],
-    axes: tuple[Float[np.ndarray, "T Q 3"], Float[np.ndarray, "T Q 3"]],
-    q: Float[np.ndarray, "n Q"],
-    distance: Float[np.ndarray, "n Q"],
-    radii: Float[np.ndarray, "Q 2"],
-) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-    """The capsule that a line of sight meets first and how far away; infinite where none."""
+def _first_hits(lines: SightLines, axes: CapsuleAxes, passing: Passing) -> _Hits:
+    """The capsule that each line of sight meets first."""
+    q, distance, radii = passing.place, passing.distance, axes.radii
     radius = radii[:, 0] + q * (radii[:, 1] - radii[:, 0])
     inside = np.sqrt(np.maximum(radius**2 - (distance + radius) ** 2, 0.0))
-    depth = (1 - q) * _along(lines, axes[0]) + q * _along(lines, axes[1]) - inside
+    depth = (1 - q) * _along(lines, axes.starts) + q * _along(lines, axes.ends) - inside
     depth = np.where(distance < 0, depth, np.inf)
     first = depth.argmin(axis=1)
-    return first, depth[np.arange(len(depth)), first]
+    return _Hits(first, depth[np.arange(len(depth)), first])
 
 
-def _place_capsules(
-    capsules: Capsules, pose: RootPose
-) -> tuple[Float[np.ndarray, "T Q 3"], Float[np.ndarray, "T Q 3"]]:
-    """Ends of all axes in camera axes."""
-    origin, turn = pose.origins[:, capsules.segment], pose.rotations[:, capsules.segment]
-    return (
-        origin + (turn @ capsules.start[..., None])[..., 0],
-        origin + (turn @ capsules.end[..., None])[..., 0],
-    )
-
-
-def _reject(vectors: Rows, ways: Rows) -> Rows:
+def _reject(vectors: Vectors, ways: Vectors) -> Vectors:
     """The part of vectors square to directions."""
     return vectors - np.einsum("ni,ni->n", vectors, ways)[:, None] * ways
 
 
-def _look_up(
-    pictures: tuple[Float[np.ndarray, "h w"], ...], pixels: Float[np.ndarray, "T n 2"]
+def _interpolate(
+    stack: Float[np.ndarray, "T h w"], pixels: Float[np.ndarray, "T n 2"]
 ) -> tuple[Float[np.ndarray, "m"], Float[np.ndarray, "m 2"]]:
-    """Values of each frame's distance picture at its pixels, between its own, and their slopes."""
-    stack = np.stack(pictures)
+    """Values of each frame's distance picture between its pixels, and their slopes."""
     last = np.array(stack.shape[:0:-1]) - 1.0
-    at = np.clip((pixels - (SILHOUETTE_SCALE - 1) / 2) / SILHOUETTE_SCALE, 0.0, last)
+    at = np.clip((pixels - (SILHOUETTE_STEP - 1) / 2) / SILHOUETTE_STEP, 0.0, last)
     low = np.minimum(at, last - 1).astype(int)
     (x, y), (fx, fy) = np.moveaxis(low, 2, 0), np.moveaxis(at - low, 2, 0)
     frame = np.arange(len(stack))[:, None]
-    (a, b), (c, d) = [[stack[frame, y + j, x + i] for i in (0, 1)] for j in (0, 1)]
+    (a, b), (c, d) = [[stack[frame, y + j, x + i].astype(float) for i in (0, 1)] for j in (0, 1)]
     value = (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d)
     slope = np.stack([(1 - fy) * (b - a) + fy * (d - c), (1 - fx) * (c - a) + fx * (d - b)], axis=2)
-    return value.ravel(), slope.reshape(-1, 2) / SILHOUETTE_SCALE
+    return value.ravel(), slope.reshape(-1, 2) / SILHOUETTE_STEP
 
 
 def _no_residuals() -> Residuals:

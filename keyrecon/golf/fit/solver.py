@@ -1,13 +1,13 @@
-"""Levenberg-Marquardt on observations that hang on the body (CVPR 2005, Section 4).
+"""The least-squares problem of a swing, linearised frame by frame (CVPR 2005, Section 4).
 
-Observations are made anew at every step, since which primitive a line of sight meets changes with
-the pose. The chain rule of Eq. 3-4 turns the slope of an error by a point of the body into slopes
-by alpha, mu and G of one frame; normal equations are summed frame by frame and only then spread
-over the unknowns, so that cost grows linearly with the number of frames.
+The chain rule (IC/2004/90, Eq. 3-4) turns the slope of a residual by a point of the body into
+slopes by coefficients, phase and root pose G of one frame; normal equations are summed frame by
+frame and only then spread over the unknowns, so that cost grows linearly with the number of frames.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -15,9 +15,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from keyrecon.golf.fit.parameterisation import SplineBasis, move_state
 from keyrecon.golf.fit.regularisation import Rows
-from keyrecon.golf.prior.kinematics import place_body, pose_rates
+from keyrecon.golf.prior.kinematics import PoseRates, place_body, pose_rates
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.records import Body, MotionModel, Residuals, RootPose, SwingState
+from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 
 Residual = Callable[[RootPose], Residuals]
 Regulariser = Callable[[SwingState], Rows]
@@ -25,104 +26,118 @@ Regulariser = Callable[[SwingState], Rows]
 
 @dataclass(frozen=True)
 class ResidualBlock:
-    """One kind of observation and how it counts."""
+    """One type of observation and how it counts."""
 
-    observe: Residual
+    residuals: Residual
     weight: float
     robust: float
-    """Size of an error, in its unit, beyond which it counts less (Geman and McClure)."""
+    """Size of a residual, in its unit, beyond which it counts less (Geman and McClure)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What a state is judged by."""
+    """What is minimised: residuals of a body's pose and the regularisation of its state."""
 
     model: MotionModel
     body: Body
-    span: SplineBasis
-    kinds: Sequence[ResidualBlock]
-    expect: Regulariser
+    basis: SplineBasis
+    blocks: Sequence[ResidualBlock]
+    regulariser: Regulariser
 
 
-def solve(problem: Problem, start: SwingState, steps: int = 15, enough: float = 1e-3) -> SwingState:
-    """The state of least cost near `start`; stops when the cost falls by less than `enough`."""
-    state, damping = start, 1e-2
-    cost, normal, slope = _linearise(problem, state)
-    for _ in range(steps):
-        step = _solve_damped(normal, slope, damping)
-        trial = move_state(state, problem.span, step)
-        trial_cost, trial_normal, trial_slope = _linearise(problem, trial)
-        if trial_cost > cost:
-            damping *= 8
-            if damping > MOST_DAMPING:
-                break
-            continue
-        fall = cost - trial_cost
-        state, cost, normal, slope = trial, trial_cost, trial_normal, trial_slope
-        damping = max(damping / 4, 1e-6)
-        if fall < enough * cost:
-            break
-    return state
+@dataclass(frozen=True, eq=False)
+class LinearisedProblem:
+    """A problem linearised at a state."""
+
+    cost: float
+    matrix: Float[np.ndarray, "S S"]
+    """Gauss and Newton's J^T W J."""
+    gradient: Float[np.ndarray, "S"]
 
 
-MOST_DAMPING = 1e5
+DAMPING = Damping(start=1e-2, increase=8.0, decrease=4.0, largest=1e5)
+"""Chosen on rendered swings; see benchmarks/golf.py."""
+LEAST_FALL = 1e-3
+"""Share of the cost by which the last step lowers it. Chosen on rendered swings; see
+benchmarks/golf.py."""
 
 
-def _solve_damped(
-    normal: Float[np.ndarray, "S S"], slope: Float[np.ndarray, "S"], damping: float
-) -> Float[np.ndarray, "S"]:
-    scale = np.diag(normal)
-    factor = cho_factor(normal + np.diag(damping * scale + 1e-9 * scale.max()))
-    return -cho_solve(factor, slope)
+def solve(problem: Problem, start: SwingState, steps: int = 15) -> SwingState:
+    """The state of least cost near `start`; stops when the cost hardly falls."""
+
+    def step(state: SwingState, here: LinearisedProblem, damping: float) -> SwingState:
+        return move_state(state, problem.basis, _solve_damped(here, damping))
+
+    def accepts(before: float, after: float) -> bool:
+        return after <= before
+
+    def converged(before: float, after: float) -> bool:
+        return before - after < LEAST_FALL * after
+
+    return minimise(start, partial(_linearise, problem), step, accepts, converged, DAMPING, steps)
 
 
-def _linearise(
-    problem: Problem, state: SwingState
-) -> tuple[float, Float[np.ndarray, "S S"], Float[np.ndarray, "S"]]:
-    """Cost, Gauss-Newton matrix and slope by the unknowns."""
-    posture = posture_at(problem.model, state.mu, state.alpha[: problem.span.alphas])
+def _solve_damped(here: LinearisedProblem, damping: float) -> Float[np.ndarray, "S"]:
+    scale = np.diag(here.matrix)
+    factor = cho_factor(here.matrix + np.diag(damping * scale + 1e-9 * scale.max()))
+    return -cho_solve(factor, here.gradient)
+
+
+def _linearise(problem: Problem, state: SwingState) -> LinearisedProblem:
+    """Residuals are made anew at every state: which primitive a line of sight meets changes."""
+    coefficients = state.coefficients[: problem.basis.n_coefficients]
+    posture = posture_at(problem.model, state.phase, coefficients)
     pose = place_body(problem.body, posture, state)
     rates = pose_rates(problem.body, posture, state, pose)
-    frames, unknowns = len(state.mu), rates[0].shape[-1]
-    normal, slope = np.zeros((frames, unknowns, unknowns)), np.zeros((frames, unknowns))
+    frames, unknowns = len(state.phase), rates.origins.shape[-1]
+    normal, slope = (
+        np.zeros((frames, unknowns, unknowns)),
+        np.zeros((frames, unknowns)),
+    )
     cost = 0.0
-    for kind in problem.kinds:
-        rows = kind.observe(pose)
-        share, part = robust_weights(rows, kind.robust)
-        cost += kind.weight * part
-        _add_rows(normal, slope, rows, chain_rule(rows, pose, rates), kind.weight * share)
-    expected = problem.expect(state)
-    total = expected.slopes.T @ expected.slopes
+    for block in problem.blocks:
+        rows = block.residuals(pose)
+        robust = robust_weights(rows, block.robust)
+        cost += block.weight * robust.cost
+        _add_rows(normal, slope, rows, chain_rule(rows, pose, rates), block.weight * robust.weights)
+    expected = problem.regulariser(state)
+    matrix = expected.slopes.T @ expected.slopes
     gradient = expected.slopes.T @ expected.values
     for t in range(frames):
-        spread = problem.span.frame_unknowns(t)
-        total += spread.T @ normal[t] @ spread
+        spread = problem.basis.frame_unknowns(t)
+        matrix += spread.T @ normal[t] @ spread
         gradient += spread.T @ slope[t]
-    return cost + float(expected.values @ expected.values), total, gradient
+    return LinearisedProblem(cost + float(expected.values @ expected.values), matrix, gradient)
 
 
-def chain_rule(
-    rows: Residuals, pose: RootPose, rates: tuple[np.ndarray, np.ndarray]
-) -> Float[np.ndarray, "n L"]:
-    """Slopes of errors by alpha, mu and G of their frame."""
+def chain_rule(rows: Residuals, pose: RootPose, rates: PoseRates) -> Float[np.ndarray, "n L"]:
+    """Slopes of residuals by coefficients, phase and G of their frame."""
     place = rows.frame, rows.segment
     arm = rows.point - pose.origins[place]
-    moved, turned = rates[0][place], rates[1][place]
+    moved, turned = rates.origins[place], rates.rotations[place]
     return np.einsum("ni,nil->nl", rows.gradient, moved) + np.einsum(
         "ni,nil->nl", np.cross(arm, rows.gradient), turned
     )
 
 
-def robust_weights(rows: Residuals, robust: float) -> tuple[Float[np.ndarray, "n"], float]:
-    """Weight of every row by the size of its group's error, and the robust cost of all.
+@dataclass(frozen=True, eq=False)
+class RobustWeights:
+    """How much each row counts, and the robust cost of all."""
+
+    weights: Float[np.ndarray, "n"]
+    cost: float
+
+
+def robust_weights(rows: Residuals, robust: float) -> RobustWeights:
+    """Weight of every row by the size of its group's residual.
 
     Geman and McClure: cost e^2 / (1 + e^2 / c^2), weight 1 / (1 + e^2 / c^2)^2.
     """
     if not len(rows.values):
-        return rows.values, 0.0
+        return RobustWeights(rows.values, 0.0)
     square = np.bincount(rows.group, rows.values**2)
     far = 1 + square / robust**2
-    return (1 / far**2)[rows.group], float((square / far).sum())
+    return RobustWeights((1 / far**2)[rows.group], float((square / far).sum()))
 
 
 def _add_rows(
@@ -136,8 +151,8 @@ def _add_rows(
     order = np.argsort(rows.frame, kind="stable")
     bounds = np.searchsorted(rows.frame[order], np.arange(len(normal) + 1))
     for t in range(len(normal)):
-        own = order[bounds[t] : bounds[t + 1]]
-        if len(own):
-            weighted = slopes[own] * weight[own, None]
-            normal[t] += weighted.T @ slopes[own]
-            slope[t] += weighted.T @ rows.values[own]
+        of_frame = order[bounds[t] : bounds[t + 1]]
+        if len(of_frame):
+            weighted = slopes[of_frame] * weight[of_frame, None]
+            normal[t] += weighted.T @ slopes[of_frame]
+            slope[t] += weighted.T @ rows.values[of_frame]

@@ -1,1 +1,1 @@
-"""What is seen of a swing: joints, club, silhouette, events (CVPR 2005, Section 4)."""
+"""What is observed of a swing: joints, club, silhouette, events (CVPR 2005, Section 4)."""

@@ -3,7 +3,7 @@
 After Jepson, Fleet and El-Maraghi (PAMI 25, 2003): every pixel of a patch around the point is
 explained by one of three components. The stable one is a Gaussian learnt slowly over time, the
 wandering one is what was there in the last frame, the lost one is anything at all. The patch moves
-by translation, turn and scale so that the pixels agree with the component that owns them, stable
+by translation, turn and scale so that the pixels agree with the component they belong to, stable
 pixels weighing most by their small deviation; so clothes that hardly change hold the patch in
 place, and what passes over it is lost. Here the pixels are Lab colours instead of the phases of
 steerable filters, and pixels off the player do not count.
@@ -16,16 +16,17 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-GRID = 21
-"""Pixels of a patch along each side."""
+PATCH_SIDE = 21
+"""Pixels of a patch along each side. Chosen on rendered swings, like all values here; see
+benchmarks/golf_tracks.py."""
 LEVELS = (4.0, 2.0, 1.0)
 """Blur of the picture and the patch from coarse to fine, pixels of the patch."""
-UNIFORM = 1e-6
+LOST_DENSITY = 1e-6
 """Density of the lost component over Lab colours."""
 LEAST_SPREAD = 4.0
 """Deviation that a stable pixel has at least: video noise, grey levels."""
-CHROMA = 1.6
-"""Weight of a and b against L."""
+CHROMA_WEIGHT = 1.6
+"""Weight of a and b against L: chroma varies less with light."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class _Model:
 
 @dataclass(frozen=True, eq=False)
 class PointTrack:
-    """Where a patch went."""
+    """Where a patch moved."""
 
     places: Float[np.ndarray, "T 2"]
     """px of the pictures given"""
@@ -73,38 +74,41 @@ def track_patch(
     pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
     weights: Sequence[UInt8[np.ndarray, "h w"]],
     start: Float[np.ndarray, "2"],
-    scales: tuple[float, float],
+    height: float,
+    fps: float,
     options: AppearanceOptions = AppearanceOptions(),
 ) -> PointTrack:
-    """Follow a point of the first of some Lab pictures through the others.
+    """Track a point of the first of some Lab pictures through the others.
 
-    `weights` tell where the player is (255); `scales` are the height of the player in px and the
-    frames per second.
+    `weights` tell where the player is (255); `height` is that of the player in these pictures, px.
     """
-    height, fps = scales
-    pixel = options.size * height / GRID
+    pixel = options.size * height / PATCH_SIDE
     pose = np.array([*start, 0.0, np.log(pixel)])
-    seen, _ = _cut(pictures[0], weights[0], pose)
-    model = _Model(seen, np.full(len(seen), 100.0), seen, np.tile([0.4, 0.4, 0.2], (len(seen), 1)))
+    colors, _ = _cut(pictures[0], weights[0], pose)
+    shares = np.tile([0.4, 0.4, 0.2], (len(colors), 1))
+    model = _Model(colors, np.full(len(colors), 100.0), colors, shares)
     rate = 1 / max(2.0, options.memory * fps)
     usual = np.array([options.move * height] * 2 + [options.turn] * 2)
     poses, confidence, speed = [pose], [1.0], np.zeros(4)
     for picture, weight in zip(pictures[1:], weights[1:], strict=True):
         before = pose
-        pose = _align(model, (picture, weight), before + speed, usual, options)
-        seen, inside = _cut(picture, weight, pose)
-        owners = _owners(model, seen, options)
-        model = _learn(model, seen, owners, rate)
+        expected = _ExpectedPose(before + speed, usual)
+        pose = _align(model, picture, weight, expected, options)
+        colors, inside = _cut(picture, weight, pose)
+        responsibility = _responsibilities(model, colors, options)
+        model = _learn(model, colors, responsibility, rate)
         speed = np.array([*(pose - before)[:2], 0.0, 0.0])
         poses.append(pose)
-        confidence.append(float((inside * (1 - owners[:, 2])).sum() / max(inside.sum(), 1e-9)))
+        confidence.append(
+            float((inside * (1 - responsibility[:, 2])).sum() / max(inside.sum(), 1e-9))
+        )
     path = np.array(poses)
     return PointTrack(path[:, :2], path[:, 2], np.array(confidence))
 
 
 def _places(pose: Float[np.ndarray, "4"]) -> Float[np.ndarray, "n 2"]:
     """Picture positions of the patch's pixels."""
-    side = np.arange(GRID) - (GRID - 1) / 2
+    side = np.arange(PATCH_SIDE) - (PATCH_SIDE - 1) / 2
     x, y = (c.ravel() * np.exp(pose[3]) for c in np.meshgrid(side, side))
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.stack([pose[0] + c * x - s * y, pose[1] + s * x + c * y], axis=1)
@@ -126,53 +130,61 @@ def _read(
 ) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n"]]:
     """Lab layers of a picture at some places, chroma strengthened, and the weights there."""
     at = places.astype(np.float32)[:, None]
-    seen = cv2.remap(picture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    read = cv2.remap(picture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     inside = cv2.remap(weight, at, None, cv2.INTER_LINEAR)
-    strength = np.tile((1.0, CHROMA, CHROMA), seen.shape[2] // 3)
-    return seen[:, 0].astype(float) * strength, inside.ravel() / 255.0
+    strength = np.tile((1.0, CHROMA_WEIGHT, CHROMA_WEIGHT), read.shape[2] // 3)
+    return read[:, 0].astype(float) * strength, inside.ravel() / 255.0
+
+
+@dataclass(frozen=True, eq=False)
+class _ExpectedPose:
+    """Where a patch is expected, and how far off it usually is."""
+
+    pose: Float[np.ndarray, "4"]
+    """Place, turn and the logarithm of the scale."""
+    spread: Float[np.ndarray, "4"]
 
 
 def _align(
     model: _Model,
-    frame: tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]],
-    guess: Float[np.ndarray, "4"],
-    usual: Float[np.ndarray, "4"],
+    picture: UInt8[np.ndarray, "h w 3"],
+    weight: UInt8[np.ndarray, "h w"],
+    expected: _ExpectedPose,
     options: AppearanceOptions,
 ) -> Float[np.ndarray, "4"]:
     """The pose at which a picture agrees best with the appearance, from coarse to fine."""
-    picture, weight = _around(frame, guess)
-    corner = np.array([*picture[1], 0.0, 0.0])
-    pose = guess - corner
-    expected = pose.copy()
+    rows, columns = _around(weight.shape, expected.pose)
+    corner = np.array([float(columns.start), float(rows.start), 0.0, 0.0])
+    crop, weight = picture[rows, columns].astype(np.float32), weight[rows, columns]
+    pose = expected.pose - corner
+    expected = _ExpectedPose(pose.copy(), expected.spread)
     for level in LEVELS:
-        layers = _differentiate(picture[0], level * np.exp(pose[3]) / 2)
+        layers = _differentiate(crop, level * np.exp(pose[3]) / 2)
         smooth = _blur_model(model, level)
         for _ in range(options.steps):
-            step = _step(smooth, (layers, weight), pose, (expected, usual), options)
+            step = _step(smooth, layers, weight, pose, expected, options)
             pose = pose + step
             if np.abs(step[:2]).max() < 0.02:
                 break
     return pose + corner
 
 
-def _around(
-    frame: tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]],
-    guess: Float[np.ndarray, "4"],
-) -> tuple[tuple[Float[np.ndarray, "y x 3"], Float[np.ndarray, "2"]], UInt8[np.ndarray, "y x"]]:
-    """The part of a picture that a patch may reach, with its corner, and the weights there."""
-    reach = int(1.5 * GRID * np.exp(guess[3])) + 4
-    size = np.array(frame[1].shape[::-1])
+def _around(shape: tuple[int, int], guess: Float[np.ndarray, "4"]) -> tuple[slice, slice]:
+    """Rows and columns of the part of a picture that a patch may reach."""
+    reach = int(1.5 * PATCH_SIDE * np.exp(guess[3])) + 4
+    size = np.array(shape[::-1])
     low = np.clip(np.round(guess[:2]).astype(int) - reach, 0, size - 4)
     high = np.clip(low + 2 * reach, low + 4, size)
-    part = np.s_[low[1] : high[1], low[0] : high[0]]
-    return (frame[0][part].astype(np.float32), low.astype(float)), frame[1][part]
+    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
 
 
 def _blur_model(model: _Model, level: float) -> _Model:
     """The appearance as seen through the blur of a level."""
 
     def blur(colors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        return cv2.GaussianBlur(colors.reshape(GRID, GRID, 3), (0, 0), level / 2).reshape(-1, 3)
+        return cv2.GaussianBlur(
+            colors.reshape(PATCH_SIDE, PATCH_SIDE, 3), (0, 0), level / 2
+        ).reshape(-1, 3)
 
     return replace(model, stable=blur(model.stable), last=blur(model.last))
 
@@ -186,56 +198,56 @@ def _differentiate(picture: Float[np.ndarray, "h w 3"], blur: float) -> Float[np
 
 def _step(
     model: _Model,
-    frame: tuple[Float[np.ndarray, "h w 9"], UInt8[np.ndarray, "h w"]],
+    layers: Float[np.ndarray, "h w 9"],
+    player: UInt8[np.ndarray, "h w"],
     pose: Float[np.ndarray, "4"],
-    expected: tuple[Float[np.ndarray, "4"], Float[np.ndarray, "4"]],
+    expected: _ExpectedPose,
     options: AppearanceOptions,
 ) -> Float[np.ndarray, "4"]:
-    """A Gauss-Newton step; `expected` holds the pose expected and its usual deviation."""
+    """A Gauss-Newton step."""
     places = _places(pose)
-    read, inside = _read(*frame, places)
-    seen, right, down = np.split(read, 3, axis=1)
-    owners = _owners(model, seen, options)
-    weight = inside[:, None] * owners[:, :2] / np.stack(
-        [model.variance, np.full(len(seen), options.wander**2)], axis=1
+    read, inside = _read(layers, player, places)
+    colors, right, down = np.split(read, 3, axis=1)
+    responsibility = _responsibilities(model, colors, options)
+    weight = inside[:, None] * responsibility[:, :2] / np.stack(
+        [model.variance, np.full(len(colors), options.wander**2)], axis=1
     )  # fmt: skip
     x, y = (places - pose[:2]).T[..., None]
     slopes = np.stack([right, down, down * x - right * y, right * x + down * y], axis=2)
     total = weight.sum(axis=1)
-    miss = seen * total[:, None] - weight[:, :1] * model.stable - weight[:, 1:] * model.last
+    residual = colors * total[:, None] - weight[:, :1] * model.stable - weight[:, 1:] * model.last
     # Neighbouring pixels of a blurred picture tell the same: they count as a ninth of evidence.
     normal = np.einsum("nci,nc,ncj->ij", slopes, np.repeat(total[:, None], 3, 1), slopes) / 9
-    slope = np.einsum("nci,nc->i", slopes, miss) / 9
-    middle, usual = expected
-    prior = np.diag(1 / usual**2)
-    return -np.linalg.solve(normal + prior, slope + prior @ (pose - middle))
+    slope = np.einsum("nci,nc->i", slopes, residual) / 9
+    prior = np.diag(1 / expected.spread**2)
+    return -np.linalg.solve(normal + prior, slope + prior @ (pose - expected.pose))
 
 
-def _owners(
-    model: _Model, seen: Float[np.ndarray, "n 3"], options: AppearanceOptions
+def _responsibilities(
+    model: _Model, colors: Float[np.ndarray, "n 3"], options: AppearanceOptions
 ) -> Float[np.ndarray, "n 3"]:
     """Probability of each component, by how well it explains a pixel."""
     densities = []
-    for colors, variance in ((model.stable, model.variance), (model.last, options.wander**2)):
-        square = ((seen - colors) ** 2).sum(axis=1) / variance
+    for mean, variance in ((model.stable, model.variance), (model.last, options.wander**2)):
+        square = ((colors - mean) ** 2).sum(axis=1) / variance
         densities.append(np.exp(-0.5 * square) / (2 * np.pi * variance) ** 1.5)
-    densities.append(np.full(len(seen), UNIFORM))
+    densities.append(np.full(len(colors), LOST_DENSITY))
     likely = model.share * np.stack(densities, axis=1)
     return likely / likely.sum(axis=1, keepdims=True)
 
 
 def _learn(
     model: _Model,
-    seen: Float[np.ndarray, "n 3"],
-    owners: Float[np.ndarray, "n 3"],
+    colors: Float[np.ndarray, "n 3"],
+    responsibility: Float[np.ndarray, "n 3"],
     rate: float,
 ) -> _Model:
     """The appearance after one more frame; pixels that lost their stable part begin anew."""
-    share = (1 - rate) * model.share + rate * owners
-    pull = rate * owners[:, 0] / share[:, 0]
-    off = seen - model.stable
+    share = (1 - rate) * model.share + rate * responsibility
+    pull = rate * responsibility[:, 0] / share[:, 0]
+    off = colors - model.stable
     stable = model.stable + pull[:, None] * off
     variance = (1 - pull) * (model.variance + pull * (off**2).sum(axis=1) / 3)
     anew = share[:, 0] < 0.1
-    stable[anew], variance[anew], share[anew] = seen[anew], 100.0, (0.2, 0.5, 0.3)
-    return _Model(stable, np.maximum(variance, LEAST_SPREAD**2), seen, share)
+    stable[anew], variance[anew], share[anew] = colors[anew], 100.0, (0.2, 0.5, 0.3)
+    return _Model(stable, np.maximum(variance, LEAST_SPREAD**2), colors, share)

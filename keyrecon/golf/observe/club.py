@@ -1,11 +1,13 @@
 """The club in every frame: the most consistent of many hypotheses, then a smooth motion.
 
 First the cheapest path through the hypotheses of all frames is found by dynamic programming: it
-gains what was seen of the shafts it takes, and pays for the movement of hands and club head and
+gains what was detected of the shafts it takes, and pays for the movement of hands and club head and
 for frames it passes over. Then a local model of the motion, hands and head each a quadratic in time
 over a window of frames, is fitted robustly to the path (the 2D motion model of Section 4.2 of the
 CVPR 2005 paper, after Lepetit, Shahrokni and Fua, CVPR 2003): what does not fit is left out, and
 frames without a shaft, those blurred at impact, get their club from the frames around.
+
+Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from collections.abc import Sequence
@@ -20,11 +22,11 @@ from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
 NOWHERE = np.full((2, 2), np.nan)
-FEWEST = 5
+FEWEST_SHAFTS = 5
 """Shafts that a local motion is fitted to, at least."""
-ROUNDS = 8
-"""Reweightings of a window."""
-ALONG = 0.04
+REWEIGHTINGS = 8
+"""Of a window."""
+ALONG_WEIGHT = 0.04
 """Weight of an end along the shaft against across, where it may not be the true end."""
 
 
@@ -50,7 +52,7 @@ class ClubOptions:
     """Distance from the local motion at which a shaft counts for a quarter, where it rests."""
     off_moving: float = 0.2
     """The same for a moving shaft, as a share of its movement from frame to frame: a quadratic
-    follows a fast club less well."""
+    fits a fast club less well."""
     min_confidence: float = 0.08
     """A shaft that counts for less was something else."""
 
@@ -60,8 +62,8 @@ class Club:
     """Where the club is."""
 
     ends: Float[np.ndarray, "T 2 2"]
-    """Where the hands hold it, and its head, px; NaN before and after all that was seen."""
-    seen: Bool[np.ndarray, "T"]
+    """Where the hands hold it, and its head, px; NaN before and after all that was detected."""
+    detected: Bool[np.ndarray, "T"]
     """False where the club comes from the frames around."""
     tip: Bool[np.ndarray, "T"]
     """Whether the hand end is where the hands are; else they may be farther on in its line."""
@@ -75,21 +77,30 @@ def track_club(
 ) -> Club:
     """The club of every frame; `height` of the player in px, `fps` of the world.
 
-    Raises KeyreconError where hardly any shaft was seen.
+    Raises KeyreconError where hardly any shaft was detected.
     """
     path = choose_shafts(shafts, height, fps, options)
     pairs = list(zip(shafts, path.tolist(), strict=True))
     taken = np.array([s.ends[k] if k >= 0 else NOWHERE for s, k in pairs])
     tip = np.array([k >= 0 and bool(s.tip[k]) for s, k in pairs])
-    model, confidence = _local_motion(taken, tip, height, fps, options)
-    seen = (path >= 0) & (confidence > options.min_confidence)
-    if seen.sum() < FEWEST:
+    local = _local_motion(taken, tip, height, fps, options)
+    detected = (path >= 0) & (local.confidence > options.min_confidence)
+    if detected.sum() < FEWEST_SHAFTS:
         raise KeyreconError(
-            f"A club was seen in only {seen.sum()} of {len(path)} frames; the video must show a "
-            "whole swing, sharp enough to see the shaft, with a camera that stands still."
+            f"A club was seen in only {detected.sum()} of {len(path)} frames; the video must show "
+            "a whole swing, sharp enough to see the shaft, with a camera that stands still."
         )
-    ends = np.where(seen[:, None, None], _lengthen(taken, model), model)
-    return Club(ends, seen, tip & seen)
+    ends = np.where(detected[:, None, None], _lengthen(taken, local.ends), local.ends)
+    return Club(ends, detected, tip & detected)
+
+
+@dataclass(frozen=True, eq=False)
+class _LocalMotion:
+    """Hands and head by a quadratic in time around every frame."""
+
+    ends: Float[np.ndarray, "T 2 2"]
+    confidence: Float[np.ndarray, "T"]
+    """Weight of the shaft taken in each frame, 0-1."""
 
 
 def _local_motion(
@@ -98,26 +109,25 @@ def _local_motion(
     height: float,
     fps: float,
     options: ClubOptions,
-) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Hands and head by a robust quadratic in time around every frame, and each shaft's confidence.
+) -> _LocalMotion:
+    """A robust fit to the shafts taken.
 
-    A head end that was seen is only known across the shaft: how far the shaft was seen along its
-    line depends on the light.
+    A head end is only known across the shaft: how far the shaft was detected along its line depends
+    on the light.
     """
     frames = np.flatnonzero(np.isfinite(taken[:, 0, 0]))
     model, confidence = np.full_like(taken, np.nan), np.zeros(len(taken))
-    if len(frames) < FEWEST:
-        return model, confidence
+    if len(frames) < FEWEST_SHAFTS:
+        return _LocalMotion(model, confidence)
     for t in range(frames[0], frames[-1] + 1):
-        near = _neighbours(frames, t, max(FEWEST, round(2 * options.window * fps) + 1))
+        near = _neighbours(frames, t, max(FEWEST_SHAFTS, round(2 * options.window * fps) + 1))
         time = (near - t) / max(1, np.abs(near - t).max())
         steps = np.abs(np.diff(taken[near], axis=0)).sum(axis=2) / np.diff(near)[:, None]
         off = options.off * height + options.off_moving * float(np.median(steps.max(axis=1)))
-        fitted, weight = _fit_window(taken[near], tip[near], time, off)
-        model[t] = fitted
+        model[t], weight = _fit_window(taken[near], tip[near], time, off)
         if t in near:
             confidence[t] = weight[np.searchsorted(near, t)]
-    return model, confidence
+    return _LocalMotion(model, confidence)
 
 
 def _neighbours(frames: Int[np.ndarray, "n"], t: int, count: int) -> Int[np.ndarray, "m"]:
@@ -135,17 +145,17 @@ def _fit_window(
     basis = np.stack([np.ones_like(time), time, time**2], axis=1)
     unit = unit_vectors(ends[:, 1] - ends[:, 0], 1e-9)
     across = np.eye(2) - unit[:, :, None] * unit[:, None, :]
-    along = np.stack([np.where(tip, 1.0, ALONG), np.full(len(tip), ALONG)], axis=1)
+    along = np.stack([np.where(tip, 1.0, ALONG_WEIGHT), np.full(len(tip), ALONG_WEIGHT)], axis=1)
     metric = across[:, None] + along[..., None, None] * (np.eye(2) - across)[:, None]
     nearness = 1 / (1 + (2 * time) ** 2)
     weight = np.ones(len(time))
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         metrics = metric * (nearness * weight)[:, None, None, None]
         coefficients = np.stack(
             [_weighted_quadratic(basis, ends[:, e], metrics[:, e]) for e in range(2)]
         )
-        miss = ends - np.einsum("nk,ekx->nex", basis, coefficients)
-        square = np.einsum("nex,nexy,ney->n", miss, metric, miss) / off**2
+        residual = ends - np.einsum("nk,ekx->nex", basis, coefficients)
+        square = np.einsum("nex,nexy,ney->n", residual, metric, residual) / off**2
         weight = 1 / (1 + square) ** 2
     return coefficients[:, 0], weight
 
@@ -165,12 +175,12 @@ def _weighted_quadratic(
 def _lengthen(
     taken: Float[np.ndarray, "T 2 2"], model: Float[np.ndarray, "T 2 2"]
 ) -> Float[np.ndarray, "T 2 2"]:
-    """Shafts as they were seen, reaching as far as the local motion tells if that is farther."""
+    """Shafts as they were detected, reaching as far as the local motion if that is farther."""
     along = taken[:, 1] - taken[:, 0]
     length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     unit = along / length
-    told = ((model[:, 1] - taken[:, 0]) * unit).sum(axis=1, keepdims=True)
-    return np.stack([taken[:, 0], taken[:, 0] + unit * np.maximum(length, told)], axis=1)
+    reach = ((model[:, 1] - taken[:, 0]) * unit).sum(axis=1, keepdims=True)
+    return np.stack([taken[:, 0], taken[:, 0] + unit * np.maximum(length, reach)], axis=1)
 
 
 def choose_shafts(
@@ -184,8 +194,8 @@ def choose_shafts(
     def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
         return _movement(shafts[before], shafts[t], height, (t - before) / fps, options)
 
-    own = [-options.gain * now.weight for now in shafts]
-    return find_cheapest_path(own, moving, max(1, round(options.gap * fps)), options.miss)
+    costs = [-options.gain * now.weight for now in shafts]
+    return find_cheapest_path(costs, moving, max(1, round(options.gap * fps)), options.miss)
 
 
 def _movement(

@@ -9,7 +9,7 @@ median of what these frames show outside of the player. Against this plate every
 probability that a pixel is no scenery (Section 4.1 of the CVPR 2005 paper begins with such masks);
 where the player hardly ever leaves, GrabCut decides in every frame anew.
 
-Arms and the club move too fast to be in any plate, whether GrabCut found them or not.
+Arms and the club move too fast to be in any plate, whether GrabCut cut them out or not.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.clicks import ClickedPose
 from keyrecon.io.frame_reader import read_grey, read_small, reduce_picture, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
@@ -28,42 +28,43 @@ from keyrecon.records import Background, CameraPath
 from keyrecon.segmentation.background_model import ForegroundModel, median_background
 from keyrecon.segmentation.color_model import to_lab
 
-BONES = (
+SEED_LINES = (
     ("head_top", "neck", "root"), ("root", "right_knee", "right_ankle"),
     ("root", "left_knee", "left_ankle"), ("neck", "right_shoulder", "right_elbow", "right_wrist"),
     ("neck", "left_shoulder", "left_elbow", "left_wrist"),
 )  # fmt: skip
 """Lines through the body; joints that were not clicked are left out."""
-SURE, LIKELY = 0.02, 0.08
-"""Widths of the lines that are certainly and probably player, player heights."""
-ABOVE, ASIDE, BELOW = 0.35, 0.5, 0.08
+SURE_WIDTH, LIKELY_WIDTH = 0.02, 0.08
+"""Widths of the lines that are certainly and probably player, player heights: a shin is .04 wide
+and a click off by .01, a thigh .08 wide."""
+REACH_ABOVE, REACH_ASIDE, REACH_BELOW = 0.35, 0.5, 0.08
 """How far the player's trunk, head and legs may get from the clicks, player heights."""
 CUT_HEIGHT = 160.0
 """Height of the player in the pictures that are cut out, px; time goes with its square."""
-LIMB, HAND = 0.032, 0.03
+LIMB_WIDTH, HAND_LENGTH = 0.032, 0.03
 """A forearm is thicker, and a hand reaches no farther from it, player heights."""
-RIM = 2
-"""Scenery around the reach that GrabCut sees, px."""
-ISLAND = 0.06
+GRABCUT_RIM = 2
+"""Scenery around the reach that GrabCut is given, px."""
+ISLAND_GAP = 0.06
 """What is farther from the player than half of this does not belong to it, player heights."""
-SAFE = 0.012
+SAFETY_RIM = 0.012
 """Width of the rim around the player that belongs to nobody, player heights."""
-SMALLEST, LARGEST = 0.01, 0.4
+SMALLEST_PLAYER, LARGEST_PLAYER = 0.01, 0.4
 """Area of the player in squared heights: people fill .16 to .2, less or more is no player."""
-SEEN_LEAST = 0.25
+LEAST_FREE = 0.25
 """Share of the sampled frames in which a place must be free to count as known: GrabCut errs in
-some."""
-NOISE = 18
+some. Chosen on rendered swings, as all that is not said to be measured; see benchmarks/golf.py."""
+PIXEL_NOISE = 18
 """Change of a pixel that is more than noise, grey levels."""
 CHANGE_FLOOR = 1e-3
 """Share of changed pixels that every frame counts for at least."""
-SOFT = 0.6
+MASK_BLUR = 0.6
 """Standard deviation that video noise is smoothed with, px of the mask."""
 
 
 @dataclass(frozen=True)
 class ForegroundOptions:
-    """How the player is told from the scene."""
+    """How the player is separated from the scene."""
 
     height: float = 300.0
     """Height of the player in the masks, px; the club is a hundredth of it wide."""
@@ -74,39 +75,52 @@ class ForegroundOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Foreground:
-    """What is no scenery, in reduced pictures."""
+class FrameForeground:
+    """What is no scenery in one frame, reduced."""
 
-    likely: UInt8[np.ndarray, "T h w"]
+    frame: int
+    likely: UInt8[np.ndarray, "h w"]
     """Probability in 1/255 that a pixel is player or club."""
     known: Bool[np.ndarray, "h w"]
-    """Where the scene was seen; elsewhere colours alone told the player from it."""
+    """Where the scene was observed; elsewhere colours alone separate the player from it."""
     shrink: float
     """Pixels of these pictures per pixel of the video."""
     height: float
     """The player from the head to the ankles, px of the video."""
 
-    def sample(self, frame: int, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
+    def to_mask(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Points of the video in pixels of the mask."""
+        return points * self.shrink + (self.shrink - 1) / 2
+
+    def to_video(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Points of the mask in pixels of the video."""
+        return (points - (self.shrink - 1) / 2) / self.shrink
+
+    def sample(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
         """Probability at points given in pixels of the video; 0 outside the picture."""
         if not points.size:
             return np.zeros(points.shape[:-1])
-        flat = (points.reshape(-1, 2) * self.shrink + (self.shrink - 1) / 2).astype(np.float32)
-        read = cv2.remap(self.likely[frame], flat[:, None], None, cv2.INTER_LINEAR)
+        flat = self.to_mask(points.reshape(-1, 2)).astype(np.float32)
+        read = cv2.remap(self.likely, flat[:, None], None, cv2.INTER_LINEAR)
         return (read.ravel() / 255.0).reshape(points.shape[:-1])
 
-    def body(self, frame: int) -> Bool[np.ndarray, "h w"]:
+    def mask(self) -> UInt8[np.ndarray, "h w"]:
+        """1 where a pixel is rather player or club than scenery."""
+        return (self.likely > 127).astype(np.uint8)
+
+    def body(self) -> Bool[np.ndarray, "h w"]:
         """The player without what is thinner than a limb: without the club.
 
         Hands, feet and what else is thin but short comes back with the limb it hangs on.
         """
-        mask = self.mask(frame)
-        limbs = cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._disk(LIMB))
-        return cv2.dilate(limbs, self._disk(2 * HAND)) & mask > 0
+        mask = self.mask()
+        limbs = cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._disk(LIMB_WIDTH))
+        return cv2.dilate(limbs, self._disk(2 * HAND_LENGTH)) & mask > 0
 
-    def player(self, frame: int) -> Bool[np.ndarray, "h w"]:
+    def player(self) -> Bool[np.ndarray, "h w"]:
         """The body without what lies apart: balls, people far away, the head of the club."""
-        body = self.body(frame).astype(np.uint8)
-        _, labels = cv2.connectedComponents(cv2.dilate(body, self._disk(ISLAND)))
+        body = self.body().astype(np.uint8)
+        _, labels = cv2.connectedComponents(cv2.dilate(body, self._disk(ISLAND_GAP)))
         counts = np.bincount(labels[body > 0], minlength=2)
         return (body > 0) & (labels == counts.argmax())
 
@@ -115,16 +129,26 @@ class Foreground:
         pixels = max(3, round(size * self.height * self.shrink)) | 1
         return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (pixels, pixels))
 
-    def mask(self, frame: int) -> UInt8[np.ndarray, "h w"]:
-        """1 where a pixel is rather player or club than scenery."""
-        return (self.likely[frame] > 127).astype(np.uint8)
+
+@dataclass(frozen=True, eq=False)
+class Foreground:
+    """What is no scenery in all frames; fields as those of one frame."""
+
+    likely: UInt8[np.ndarray, "T h w"]
+    known: Bool[np.ndarray, "h w"]
+    shrink: float
+    height: float
+
+    def frame(self, number: int) -> FrameForeground:
+        """That of one frame."""
+        return FrameForeground(number, self.likely[number], self.known, self.shrink, self.height)
 
 
 @dataclass(frozen=True, eq=False)
 class _Cutter:
     """Cuts the player out of single pictures by what was learnt in the clicked one."""
 
-    clicks: GolfClicks
+    pose: ClickedPose
     width: int
     """Of the pictures that are cut out, px."""
     models: tuple[np.ndarray, np.ndarray]
@@ -133,8 +157,9 @@ class _Cutter:
     def __call__(self, picture: UInt8[np.ndarray, "h w 3"]) -> Bool[np.ndarray, "h w"]:
         small = reduce_picture(picture, self.width)
         mask = np.zeros(small.shape[:2], np.uint8)
-        x0, y0, x1, y1 = _reach(self.clicks, self.width / self.clicks.size[0])
-        part = np.s_[max(0, y0 - RIM) : y1 + RIM, max(0, x0 - RIM) : x1 + RIM]
+        x0, y0, x1, y1 = _reach(self.pose, self.width / self.pose.size[0])
+        rim = GRABCUT_RIM
+        part = np.s_[max(0, y0 - rim) : y1 + rim, max(0, x0 - rim) : x1 + rim]
         trimap = np.full(mask.shape, cv2.GC_BGD, np.uint8)
         trimap[y0:y1, x0:x1] = cv2.GC_PR_FGD
         trimap = np.ascontiguousarray(trimap[part])
@@ -147,7 +172,7 @@ class _Cutter:
 
 def separate_player(
     video: Video,
-    clicks: GolfClicks,
+    pose: ClickedPose,
     options: ForegroundOptions = ForegroundOptions(),
     progress: Progress = silent,
 ) -> Foreground:
@@ -155,14 +180,14 @@ def separate_player(
 
     Raises KeyreconError where the clicks do not lie on anything that differs from the scene.
     """
-    width = max(16, round(video.width * min(1.0, options.height / clicks.height)))
-    cutter = _learn_cutter(reduce_picture(video.frame(clicks.frame), width), clicks)
+    width = max(16, round(video.width * min(1.0, options.height / pose.height)))
+    cutter = _learn_cutter(reduce_picture(video.frame(pose.frame), width), pose)
     plate = _learn_plate(video, cutter, width, options, progress)
     scene = ForegroundModel(plate, _still(len(video)), options.sure)
     compare = partial(_likely, scene, cutter)
     pictures = progress(read_small(video, width), "Separating the player", len(video))
     likely = np.stack(list(side_by_side(compare, pictures)))
-    return Foreground(likely, plate.known, width / video.width, clicks.height)
+    return Foreground(likely, plate.known, width / video.width, pose.height)
 
 
 def _likely(
@@ -173,7 +198,7 @@ def _likely(
     # A scene is compared with the pixels around too: next to the unknown it is unknown as well.
     unknown = cv2.dilate((~scene.background.known).astype(np.uint8), np.ones((3, 3))) > 0
     likely[unknown] = cutter(picture)[unknown]
-    return (255 * cv2.GaussianBlur(likely, (0, 0), SOFT)).astype(np.uint8)
+    return (255 * cv2.GaussianBlur(likely, (0, 0), MASK_BLUR)).astype(np.uint8)
 
 
 def _still(count: int) -> CameraPath:
@@ -187,12 +212,12 @@ def _learn_plate(
     numbers = _eventful_frames(video, cutter, options.cut)
     small = read_small(video, width, set(numbers.tolist()))
     pictures = list(progress(small, "Reading the scene", len(numbers)))
-    height = cutter.clicks.height * width / video.width
-    rim = np.ones((2 * max(1, round(SAFE * height)) + 1,) * 2)
+    height = cutter.pose.height * width / video.width
+    rim = np.ones((2 * max(1, round(SAFETY_RIM * height)) + 1,) * 2)
     free = [cv2.dilate(m.astype(np.uint8), rim) == 0 for m in side_by_side(cutter, pictures)]
     return median_background(
         [to_lab(p) for p in pictures], free, _still(len(numbers)).to_reference,
-        width / video.width, min_share=SEEN_LEAST,
+        width / video.width, min_share=LEAST_FREE,
     )  # fmt: skip
 
 
@@ -202,56 +227,56 @@ def _eventful_frames(video: Video, cutter: _Cutter, count: int) -> Int[np.ndarra
     for grey in read_grey(video, cutter.width):
         if before is not None:
             moved = cv2.absdiff(grey, before)
-            change.append(CHANGE_FLOOR + float((moved > NOISE).mean()))
+            change.append(CHANGE_FLOOR + float((moved > PIXEL_NOISE).mean()))
         before = grey
     passed = np.cumsum(change)
     return np.unique(np.searchsorted(passed, np.linspace(0, passed[-1], count)))
 
 
-def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], clicks: GolfClicks) -> _Cutter:
+def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], pose: ClickedPose) -> _Cutter:
     """Colours of the player and the scene in the clicked picture."""
-    shrink = picture.shape[1] / clicks.size[0]
-    width = max(16, round(clicks.size[0] * min(shrink, CUT_HEIGHT / clicks.height)))
+    shrink = picture.shape[1] / pose.size[0]
+    width = max(16, round(pose.size[0] * min(shrink, CUT_HEIGHT / pose.height)))
     small = reduce_picture(picture, width)
     models = np.zeros((1, 65)), np.zeros((1, 65))
-    trimap = _seed(small.shape[:2], clicks)
+    trimap = _seed(small.shape[:2], pose)
     cv2.setRNGSeed(0)  # its clusters begin at random; the same clicks give the same player
     cv2.grabCut(small, trimap, None, *models, 5, cv2.GC_INIT_WITH_MASK)
-    cutter = _Cutter(clicks, width, models)
-    _check_player(cutter(small), clicks)
+    cutter = _Cutter(pose, width, models)
+    _check_player(cutter(small), pose)
     return cutter
 
 
-def _seed(shape: tuple[int, int], clicks: GolfClicks) -> UInt8[np.ndarray, "h w"]:
+def _seed(shape: tuple[int, int], pose: ClickedPose) -> UInt8[np.ndarray, "h w"]:
     """GrabCut's beginning: lines through the body, what is around it, and the scene."""
-    shrink = shape[1] / clicks.size[0]
+    shrink = shape[1] / pose.size[0]
     trimap = np.full(shape, cv2.GC_BGD, np.uint8)
-    x0, y0, x1, y1 = _reach(clicks, shrink)
+    x0, y0, x1, y1 = _reach(pose, shrink)
     trimap[y0:y1, x0:x1] = cv2.GC_PR_BGD
-    for width, label in ((LIKELY, cv2.GC_PR_FGD), (SURE, cv2.GC_FGD)):
-        thick = max(1, round(width * clicks.height * shrink))
-        for names in BONES:
-            line = [clicks.place(n) for n in names if n in clicks.joints or n == "root"]
+    for width, label in ((LIKELY_WIDTH, cv2.GC_PR_FGD), (SURE_WIDTH, cv2.GC_FGD)):
+        thick = max(1, round(width * pose.height * shrink))
+        for names in SEED_LINES:
+            line = [pose.place(n) for n in names if pose.has(n)]
             corners = np.round(np.array(line) * shrink).astype(np.int32)
             cv2.polylines(trimap, [corners], False, label, thick)
     return trimap
 
 
-def _reach(clicks: GolfClicks, shrink: float) -> tuple[int, int, int, int]:
+def _reach(pose: ClickedPose, shrink: float) -> tuple[int, int, int, int]:
     """Left, top, right and bottom of where trunk, head and legs may come during the swing."""
-    places = np.array([clicks.place(n) for n in clicks.joints])
-    low = places.min(axis=0) - clicks.height * np.array([ASIDE, ABOVE])
-    high = places.max(axis=0) + clicks.height * np.array([ASIDE, BELOW])
+    places = pose.joints.places
+    low = places.min(axis=0) - pose.height * np.array([REACH_ASIDE, REACH_ABOVE])
+    high = places.max(axis=0) + pose.height * np.array([REACH_ASIDE, REACH_BELOW])
     (x0, y0), (x1, y1) = np.maximum(low * shrink, 0).astype(int), (high * shrink).astype(int)
     return int(x0), int(y0), int(x1), int(y1)
 
 
-def _check_player(mask: Bool[np.ndarray, "h w"], clicks: GolfClicks) -> None:
+def _check_player(mask: Bool[np.ndarray, "h w"], pose: ClickedPose) -> None:
     """What has the colours of the clicked figure must be as large as one, not the scene."""
-    height = clicks.height * mask.shape[1] / clicks.size[0]
+    height = pose.height * mask.shape[1] / pose.size[0]
     area = float(mask.sum() / height**2)
-    if not SMALLEST < area < LARGEST:
+    if not SMALLEST_PLAYER < area < LARGEST_PLAYER:
         raise KeyreconError(
-            f"Around the clicks of frame {clicks.frame} no player stands out from the scene "
+            f"Around the clicks of frame {pose.frame} no player stands out from the scene "
             f"(an area of {area:.2f} squared heights); check that the clicks lie on the player."
         )

@@ -1,16 +1,16 @@
-"""Lines of a picture near the one that is expected.
-
-A line counts by how far its middle is brighter, or darker, than both of its sides, in the picture
-as well as in its difference to the temporal median: a rope in the scene is missing in the second,
-the ghost of a club that rested there in the first, and the edge of an arm has one side only.
-
-The club looked for once more, where the fitted swing expects it.
+"""Guided club detection: lines of a picture near the club that a fitted swing expects.
 
 Nothing but the club itself can tell at first where it is, so what lies on the player is left out
 then: stripes, folds and gaps between arms look alike. Once a swing has been fitted, the global
-model that Gehrig, Lepetit and Fua (BMVC 2003) make of polynomials, the lines near the expected one
-and the one seen at first are all that need be compared. The cheapest path through the best lines
-of all frames departs from the expectation as slowly as the fit is wrong.
+model that Gehrig, Lepetit and Fua (BMVC 2003) make of polynomials, the lines near the expected club
+and the one detected at first are all that need be compared. The cheapest path through the best
+lines of all frames departs from the expectation as slowly as the fit is wrong.
+
+A line counts by how far its middle is brighter, or darker, than both of its sides, in the picture
+as well as in its difference to the temporal median: a rope in the scene is missing in the second,
+the after-image of a club that rested there in the first, and the edge of an arm has one side only.
+
+Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from collections.abc import Sequence
@@ -26,17 +26,17 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
 
-PLACES = 32
-"""Places at which a line is looked at."""
-SHAFT = (0.2, 0.95)
+SAMPLES_ALONG = 32
+"""Places at which a line is sampled."""
+SHAFT_PART = (0.2, 0.95)
 """Where on the club they lie, between its ends: beside the hands and the head."""
-ASIDES = 21
+N_OFFSETS = 21
 """Offsets that are tried."""
-NEIGHBOURS = (7, 7)
-"""Turns and offsets among which only the best line is kept."""
+PEAK_TURNS, PEAK_OFFSETS = 7, 7
+"""Neighbouring turns and offsets among which only the best line is kept."""
 SHUTTER = 0.5
-"""Share of the time between frames for which a camera's shutter is open."""
-BLURS = (0.5, 1.0)
+"""Share of the time between frames for which a camera's shutter is open: half, as in cinema."""
+BLUR_SHARES = (0.5, 1.0)
 """A blur seems narrower where it is pale, and where the club is slower than expected."""
 Picture = Float[np.ndarray, "h w"]
 
@@ -47,11 +47,11 @@ class LineOptions:
 
     turn: float = 45.0
     """Degrees by which the club may be turned from where it is expected."""
-    aside: float = 0.05
+    offset: float = 0.05
     """How far beside the expected hands its line may pass."""
     usual_turn: float = 10.0
     """Degrees by which it usually is turned."""
-    usual_aside: float = 0.025
+    usual_offset: float = 0.025
     """How far beside it usually passes."""
     far: float = 3.0
     """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
@@ -62,8 +62,8 @@ class LineOptions:
     """Grey levels by which a sure shaft stands out."""
     gain: float = 15.0
     """What a club that stands out from end to end is worth, in squared standard deviations."""
-    known: float = 3.0
-    """What a line is worth besides for having been seen at first, without any expectation."""
+    detected: float = 3.0
+    """What a line is worth besides for having been detected at first, without any expectation."""
     most: int = 6
     """Lines kept in a frame."""
     shortest: float = 0.1
@@ -71,11 +71,12 @@ class LineOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class ExpectedLine:
-    """A frame in which lines are looked for."""
+class SearchedFrame:
+    """A frame in which lines are searched for."""
 
-    pictures: tuple[Picture, Picture]
-    """The frame, and its difference to the median."""
+    picture: Picture
+    change: Picture
+    """Its difference to the temporal median."""
     height: float
     """Of the player, px."""
     swept: Float[np.ndarray, "2"]
@@ -83,7 +84,7 @@ class ExpectedLine:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class ClubLines:
     """Lines of a frame that may be the club."""
 
     ends: Float[np.ndarray, "n 2 2"]
@@ -95,52 +96,51 @@ class Lines:
 
 
 def find_lines(
-    sight: ExpectedLine,
+    searched: SearchedFrame,
     first: Float[np.ndarray, "2 2"],
     expected: Float[np.ndarray, "2 2"],
     options: LineOptions,
-) -> Lines:
-    """The lines near the expected club that stand out most, and the one that was seen at first.
+) -> ClubLines:
+    """The lines near the expected club that stand out most, and the one detected at first.
 
-    Where nothing can be expected, NaN, the one that was seen at first has to stand out alone.
+    Where nothing can be expected, NaN, the one detected at first has to stand out alone.
     """
-    ends, expected = np.zeros((0, 2, 2)), expected / sight.height
+    ends, expected = np.zeros((0, 2, 2)), expected / searched.height
     if np.linalg.norm(expected[1] - expected[0]) > options.shortest:
-        ends = _best_lines(sight, expected, options)
-    known = int(np.isfinite(first).all())
-    if known:
-        line = _sharpen(sight, lay_on(first / sight.height, expected), options)
+        ends = _best_lines(searched, expected, options)
+    detected = int(np.isfinite(first).all())
+    if detected:
+        line = _sharpen(searched, lay_on(first / searched.height, expected), options)
         ends = np.concatenate([ends, line[None]])
     departure = measure_departure(expected, ends, options)
-    worth = _weigh(departure, _contrast(sight, ends, options), options)
+    worth = _weigh(departure, _contrast(searched, ends, options), options)
     if np.isfinite(expected).all():
-        worth[len(ends) - known :] += options.known
-    return Lines(ends, departure, worth)
+        worth[len(ends) - detected :] += options.detected
+    return ClubLines(ends, departure, worth)
 
 
 def _best_lines(
-    sight: ExpectedLine, expected: Float[np.ndarray, "2 2"], options: LineOptions
+    searched: SearchedFrame, expected: Float[np.ndarray, "2 2"], options: LineOptions
 ) -> Float[np.ndarray, "n 2 2"]:
     """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
     turns = np.arange(-options.turn, options.turn + 0.5)
-    asides = np.linspace(-options.aside, options.aside, ASIDES)
-    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
-    ends = _shift(expected, turn, aside)
-    contrast = _contrast(sight, ends, options)
+    offsets = np.linspace(-options.offset, options.offset, N_OFFSETS)
+    turn, offset = (grid.ravel() for grid in np.meshgrid(turns, offsets, indexing="ij"))
+    ends = _shift(expected, turn, offset)
+    contrast = _contrast(searched, ends, options)
     worth = _weigh(measure_departure(expected, ends, options), contrast, options)
-    worth, sharp = (v.reshape(len(turns), ASIDES) for v in (worth, contrast.mean(axis=1)))
-    peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones(NEIGHBOURS)))
+    worth, sharp = (v.reshape(len(turns), N_OFFSETS) for v in (worth, contrast.mean(axis=1)))
+    peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones((PEAK_TURNS, PEAK_OFFSETS))))
     best = peaks[np.argsort(-worth.ravel()[peaks])][: options.most]
-    return ends[[_sharpest(sharp, divmod(peak, ASIDES)) for peak in best.tolist()]]
+    return ends[[_sharpest(sharp, *divmod(peak, N_OFFSETS)) for peak in best.tolist()]]
 
 
-def _sharpest(sharp: Float[np.ndarray, "a b"], peak: tuple[int, int]) -> int:
+def _sharpest(sharp: Float[np.ndarray, "a b"], turn: int, offset: int) -> int:
     """Index of the line of most contrast among the neighbours of one."""
-    (i, j), (di, dj) = peak, (n // 2 for n in NEIGHBOURS)
-    low = max(0, i - di), max(0, j - dj)
-    part = sharp[low[0] : i + di + 1, low[1] : j + dj + 1]
+    first, left = max(0, turn - PEAK_TURNS // 2), max(0, offset - PEAK_OFFSETS // 2)
+    part = sharp[first : turn + PEAK_TURNS // 2 + 1, left : offset + PEAK_OFFSETS // 2 + 1]
     k, m = divmod(int(part.argmax()), part.shape[1])
-    return (low[0] + k) * sharp.shape[1] + low[1] + m
+    return (first + k) * sharp.shape[1] + left + m
 
 
 def lay_on(
@@ -155,24 +155,24 @@ def lay_on(
 
 
 def _sharpen(
-    sight: ExpectedLine, line: Float[np.ndarray, "2 2"], options: LineOptions
+    searched: SearchedFrame, line: Float[np.ndarray, "2 2"], options: LineOptions
 ) -> Float[np.ndarray, "2 2"]:
-    """The line of most contrast among the neighbours of one: a shaft seen in part is askew."""
-    turns = np.arange(-(NEIGHBOURS[0] // 2), NEIGHBOURS[0] // 2 + 1.0)
-    asides = turns * 2 * options.aside / (ASIDES - 1)
-    turn, aside = (grid.ravel() for grid in np.meshgrid(turns, asides, indexing="ij"))
-    ends = _shift(line, turn, aside)
-    return ends[int(_contrast(sight, ends, options).mean(axis=1).argmax())]
+    """The line of most contrast among the neighbours of one: a shaft detected in part is askew."""
+    turns = np.arange(-(PEAK_TURNS // 2), PEAK_TURNS // 2 + 1.0)
+    offsets = turns * 2 * options.offset / (N_OFFSETS - 1)
+    turn, offset = (grid.ravel() for grid in np.meshgrid(turns, offsets, indexing="ij"))
+    ends = _shift(line, turn, offset)
+    return ends[int(_contrast(searched, ends, options).mean(axis=1).argmax())]
 
 
 def _shift(
-    expected: Float[np.ndarray, "2 2"], turn: Float[np.ndarray, "n"], aside: Float[np.ndarray, "n"]
+    expected: Float[np.ndarray, "2 2"], turn: Float[np.ndarray, "n"], offset: Float[np.ndarray, "n"]
 ) -> Float[np.ndarray, "n 2 2"]:
     """The expected club turned about its hands by degrees and shifted sideways."""
     way = expected[1] - expected[0]
     across = np.array([-way[1], way[0]])
     angle = np.radians(turn)[:, None]
-    hands = expected[0] + aside[:, None] * across / np.linalg.norm(across)
+    hands = expected[0] + offset[:, None] * across / np.linalg.norm(across)
     return np.stack([hands, hands + np.cos(angle) * way + np.sin(angle) * across], axis=1)
 
 
@@ -191,23 +191,26 @@ def measure_departure(
     turn = np.arctan2(way[0] * theirs[:, 1] - way[1] * theirs[:, 0], theirs @ way)
     off = ends[:, 0] - expected[0]
     length = np.maximum(np.linalg.norm(theirs, axis=1), 1e-9)
-    aside = (theirs[:, 0] * off[:, 1] - theirs[:, 1] * off[:, 0]) / length
-    return np.stack([np.degrees(turn) / options.usual_turn, aside / options.usual_aside], axis=1)
+    offset = (theirs[:, 0] * off[:, 1] - theirs[:, 1] * off[:, 0]) / length
+    return np.stack([np.degrees(turn) / options.usual_turn, offset / options.usual_offset], axis=1)
 
 
 def _contrast(
-    sight: ExpectedLine, ends: Float[np.ndarray, "n 2 2"], options: LineOptions
+    searched: SearchedFrame, ends: Float[np.ndarray, "n 2 2"], options: LineOptions
 ) -> Float[np.ndarray, "n p"]:
     """Grey levels by which places along lines stand out in both pictures."""
-    share = np.linspace(*SHAFT, PLACES)
+    share = np.linspace(*SHAFT_PART, SAMPLES_ALONG)
     points = ends[:, None, 0] + share[:, None] * (ends[:, None, 1] - ends[:, None, 0])
     way = ends[:, 1] - ends[:, 0]
     across = unit_vectors(np.stack([-way[:, 1], way[:, 0]], axis=1), 1e-9)
-    blur = SHUTTER / 2 * (sight.swept[0] + share * (sight.swept[1] - sight.swept[0]))
-    widths = [np.full(PLACES, w) for w in options.widths]
-    widths += [options.widths[0] + share * blur for share in BLURS]
-    sides = [sight.height * width[:, None] * across[:, None] for width in widths]
-    return np.minimum(*(_stand_out(p, sight.height * points, sides) for p in sight.pictures))
+    blur = SHUTTER / 2 * (searched.swept[0] + share * (searched.swept[1] - searched.swept[0]))
+    widths = [np.full(SAMPLES_ALONG, w) for w in options.widths]
+    widths += [options.widths[0] + share * blur for share in BLUR_SHARES]
+    sides = [searched.height * width[:, None] * across[:, None] for width in widths]
+    return np.minimum(
+        _stand_out(searched.picture, searched.height * points, sides),
+        _stand_out(searched.change, searched.height * points, sides),
+    )
 
 
 def _stand_out(
@@ -240,44 +243,55 @@ def _weigh(
     return options.gain * share - 0.5 * off
 
 
-PLATE = 15
+MEDIAN_FRAMES = 15
 """Frames whose median stands for the scene."""
-USUAL = 1.0
-"""Usual departures within which a line seen at first is the same club."""
-ALONG = 0.12
+SAME_CLUB = 1.0
+"""Usual departures within which a line detected at first is the same club."""
+EXPECTED_SPREAD = 0.12
 """Standard deviation along the shaft of hands that were only expected there, player heights."""
-BRIDGED = 0.5
-"""Longest time over which the fit's error is thought to last, seconds."""
+BRIDGED_SECONDS = 0.5
+"""Longest time over which the fit's error is thought to last."""
 
 
 @dataclass(frozen=True)
 class GuidedDetectionOptions:
-    """How the club is looked for once more."""
+    """How the club is detected with the help of a fitted swing."""
 
     lines: LineOptions = field(default_factory=LineOptions)
     """What may be the club."""
     miss: float = 3.0
-    """Cost of a frame in which the club is not seen: it must stand out over a fifth at least."""
+    """Cost of a frame without the club: it must stand out over a fifth at least."""
     pace: float = 0.1
     """Seconds in which the fit's error may change by its usual size."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedClubs:
+    """What is known of the club in every frame; ends are hands and head, px."""
+
+    first: Float[np.ndarray, "T 2 2"]
+    """Where it was detected at first, NaN where it was not."""
+    expected: Float[np.ndarray, "T 2 2"]
+    resting: Bool[np.ndarray, "T"]
+    """Whether it rests, so that it is in the median picture too."""
+    height: float
+    """Of the player, px."""
 
 
 def detect_club_guided(
     observations: Observations,
     video: Video,
-    plate: Float[np.ndarray, "h w"],
     fitted: FittedSwing,
-    height: float,
     options: GuidedDetectionOptions = GuidedDetectionOptions(),
 ) -> Observations:
-    """The observations with the club of a second look at the swing; `height` of the player in px.
+    """The observations with the club of a guided detection.
 
-    `plate` is the median picture (`median_picture`).
-    How far a shaft reaches was seen at first, where that was the same one.
+    How far a shaft reaches was detected at first, where that was the same one.
     """
-    first, resting = observations.club, np.arange(len(observations.club)) < fitted.keys[0]
-    ends = detect_in_frame((video, plate), (first, fitted.club_seen), height, resting, options)
-    along = np.tile([ALONG * height, np.inf], (len(ends), 1))
+    first, height = observations.club, observations.height
+    resting = np.arange(len(first)) < fitted.keys[0]
+    ends = detect_clubs(video, ExpectedClubs(first, fitted.club2d, resting, height), options)
+    along = np.tile([EXPECTED_SPREAD * height, np.inf], (len(ends), 1))
     for t in _find_same(ends, first, height, options.lines):
         ends[t], along[t] = lay_on(ends[t], first[t]), observations.club_along[t]
     return replace(observations, club=ends, club_along=along)
@@ -289,37 +303,28 @@ def _find_same(
     height: float,
     options: LineOptions,
 ) -> Int[np.ndarray, "n"]:
-    """Frames in which the club is what was seen at first."""
+    """Frames in which the club is what was detected at first."""
     pairs = zip(ends / height, first / height, strict=True)
     apart = [measure_departure(e, f[None], options)[0] for e, f in pairs]
-    seen = np.isfinite(ends + first).all(axis=(1, 2))
-    return np.flatnonzero(seen & (np.abs(apart).max(axis=1) < USUAL))
+    both = np.isfinite(ends + first).all(axis=(1, 2))
+    return np.flatnonzero(both & (np.abs(apart).max(axis=1) < SAME_CLUB))
 
 
-def detect_in_frame(
-    scene: tuple[Video, Float[np.ndarray, "h w"]],
-    clubs: tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T 2 2"]],
-    height: float,
-    resting: Bool[np.ndarray, "T"],
-    options: GuidedDetectionOptions = GuidedDetectionOptions(),
+def detect_clubs(
+    video: Video, clubs: ExpectedClubs, options: GuidedDetectionOptions = GuidedDetectionOptions()
 ) -> Float[np.ndarray, "T 2 2"]:
-    """Hand end and head of the club, px, NaN where it is not seen.
-
-    `scene` is the video with its median picture, in which a `resting` club is too; `clubs` are
-    where it was seen at first, NaN where it was not, and where it is expected; `height` is that of
-    the player in px.
-    """
-    (video, plate), (first, expected) = scene, clubs
+    """Hand end and head of the club, px, NaN where it is not detected."""
+    median, height, expected = median_picture(video), clubs.height, clubs.expected
     swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
 
-    def look(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> Lines:
+    def detect(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> ClubLines:
         frame, grey = numbered
         picture = grey.astype(np.float32)
-        moved = picture if resting[frame] else picture - plate
-        sight = ExpectedLine((picture, moved), height, swept[frame])
-        return find_lines(sight, first[frame], expected[frame], options.lines)
+        change = picture if clubs.resting[frame] else picture - median
+        searched = SearchedFrame(picture, change, height, swept[frame])
+        return find_lines(searched, clubs.first[frame], expected[frame], options.lines)
 
-    lines = list(side_by_side(look, enumerate(video.grey_frames())))
+    lines = list(side_by_side(detect, enumerate(video.grey_frames())))
     chosen = _choose(lines, video.fps, options)
     ends = np.full_like(expected, np.nan)
     for t in np.flatnonzero(chosen >= 0):
@@ -329,13 +334,13 @@ def detect_in_frame(
 
 def median_picture(video: Video) -> Float[np.ndarray, "h w"]:
     """The scene, and what of the player hardly moves."""
-    chosen = set(np.linspace(0, len(video) - 1, PLATE).astype(int).tolist())
+    chosen = set(np.linspace(0, len(video) - 1, MEDIAN_FRAMES).astype(int).tolist())
     pictures = [g for t, g in enumerate(video.grey_frames()) if t in chosen]
     return np.median(np.stack(pictures), axis=0).astype(np.float32)
 
 
 def _choose(
-    lines: Sequence[Lines], fps: float, options: GuidedDetectionOptions
+    lines: Sequence[ClubLines], fps: float, options: GuidedDetectionOptions
 ) -> Int[np.ndarray, "T"]:
     """The line taken in every frame, -1 where none."""
 
@@ -344,5 +349,5 @@ def _choose(
         square = np.minimum((change**2).sum(axis=2), options.lines.far**2)
         return 0.5 * square * min(1.0, options.pace * fps / (t - before))
 
-    own = [options.miss - b.worth for b in lines]
-    return find_cheapest_path(own, moving, max(1, round(BRIDGED * fps)), 0.0)
+    costs = [options.miss - b.worth for b in lines]
+    return find_cheapest_path(costs, moving, max(1, round(BRIDGED_SECONDS * fps)), 0.0)

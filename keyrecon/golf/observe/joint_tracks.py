@@ -1,126 +1,135 @@
-"""Joints that are followed through the video: head, knees and ankles (CVPR 2005, Section 4.2).
+"""Joints tracked through the video: head, knees and ankles (CVPR 2005, Section 4.2).
 
-Every clicked one of them that can be seen is followed by its appearance, forwards and backwards
-from the clicked frame. Three things that appearance cannot tell are told by what is known of legs.
-Seen along the line of the feet, the farther leg is behind the nearer one: it is not followed. Where
+Every clicked one of them that is visible is tracked by its appearance, forwards and backwards from
+the clicked frame. Three things that appearance cannot tell follow from what is known of legs.
+Along the line of the feet, the farther leg is behind the nearer one: it is not tracked. Where
 the left and the right one come to lie at the same place, a tracker cannot but hold on to the nearer
 one: the one that had moved less before counts as hidden from then on. And a knee that slips along
 the thigh changes the length of the shank.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.body import LSP14
-from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observe.appearance_tracker import AppearanceOptions, PointTrack, track_patch
 from keyrecon.golf.observe.foreground import Foreground
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.progress import Progress, silent
 
-SPREAD = {"head_top": 0.02, "knee": 0.02, "ankle": 0.018}
+TRACK_SPREAD = {"head_top": 0.02, "knee": 0.02, "ankle": 0.018}
 """Standard deviation of a tracked joint, player heights: cloth slides over knees."""
 IN_LINE = 0.12
-"""Feet closer than this across the picture are seen in line, player heights."""
-SHANK = (0.6, 1.25)
+"""Feet closer than this across the picture stand in line, player heights."""
+SHANK_LENGTHS = (0.6, 1.25)
 """Least and greatest length of the shank, in lengths of the clicked one."""
 HIDDEN_SPREAD = 0.04
 """The same of a joint that was clicked behind something."""
 CLICK_SPREAD = 0.015
 """The same of any other click."""
-TURNED = 0.08
+TURN_SPREAD = 0.08
 """Standard deviation that a turn of one radian adds to the top of the head, player heights."""
 SAME_PLACE = 0.035
 """Left and right closer than this are one and the same picture, player heights."""
-BEFORE = 0.3
+SECONDS_BEFORE = 0.3
 """Time before they meet over which their movement is compared, seconds."""
 
 Joints = Float[np.ndarray, "T 14 2"]
-Spread = Float[np.ndarray, "T 14"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedJoints:
+    """Joints in px of the video."""
+
+    joints: Joints
+    """NaN where unknown."""
+    spread: Float[np.ndarray, "T 14"]
+    """Standard deviations; infinite where unknown."""
 
 
 def track_joints(
     pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
     foreground: Foreground,
-    clicks: GolfClicks,
+    pose: ClickedPose,
     fps: float,
     options: AppearanceOptions = AppearanceOptions(),
     progress: Progress = silent,
-) -> tuple[Joints, Spread]:
-    """Joints in px of the video, NaN where unknown, and their standard deviations.
+) -> TrackedJoints:
+    """Tracks of the clicked joints; others are known in the clicked frame alone.
 
     `pictures` are in Lab and as small as the masks of `foreground`.
     """
     joints = np.full((len(pictures), len(LSP14.names), 2), np.nan)
     spread = np.full(joints.shape[:2], np.inf)
-    names = [n for n in clicks.joints if n in LSP14.names]
-    behind = {*clicks.hidden, *_farther_leg(clicks)}
-    tracked = [n for n in names if _kind(n) in SPREAD and n not in behind]
+    names = [n for n in pose.joints.names if n in LSP14.names]
+    behind = {*pose.hidden, *_farther_leg(pose)}
+    tracked = [n for n in names if _kind(n) in TRACK_SPREAD and n not in behind]
 
-    def follow(name: str) -> PointTrack:
-        start = clicks.head if name == "head_top" else clicks.place(name)
-        return _track_both_ways(pictures, foreground, start, (clicks.frame, fps), options)
+    def track(name: str) -> PointTrack:
+        start = pose.head if name == "head_top" else pose.place(name)
+        return _track_both_ways(pictures, foreground, start, pose.frame, fps, options)
 
-    trails = side_by_side(follow, progress(tracked, "Following joints", len(tracked)))
-    for name, trail in zip(tracked, trails, strict=True):
+    tracks = side_by_side(track, progress(tracked, "Tracking joints", len(tracked)))
+    for name, trail in zip(tracked, tracks, strict=True):
         index = LSP14.index(name)
-        offset = clicks.place(name) - clicks.head if name == "head_top" else np.zeros(2)
+        offset = pose.place(name) - pose.head if name == "head_top" else np.zeros(2)
         turn = trail.turns if name == "head_top" else np.zeros(len(trail.turns))
         joints[:, index] = trail.places + _turned(offset, turn)
-        own = SPREAD[_kind(name)] + TURNED * np.abs(turn)
-        spread[:, index] = own * foreground.height / np.maximum(trail.confidence, 0.1)
+        base = TRACK_SPREAD[_kind(name)] + TURN_SPREAD * np.abs(turn)
+        spread[:, index] = base * foreground.height / np.maximum(trail.confidence, 0.1)
     for name in set(names) - set(tracked):
         index = LSP14.index(name)
-        joints[clicks.frame, index] = clicks.place(name)
-        own = HIDDEN_SPREAD if name in clicks.hidden else CLICK_SPREAD
-        spread[clicks.frame, index] = own * foreground.height
+        joints[pose.frame, index] = pose.place(name)
+        base = HIDDEN_SPREAD if name in pose.hidden else CLICK_SPREAD
+        spread[pose.frame, index] = base * foreground.height
     for pair in LSP14.mirrored:
-        _hide_dragged(joints, pair, clicks.frame, foreground.height, fps)
+        _hide_dragged(joints, pair, pose.frame, foreground.height, fps)
     for side in ("left", "right"):
-        _drop_slipped(joints, side, clicks.frame)
-    return joints, np.where(np.isfinite(joints[..., 0]), spread, np.inf)
+        _drop_slid_knees(joints, side, pose.frame)
+    return TrackedJoints(joints, np.where(np.isfinite(joints[..., 0]), spread, np.inf))
 
 
 def _kind(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
 
 
-def _farther_leg(clicks: GolfClicks) -> tuple[str, ...]:
+def _farther_leg(pose: ClickedPose) -> tuple[str, ...]:
     """The leg behind the other one, if any: the nearer foot stands lower in the picture."""
-    apart = clicks.place("right_ankle") - clicks.place("left_ankle")
-    if abs(apart[0]) > IN_LINE * clicks.height:
+    apart = pose.place("right_ankle") - pose.place("left_ankle")
+    if abs(apart[0]) > IN_LINE * pose.height:
         return ()
     side = "left" if apart[1] > 0 else "right"
     return f"{side}_knee", f"{side}_ankle"
 
 
-def _drop_slipped(joints: Joints, side: str, clicked: int) -> None:
+def _drop_slid_knees(joints: Joints, side: str, clicked: int) -> None:
     """Forget knees where the shank has an impossible length."""
     knee, ankle = LSP14.index(f"{side}_knee"), LSP14.index(f"{side}_ankle")
     length = np.linalg.norm(joints[:, knee] - joints[:, ankle], axis=1)
     share = length / length[clicked]
-    joints[(share < SHANK[0]) | (share > SHANK[1]), knee] = np.nan
+    joints[(share < SHANK_LENGTHS[0]) | (share > SHANK_LENGTHS[1]), knee] = np.nan
 
 
 def _track_both_ways(
     pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
     foreground: Foreground,
     start: Float[np.ndarray, "2"],
-    clock: tuple[int, float],
+    frame: int,
+    fps: float,
     options: AppearanceOptions,
 ) -> PointTrack:
-    """A trail through all frames, in px of the video; `clock` is the clicked frame and the rate."""
-    frame, fps = clock
+    """A track through all frames from the clicked one, in px of the video."""
     shrink = foreground.shrink
     shift = (shrink - 1) / 2
-    scales = (foreground.height * shrink, fps)
-    parts = []
+    parts, height = [], foreground.height * shrink
     for way in (slice(frame, None), slice(frame, None if frame else 0, -1)):
         few = list(pictures[way]) or [pictures[frame]]
         weights = list(foreground.likely[way]) or [foreground.likely[frame]]
-        parts.append(track_patch(few, weights, start * shrink + shift, scales, options))
+        parts.append(track_patch(few, weights, start * shrink + shift, height, fps, options))
     on, back = parts
     return PointTrack(
         (np.concatenate([back.places[:0:-1], on.places]) - shift) / shrink,
@@ -150,6 +159,6 @@ def _hide_dragged(
         met = np.flatnonzero(apart[order] < SAME_PLACE * height)
         if not len(met):
             continue
-        before = order[max(0, met[0] - round(BEFORE * fps)) : met[0] + 1]
+        before = order[max(0, met[0] - round(SECONDS_BEFORE * fps)) : met[0] + 1]
         moved = [np.linalg.norm(side[before[-1]] - side[before[0]]) for side in (left, right)]
         joints[order[met[0] :], pair[int(np.argmin(moved))]] = np.nan

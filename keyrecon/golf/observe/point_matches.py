@@ -1,6 +1,6 @@
-"""Points of the player's surface found again in the next frame (CVPR 2005, Section 4.3).
+"""Points of the player's surface matched in the next frame (CVPR 2005, Section 4.3).
 
-Points on a grid over the player are followed by pyramidal Lucas-Kanade, forwards and back; those
+Points on a grid over the player are tracked by pyramidal Lucas-Kanade, forwards and back; those
 that do not come back to where they started, or lie where nothing holds them, are left out.
 """
 
@@ -42,10 +42,10 @@ def match_points(
         return np.zeros((0, 2)), np.zeros((0, 2))
     side = max(7, round(options.window * height)) | 1
     flow = {"winSize": (side, side), "maxLevel": 3}
-    end, found, _ = cv2.calcOpticalFlowPyrLK(grey, following, start, None, **flow)
+    end, tracked, _ = cv2.calcOpticalFlowPyrLK(grey, following, start, None, **flow)
     back, again, _ = cv2.calcOpticalFlowPyrLK(following, grey, end, None, **flow)
     near = np.linalg.norm(back - start, axis=1) < max(0.5, options.back * height)
-    good = near & (found.ravel() > 0) & (again.ravel() > 0)
+    good = near & (tracked.ravel() > 0) & (again.ravel() > 0)
     return start[good].astype(float), end[good].astype(float)
 
 

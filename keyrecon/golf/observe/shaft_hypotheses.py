@@ -1,10 +1,13 @@
-"""What a bar would mean if it were the club: where the hands hold it and where its head is.
+"""What a line segment would mean if it were the club: where the hands and its head would be.
 
-Of every bar come several hypotheses (Lepetit, Shahrokni and Fua, CVPR 2003, keep many per frame
-too): either end may be the one that is held. The held end is followed back to the player, where
+Of every segment come several hypotheses (Lepetit, Shahrokni and Fua, CVPR 2003, keep many per frame
+too): either end may be the one that is held. The held end is extended back to the player, where
 the hands are; a shaft that passes behind the player may be held farther on. The other end is
-followed to the last pixel of the foreground in its line, where the club head is. A hypothesis
-weighs what was seen of it, less where it lies on the player, whose clothes have stripes and folds.
+extended to the last pixel of the foreground in its line, where the club head is. A hypothesis
+weighs what was detected of it, less where it lies on the player, whose clothes have stripes and
+folds.
+
+Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from dataclasses import dataclass
@@ -13,17 +16,19 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from keyrecon.golf.observe.foreground import Foreground
+from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.golf.observe.line_segments import LineSegments
 
-STEP = 0.01
-"""Places at which a line is looked at, player heights apart."""
-SEEN = 0.3
+SAMPLE_STEP = 0.01
+"""Places at which a line is sampled, player heights apart."""
+SHAFT_FOREGROUND = 0.3
 """Probability of foreground that continues a shaft to its head."""
-GAP = 3
+GAP_SAMPLES = 3
 """Places in a row that may be missing."""
-FIST = (0.04, 0.16)
+BEYOND_HANDS = (0.04, 0.16)
 """Stretch behind the end of a shaft that lies beyond the hands that hold it, player heights."""
+TIP_SHARE = 0.4
+"""Share of this stretch in which the scene shows where nothing of the player lies behind."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class ShaftOptions:
     longest: float = 0.75
     """From the hands to the head of the club: a driver is about two thirds."""
     reach: float = 0.3
-    """Farthest that the seen part of a shaft begins from the hands."""
+    """Farthest that the detected part of a shaft begins from the hands."""
     arms: float = 0.6
     """Farthest that the hands get from where the shoulders were clicked."""
     on_player: float = 0.1
@@ -45,9 +50,9 @@ class ShaftOptions:
     loose: float = 0.5
     """Weight of a shaft whose head would be nearer to the player than the hands that hold it."""
     bridged: float = 0.3
-    """Cost of each length between the joined bars of a shaft."""
+    """Cost of each length between the joined segments of a shaft."""
     least: float = 0.05
-    """Less seen of a shaft is nothing."""
+    """Less of a shaft is nothing."""
     most: int = 24
     """Hypotheses kept in a frame."""
 
@@ -59,39 +64,50 @@ class ShaftHypotheses:
     ends: Float[np.ndarray, "n 2 2"]
     """Hand end, head end, px."""
     weight: Float[np.ndarray, "n"]
-    """What was seen of it, player heights."""
+    """What was detected of it, player heights."""
     tip: Bool[np.ndarray, "n"]
     """Whether nothing of the player lies behind the hand end in the shaft's line: else the shaft
     may pass behind the player and be held farther on."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Player:
+    """The player without the club, and how far pixels are from him."""
+
+    foreground: FrameForeground
+    distance: Float[np.ndarray, "h w"]
+    """Pixels of the mask."""
+    rim: float
+    """Distance up to which something lies on the player, pixels of the mask."""
+
+    def outside(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n"]:
+        """Distance to the player at points of the video, pixels of the mask."""
+        return _read(self.distance, self.foreground, points)
+
+
 def propose_shafts(
-    bars: LineSegments,
-    foreground: Foreground,
-    frame: int,
+    segments: LineSegments,
+    foreground: FrameForeground,
     shoulders: Float[np.ndarray, "2"],
     options: ShaftOptions = ShaftOptions(),
 ) -> ShaftHypotheses:
     """The most likely clubs of a frame, best first; `shoulders` is the middle between them, px."""
-    outside = _beside_player(foreground, frame)
-    rim = options.rim * foreground.height * foreground.shrink
+    player = _Player(
+        foreground, _player_distance(foreground),
+        options.rim * foreground.height * foreground.shrink,
+    )  # fmt: skip
     rows = []
-    for bar, support in zip(bars.ends, bars.support / foreground.height, strict=True):
-        line = bar[0] + np.linspace(0, 1, 12)[:, None] * (bar[1] - bar[0])
-        sure = _extend_both_ways(foreground.known.astype(np.uint8), foreground, line) > 0
-        beside = ((_extend_both_ways(outside, foreground, line) > rim) & sure).mean()
-        weight = support * (options.on_player + (1 - options.on_player) * beside)
-        span = float(np.linalg.norm(bar[1] - bar[0])) / foreground.height
-        weight -= options.bridged * max(0.0, span - support)
+    for segment, support in zip(segments.ends, segments.support / foreground.height, strict=True):
+        weight = _weigh(segment, support, player, options)
         if weight < options.least:
             continue
-        for held, other in (bar, bar[::-1]):
-            head = _follow_to_head(held, other, (foreground, frame), options)
-            hand = _follow_to_hands(held, head, (outside, foreground), options)
-            if _possible(np.stack([hand, head]), (outside, foreground), shoulders, options):
-                tip = _is_tip(hand, head, (outside, foreground), rim)
-                near, far = _extend_both_ways(outside, foreground, np.stack([hand, head]))
-                rows.append((weight if near < far else options.loose * weight, hand, head, tip))
+        for held, other in (segment, segment[::-1]):
+            head = _extend_to_head(held, other, foreground, options)
+            hand = _extend_to_hands(held, head, player, options)
+            if _possible(np.stack([hand, head]), player, shoulders, options):
+                near, far = player.outside(np.stack([hand, head]))
+                share = 1.0 if near < far else options.loose
+                rows.append((share * weight, hand, head, _is_tip(hand, head, player)))
     rows = sorted(rows, key=lambda r: -r[0])[: options.most]
     return ShaftHypotheses(
         np.array([r[1:3] for r in rows]).reshape(-1, 2, 2),
@@ -100,83 +116,84 @@ def propose_shafts(
     )
 
 
+def _weigh(
+    segment: Float[np.ndarray, "2 2"], support: float, player: _Player, options: ShaftOptions
+) -> float:
+    """What was detected of a segment beside the player; `support` in player heights."""
+    foreground = player.foreground
+    line = segment[0] + np.linspace(0, 1, 12)[:, None] * (segment[1] - segment[0])
+    sure = _read(foreground.known.astype(np.uint8), foreground, line) > 0
+    beside = ((player.outside(line) > player.rim) & sure).mean()
+    length = float(np.linalg.norm(segment[1] - segment[0])) / foreground.height
+    weight = support * (options.on_player + (1 - options.on_player) * beside)
+    return weight - options.bridged * max(0.0, length - support)
+
+
 def _possible(
     ends: Float[np.ndarray, "2 2"],
-    player: tuple[Float[np.ndarray, "h w"], Foreground],
+    player: _Player,
     shoulders: Float[np.ndarray, "2"],
     options: ShaftOptions,
 ) -> bool:
-    """Whether arms reach the hand end, and the club reaches its head, away from the player."""
-    outside, foreground = player
-    height = foreground.height
-    away = (
-        _extend_both_ways(outside, foreground, ends[1:])[0]
-        > options.free * height * foreground.shrink
-    )
+    """Whether arms reach the hand end, and the club reaches its head, off the player."""
+    height, shrink = player.foreground.height, player.foreground.shrink
+    free = player.outside(ends[1:])[0] > options.free * height * shrink
     near = np.linalg.norm(ends[0] - shoulders) < options.arms * height
-    return bool(away and near and np.linalg.norm(ends[1] - ends[0]) < options.longest * height)
+    return bool(free and near and np.linalg.norm(ends[1] - ends[0]) < options.longest * height)
 
 
-def _is_tip(
-    hand: Float[np.ndarray, "2"],
-    head: Float[np.ndarray, "2"],
-    player: tuple[Float[np.ndarray, "h w"], Foreground],
-    rim: float,
-) -> bool:
+def _is_tip(hand: Float[np.ndarray, "2"], head: Float[np.ndarray, "2"], player: _Player) -> bool:
     """Whether the scene shows behind the hands, in the line of the shaft."""
-    outside, foreground = player
     unit = (hand - head) / np.linalg.norm(hand - head)
-    line = hand + foreground.height * np.linspace(*FIST, 10)[:, None] * unit
-    return bool((_extend_both_ways(outside, foreground, line) > rim).mean() > 0.4)
+    line = hand + player.foreground.height * np.linspace(*BEYOND_HANDS, 10)[:, None] * unit
+    return bool((player.outside(line) > player.rim).mean() > TIP_SHARE)
 
 
-def _beside_player(foreground: Foreground, frame: int) -> Float[np.ndarray, "h w"]:
+def _player_distance(foreground: FrameForeground) -> Float[np.ndarray, "h w"]:
     """Distance of every pixel to the player without the club, pixels of the mask."""
-    free = (~foreground.player(frame)).astype(np.uint8)
+    free = (~foreground.player()).astype(np.uint8)
     return cv2.distanceTransform(free, cv2.DIST_L2, 3)
 
 
-def _extend_both_ways(
+def _read(
     picture: Float[np.ndarray, "h w"] | UInt8[np.ndarray, "h w"],
-    foreground: Foreground,
+    foreground: FrameForeground,
     points: Float[np.ndarray, "n 2"],
 ) -> Float[np.ndarray, "n"]:
     """Values of a picture of the mask's size at points in px of the video."""
-    places = (points * foreground.shrink + (foreground.shrink - 1) / 2).astype(np.float32)
+    places = foreground.to_mask(points).astype(np.float32)
     read = cv2.remap(
         picture, places[:, None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
     return read.ravel().astype(float)
 
 
-def _follow_to_head(
+def _extend_to_head(
     held: Float[np.ndarray, "2"],
     other: Float[np.ndarray, "2"],
-    seen: tuple[Foreground, int],
+    foreground: FrameForeground,
     options: ShaftOptions,
 ) -> Float[np.ndarray, "2"]:
-    """The last place of the foreground beyond the free end of a bar."""
-    foreground, frame = seen
+    """The last place of the foreground beyond the free end of a segment."""
     unit = (other - held) / np.linalg.norm(other - held)
-    steps = np.arange(1, round(options.longest / STEP)) * STEP * foreground.height
+    steps = np.arange(1, round(options.longest / SAMPLE_STEP)) * SAMPLE_STEP * foreground.height
     aside = np.array([-unit[1], unit[0]]) / foreground.shrink
     lines = other + steps[:, None] * unit + np.arange(-1, 2)[:, None, None] * aside
-    there = foreground.sample(frame, lines).max(axis=0) > SEEN
-    missing = np.convolve(~there, np.ones(GAP), "full")[: len(there)] >= GAP
+    there = foreground.sample(lines).max(axis=0) > SHAFT_FOREGROUND
+    missing = np.convolve(~there, np.ones(GAP_SAMPLES), "full")[: len(there)] >= GAP_SAMPLES
     stop = int(missing.argmax()) if missing.any() else len(there)
     last = np.flatnonzero(there[:stop])
     return other + unit * (steps[last[-1]] if len(last) else 0.0)
 
 
-def _follow_to_hands(
+def _extend_to_hands(
     held: Float[np.ndarray, "2"],
     head: Float[np.ndarray, "2"],
-    player: tuple[Float[np.ndarray, "h w"], Foreground],
+    player: _Player,
     options: ShaftOptions,
 ) -> Float[np.ndarray, "2"]:
-    """Where the line of a shaft meets the player; its end, if that is too far away."""
-    outside, foreground = player
+    """Where the line of a shaft meets the player; its end, if that is too far off."""
     unit = (held - head) / np.linalg.norm(held - head)
-    steps = np.arange(0, options.reach, STEP) * foreground.height
-    there = _extend_both_ways(outside, foreground, held + steps[:, None] * unit) <= 1.0
+    steps = np.arange(0, options.reach, SAMPLE_STEP) * player.foreground.height
+    there = player.outside(held + steps[:, None] * unit) <= 1.0
     return held + unit * (steps[there.argmax()] if there.any() else 0.0)

@@ -1,20 +1,22 @@
-"""When a filmed swing passes its key postures, told by the club (CVPR 2005, Section 5.1, Fig. 9).
+"""When a filmed swing passes its key postures (CVPR 2005, Section 5.1, Fig. 7).
 
-From whatever side a swing is filmed, the hands go up, down to the ball and up again: the hit is the
-lowest place between two high ones that follow one another within a second or so. Around this
-triple lie the four key postures: the top is amid the time for which the hands are highest, the hit
-where the club is nearest to how it lay at address, the upswing begins where the club leaves the
-place where it rested before, and the finish is where it first rests after the hit. The normalised
-time of every frame follows by monotone interpolation (Fritsch and Carlson's PCHIP; a free spline
-overshoots at the top, where the pace changes threefold).
+At first the club tells. From whatever side a swing is filmed, the hands go up, down to the ball and
+up again: the hit is the lowest place between two high ones that follow one another within a second
+or so. Around this triple lie the four key postures: the top is amid the time for which the hands
+are highest, the hit where the club is nearest to how it lay at address, the upswing begins where
+the club leaves the place where it rested before, and the finish is where it first rests after the
+hit. The normalised time of every frame follows by monotone interpolation (Fritsch and Carlson's
+PCHIP; a free spline overshoots at the top, where the pace changes threefold).
 
-When the hands leave their rest at address and find one at the finish, told by the picture.
+Once a swing is fitted, the picture tells when the hands leave their rest at address and find one at
+the finish. A swing begins and ends where the hands are slower than a small share of their peak
+speed: so it is measured in captures (`prior.key_postures`), and so it is here. Near its ends a
+fitted motion hardly moves and tells little of the time; but slow hands are tracked by optical flow
+to a tenth of a pixel (Lucas and Kanade on pyramids, checked forward and backward). How much of
+their speed the line of sight hides, the fitted swing tells: filmed down the line, hands leave their
+address towards the camera.
 
-A swing begins and ends where the hands are slower than a small share of their peak speed: so it is
-measured in captures (`keyposes`), and so it is here. Near its ends a fitted motion hardly moves and
-tells little of the time; but slow hands are followed by optical flow to a tenth of a pixel (Lucas
-and Kanade on pyramids, checked forward and backward). How much of their speed the line of sight
-hides, the fitted swing tells: seen down the line, hands leave their address towards the camera.
+Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from dataclasses import dataclass
@@ -29,11 +31,15 @@ from scipy.spatial import cKDTree
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.club import Club
 from keyrecon.golf.prior.key_postures import REST_SPEED, SMOOTH
-from keyrecon.golf.records import FittedSwing
+from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.video import Video
 
-NEAR_ADDRESS = 0.15
+LARGEST_NOISE = 0.15
 """What is farther from the address, player heights, is no noise."""
+HIT_WINDOW = 0.15
+"""Seconds around the lowest hands in which the ball is hit."""
+FEWEST_POINTS = 3
+"""Points that tell a movement, at least."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ def find_key_frames(
     top = _middle_of_height(hands[:, 1], top, low, round(options.upswing * fps), options.valley)
     speed = np.linalg.norm(np.gradient(ends, 1 / fps, axis=0), axis=2).sum(axis=1) / height
     start = _last_at_address(ends / height, top, low, options.address)
-    hit = _return_to_address(club.ends, ends[start], (top, low), fps)
+    hit = _return_to_address(club.ends, ends[start], top, low, fps)
     resting = speed < options.rest * speed[top:].max()
     finish = _first_rest(resting, speed, round(hit), round(options.pause * fps))
     return np.array([start, top, hit, finish], float)
@@ -85,10 +91,10 @@ def interpolate_times(
     return PchipInterpolator(keys, key_times)(inside)
 
 
-def keep_order(mu: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
+def keep_order(phase: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
     """Normalised times that rise up to the finish, and after it may only fall."""
-    last = int(mu.argmax())
-    rising, falling = np.maximum.accumulate(mu[:last]), np.minimum.accumulate(mu[last:])
+    last = int(phase.argmax())
+    rising, falling = np.maximum.accumulate(phase[:last]), np.minimum.accumulate(phase[last:])
     return np.clip(np.concatenate([rising, falling]), 0, 1)
 
 
@@ -102,20 +108,20 @@ def _fill(ends: Float[np.ndarray, "T 2 2"]) -> Float[np.ndarray, "T 2 2"]:
 def _find_lowest(y: Float[np.ndarray, "T"], fps: float, options: TimingOptions) -> tuple[int, int]:
     """Frames of the high place before and of the low place, in the deepest dip of the hands."""
     before, after = round(options.upswing * fps), round(options.finish * fps)
-    best, found = 0.0, (0, 0)
+    best, top_and_low = 0.0, (0, 0)
     for t in range(2, len(y) - 2):
         up = max(0, t - before)
         top = up + int(y[up:t].argmin())
         dip = min(y[t] - y[top], y[t] - y[t + 1 : t + after].min())
         if dip > best:
-            best, found = dip, (top, t)
+            best, top_and_low = dip, (top, t)
     if best < options.rise:
         raise KeyreconError(
             f"There is no swing in this video: the hands dip by only {best:.2f} player heights "
             f"between two high places, a swing by {options.rise:g} or more. Give a video with a "
             "whole swing, from the address to the finish."
         )
-    return found
+    return top_and_low
 
 
 def _middle_of_height(
@@ -138,7 +144,7 @@ def _last_at_address(ends: Float[np.ndarray, "T 2 2"], top: int, low: int, addre
     frames, poses = np.flatnonzero(down), ends[:top][down]
     apart = np.linalg.norm(poses[:, None] - poses, axis=3).sum(axis=2)
     rest = int((apart < address).sum(axis=1).argmax())
-    noise = float(np.median(apart[rest][apart[rest] < NEAR_ADDRESS]))
+    noise = float(np.median(apart[rest][apart[rest] < LARGEST_NOISE]))
     return int(frames[np.flatnonzero(apart[rest] <= address + noise)[-1]])
 
 
@@ -155,13 +161,13 @@ def _first_rest(resting: np.ndarray, speed: np.ndarray, hit: int, pause: int) ->
 def _return_to_address(
     ends: Float[np.ndarray, "T 2 2"],
     address: Float[np.ndarray, "2 2"],
-    around: tuple[int, int],
+    top: int,
+    low: int,
     fps: float,
 ) -> float:
     """When the shaft is nearest to how it lay at address, between frames if need be."""
-    top, low = around
-    first = max(top + 1, low - round(0.15 * fps))
-    last = min(len(ends) - 1, low + round(0.15 * fps))
+    first = max(top + 1, low - round(HIT_WINDOW * fps))
+    last = min(len(ends) - 1, low + round(HIT_WINDOW * fps))
     best, hit = np.inf, float(low)
     target = address[1] - address[0]
     for t in range(first, last):
@@ -176,57 +182,64 @@ def _return_to_address(
     return hit
 
 
-FEWEST = 3
-"""Points that tell a movement, at least."""
-
-
 @dataclass(frozen=True)
 class SwingEventOptions:
-    """How resting hands are told; lengths in player heights, times in seconds."""
+    """How resting hands are detected; lengths in player heights, times in seconds."""
 
     around: float = 0.15
     """How much earlier or later than fitted the swing may begin or end."""
     hands: float = 0.04
-    """Radius around the fitted hands in which points are followed."""
+    """Radius around the fitted hands in which points are tracked."""
     grid: float = 0.008
     """Distance between these points."""
     player: float = 0.02
     """Distance from a sample of the player's mask within which a point is on the player."""
     patch: float = 0.03
-    """Side of the patch by which a point is found again."""
-    slip: float = 0.004
-    """A point that is not back within this, found forward and then backward, is lost."""
+    """Side of the patch by which a point is tracked."""
+    return_error: float = 0.004
+    """A point that is not back within this, tracked forward and then backward, is lost."""
     direction: float = 0.1
-    """Time over which the fitted hands tell how much of their speed is seen."""
+    """Time over which the fitted hands tell how much of their speed the picture shows."""
     quiet: float = 0.2
-    """Share of the peak speed that fitted hands may have where they rest: seen along their way,
+    """Share of the peak speed that fitted hands may have where they rest: filmed along their way,
     moving hands seem to rest too."""
     least: float = 0.01
     """Share of the peak speed below which all is rest: a player sways, a picture has noise."""
 
 
+@dataclass(frozen=True, eq=False)
+class _HandTracks:
+    """Hands of a fitted swing, and the player around them."""
+
+    hands: Float[np.ndarray, "T 2"]
+    """px"""
+    player: tuple[Float[np.ndarray, "_ 2"], ...]
+    """Samples of the player's mask in every frame."""
+    height: float
+    """Of the player, px."""
+
+
 def detect_swing_events(
     video: Video,
-    player: tuple[Float[np.ndarray, "_ 2"], ...],
+    observations: Observations,
     fitted: FittedSwing,
-    height: float,
     options: SwingEventOptions = SwingEventOptions(),
 ) -> Float[np.ndarray, "4"]:
-    """Key postures of a fitted swing, the first and the last one anew.
-
-    `player` are samples of the player's mask in every frame; `height` is that of the player in px.
-    """
+    """Key postures of a fitted swing, the first and the last one anew."""
     fps, (start, top, hit, finish) = video.fps, fitted.keys
-    reach, last = round(options.around * fps), len(video) - 1
-    spans = [(max(0, round(k) - reach), min(last, round(k) + reach)) for k in (start, finish)]
-    speeds = _hand_speeds(video, player, fitted.club_seen[:, 0] / height, (spans, height), options)
-    span, expected = round(options.direction * fps), _fitted_speed(fitted, fps)
-    for speed, (low, high) in zip(speeds, spans, strict=True):
-        speed[expected[low : high + 1] > options.quiet * expected.max()] = np.inf
-    ways = (start, start + span), (finish - span, finish)
-    limits = [expected.max() * _resting_share(fitted, way, height, options) for way in ways]
-    start = spans[0][0] + _last_rest(speeds[0], limits[0])
-    finish = spans[1][0] + _first_of_slowest(speeds[1], limits[1])
+    height, reach, last = observations.height, round(options.around * fps), len(video) - 1
+    early, late = (
+        slice(max(0, round(k) - reach), min(last, round(k) + reach) + 1) for k in (start, finish)
+    )
+    tracks = _HandTracks(fitted.club2d[:, 0], observations.foreground, height)
+    speeds = _hand_speeds(video, tracks, (early, late), options)
+    step, expected = round(options.direction * fps), _fitted_speed(fitted, fps)
+    for speed, part in zip(speeds, (early, late), strict=True):
+        speed[expected[part] > options.quiet * expected.max()] = np.inf
+    leaving = expected.max() * _resting_share(fitted, start, start + step, height, options)
+    stopping = expected.max() * _resting_share(fitted, finish - step, finish, height, options)
+    start = early.start + _last_rest(speeds[0], leaving)
+    finish = late.start + _first_of_slowest(speeds[1], stopping)
     return np.array([min(start, top - 1), top, hit, max(finish, hit + 1)], float)
 
 
@@ -250,33 +263,28 @@ def _fitted_speed(fitted: FittedSwing, fps: float) -> Float[np.ndarray, "T"]:
 
 
 def _resting_share(
-    fitted: FittedSwing, way: tuple[float, float], height: float, options: SwingEventOptions
+    fitted: FittedSwing, first: float, last: float, height: float, options: SwingEventOptions
 ) -> float:
-    """Share of the peak speed below which hands rest, as far as it is seen between two frames."""
-    one, other = np.clip(np.round(way).astype(int), 0, len(fitted.club) - 1)
+    """Share of the peak speed below which hands rest, as far as the picture shows it."""
+    one, other = np.clip(np.round((first, last)).astype(int), 0, len(fitted.club) - 1)
     real = np.linalg.norm(fitted.club[other, 0] - fitted.club[one, 0]) / fitted.body.stature
-    seen = np.linalg.norm(fitted.club_seen[other, 0] - fitted.club_seen[one, 0]) / height
-    return max(REST_SPEED * float(seen / max(real, 1e-9)), options.least)
+    shown = np.linalg.norm(fitted.club2d[other, 0] - fitted.club2d[one, 0]) / height
+    return max(REST_SPEED * float(shown / max(real, 1e-9)), options.least)
 
 
 def _hand_speeds(
-    video: Video,
-    player: tuple[Float[np.ndarray, "_ 2"], ...],
-    hands: Float[np.ndarray, "T 2"],
-    where: tuple[list[tuple[int, int]], float],
-    options: SwingEventOptions,
+    video: Video, tracks: _HandTracks, parts: tuple[slice, slice], options: SwingEventOptions
 ) -> list[Float[np.ndarray, "_"]]:
-    """Speed of the hands in the picture in spans of frames, heights per second."""
-    spans, height = where
-    steps = np.full((len(hands), 2), np.nan)
+    """Speed of the hands in the picture in parts of the video, heights per second."""
+    steps = np.full((len(tracks.hands), 2), np.nan)
     before: UInt8[np.ndarray, "h w"] | None = None
     for t, picture in enumerate(video.grey_frames()):
         after = np.ascontiguousarray(picture)
-        if before is not None and any(low < t <= high for low, high in spans):
-            points = _points_on_hands(hands[t - 1] * height, player[t - 1], height, options)
-            steps[t - 1] = _find_step(before, after, points, height, options)
+        if before is not None and any(part.start < t < part.stop for part in parts):
+            points = _points_on_hands(tracks, t - 1, options)
+            steps[t - 1] = _find_step(before, after, points, tracks.height, options)
         before = after
-    return [_speed(steps[low:high], video.fps) for low, high in spans]
+    return [_speed(steps[part.start : part.stop - 1], video.fps) for part in parts]
 
 
 def _speed(steps: Float[np.ndarray, "n 2"], fps: float) -> Float[np.ndarray, "m"]:
@@ -287,12 +295,10 @@ def _speed(steps: Float[np.ndarray, "n 2"], fps: float) -> Float[np.ndarray, "m"
 
 
 def _points_on_hands(
-    hands: Float[np.ndarray, "2"],
-    player: Float[np.ndarray, "n 2"],
-    height: float,
-    options: SwingEventOptions,
+    tracks: _HandTracks, frame: int, options: SwingEventOptions
 ) -> Float[np.ndarray, "m 2"]:
     """Points of a grid around the hands that are on the player, px."""
+    hands, player, height = tracks.hands[frame], tracks.player[frame], tracks.height
     side = np.arange(-options.hands, options.hands + options.grid / 2, options.grid)
     grid = np.stack(np.meshgrid(side, side), axis=2).reshape(-1, 2)
     points = hands + height * grid[np.linalg.norm(grid, axis=1) <= options.hands]
@@ -307,14 +313,14 @@ def _find_step(
     options: SwingEventOptions,
 ) -> Float[np.ndarray, "2"]:
     """Median movement of points from one picture to the next, heights; NaN where they are lost."""
-    if len(points) < FEWEST:
+    if len(points) < FEWEST_POINTS:
         return np.full(2, np.nan)
     side = max(5, round(options.patch * height)) | 1
     start = points.astype(np.float32)[:, None]
-    there, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, winSize=(side, side))
+    there, tracked, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, winSize=(side, side))
     back, again, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, winSize=(side, side))
-    kept = (found.ravel() > 0) & (again.ravel() > 0)
-    kept &= np.linalg.norm(back - start, axis=2).ravel() < options.slip * height
-    if kept.sum() < FEWEST:
+    kept = (tracked.ravel() > 0) & (again.ravel() > 0)
+    kept &= np.linalg.norm(back - start, axis=2).ravel() < options.return_error * height
+    if kept.sum() < FEWEST_POINTS:
         return np.full(2, np.nan)
     return np.median((there - start)[kept, 0], axis=0) / height

@@ -120,7 +120,7 @@ FOLDED = 0.3
 """Shortest reach: an elbow bends by 145 degrees."""
 
 
-def carry_swing(swing: Swing, body: Body) -> Swing:
+def retarget_swing(swing: Swing, body: Body) -> Swing:
     """The swing as a player with this body makes it, in that body's metres."""
     return change_swing(swing, body, *turns_from_swing(swing))
 

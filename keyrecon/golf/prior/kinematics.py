@@ -1,11 +1,13 @@
 """Where a posture puts the player's segments, and how they move with every unknown."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.golf.prior.motion_model import cross_matrix
+from keyrecon.golf.prior.motion_model import cross_matrix, posture_at, posture_by_frame
 from keyrecon.golf.prior.skeleton import CLUB, PARENTS, REST, SEGMENTS
-from keyrecon.golf.records import Body, Posture, RootPose, SwingState
+from keyrecon.golf.records import Body, Posture, RootPose, SwingFit, SwingState
 
 
 def place_body(body: Body, posture: Posture, state: SwingState) -> RootPose:
@@ -30,12 +32,29 @@ def hang_segments(
     return origins
 
 
-def pose_rates(
-    body: Body, posture: Posture, state: SwingState, pose: RootPose
-) -> tuple[Float[np.ndarray, "T P 3 L"], Float[np.ndarray, "T P 3 L"]]:
-    """Velocities of origins and rotations by alpha, mu, turn and shift of G (Eq. 3-4).
+def fitted_pose(fit: SwingFit) -> RootPose:
+    """All segments of a fitted swing in camera axes."""
+    state = fit.state
+    if state.frame_coefficients is None:
+        posture = posture_at(fit.model, state.phase, state.coefficients)
+    else:
+        posture = posture_by_frame(fit.model, state.phase, state.frame_coefficients)
+    return place_body(fit.body, posture, state)
 
-    L = m + 1 + 6. Rotation velocities are in camera axes; the turn of G is about `position`.
+
+@dataclass(frozen=True, eq=False)
+class PoseRates:
+    """How segments move with the unknowns of their frame; L = m + 1 + 6."""
+
+    origins: Float[np.ndarray, "T P 3 L"]
+    rotations: Float[np.ndarray, "T P 3 L"]
+    """Rotation velocities in camera axes."""
+
+
+def pose_rates(body: Body, posture: Posture, state: SwingState, pose: RootPose) -> PoseRates:
+    """Velocities by coefficients, phase, turn and shift of G (IC/2004/90, Eq. 3-4).
+
+    The turn of G is about `position`.
     """
     frames, _, _, learnt = posture.turn_rates.shape
     moved = np.zeros((frames, len(SEGMENTS), 3, learnt + 6))
@@ -50,13 +69,13 @@ def pose_rates(
         turned[:, p, :, :learnt] += pose.rotations[:, parent] @ posture.turn_rates[:, p]
         arm = pose.origins[:, p] - pose.origins[:, parent]
         moved[:, p] = moved[:, parent] - cross_matrix(arm) @ turned[:, parent]
-    return moved, turned
+    return PoseRates(moved, turned)
 
 
 def find_joints(body: Body, pose: RootPose) -> Float[np.ndarray, "T 14 3"]:
     """LSP14's joints in camera axes, metres."""
-    carried = pose.rotations[:, body.joint_segment] @ body.joint_place[..., None]
-    return pose.origins[:, body.joint_segment] + carried[..., 0]
+    from_origin = pose.rotations[:, body.joint_segment] @ body.joint_place[..., None]
+    return pose.origins[:, body.joint_segment] + from_origin[..., 0]
 
 
 def find_club(body: Body, pose: RootPose) -> Float[np.ndarray, "T 2 3"]:

@@ -2,9 +2,12 @@
 
 A motion vector holds N postures. Between them postures are interpolated by Catmull-Rom's cubic,
 so that the slope by normalised time is continuous and Gauss-Newton sees no kinks. A posture is
-linear in alpha as long as it is a rotation vector about the segment's `centre`; the derivative of
-the exponential map (its left Jacobian) turns rates of the vector into a rotation velocity.
+linear in the coefficients as long as it is a rotation vector about the segment's `centre`; the
+derivative of the exponential map (its left Jacobian) turns rates of the vector into a rotation
+velocity.
 """
+
+from dataclasses import fields
 
 import numpy as np
 from jaxtyping import Float
@@ -20,40 +23,48 @@ _CUBIC = 0.5 * np.array(
 
 
 def posture_at(
-    model: MotionModel, mu: Float[np.ndarray, "T"], alpha: Float[np.ndarray, "m"]
+    model: MotionModel, phase: Float[np.ndarray, "T"], coefficients: Float[np.ndarray, "m"]
 ) -> Posture:
-    """Postures at normalised times with their rates by alpha and mu.
+    """Postures at normalised times with their rates by coefficients and phase.
 
-    Before 0 and after 1 the player stands still. Fewer alphas than components may be given.
+    Before 0 and after 1 the player stands still. Fewer coefficients than components may be given.
     """
     samples = len(model.mean)
-    first, weights, slopes = _interpolate(mu, samples)
-    components = model.components[: len(alpha)]
-    motion = model.mean + np.tensordot(alpha, components, axes=1)
+    first, weights, slopes = _interpolate(phase, samples)
+    components = model.components[: len(coefficients)]
+    motion = model.mean + np.tensordot(coefficients, components, axes=1)
     around = np.clip(first[:, None] + np.arange(-1, 3), 0, samples - 1)
     vector = np.einsum("tk,tkd->td", weights, motion[around])
-    by_mu = np.einsum("tk,tkd->td", slopes, motion[around])
-    by_alpha = np.einsum("tk,ctkd->tdc", weights, components[:, around])
-    rates = np.concatenate([by_alpha, by_mu[..., None]], axis=2)
+    by_phase = np.einsum("tk,tkd->td", slopes, motion[around])
+    by_coefficients = np.einsum("tk,ctkd->tdc", weights, components[:, around])
+    rates = np.concatenate([by_coefficients, by_phase[..., None]], axis=2)
     turned = 3 * len(SEGMENTS)
-    vectors = vector[:, :turned].reshape(len(mu), -1, 3)
+    vectors = vector[:, :turned].reshape(len(phase), -1, 3)
     turns = model.centre @ _rotations(vectors)
     velocity = model.centre @ left_jacobian(vectors)
-    turn_rates = velocity @ rates[:, :turned].reshape(len(mu), len(SEGMENTS), 3, -1)
+    turn_rates = velocity @ rates[:, :turned].reshape(len(phase), len(SEGMENTS), 3, -1)
     return Posture(turns, vector[:, turned:], turn_rates, rates[:, turned:])
 
 
+def posture_by_frame(
+    model: MotionModel, phase: Float[np.ndarray, "T"], coefficients: Float[np.ndarray, "T m"]
+) -> Posture:
+    """The same where every frame has other coefficients."""
+    each = [posture_at(model, phase[t : t + 1], c) for t, c in enumerate(coefficients)]
+    return Posture(*(np.concatenate([getattr(p, f.name) for p in each]) for f in fields(Posture)))
+
+
 def _interpolate(
-    mu: Float[np.ndarray, "T"], samples: int
+    phase: Float[np.ndarray, "T"], samples: int
 ) -> tuple[np.ndarray, Float[np.ndarray, "T 4"], Float[np.ndarray, "T 4"]]:
     """Sample before each time, weights of the four samples around it, and their slopes."""
-    inside = np.clip(mu, 0, 1)
+    inside = np.clip(phase, 0, 1)
     place = inside * (samples - 1)
     first = np.minimum(place.astype(int), samples - 2)
     u = place - first
     weights = np.stack([u**0, u, u**2, u**3], axis=1) @ _CUBIC
     slopes = np.stack([0 * u, u**0, 2 * u, 3 * u**2], axis=1) @ _CUBIC * (samples - 1)
-    slopes[inside != mu] = 0
+    slopes[inside != phase] = 0
     return first, weights, slopes
 
 

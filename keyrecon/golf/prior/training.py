@@ -1,15 +1,14 @@
 """Learn the motion model: principal components of swings (CVPR 2005, Section 3).
 
-Every swing is carried to one body, so that the model holds styles and not proportions, then
+Every swing is retargeted to one body, so that the model holds styles and not proportions, then
 warped and sampled; captured swings are joined by variations of them. Components are those of the
 motion vectors weighted by how far joints move: a degree at the pelvis moves the whole body, a
-degree at the wrist only the club. They are scaled by their standard deviation, so that each alpha
-has unit variance and their squares add up to a Mahalanobis distance.
+degree at the wrist only the club. They are scaled by their standard deviation, so that each
+coefficient has unit variance and their squares add up to a Mahalanobis distance.
 
-What the model is worth: every captured swing explained by a model learnt without it.
-
-For each number m of components the left-out swing is replaced by the closest motion that the
-others and their variations span, and both are compared as joints of the same body.
+What the model is worth cross-validation tells: every captured swing is explained by a model learnt
+without it. For each number m of components the left-out swing is replaced by the closest motion
+that the others and their variations span, and both are compared as joints of the same body.
 """
 
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.prior.captured_swing import carry_swing, place_turns
+from keyrecon.golf.prior.captured_swing import place_turns, retarget_swing
 from keyrecon.golf.prior.motion_vectors import (
     FARTHEST_TURN,
     farthest_turn,
@@ -41,7 +40,7 @@ SWING_PRIOR_VERSION = 1
 REFERENCE = 1.75
 """Metres; stature of the body that swings are learnt on. Angles do not depend on it."""
 LEAST_LEVER = 0.02
-"""Metres per radian for segments that carry no joint, such as feet."""
+"""Metres per radian for segments without joints, such as feet."""
 SMALLEST = 1e-4
 """Share of the variance under which a component is noise of rounding."""
 
@@ -75,7 +74,7 @@ def collect_swings(
         raise KeyreconError("One swing has no variance; give several, or variations of it.")
     body = size_body(REFERENCE)
     keys = mean_keys(swings)
-    captured = [carry_swing(swing, body) for swing in swings]
+    captured = [retarget_swing(swing, body) for swing in swings]
     sampled = [sample_swing(swing, keys) for swing in captured]
     centre = find_centre(np.stack([turns for turns, _ in sampled]))
     vectors = [motion_vector(one, centre) for one in sampled]
@@ -147,9 +146,9 @@ def motion_weights() -> Float[np.ndarray, "D"]:
         origins[p] = origins[parent] + body.offsets[p]
     arms = np.zeros(len(NAMES))
     for p in range(len(NAMES)):
-        carried = [j for j, s in enumerate(body.joint_segment) if _hangs_on(int(s), p)]
-        reach = np.linalg.norm(joints[0, carried] - origins[p], axis=1)
-        arms[p] = np.sqrt((reach**2).sum() / len(joints[0])) if carried else 0.0
+        moving = [j for j, s in enumerate(body.joint_segment) if _hangs_on(int(s), p)]
+        reach = np.linalg.norm(joints[0, moving] - origins[p], axis=1)
+        arms[p] = np.sqrt((reach**2).sum() / len(joints[0])) if moving else 0.0
     arms[NAMES.index("club")] = np.linalg.norm(club[0, 1] - club[0, 0]) / len(joints[0])
     arms = np.maximum(arms, LEAST_LEVER)
     return np.concatenate([np.repeat(arms, 3), np.full(3, REFERENCE)])
@@ -163,7 +162,7 @@ def _hangs_on(segment: int, ancestor: int) -> bool:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Error of swings that the model has not seen, mean of all, for one number of components."""
+    """Error of left-out swings, mean of all, for one number of components."""
 
     components: int
     mpjpe: float
@@ -178,7 +177,7 @@ def cross_validate(
     """Errors per number of components, from 0 (the mean motion); empty for a single capture."""
     if database.captured < 2:
         return []
-    rows = [_leave_out(database, out, options) for out in range(database.captured)]
+    rows = [_validate_without(database, out, options) for out in range(database.captured)]
     least = min(len(row) for row in rows)
     errors = np.mean([row[:least] for row in rows], axis=0)
     return [CrossValidation(m, float(both[0]), float(both[1])) for m, both in enumerate(errors)]
@@ -194,19 +193,21 @@ def without(database: Database, out: int) -> Database:
     return replace(database, vectors=database.vectors[kept], captured=database.captured - 1)
 
 
-def _leave_out(database: Database, out: int, options: TrainOptions) -> Float[np.ndarray, "C 2"]:
+def _validate_without(
+    database: Database, out: int, options: TrainOptions
+) -> Float[np.ndarray, "C 2"]:
     """MPJPE and PA-MPJPE of one swing, mm, for 0, 1, 2 ... components of the others."""
     model = learn_motion(without(database, out), "", options)
     truth = database.vectors[out]
     weight = motion_weights()
     axes = (model.components * weight).reshape(len(model.components), -1)
     size = (axes**2).sum(axis=1)
-    alpha = axes @ ((truth - model.mean) * weight).ravel() / size
+    coefficients = axes @ ((truth - model.mean) * weight).ravel() / size
     joints = vector_joints(model, truth)
     root = [LSP14.index("right_hip"), LSP14.index("left_hip")]
     errors = []
-    for m in range(len(alpha) + 1):
-        motion = model.mean + np.tensordot(alpha[:m], model.components[:m], axes=1)
+    for m in range(len(coefficients) + 1):
+        motion = model.mean + np.tensordot(coefficients[:m], model.components[:m], axes=1)
         ours = vector_joints(model, motion)
         errors.append((1000 * mpjpe(ours, joints, root), 1000 * pa_mpjpe(ours, joints)))
     return np.array(errors)

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
-from keyrecon.golf.prior.captured_swing import carry_swing, change_swing
+from keyrecon.golf.prior.captured_swing import change_swing, retarget_swing
 from keyrecon.golf.prior.skeleton import CLUB, NAMES, PARENTS, turns_from_swing
 from keyrecon.golf.records import Body, Swing
 
@@ -61,7 +61,7 @@ class VariationOptions:
 def vary_swing(
     swing: Swing, body: Body, options: VariationOptions, rng: np.random.Generator
 ) -> Swing:
-    """One variation of a swing, made by a player with a body of its own and carried to `body`."""
+    """One variation of a swing, made by a player of other proportions and retargeted to `body`."""
     turns, place = _retime(swing, options, rng)
     bumps = _bumps(swing, len(turns))
     _turn_further(turns, bumps, int(swing.keys[0]), options.turn * rng.normal(0, 1, 2), rng)
@@ -73,7 +73,7 @@ def vary_swing(
     sway = np.column_stack([bumps, np.ones(len(turns))]) @ rng.normal(0, options.sway, (3, 3))
     stance = float(np.exp(rng.normal(0, options.stance)))
     theirs = _vary_body(body, options.build, rng)
-    return carry_swing(change_swing(swing, theirs, turns, place + sway, stance), body)
+    return retarget_swing(change_swing(swing, theirs, turns, place + sway, stance), body)
 
 
 def tilt_arms(swing: Swing, turns: Turns, degrees: float) -> None:
@@ -115,9 +115,9 @@ def _turn_further(
     rng: np.random.Generator,
 ) -> None:
     """Stretch the turns from address; parts of the body share half of the amount."""
-    own = np.abs(amount).mean()
+    spread = np.abs(amount).mean()
     for segments in ((PELVIS,), (TRUNK,), ARMS):
-        share = 1 + bumps @ (amount + own * rng.normal(0, 0.5, 2))
+        share = 1 + bumps @ (amount + spread * rng.normal(0, 0.5, 2))
         for p in segments:
             start = turns[address, p]
             way = Rotation.from_matrix(start.T @ turns[:, p]).as_rotvec()
@@ -125,16 +125,16 @@ def _turn_further(
 
 
 def _add_habits(turns: Turns, swing: Swing, spread: float, rng: np.random.Generator) -> None:
-    """Turn segments by a little of their own, smoothly from key posture to key posture.
+    """Turn segments a little, each otherwise, smoothly from key posture to key posture.
 
-    The last bones of limbs that reach for a place afterwards have no say of their own.
+    The last bones of limbs that reach for a place afterwards are left alone.
     """
     at_keys = rng.normal(0, np.radians(spread / np.sqrt(2)), (5, len(NAMES), 3))
     at_keys[:, REACHING] = 0
     curve = PchipInterpolator(swing.keys, at_keys[:4] + at_keys[4])
     frames = np.clip(np.arange(len(turns)), swing.keys[0], swing.keys[3])
-    own = Rotation.from_rotvec(curve(frames).reshape(-1, 3)).as_matrix()
-    turns[:] = own.reshape(turns.shape) @ turns
+    habits = Rotation.from_rotvec(curve(frames).reshape(-1, 3)).as_matrix()
+    turns[:] = habits.reshape(turns.shape) @ turns
 
 
 def _tilt(turns: Turns, segments: tuple[int, ...], degrees: Float[np.ndarray, "T"]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from golf_truth import camera_before, even_times
 
-from keyrecon.golf.fit.proportions import PARTS, ProportionOptions, fit_proportions, scale_body
+from keyrecon.golf.fit.proportions import PARTS, fit_proportions, scale_body
 from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
@@ -27,7 +27,7 @@ def posed():
     state = SwingState(
         np.zeros(0), even_times(40, 5), np.tile(rotation, (40, 1, 1)), np.tile(position, (40, 1))
     )
-    posture = posture_at(model, state.mu, state.alpha)
+    posture = posture_at(model, state.phase, state.coefficients)
     joints = find_joints(theirs := scale_body(body, FACTORS), place_body(theirs, posture, state))
     pixels = project(joints[FRAMES].reshape(-1, 3), CAMERA)[0].reshape(4, 14, 2)
     return body, place_body(body, posture, state), SwingMarks(FRAMES, pixels)
@@ -39,7 +39,7 @@ def lengths(body):
 
 def test_marks_of_four_postures_tell_how_long_the_limbs_are(posed):
     body, pose, marks = posed
-    found = fit_proportions(body, pose, marks, CAMERA, ProportionOptions(spread=1.0))
+    found = fit_proportions(body, pose, marks, CAMERA, spread=1.0)
     share = lengths(found) / lengths(scale_body(body, FACTORS))
     assert np.ptp(share) < 0.02  # how large all of the player is, one camera cannot tell
 
@@ -55,7 +55,7 @@ def test_a_longer_part_moves_what_hangs_on_it():
     body = size_body(1.8)
     longer = scale_body(body, 1 + 0.1 * np.eye(len(PARTS))[PARTS.index("thigh")])
     state = SwingState(np.zeros(0), np.zeros(1), np.eye(3)[None], np.zeros((1, 3)))
-    posture = posture_at(read_motion_model(), state.mu, state.alpha)
+    posture = posture_at(read_motion_model(), state.phase, state.coefficients)
     legs = [find_joints(b, place_body(b, posture, state))[0, :6] for b in (body, longer)]
     thighs = [np.linalg.norm(leg[2] - leg[1]) for leg in legs]
     shanks = [np.linalg.norm(leg[1] - leg[0]) for leg in legs]

@@ -7,12 +7,14 @@ import pytest
 from golf_truth import observe
 
 from keyrecon.golf.fit.residuals import (
+    SightLines,
     foreground_residuals,
     match_residuals,
     pass_capsules,
+    place_capsules,
     project,
-    sight_lines,
-    silhouette_distance_residuals,
+    sight_directions,
+    silhouette_residuals,
 )
 from keyrecon.golf.records import Camera, Capsules, Matches, RootPose
 
@@ -57,7 +59,7 @@ def samples(seed=1):
 
 def distances():
     picture = np.fromfunction(lambda y, x: 0.6 * x + 0.8 * y, (120, 160))
-    return picture, picture + 3.0
+    return np.stack([picture, picture + 3.0])
 
 
 def cases():
@@ -65,12 +67,12 @@ def cases():
     matches = Matches(np.zeros(40, int), start, start + 3.0)
     return {
         "foreground": (foreground_residuals, seen(foreground=(samples(), samples(2)))),
-        "away": (silhouette_distance_residuals, seen(away=distances())),
+        "silhouette": (silhouette_residuals, seen(silhouette_distance=distances())),
         "match": (match_residuals, seen(matches=matches)),
     }
 
 
-@pytest.mark.parametrize("kind", ["foreground", "away", "match"])
+@pytest.mark.parametrize("kind", ["foreground", "silhouette", "match"])
 def test_slopes_agree_with_finite_differences(kind):
     observe_, observations = cases()[kind]
     placed = pose()
@@ -99,19 +101,20 @@ def test_a_line_of_sight_through_the_body_misses_nothing():
 
 
 def test_the_distance_of_a_line_of_sight_is_that_of_the_nearest_point_of_the_surface():
-    placed, ways = pose(1), sight_lines(samples(), CAMERA)
+    placed, ways = pose(1), sight_directions(samples(), CAMERA)
+    lines = SightLines(ways, np.zeros(60, int))
+    distances = pass_capsules(lines, place_capsules(CAPSULES, placed)).distance
     starts = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.start)
     ends = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.end)
-    _, found = pass_capsules((ways, np.zeros(60, int)), starts, ends, CAPSULES.radii)
     share = np.linspace(0, 1, 2001)[:, None, None]
     points = (1 - share) * starts[0] + share * ends[0]
     radii = CAPSULES.radii[:, 0] + share[..., 0] * (CAPSULES.radii[:, 1] - CAPSULES.radii[:, 0])
-    for way, distance in zip(ways, found, strict=True):
+    for way, distance in zip(ways, distances, strict=True):
         apart = np.linalg.norm(points - (points @ way)[..., None] * way, axis=2) - radii
         np.testing.assert_allclose(distance, apart.min(axis=0), atol=1e-4)
 
 
-def test_a_body_that_does_not_move_carries_its_points_nowhere():
+def test_a_body_that_does_not_move_moves_its_points_nowhere():
     placed = pose()
     still = RootPose(placed.origins[:1].repeat(2, axis=0), placed.rotations[:1].repeat(2, axis=0))
     start = np.random.default_rng(4).uniform([290, 180], [350, 300], (40, 2))

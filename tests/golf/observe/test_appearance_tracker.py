@@ -19,31 +19,31 @@ def moved(picture, shift, turn=0.0, about=(120, 120)):
     return cv2.warpAffine(picture, matrix, picture.shape[1::-1], borderMode=cv2.BORDER_REFLECT)
 
 
-def follow(pictures, weights=None):
+def track(pictures, weights=None):
     everywhere = [np.full(p.shape[:2], 255, np.uint8) for p in pictures]
-    return track_patch(pictures, weights or everywhere, np.array([120.0, 120.0]), (HEIGHT, 30.0))
+    return track_patch(pictures, weights or everywhere, np.array([120.0, 120.0]), HEIGHT, 30.0)
 
 
-def test_a_patch_is_followed_to_a_fraction_of_a_pixel():
+def test_a_patch_is_tracked_to_a_fraction_of_a_pixel():
     way = np.stack([2.5 * np.arange(20), 8 * np.sin(np.arange(20) / 4)], axis=1)
-    trail = follow([moved(cloth(), s) for s in way])
-    assert np.abs(trail.places - [120, 120] - way).max() < 0.5
+    path = track([moved(cloth(), s) for s in way])
+    assert np.abs(path.places - [120, 120] - way).max() < 0.5
 
 
 def test_the_turn_of_a_patch_is_told():
     turns = np.linspace(0, 0.6, 20)
-    trail = follow([moved(cloth(), (0, 0), turn) for turn in turns])
-    assert np.abs(trail.turns - turns).max() < 0.03
+    path = track([moved(cloth(), (0, 0), turn) for turn in turns])
+    assert np.abs(path.turns - turns).max() < 0.03
 
 
-def test_what_passes_over_a_patch_is_lost_and_does_not_carry_it_away():
+def test_what_passes_over_a_patch_is_lost_and_does_not_drag_it_along():
     pictures = [moved(cloth(), (t, 0)) for t in range(30)]
     for t in range(8, 26):
         x = 60 + 6 * (t - 8)
         pictures[t][:, x : x + 9] = (20, 128, 128)
-    trail = follow(pictures)
-    assert abs(trail.places[-1, 0] - 149) < 1.5
-    assert trail.confidence[:6].min() > 0.95
+    path = track(pictures)
+    assert abs(path.places[-1, 0] - 149) < 1.5
+    assert path.confidence[:6].min() > 0.95
 
 
 def test_the_scene_around_the_player_does_not_count():
@@ -56,5 +56,5 @@ def test_the_scene_around_the_player_does_not_count():
         weight[100:140, x : x + 40] = 255
         pictures.append(scene)
         weights.append(weight)
-    trail = follow(pictures, weights)
-    assert np.abs(trail.places[:, 0] - 120 - np.arange(20)).max() < 1
+    path = track(pictures, weights)
+    assert np.abs(path.places[:, 0] - 120 - np.arange(20)).max() < 1

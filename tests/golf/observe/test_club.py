@@ -4,7 +4,7 @@ import pytest
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.club import track_club
-from keyrecon.golf.observe.foreground import Foreground
+from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.golf.observe.line_segments import (
     LineSegments,
     detect_line_segments,
@@ -27,7 +27,7 @@ def draw(angle, shade=30, thickness=2, ground=120, length=100):
         cv2.line(target, *club, value, thickness, cv2.LINE_AA, 4)
         cv2.rectangle(target, (80, 60), (120, 240), int(min(255, value + 40)), -1)
         cv2.line(target, (110, 90), (140, 150), int(min(255, value + 40)), 10)
-    return picture, Foreground(mask[None], np.ones(mask.shape, bool), 1.0, HEIGHT), head
+    return picture, FrameForeground(0, mask, np.ones(mask.shape, bool), 1.0, HEIGHT), head
 
 
 def direction(ends):
@@ -39,8 +39,8 @@ def direction(ends):
 @pytest.mark.parametrize("degrees", [-60, 10, 50])
 def test_a_dark_or_bright_shaft_is_found_from_the_hands_to_the_head(shade, degrees):
     picture, foreground, head = draw(np.radians(degrees), shade)
-    bars = detect_line_segments(picture, foreground, 0)
-    best = propose_shafts(bars, foreground, 0, SHOULDERS).ends[0]
+    segments = detect_line_segments(picture, foreground)
+    best = propose_shafts(segments, foreground, SHOULDERS).ends[0]
     assert abs(direction(best) - degrees) < 1.5
     turn = np.exp(-1j * np.radians(degrees)) * complex(*best[0] - HANDS)
     assert 0 <= turn.real < 0.08 * HEIGHT  # the fist hides where it begins
@@ -51,9 +51,8 @@ def test_a_dark_or_bright_shaft_is_found_from_the_hands_to_the_head(shade, degre
 def test_a_shaft_that_differs_from_the_scene_in_colour_only_is_found_in_the_foreground():
     _, foreground, _ = draw(np.radians(20))
     plain = np.full((300, 320), 120, np.uint8)
-    best = propose_shafts(
-        detect_line_segments(plain, foreground, 0), foreground, 0, SHOULDERS
-    ).ends[0]
+    segments = detect_line_segments(plain, foreground)
+    best = propose_shafts(segments, foreground, SHOULDERS).ends[0]
     assert abs(direction(best) - 20) < 2
 
 
@@ -82,20 +81,20 @@ def swinging(frames=60, fps=60.0, seed=0):
     for t in range(frames):
         false = rng.uniform(40, 260, (2, 2, 2))
         hidden = 25 < t < 35 and t % 3 == 0
-        own = true[t][None] + rng.normal(0, 1, (1, 2, 2))
-        ends = false if hidden else np.concatenate([own, false])
+        right = true[t][None] + rng.normal(0, 1, (1, 2, 2))
+        ends = false if hidden else np.concatenate([right, false])
         weight = np.full(len(ends), 0.2)
         weight[0] = 0.1 if hidden else 0.4
         shafts.append(ShaftHypotheses(ends, weight, np.ones(len(ends), bool)))
     return true, shafts, fps
 
 
-def test_the_club_is_followed_through_frames_that_do_not_show_it():
+def test_the_club_is_tracked_through_frames_that_do_not_show_it():
     true, shafts, fps = swinging()
     club = track_club(shafts, HEIGHT, fps)
     wrong = np.abs((direction(club.ends) - direction(true) + 180) % 360 - 180)
     assert (wrong < 5).mean() > 0.95
-    assert club.seen.mean() > 0.85
+    assert club.detected.mean() > 0.85
 
 
 def test_hypotheses_that_jump_about_are_not_the_club():
@@ -104,7 +103,7 @@ def test_hypotheses_that_jump_about_are_not_the_club():
         far = shafts[t].ends[:1] + np.array([80.0, -60.0])
         shafts[t] = ShaftHypotheses(far, np.array([0.4]), np.ones(1, bool))
     club = track_club(shafts, HEIGHT, fps)
-    assert not club.seen[[10, 20, 45]].any()
+    assert not club.detected[[10, 20, 45]].any()
 
 
 def test_a_video_without_a_club_says_so():

@@ -1,13 +1,15 @@
-"""A drawn golfer who never leaves the spot, told from a scene with a horizon."""
+"""A drawn golfer who never leaves the spot, before a scene with a horizon."""
+
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.clicks import GolfClicks, clicked_pose
+from keyrecon.golf.observation import find_whole
 from keyrecon.golf.observe.foreground import separate_player
-from keyrecon.golf.observe.observation import find_whole
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 
@@ -51,7 +53,7 @@ def clicks(**moved):
         "right_knee": (106.0, 150.0), "left_knee": (119.0, 150.0),
         "right_ankle": (101.0, 178.0), "left_ankle": (125.0, 178.0),
     }  # fmt: skip
-    return GolfClicks(0, SIZE, joints | moved)
+    return clicked_pose(GolfClicks(0, SIZE, joints | moved))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +66,7 @@ def video(tmp_path_factory):
 def test_a_player_who_never_leaves_the_spot_is_told_from_the_scene(video):
     found = separate_player(video, clicks())
     for t in (0, 12, 20):
-        mask, true = found.mask(t) > 0, true_mask(t)
+        mask, true = found.frame(t).mask() > 0, true_mask(t)
         assert (mask & true).sum() > 0.9 * true.sum()
         assert (mask & ~true).sum() < 0.12 * true.sum()
 
@@ -73,20 +75,22 @@ def test_what_is_thinner_than_a_limb_is_no_part_of_the_body(video):
     found = separate_player(video, clicks())
     likely = found.likely.copy()
     cv2.line(likely[5], (180, 20), (230, 190), 255, 2)
-    body = type(found)(likely, found.known, found.shrink, found.height).body(5)
+    body = replace(found, likely=likely).frame(5).body()
     assert not body[:, 185:].any()
     assert (body & true_mask(5)).sum() > 0.85 * true_mask(5).sum()
 
 
 def test_clicks_on_nothing_say_so(video):
-    off = {name: (20.0 + 4 * i, y) for i, (name, (_, y)) in enumerate(clicks().joints.items())}
+    joints = clicks().joints
+    heights = zip(joints.names, joints.places[:, 1].tolist(), strict=True)
+    off = {name: (20.0 + 4 * i, y) for i, (name, y) in enumerate(heights)}
     with pytest.raises(KeyreconError, match="no player stands out"):
         separate_player(video, clicks(**off))
 
 
 def test_the_same_clicks_cut_out_the_same_player_again(video):
     once, again = (separate_player(video, clicks()) for _ in range(2))
-    assert all((once.mask(t) == again.mask(t)).all() for t in range(FRAMES))
+    assert all((once.frame(t).mask() == again.frame(t).mask()).all() for t in range(FRAMES))
 
 
 def test_a_mask_that_lost_half_of_the_player_counts_for_nothing():

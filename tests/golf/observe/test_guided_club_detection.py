@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.golf.observe.guided_club_detection import detect_in_frame, lay_on, median_picture
+from keyrecon.golf.observe.guided_club_detection import ExpectedClubs, detect_clubs, lay_on
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 
@@ -26,9 +26,9 @@ def off(found, true):
     return np.degrees(np.abs(np.arctan2(turn, (ways[0] * ways[1]).sum(axis=1))))
 
 
-def look(film, first, expected, resting=None):
+def detect(film, first, expected, resting=None):
     resting = np.zeros(FRAMES, bool) if resting is None else resting
-    return detect_in_frame((film, median_picture(film)), (first, expected), HEIGHT, resting)
+    return detect_clubs(film, ExpectedClubs(first, expected, resting, HEIGHT))
 
 
 def draw(picture, ends, shade=200):
@@ -57,7 +57,7 @@ def film(tmp_path_factory):
 
 def test_a_club_is_found_where_it_is_expected_only_roughly(film):
     expected = clubs(ANGLES + 12, HANDS + np.array([3.0, -4.0]))
-    found = look(film, NOWHERE, expected)
+    found = detect(film, NOWHERE, expected)
     known = np.isfinite(found[:, 0, 0])
     assert known[:18].mean() > 0.8 and known[22:].mean() > 0.8
     assert (off(found, clubs(ANGLES))[known] < 3).mean() > 0.9
@@ -65,14 +65,14 @@ def test_a_club_is_found_where_it_is_expected_only_roughly(film):
 
 def test_a_rope_in_the_scene_is_not_taken_for_it(film):
     expected = clubs(np.full(FRAMES, 70.0))
-    found = look(film, NOWHERE, expected)
+    found = detect(film, NOWHERE, expected)
     far = np.abs(ANGLES - 70) > 45
     assert np.isfinite(found[far, 0, 0]).mean() < 0.1
 
 
-def test_what_was_seen_at_first_stays_where_the_expectation_is_all_wrong(film):
+def test_what_was_detected_at_first_stays_where_the_expectation_is_all_wrong(film):
     true = clubs(ANGLES)
-    found = look(film, true, clubs(ANGLES + 100))
+    found = detect(film, true, clubs(ANGLES + 100))
     clear = np.abs(np.arange(FRAMES) - 20) > 4
     assert (np.nan_to_num(off(found, true), nan=99.0)[clear] < 1).mean() > 0.8
 
@@ -80,12 +80,12 @@ def test_what_was_seen_at_first_stays_where_the_expectation_is_all_wrong(film):
 def test_nothing_is_found_where_the_club_points_at_the_camera(film):
     expected = clubs(ANGLES)
     expected[:, 1] = expected[:, 0] + 0.1 * (expected[:, 1] - expected[:, 0])
-    assert np.isnan(look(film, NOWHERE, expected)).all()
+    assert np.isnan(detect(film, NOWHERE, expected)).all()
 
 
-def test_a_line_seen_askew_is_moved_on_to_the_shaft(film):
+def test_a_line_detected_askew_is_moved_on_to_the_shaft(film):
     askew = clubs(ANGLES + 3, HANDS + np.array([0.0, 1.5]))
-    found = look(film, askew, clubs(ANGLES + 100))
+    found = detect(film, askew, clubs(ANGLES + 100))
     clear = np.abs(np.arange(FRAMES) - 20) > 4
     assert (np.nan_to_num(off(found, clubs(ANGLES)), nan=99.0)[clear] < 1.5).mean() > 0.8
 
@@ -102,9 +102,9 @@ def still_film(tmp_path_factory):
 
 def test_a_club_that_rests_is_told_by_the_picture_alone(still_film):
     expected = clubs(np.full(FRAMES, 70.0))
-    found = look(still_film, NOWHERE, expected, np.ones(FRAMES, bool))
+    found = detect(still_film, NOWHERE, expected, np.ones(FRAMES, bool))
     assert (off(found, clubs(np.full(FRAMES, 75.0))) < 1.5).all()
-    assert np.isnan(look(still_film, NOWHERE, expected)).all()
+    assert np.isnan(detect(still_film, NOWHERE, expected)).all()
 
 
 def test_a_club_laid_on_a_line_keeps_its_length_and_its_hands_along_it():

@@ -20,8 +20,8 @@ def filmed(keys=TRUE, frames=160):
     turn = np.radians(90) + np.radians(np.interp(passed, [0, 1, 2, 3], [0, 190, 0, -220]))
     hands = np.stack([300 - 60 * np.sin(np.pi * passed / 2), 300 - 80 * up], axis=1)
     head = hands + 110 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    seen = np.ones(frames, bool)
-    return Club(np.stack([hands, head], axis=1), seen, seen)
+    detected = np.ones(frames, bool)
+    return Club(np.stack([hands, head], axis=1), detected, detected)
 
 
 def test_key_postures_are_found_within_two_frames():
@@ -39,25 +39,25 @@ def test_a_rest_with_the_hands_up_is_no_address():
     club = filmed(np.array([30, 78, 110, 144]), 180)
     ends = club.ends.copy()
     ends[60:78] = ends[78]
-    found = find_key_frames(Club(ends, club.seen, club.tip), HEIGHT, FPS)
+    found = find_key_frames(Club(ends, club.detected, club.tip), HEIGHT, FPS)
     assert abs(found[0] - 30) <= 4
 
 
 def test_someone_who_stands_still_makes_no_swing():
     club = filmed()
-    still = Club(club.ends[:1].repeat(100, axis=0), club.seen[:100], club.tip[:100])
+    still = Club(club.ends[:1].repeat(100, axis=0), club.detected[:100], club.tip[:100])
     with pytest.raises(KeyreconError, match="no swing in this video"):
         find_key_frames(still, HEIGHT, FPS)
 
 
 def test_after_the_finish_normalised_time_may_only_fall():
-    mu = keep_order(np.array([-0.1, 0.2, 0.1, 0.5, 1.2, 0.9, 0.95, 0.8]))
-    np.testing.assert_allclose(mu, [0, 0.2, 0.2, 0.5, 1, 0.9, 0.9, 0.8])
+    phase = keep_order(np.array([-0.1, 0.2, 0.1, 0.5, 1.2, 0.9, 0.95, 0.8]))
+    np.testing.assert_allclose(phase, [0, 0.2, 0.2, 0.5, 1, 0.9, 0.9, 0.8])
 
 
 def test_normalised_time_rises_through_the_key_postures_and_rests_outside():
     times = np.array([0.0, 0.6, 0.75, 1.0])
-    mu = interpolate_times(TRUE.astype(float), times, 160)
-    np.testing.assert_allclose(mu[TRUE], times, atol=1e-9)
-    assert (np.diff(mu) >= 0).all()
-    assert mu[0] == 0 and mu[-1] == 1
+    phase = interpolate_times(TRUE.astype(float), times, 160)
+    np.testing.assert_allclose(phase[TRUE], times, atol=1e-9)
+    assert (np.diff(phase) >= 0).all()
+    assert phase[0] == 0 and phase[-1] == 1

@@ -1,6 +1,7 @@
 """The swing prior in the keyframe pipeline."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,11 +15,13 @@ from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import SwingState
 from keyrecon.golf.swing_prior import fit_swing_prior
 from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
+from keyrecon.io.video import Video
 from keyrecon.metrics import pa_mpjpe
 from keyrecon.records import Annotations, JointTracks
 
 FRAMES, FPS = 50, 30.0
-SIZE = (1280, 720)
+HEIGHTS = np.full(FRAMES, 380.0)
+VIDEO = Video(Path("swing.mp4"), 1280, 720, np.arange(FRAMES), np.arange(FRAMES) / FPS, FPS, 0)
 
 
 @pytest.fixture(scope="module")
@@ -26,19 +29,20 @@ def filmed():
     """Joints of a swing of the prior in camera axes, and in the picture."""
     model = read_motion_model()
     rotation, position = camera_before(170.0)
-    alpha = np.random.default_rng(5).normal(0, 0.6, len(model.components))
+    coefficients = np.random.default_rng(5).normal(0, 0.6, len(model.components))
     state = SwingState(
-        alpha, even_times(FRAMES, 6), np.tile(rotation, (FRAMES, 1, 1)),
+        coefficients, even_times(FRAMES, 6), np.tile(rotation, (FRAMES, 1, 1)),
         np.tile(position, (FRAMES, 1)),
     )  # fmt: skip
     joints = find_joints(
-        size_body(1.75), place_body(size_body(1.75), posture_at(model, state.mu, alpha), state)
+        size_body(1.75),
+        place_body(size_body(1.75), posture_at(model, state.phase, coefficients), state),
     )
     pixels = 1100.0 * joints[..., :2] / joints[..., 2:] + np.array([639.5, 359.5])
     return joints, pixels
 
 
-def followed(pixels):
+def propagated(pixels):
     confidence = np.full(pixels.shape[:2], 0.8)
     return JointTracks(pixels, confidence, np.zeros(pixels.shape[:2], np.int64))
 
@@ -50,24 +54,19 @@ def marked(pixels, frames):
     )
 
 
-def test_a_swing_is_found_behind_followed_joints(filmed):
+def test_a_swing_is_found_behind_propagated_joints(filmed):
     joints, pixels = filmed
     noisy = pixels + np.random.default_rng(0).normal(0, 3.0, pixels.shape)
-    seen = (np.full(FRAMES, 380.0), SIZE)
-    time = np.arange(FRAMES) / FPS
-    found = fit_swing_prior(
-        followed(noisy), marked(pixels, [6, 22, 34]), read_motion_model(), seen, time
+    fitted = fit_swing_prior(
+        propagated(noisy), marked(pixels, [6, 22, 34]), read_motion_model(), HEIGHTS, VIDEO
     )
-    assert 1000 * pa_mpjpe(found, joints) < 40
+    assert 1000 * pa_mpjpe(fitted, joints) < 40
 
 
 def test_a_player_who_stands_still_does_not_swing(filmed):
     still = np.repeat(filmed[1][:1], FRAMES, axis=0)
     with pytest.raises(KeyreconError, match="no swing"):
-        fit_swing_prior(
-            followed(still), marked(still, [6]), read_motion_model(),
-            (np.full(FRAMES, 380.0), SIZE), np.arange(FRAMES) / FPS,
-        )  # fmt: skip
+        fit_swing_prior(propagated(still), marked(still, [6]), read_motion_model(), HEIGHTS, VIDEO)
 
 
 def test_a_prior_of_another_version_is_refused(tmp_path):

@@ -36,16 +36,16 @@ def model():
 
 @pytest.fixture(scope="module")
 def state():
-    mu = np.array([0.1, 0.337, 0.521, 0.9])
+    phase = np.array([0.1, 0.337, 0.521, 0.9])
     return SwingState(
-        np.array([0.7, -1.2]), mu, Rotation.random(4, random_state=3).as_matrix(),
+        np.array([0.7, -1.2]), phase, Rotation.random(4, random_state=3).as_matrix(),
         np.random.default_rng(4).normal(size=(4, 3)),
     )  # fmt: skip
 
 
 def put(model, state):
     body = size_body(1.8)
-    return body, place_body(body, posture_at(model, state.mu, state.alpha), state)
+    return body, place_body(body, posture_at(model, state.phase, state.coefficients), state)
 
 
 def test_joints_of_a_placed_body_give_its_pose_back(model, state):
@@ -54,8 +54,10 @@ def test_joints_of_a_placed_body_give_its_pose_back(model, state):
     feet = pose.origins[:, 13:15] + 0.2 * (pose.rotations[:, 13:15] @ REST[13, :, None])[..., 0]
     swing = Swing("drawn", joints, feet, club, np.arange(4), 30.0, 1.8)
     turns, place = turns_from_swing(swing)
-    still = SwingState(state.alpha, state.mu, np.tile(np.eye(3), (4, 1, 1)), np.zeros((4, 3)))
-    posture = posture_at(model, state.mu, state.alpha)
+    still = SwingState(
+        state.coefficients, state.phase, np.tile(np.eye(3), (4, 1, 1)), np.zeros((4, 3))
+    )
+    posture = posture_at(model, state.phase, state.coefficients)
     again = place_body(
         body, type(posture)(turns, place, posture.turn_rates, posture.place_rates), still
     )
@@ -95,30 +97,32 @@ def test_left_jacobian_is_the_derivative_of_the_exponential_map():
 
 
 def moved_by(model, state, unknown, step):
-    alpha, mu = state.alpha.copy(), state.mu.copy()
+    coefficients, phase = state.coefficients.copy(), state.phase.copy()
     rotation, position = state.rotation, state.position
     if unknown < 2:
-        alpha[unknown] += step
+        coefficients[unknown] += step
     elif unknown == 2:
-        mu += step
+        phase += step
     elif unknown < 6:
         rotation = Rotation.from_rotvec(step * np.eye(3)[unknown - 3]).as_matrix() @ rotation
     else:
         position = position + step * np.eye(3)[unknown - 6]
-    return put(model, SwingState(alpha, mu, rotation, position))[1]
+    return put(model, SwingState(coefficients, phase, rotation, position))[1]
 
 
 @pytest.mark.parametrize("unknown", range(9))
 def test_rates_of_all_segments_agree_with_finite_differences(model, state, unknown):
     body, pose = put(model, state)
-    posture = posture_at(model, state.mu, state.alpha)
-    moved, turned = pose_rates(body, posture, state, pose)
+    posture = posture_at(model, state.phase, state.coefficients)
+    rates = pose_rates(body, posture, state, pose)
     h = 1e-6
     after, before = (moved_by(model, state, unknown, s) for s in (h, -h))
-    assert np.allclose(moved[..., unknown], (after.origins - before.origins) / (2 * h), atol=1e-6)
+    assert np.allclose(
+        rates.origins[..., unknown], (after.origins - before.origins) / (2 * h), atol=1e-6
+    )
     spin = after.rotations @ np.swapaxes(before.rotations, 2, 3)
     velocity = Rotation.from_matrix(spin.reshape(-1, 3, 3)).as_rotvec().reshape(4, P, 3) / (2 * h)
-    assert np.allclose(turned[..., unknown], velocity, atol=1e-6)
+    assert np.allclose(rates.rotations[..., unknown], velocity, atol=1e-6)
 
 
 def test_a_player_stands_still_before_and_after_the_swing(model):

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from keyrecon.app.golf_demo import draw_swing
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.prior.captured_swing import MIRROR, carry_swing, make_swing
+from keyrecon.golf.prior.captured_swing import MIRROR, make_swing, retarget_swing
 from keyrecon.golf.prior.key_postures import find_key_postures
 from keyrecon.golf.prior.motion_vectors import motion_vector, sample_swing
 from keyrecon.golf.prior.skeleton import size_body
@@ -72,14 +72,14 @@ def test_a_left_hander_gives_the_swing_of_his_mirror_image(swings):
 
 def test_another_body_keeps_feet_in_place_and_hands_together(swings):
     swing = swings[0]
-    carried = carry_swing(swing, size_body(1.6))
+    retargeted = retarget_swing(swing, size_body(1.6))
     ankles = [LSP14.index("right_ankle"), LSP14.index("left_ankle")]
-    slid = carried.joints[:, ankles] - 1.6 / swing.stature * swing.joints[:, ankles]
+    slid = retargeted.joints[:, ankles] - 1.6 / swing.stature * swing.joints[:, ankles]
     assert np.abs(slid).max() < 0.02
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
     before, after = (
         np.linalg.norm(s.joints[:, wrists[0]] - s.joints[:, wrists[1]], axis=1)
-        for s in (swing, carried)
+        for s in (swing, retargeted)
     )
     assert np.median(np.abs(after - 1.6 / swing.stature * before)) < 0.01
 
@@ -90,8 +90,8 @@ def test_without_variation_all_swings_lie_in_the_span_of_their_components(swings
     assert len(model.components) == len(swings) - 1
     axes = model.components.reshape(len(model.components), -1)
     for vector in database.vectors:
-        alpha, *_ = np.linalg.lstsq(axes.T, (vector - model.mean).ravel(), rcond=None)
-        assert np.allclose(model.mean.ravel() + alpha @ axes, vector.ravel(), atol=1e-6)
+        coefficients, *_ = np.linalg.lstsq(axes.T, (vector - model.mean).ravel(), rcond=None)
+        assert np.allclose(model.mean.ravel() + coefficients @ axes, vector.ravel(), atol=1e-6)
     assert model.explained[-1] == pytest.approx(1.0)
 
 
@@ -99,10 +99,10 @@ def test_alphas_of_the_database_have_unit_variance(swings):
     database = collect_swings(swings, NO_VARIATION)
     model = learn_motion(database, "drawn", NO_VARIATION)
     axes = model.components.reshape(len(model.components), -1)
-    alphas = [
+    coefficients = [
         np.linalg.lstsq(axes.T, (v - model.mean).ravel(), rcond=None)[0] for v in database.vectors
     ]
-    np.testing.assert_allclose(np.var(alphas, axis=0, ddof=1), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(np.var(coefficients, axis=0, ddof=1), 1.0, rtol=1e-6)
 
 
 def test_a_swing_is_left_out_with_its_variations(swings):

@@ -9,10 +9,9 @@ from golf_truth import camera_before, even_times, observe
 
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.observe.swing_events import detect_swing_events
-from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
-from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, SwingState
+from keyrecon.golf.records import Camera, SwingFit, SwingState
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
@@ -62,15 +61,17 @@ def fitted_swing(places, off):
         np.zeros(1), even_times(FRAMES), np.tile(rotation, (FRAMES, 1, 1)),
         np.tile(position, (FRAMES, 1)),
     )  # fmt: skip
-    pose = place_body(body, posture_at(model, state.mu, state.alpha), state)
+    fit = SwingFit(model, body, state)
+    pose = fitted_pose(fit)
     joints, club = find_joints(body, pose), find_club(body, pose)
-    seen = observe(joints, club, Camera(1000.0, np.array([160.0, 150.0])), 0.0)
-    swing = describe_fit(model, body, state, seen, np.arange(FRAMES) / FPS, 0)
+    observations = observe(joints, club, Camera(1000.0, np.array([160.0, 150.0])), 0.0)
+    swing = describe_fit(fit, observations, np.arange(FRAMES) / FPS)
     club = np.zeros((FRAMES, 2, 3))
     club[:, 0, 0] = STATURE * hands()
     ends = np.repeat(places[:, None], 2, axis=1)
     keys = np.array([LEAVES, TURNS, 76.0, STOPS]) + off
-    return replace(swing, club=club, club_seen=ends, keys=keys)
+    swing = replace(swing, club=club, club2d=ends, keys=keys)
+    return swing, replace(observations, height=HEIGHT)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])
@@ -81,7 +82,7 @@ def test_hands_tell_when_a_swing_begins_and_ends_however_much_of_their_way_is_se
     video, places = filmed(tmp_path, share)
     grid = np.stack(np.meshgrid(np.arange(-15, 16, 6), np.arange(-15, 16, 6)), axis=2)
     player = tuple(place + grid.reshape(-1, 2) for place in places)
-    swing = fitted_swing(places, np.array([off, 0, 0, -off]))
-    found = detect_swing_events(video, player, swing, HEIGHT)
-    assert np.abs(found[[0, 3]] - rests()).max() <= 1
-    assert (found[1:3] == swing.keys[1:3]).all()
+    swing, observations = fitted_swing(places, np.array([off, 0, 0, -off]))
+    keys = detect_swing_events(video, replace(observations, foreground=player), swing)
+    assert np.abs(keys[[0, 3]] - rests()).max() <= 1
+    assert (keys[1:3] == swing.keys[1:3]).all()

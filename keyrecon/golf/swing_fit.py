@@ -1,0 +1,128 @@
+"""The stages of a golf fit: observe, fit, and detect the club again where the fit expects it.
+
+Observations come first (`observation`). A first fit of the motion model follows. Then, in
+rounds, the club is detected once more with the fitted swing as a guide, the hands tell when the
+swing begins and ends better than club or fit do, and the model is fitted to both.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.golf.fit.fitting import FitOptions, fit_swing, refit_swing
+from keyrecon.golf.fit.handedness import mirror_observations
+from keyrecon.golf.fit.initial_pose import initial_fit
+from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observation import ObservationOptions
+from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
+from keyrecon.golf.observe.swing_events import (
+    SwingEventOptions,
+    detect_swing_events,
+    interpolate_times,
+)
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
+from keyrecon.io.video import Video
+from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
+from keyrecon.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class GolfOptions:
+    """From a video to a fitted swing."""
+
+    method: Literal["swing", "windows"] = "swing"
+    """'swing' fits all frames at once; 'windows' slides over three frames as in the paper."""
+    observation: ObservationOptions = field(default_factory=ObservationOptions)
+    """What is observed in the video."""
+    fit: FitOptions = field(default_factory=FitOptions)
+    """How the model is fitted to it."""
+    windows: WindowOptions = field(default_factory=WindowOptions)
+    """The paper's sliding windows, where they are asked for."""
+    guided_rounds: int = 2
+    """How many times the club is detected again where the fitted swing expects it."""
+    guided_detection: GuidedDetectionOptions = field(default_factory=GuidedDetectionOptions)
+    """How it is detected then."""
+    events: SwingEventOptions = field(default_factory=SwingEventOptions)
+    """When hands rest."""
+    proportions: ProportionOptions = field(default_factory=ProportionOptions)
+    """How annotated keyframes tell the player's proportions."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedFit:
+    """What a round of guided club detection changes."""
+
+    club: Float[np.ndarray, "T 2 2"]
+    club_along: Float[np.ndarray, "T 2"]
+    keys: Float[np.ndarray, "4"]
+    phase: Float[np.ndarray, "T"]
+    fitted: FittedSwing
+
+    def update(self, observations: Observations) -> Observations:
+        """The observations of this round."""
+        return replace(
+            observations, club=self.club, club_along=self.club_along, keys=self.keys,
+            phase=self.phase,
+        )  # fmt: skip
+
+
+def fit_observations(
+    observations: Observations,
+    video: Video,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    previous: SwingState | None = None,
+    progress: Progress = silent,
+) -> FittedSwing:
+    """Fit the model to what was observed, from scratch or going on from a `previous` state.
+
+    Left-handers are mirrored on the way in and out; states are those of right-handers.
+    """
+    mirrored = observations
+    if observations.left_handed:
+        mirrored = mirror_observations(observations, video.width)
+    initial = initial_fit(mirrored, model, size_body(observations.stature))
+    if previous is not None:
+        fit = refit_swing(mirrored, initial, previous, video.fps, options.fit)
+    elif options.method == "swing":
+        fit = fit_swing(mirrored, initial, video.fps, options.fit)
+    else:
+        fit = fit_sliding_windows(mirrored, initial, options.windows, progress)
+    if mirrored.marks is not None and options.method == "swing":
+        fit = refit_proportions(fit, mirrored, initial, video.fps, options.fit, options.proportions)
+    return describe_fit(fit, observations, video.time)
+
+
+def fit_guided(
+    observations: Observations,
+    fitted: FittedSwing,
+    video: Video,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+) -> GuidedFit:
+    """The club detected where a fitted swing expects it, and the fit with it.
+
+    `observations` are the first ones: their key postures at top and hit follow from the club alone,
+    since a fit must not confirm itself.
+    """
+    guided = detect_club_guided(observations, video, fitted, options.guided_detection)
+    keys = detect_swing_events(video, guided, fitted, options.events)
+    keys[1:3] = observations.keys[1:3]
+    phase = interpolate_times(keys, model.keys, len(video))
+    guided = replace(guided, keys=keys, phase=phase)
+    fitted = fit_observations(guided, video, model, options, fitted.state)
+    return GuidedFit(guided.club, guided.club_along, keys, phase, fitted)
+
+
+def finish_fit(
+    observations: Observations,
+    fitted: FittedSwing,
+    video: Video,
+    options: SwingEventOptions = SwingEventOptions(),
+) -> FittedSwing:
+    """The fitted swing with its beginning and end as the hands in the picture tell them."""
+    return replace(fitted, keys=detect_swing_events(video, observations, fitted, options))

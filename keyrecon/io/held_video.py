@@ -1,0 +1,117 @@
+"""A video that is decoded once, however often it is read.
+
+Decoding costs more than most work on a picture, and a golf fit reads its few hundred frames a dozen
+times. Frames are held as the codec stores them, at half of the size of RGB, so that whoever reads
+them gets the same pixels as from the file. What does not fit into memory lies in a temporary file;
+its rows are padded otherwise, which the scaler of FFmpeg may round otherwise (`width` of `frames`).
+"""
+
+import tempfile
+import weakref
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import cached_property
+from threading import Lock
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from keyrecon.io.video import Video
+
+if TYPE_CHECKING:
+    import av
+
+MOST_IN_MEMORY = 1.5e9
+"""Bytes of decoded frames that are held in memory: ten seconds of 1920 x 1080 at 48 frames per
+second; a computer on which one looks at such videos has several times as much."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldVideo(Video):
+    """A video whose frames are held once they have been decoded."""
+
+    most_in_memory: float = MOST_IN_MEMORY
+    """Bytes; what is beyond lies in a temporary file."""
+
+    @cached_property
+    def _held(self) -> "_HeldFrames":
+        return _HeldFrames(super()._decoded(0, None), self.most_in_memory)
+
+    def _decoded(self, start: int, stop: int | None) -> "Iterator[av.VideoFrame]":
+        yield from self._held.read(start, len(self) if stop is None else min(stop, len(self)))
+
+
+def hold_frames(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> HeldVideo:
+    """The same video, decoded only once."""
+    own = {field.name: getattr(video, field.name) for field in fields(Video)}
+    return HeldVideo(**own, most_in_memory=most_in_memory)
+
+
+@dataclass(frozen=True)
+class _StoredFrame:
+    """How a frame lies in the file."""
+
+    place: int
+    """Of its first byte."""
+    format: str
+    width: int
+    height: int
+    colorspace: int
+    color_range: int
+    planes: tuple[tuple[int, int], ...]
+    """Rows of every plane and bytes in each of them."""
+
+
+class _HeldFrames:
+    """Decoded frames, the first ones in memory, the others in an unnamed file."""
+
+    def __init__(self, frames: "Iterator[av.VideoFrame]", most_in_memory: float) -> None:
+        """Hold all frames of an iterator."""
+        self._memory: list[av.VideoFrame] = []
+        self._stored: list[_StoredFrame] = []
+        self._file: IO[bytes] | None = None
+        self._lock = Lock()
+        held = 0
+        for frame in frames:
+            held += sum(plane.buffer_size for plane in frame.planes)
+            if held <= most_in_memory:
+                self._memory.append(frame)
+            else:
+                self._store(frame)
+
+    def read(self, start: int, stop: int) -> "Iterator[av.VideoFrame]":
+        """Frames start..stop-1."""
+        for number in range(start, stop):
+            if number < len(self._memory):
+                yield self._memory[number]
+            else:
+                yield self._restore(self._stored[number - len(self._memory)])
+
+    def _store(self, frame: "av.VideoFrame") -> None:
+        if self._file is None:
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the frames
+            weakref.finalize(self, self._file.close)
+        planes = tuple((plane.height, plane.line_size) for plane in frame.planes)
+        self._stored.append(
+            _StoredFrame(
+                self._file.tell(), frame.format.name, frame.width, frame.height,
+                int(frame.colorspace), int(frame.color_range), planes,
+            )
+        )  # fmt: skip
+        for plane, (rows, size) in zip(frame.planes, planes, strict=True):
+            self._file.write(memoryview(plane)[: rows * size])
+
+    def _restore(self, stored: _StoredFrame) -> "av.VideoFrame":
+        import av
+
+        frame = av.VideoFrame(stored.width, stored.height, stored.format)
+        frame.colorspace, frame.color_range = stored.colorspace, stored.color_range
+        with self._lock:
+            self._file.seek(stored.place)
+            planes = [self._file.read(rows * size) for rows, size in stored.planes]
+        for plane, pixels, (rows, size) in zip(frame.planes, planes, stored.planes, strict=True):
+            target = np.frombuffer(plane, np.uint8)[: rows * plane.line_size].reshape(rows, -1)
+            source = np.frombuffer(pixels, np.uint8).reshape(rows, size)
+            width = min(size, plane.line_size)  # both have all pixels and some padding
+            target[:, :width] = source[:, :width]
+        return frame

@@ -1,0 +1,138 @@
+"""A golf fit in its project folder: kept, resumed, exported, and read from the video once."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from keyrecon.app import golf as app
+from keyrecon.app.exporting import export
+from keyrecon.app.golf import fit_file
+from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.fit.fitting import FitOptions
+from keyrecon.golf.swing_fit import GolfOptions
+from keyrecon.io.formats.clicks import write_clicks
+from keyrecon.io.formats.model_file import read_motion_model
+from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.video import Video, open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.metrics import read_truth
+from keyrecon.progress import silent
+from keyrecon.synthetic.golf import SwingFilm, film_swing
+
+QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1)
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory):
+    """A small film of a swing, its clicks, and a finished fit."""
+    folder = tmp_path_factory.mktemp("golf")
+    film = SwingFilm(fps=24.0, before=0.3, after=0.2)
+    camera = replace(film.scene.camera, width=400, height=300, player_px=190.0)
+    film = replace(film, scene=replace(film.scene, camera=camera, workers=1))
+    film_swing(draw_swing(read_motion_model(), SEED), film, folder)
+    write_clicks(folder / "clicks.json", click_first_frame(read_truth(folder / "truth.npz")))
+    return folder
+
+
+def fit(swing, out, **more):
+    options = more.pop("options", QUICK)
+    return fit_file(swing / "video.mp4", swing / "clicks.json", out, options=options, **more)
+
+
+@pytest.fixture(scope="module")
+def decoded_at_first(swing):
+    """A finished fit in PROJECT, and how many frames it decoded."""
+    counts, original = [], Video._decoded
+
+    def spy(self, start, stop):
+        for frame in original(self, start, stop):
+            counts.append(1)
+            yield frame
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Video, "_decoded", spy)
+        text = fit(swing, swing / "project")
+        first = len(counts)
+        assert fit(swing, swing / "project").split("\n")[0] == text.split("\n")[0]
+        again = len(counts) - first
+    return text, first, again
+
+
+def test_a_fit_decodes_its_video_at_most_twice(swing, decoded_at_first):
+    frames = len(open_video(swing / "video.mp4"))
+    assert frames <= decoded_at_first[1] <= 2 * frames
+
+
+def test_a_fit_that_is_repeated_decodes_nothing(decoded_at_first):
+    assert decoded_at_first[2] == 0
+
+
+def test_a_fit_tells_the_frames_of_the_key_postures(swing, decoded_at_first):
+    assert decoded_at_first[0].startswith("Upswing from frame ")
+    keys = np.array(
+        [float(part.split(" ")[-1]) for part in decoded_at_first[0].split(";")[0].split(",")]
+    )
+    assert np.abs(keys - read_truth(swing / "truth.npz")["keys"]).max() < 8
+
+
+def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
+    folder = swing / "project"
+    names = {file.name for file in folder.iterdir()}
+    assert names >= {
+        "project.toml", "golf_clicks.json", "cache", "motion.npz", "overlay.mp4", "report.html",
+    }  # fmt: skip
+    workspace = Workspace(folder)
+    assert workspace.options(GolfOptions(), GolfOptions()) == QUICK
+    export(workspace, [folder / "swing.csv"], silent)
+    assert len((folder / "swing.csv").read_text().splitlines()) > len(workspace.video())
+
+
+def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tmp_path):
+    project = shutil.copytree(swing / "project", tmp_path / "p")
+    (result,) = (project / "cache").glob("result-*.npz")
+    result.unlink()
+    (project / "motion.npz").unlink()
+    before = {file: file.stat().st_mtime_ns for file in (project / "cache").iterdir()}
+    assert len(before) == 4  # camera, observe, fit, guided_1
+    fit(swing, project)
+    assert result.is_file() and all(f.stat().st_mtime_ns == at for f, at in before.items())
+    ours, theirs = (read_motion(f / "motion.npz") for f in (project, swing / "project"))
+    assert np.array_equal(ours.points3d, theirs.points3d)
+
+
+def test_a_project_of_another_video_is_left_alone(swing, decoded_at_first, tmp_path):
+    other = tmp_path / "other.mp4"
+    size = open_video(swing / "video.mp4")
+    picture = np.zeros((size.height, size.width, 3), np.uint8)
+    write_video(other, (picture for _ in range(5)), 24.0)
+    with pytest.raises(KeyreconError, match="is the project of another video"):
+        fit_file(other, swing / "clicks.json", swing / "project", options=QUICK)
+
+
+def test_a_project_with_keyframes_is_left_alone(swing, tmp_path):
+    video = open_video(swing / "video.mp4")
+    Workspace.create(tmp_path, video, Path(swing / "video.mp4"), {})
+    with pytest.raises(KeyreconError, match="a project with keyframes"):
+        fit(swing, tmp_path)
+    assert not (tmp_path / "golf_clicks.json").exists()
+
+
+def test_another_slow_motion_needs_another_folder(swing, decoded_at_first):
+    with pytest.raises(KeyreconError, match="was made with --slowmo 1"):
+        fit(swing, swing / "project", slow_motion=4.0)
+
+
+def test_other_clicks_stay_beside_the_new_ones(swing, tmp_path):
+    video = open_video(swing / "video.mp4")
+    clicks = swing / "clicks.json"
+    app.open_golf_project(tmp_path / "p", video, clicks)
+    moved = tmp_path / "moved.json"
+    moved.write_text(clicks.read_text() + "\n")
+    app.open_golf_project(tmp_path / "p", video, moved)
+    assert (tmp_path / "p" / "golf_clicks.json").read_text() == moved.read_text()
+    assert (tmp_path / "p" / "golf_clicks.old-1.json").read_text() == clicks.read_text()

@@ -1,0 +1,69 @@
+"""Frames held in memory or in a file are those of the video."""
+
+import numpy as np
+import pytest
+
+from keyrecon.io.held_video import hold_frames
+from keyrecon.io.video import Video, open_video
+from keyrecon.io.video_writer import write_video
+
+FRAMES, SIZE = 12, (70, 100)
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory):
+    """Coloured noise of a size whose rows need padding."""
+    rng = np.random.default_rng(0)
+    path = tmp_path_factory.mktemp("held") / "v.mp4"
+    write_video(path, (rng.integers(0, 255, (*SIZE, 3), np.uint8) for _ in range(FRAMES)), 25.0)
+    return open_video(path, 1)
+
+
+@pytest.fixture
+def decoded(monkeypatch):
+    """How many frames were decoded."""
+    counts = []
+    original = Video._decoded
+
+    def spy(self, start, stop):
+        for frame in original(self, start, stop):
+            counts.append(start)
+            yield frame
+
+    monkeypatch.setattr(Video, "_decoded", spy)
+    return counts
+
+
+@pytest.mark.parametrize("bytes_in_memory", [1e9, 6e4, 0.0])
+def test_held_frames_are_those_of_the_video(video, bytes_in_memory):
+    held = hold_frames(video, bytes_in_memory)
+    for read in (
+        lambda v: v.frames(),
+        lambda v: v.frames(2, 5),
+        lambda v: v.grey_frames(),
+        lambda v: v.chosen_frames({1, 7}, 7),
+        lambda v: [v.frame(9)],
+    ):
+        ours, theirs = ([np.array(p) for p in read(v)] for v in (held, video))
+        assert len(ours) == len(theirs)
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+def test_reduced_frames_in_memory_are_those_of_the_video(video):
+    pairs = zip(hold_frames(video).frames(width=40), video.frames(width=40), strict=True)
+    assert all(np.array_equal(a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("bytes_in_memory", [1e9, 0.0])
+def test_a_held_video_is_decoded_once(video, decoded, bytes_in_memory):
+    held = hold_frames(video, bytes_in_memory)
+    assert not decoded
+    for _ in range(3):
+        assert sum(1 for _ in held.frames()) == sum(1 for _ in held.grey_frames()) == FRAMES - 1
+    assert len(decoded) == FRAMES - 1
+
+
+def test_a_held_video_counts_as_the_same_video(video):
+    held = hold_frames(video)
+    assert held.fingerprint == video.fingerprint and len(held) == len(video)
+    assert np.array_equal(held.time, video.time) and held.fps == video.fps
