@@ -35,7 +35,7 @@ def read_swings(paths: Iterable[Path]) -> tuple[Swing, ...]:
 def train(
     paths: Sequence[Path], out: Path, options: TrainOptions, progress: Progress = silent
 ) -> str:
-    """Learn a model from captured swings, write it, and tell what it is worth."""
+    """Learn a model from captured swings, write it, and describe what it is worth."""
     swings = read_swings(paths)
     database = collect_swings(swings, options, progress)
     model = learn_motion(database, _provenance(swings, options), options)

@@ -1,7 +1,7 @@
 """The stages of a golf fit: observe, fit, and detect the club again where the fit expects it.
 
 Observations come first (`observation`). A first fit of the motion model follows. Then, in
-rounds, the club is detected once more with the fitted swing as a guide, the hands tell when the
+rounds, the club is detected once more where the fitted swing expects it, the hands tell when the
 swing begins and ends better than club or fit do, and the model is fitted to both.
 """
 

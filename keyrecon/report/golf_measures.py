@@ -26,7 +26,7 @@ class SwingMeasures:
     """Turn of the shoulders from the beginning of the upswing."""
     hips: Float[np.ndarray, "T"]
     club_found: float
-    """Share of the frames in which the club was seen."""
+    """Share of the frames in which the club was detected."""
 
     @property
     def tempo(self) -> float:
@@ -50,8 +50,8 @@ def measure_swing(fitted: FittedSwing, observations: Observations) -> SwingMeasu
         sign * _turn(motion.points3d, _pair(motion, part), up, round(start))
         for part in ("shoulder", "hip")
     ]
-    seen = float(np.isfinite(observations.club[:, 0, 0]).mean())
-    return SwingMeasures(times[1] - times[0], times[2] - times[1], *turns, seen)
+    detected = float(np.isfinite(observations.club[:, 0, 0]).mean())
+    return SwingMeasures(times[1] - times[0], times[2] - times[1], *turns, detected)
 
 
 def _pair(motion: Motion, part: str) -> tuple[int, int]:

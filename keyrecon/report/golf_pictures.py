@@ -1,4 +1,4 @@
-"""The golfer's volumetric primitives on a picture, and as seen from above (CVPR 2005, Fig. 1).
+"""The golfer's volumetric primitives on a picture, and from above (CVPR 2005, Fig. 1).
 
 A tapered capsule looks like the hull of two discs; far ones are drawn before near ones.
 
@@ -27,13 +27,13 @@ CLUB = (213, 94, 0)
 """Vermillion of Okabe and Ito."""
 BODY = (196, 190, 180)
 FLOOR = (46, 52, 50)
-REACH = 1.5
+VIEW_RADIUS = 1.5
 """Metres from the player to the edge of the view from above."""
 
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """Both ends of every capsule as seen."""
+    """Both ends of every capsule in a picture."""
 
     centres: Float[np.ndarray, "Q 2 2"]
     """px"""
@@ -64,17 +64,17 @@ def draw_golfer(
 def draw_from_above(fitted: FittedSwing, frame: int, size: int) -> UInt8[np.ndarray, "size size 3"]:
     """The primitives from above: the camera is below the picture and looks up in it."""
     middle = fitted.pose.origins[0, 0]
-    scale = size / (2 * REACH)
+    scale = size / (2 * VIEW_RADIUS)
 
-    def look(points: np.ndarray) -> np.ndarray:
+    def from_above(points: np.ndarray) -> np.ndarray:
         flat = (points - middle)[..., [0, 2]] * [1.0, -1.0]
         return flat * scale + size / 2
 
     ends, radii = _place(fitted.capsules, fitted.pose, frame)
-    discs = Discs(look(ends), radii * scale, np.argsort(-ends[..., 1].mean(axis=1)).tolist())
+    discs = Discs(from_above(ends), radii * scale, np.argsort(-ends[..., 1].mean(axis=1)).tolist())
     picture = np.full((size, size, 3), FLOOR, np.uint8)
     _draw_discs(picture, discs, fitted.capsules)
-    _draw_club(picture, look(fitted.club[frame]))
+    _draw_club(picture, from_above(fitted.club[frame]))
     return picture
 
 
@@ -144,7 +144,7 @@ def overlay_strip(
 
 
 def path_picture(video: Video, fitted: FittedSwing, observations: Observations) -> str:
-    """The paths of club head and hands over the picture at the hit; dots are what was seen."""
+    """The paths of club head and hands over the picture at the hit; dots are detections."""
     hit = int(np.clip(round(float(fitted.keys[2])), 0, len(video) - 1))
     drawn = video.frame(hit).copy()
     swing = slice(max(0, int(fitted.keys[0])), int(np.ceil(fitted.keys[3])) + 1)
@@ -181,8 +181,8 @@ def _pixel(point: Float[np.ndarray, "2"]) -> tuple[int, int]:
 def _chosen(video: Video, frames: list[int]) -> list[tuple[int, np.ndarray]]:
     """Frames by number, read in one pass; a number may occur twice."""
     wanted = set(frames)
-    found = dict(zip(sorted(wanted), video.chosen_frames(wanted, max(frames)), strict=True))
-    return [(frame, found[frame]) for frame in frames]
+    pictures = dict(zip(sorted(wanted), video.chosen_frames(wanted, max(frames)), strict=True))
+    return [(frame, pictures[frame]) for frame in frames]
 
 
 def _small(picture: UInt8[np.ndarray, "h w 3"], width: int = WIDTH) -> str:

@@ -37,7 +37,7 @@ def test_the_root_lies_between_both_hips(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"keyrecon_golf_clicks": 2}, "version 2"),
         ({"joints": {**JOINTS, "nose": (90, 40)}}, "'nose', which is no joint"),
@@ -48,8 +48,8 @@ def test_the_root_lies_between_both_hips(tmp_path):
         ({"joints": 7}, "not a file of golf clicks"),
     ],
 )
-def test_a_file_that_cannot_start_a_fit_says_why(tmp_path, changes, told):
-    with pytest.raises(KeyreconError, match=told):
+def test_a_file_that_cannot_start_a_fit_says_why(tmp_path, changes, message):
+    with pytest.raises(KeyreconError, match=message):
         read_clicks(file_of(tmp_path, **changes))
 
 

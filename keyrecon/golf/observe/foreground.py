@@ -4,12 +4,12 @@ A golfer hardly leaves the spot, so the temporal median alone would take the leg
 a few frames, first of all the clicked one, the player is therefore cut out first by GrabCut
 (Rother, Kolmogorov and Blake, SIGGRAPH 2004): the lines between the clicked joints seed the
 player, everything farther away than an arm the scene, and the colours learnt there serve all other
-frames unchanged, since colours that adapt drift into the scene. The plate of the scene is the
-median of what these frames show outside of the player. Against this plate every frame gives the
+frames unchanged, since colours that adapt drift into the scene. The background model is the
+median of what these frames show outside of the player. Against it every frame gives the
 probability that a pixel is no scenery (Section 4.1 of the CVPR 2005 paper begins with such masks);
 where the player hardly ever leaves, GrabCut decides in every frame anew.
 
-Arms and the club move too fast to be in any plate, whether GrabCut cut them out or not.
+Arms and the club move too fast to be in any background, whether GrabCut cut them out or not.
 """
 
 from dataclasses import dataclass
@@ -182,12 +182,12 @@ def separate_player(
     """
     width = max(16, round(video.width * min(1.0, options.height / pose.height)))
     cutter = _learn_cutter(reduce_picture(video.frame(pose.frame), width), pose)
-    plate = _learn_plate(video, cutter, width, options, progress)
-    scene = ForegroundModel(plate, _still(len(video)), options.sure)
+    background = _learn_background(video, cutter, width, options, progress)
+    scene = ForegroundModel(background, _still(len(video)), options.sure)
     compare = partial(_likely, scene, cutter)
     pictures = progress(read_small(video, width), "Separating the player", len(video))
     likely = np.stack(list(side_by_side(compare, pictures)))
-    return Foreground(likely, plate.known, width / video.width, pose.height)
+    return Foreground(likely, background.known, width / video.width, pose.height)
 
 
 def _likely(
@@ -205,7 +205,7 @@ def _still(count: int) -> CameraPath:
     return CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
 
 
-def _learn_plate(
+def _learn_background(
     video: Video, cutter: _Cutter, width: int, options: ForegroundOptions, progress: Progress
 ) -> Background:
     """Median of the sampled frames outside of the player."""

@@ -33,7 +33,7 @@ TIP_SHARE = 0.4
 
 @dataclass(frozen=True)
 class ShaftOptions:
-    """What a club may look like; lengths in player heights."""
+    """What may be a club; lengths in player heights."""
 
     longest: float = 0.75
     """From the hands to the head of the club: a driver is about two thirds."""

@@ -3,7 +3,7 @@
 Sixteen segments hang on one another by ball joints, pelvis first; the club hangs on the left
 forearm. A segment's axes are those of its parent at rest, where every bone points along `rest`.
 Pelvis and trunk get their axes from two lines each (hips and spine, shoulders and spine). Of any
-other bone only the direction can be seen, so it turns from rest by the shortest way: no twist is
+other bone only the direction is captured, so it turns from rest by the shortest way: no twist is
 made up, and the only undefined direction is opposite to rest, where no limb can go.
 """
 
@@ -85,11 +85,11 @@ def size_body(stature: float, club: float = CLUB_LENGTH) -> Body:
             offsets[index, 0] = HALF_HIPS if segment.name.startswith("right") else -HALF_HIPS
     offsets[CLUB] += GRIP * REST[NAMES.index("left_forearm")]
     ends = {s.end: i for i, s in enumerate(SEGMENTS) if s.end}
-    carriers = np.array([ends.get(name, 0) for name in LSP14.names])
-    places = np.array([_length(SEGMENTS[c]) * REST[c] for c in carriers])
+    segments_of_joints = np.array([ends.get(name, 0) for name in LSP14.names])
+    places = np.array([_length(SEGMENTS[c]) * REST[c] for c in segments_of_joints])
     for side, sign in (("right", 1), ("left", -1)):
         places[LSP14.index(f"{side}_hip")] = [sign * HALF_HIPS, 0, 0]
-    return Body(stature, stature * offsets, carriers, stature * places, club)
+    return Body(stature, stature * offsets, segments_of_joints, stature * places, club)
 
 
 def _length(segment: Segment) -> float:

@@ -83,7 +83,7 @@ def collect_swings(
     rng = np.random.default_rng(options.variation.seed)
     wanted = [swing for swing in captured for _ in range(options.variation.count)]
     for swing in progress(wanted, "Varying swings", len(wanted)):
-        vectors.append(_vary(swing, (keys, centre), options.variation, rng))
+        vectors.append(_vary(swing, keys, centre, options.variation, rng))
     return Database(centre, np.stack(vectors), keys, len(swings))
 
 
@@ -98,12 +98,12 @@ def _check_turns(name: str, vector: Float[np.ndarray, "N D"]) -> None:
 
 def _vary(
     swing: Swing,
-    basis: tuple[Float[np.ndarray, "4"], Float[np.ndarray, "P 3 3"]],
+    keys: Float[np.ndarray, "4"],
+    centre: Float[np.ndarray, "P 3 3"],
     options: VariationOptions,
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "N D"]:
     """A variation; one that turns a limb inside out is drawn again."""
-    keys, centre = basis
     body = size_body(REFERENCE)
     while True:
         vector = motion_vector(sample_swing(vary_swing(swing, body, options, rng), keys), centre)

@@ -138,7 +138,7 @@ def _add_habits(turns: Turns, swing: Swing, spread: float, rng: np.random.Genera
 
 
 def _tilt(turns: Turns, segments: tuple[int, ...], degrees: Float[np.ndarray, "T"]) -> None:
-    """Turn segments about the left-right axis of what carries them."""
+    """Turn segments about the left-right axis of their parents."""
     tilt = Rotation.from_euler("x", degrees[:, None], degrees=True).as_matrix()
     for p in segments:
         turns[:, p] = tilt @ turns[:, p]

@@ -39,16 +39,16 @@ def lengths(body):
 
 def test_marks_of_four_postures_tell_how_long_the_limbs_are(posed):
     body, pose, marks = posed
-    found = fit_proportions(body, pose, marks, CAMERA, spread=1.0)
-    share = lengths(found) / lengths(scale_body(body, FACTORS))
+    fitted = fit_proportions(body, pose, marks, CAMERA, spread=1.0)
+    share = lengths(fitted) / lengths(scale_body(body, FACTORS))
     assert np.ptp(share) < 0.02  # how large all of the player is, one camera cannot tell
 
 
 def test_without_marks_the_player_is_average(posed):
     body, pose, marks = posed
     nothing = replace(marks, joints=np.full_like(marks.joints, np.nan))
-    found = fit_proportions(body, pose, nothing, CAMERA)
-    np.testing.assert_allclose(found.offsets, body.offsets, atol=1e-9)
+    fitted = fit_proportions(body, pose, nothing, CAMERA)
+    np.testing.assert_allclose(fitted.offsets, body.offsets, atol=1e-9)
 
 
 def test_a_longer_part_moves_what_hangs_on_it():

@@ -34,7 +34,7 @@ def pose(frames=2, seed=0):
     return RootPose(np.array([0.0, 0.0, 4.0]) + rng.normal(0, 0.1, (frames, 2, 3)), turns)
 
 
-def seen(**what):
+def observed(**what):
     return replace(observe(np.ones((2, 14, 3)), np.ones((2, 2, 3)), CAMERA, 0.0), **what)
 
 
@@ -66,9 +66,9 @@ def cases():
     start = np.random.default_rng(4).uniform([290, 180], [350, 300], (40, 2))
     matches = Matches(np.zeros(40, int), start, start + 3.0)
     return {
-        "foreground": (foreground_residuals, seen(foreground=(samples(), samples(2)))),
-        "silhouette": (silhouette_residuals, seen(silhouette_distance=distances())),
-        "match": (match_residuals, seen(matches=matches)),
+        "foreground": (foreground_residuals, observed(foreground=(samples(), samples(2)))),
+        "silhouette": (silhouette_residuals, observed(silhouette_distance=distances())),
+        "match": (match_residuals, observed(matches=matches)),
     }
 
 
@@ -97,7 +97,7 @@ def test_a_line_of_sight_through_the_body_misses_nothing():
     placed = pose()
     inside = placed.origins[:, 0] + np.einsum("tij,j->ti", placed.rotations[:, 0], [0, 0.1, 0.02])
     through = tuple(project(p[None], CAMERA)[0] for p in inside)
-    assert len(foreground_residuals(seen(foreground=through), CAPSULES, placed).values) == 0
+    assert len(foreground_residuals(observed(foreground=through), CAPSULES, placed).values) == 0
 
 
 def test_the_distance_of_a_line_of_sight_is_that_of_the_nearest_point_of_the_surface():
@@ -119,6 +119,6 @@ def test_a_body_that_does_not_move_moves_its_points_nowhere():
     still = RootPose(placed.origins[:1].repeat(2, axis=0), placed.rotations[:1].repeat(2, axis=0))
     start = np.random.default_rng(4).uniform([290, 180], [350, 300], (40, 2))
     matches = Matches(np.zeros(40, int), start, start)
-    rows = match_residuals(seen(matches=matches), CAPSULES, still)
+    rows = match_residuals(observed(matches=matches), CAPSULES, still)
     assert len(rows.values) > 8
     assert np.abs(rows.values).max() < 1e-6

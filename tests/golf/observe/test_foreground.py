@@ -64,18 +64,18 @@ def video(tmp_path_factory):
 
 
 def test_a_player_who_never_leaves_the_spot_is_told_from_the_scene(video):
-    found = separate_player(video, clicks())
+    foreground = separate_player(video, clicks())
     for t in (0, 12, 20):
-        mask, true = found.frame(t).mask() > 0, true_mask(t)
+        mask, true = foreground.frame(t).mask() > 0, true_mask(t)
         assert (mask & true).sum() > 0.9 * true.sum()
         assert (mask & ~true).sum() < 0.12 * true.sum()
 
 
 def test_what_is_thinner_than_a_limb_is_no_part_of_the_body(video):
-    found = separate_player(video, clicks())
-    likely = found.likely.copy()
+    foreground = separate_player(video, clicks())
+    likely = foreground.likely.copy()
     cv2.line(likely[5], (180, 20), (230, 190), 255, 2)
-    body = replace(found, likely=likely).frame(5).body()
+    body = replace(foreground, likely=likely).frame(5).body()
     assert not body[:, 185:].any()
     assert (body & true_mask(5)).sum() > 0.85 * true_mask(5).sum()
 

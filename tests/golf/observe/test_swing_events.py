@@ -25,9 +25,9 @@ def filmed(keys=TRUE, frames=160):
 
 
 def test_key_postures_are_found_within_two_frames():
-    found = find_key_frames(filmed(), HEIGHT, FPS)
-    assert np.abs(found[:3] - TRUE[:3]).max() <= 2
-    assert abs(found[3] - TRUE[3]) <= 5
+    keys = find_key_frames(filmed(), HEIGHT, FPS)
+    assert np.abs(keys[:3] - TRUE[:3]).max() <= 2
+    assert abs(keys[3] - TRUE[3]) <= 5
 
 
 def test_slow_motion_changes_no_key_posture():
@@ -39,8 +39,8 @@ def test_a_rest_with_the_hands_up_is_no_address():
     club = filmed(np.array([30, 78, 110, 144]), 180)
     ends = club.ends.copy()
     ends[60:78] = ends[78]
-    found = find_key_frames(Club(ends, club.detected, club.tip), HEIGHT, FPS)
-    assert abs(found[0] - 30) <= 4
+    keys = find_key_frames(Club(ends, club.detected, club.tip), HEIGHT, FPS)
+    assert abs(keys[0] - 30) <= 4
 
 
 def test_someone_who_stands_still_makes_no_swing():

@@ -39,9 +39,9 @@ def with_rest(points, frames=40):
 
 def test_key_postures_of_a_drawn_swing_are_found(swings):
     for swing in swings:
-        found = find_key_postures(with_rest(swing.joints), with_rest(swing.club), swing.fps)
-        assert np.abs(found - 40 - swing.keys)[[1, 2]].max() <= 5
-        assert np.abs(found - 40 - swing.keys)[[0, 3]].max() <= 20
+        keys = find_key_postures(with_rest(swing.joints), with_rest(swing.club), swing.fps)
+        assert np.abs(keys - 40 - swing.keys)[[1, 2]].max() <= 5
+        assert np.abs(keys - 40 - swing.keys)[[0, 3]].max() <= 20
 
 
 def test_a_player_who_only_stands_has_no_swing(swings):
