@@ -1,4 +1,4 @@
-"""The table of keyrecon/lifting/priors/posture.py, from the captures it was made of.
+"""The posture table of keyrecon/lifting/priors/anatomy.py, from the captures it was made of.
 
     python benchmarks/posture_table.py [--mocap DIR]
 

@@ -111,7 +111,7 @@ def track_depth_signs(
         bones, breadths, anatomy, options.joint_limits, options.expected_depth
     )
     if hidden is not None:
-        limbs = _with_occlusion(limbs, bones, hidden, skeleton)
+        limbs = _with_occlusion(limbs, bones, hidden, anatomy)
     sign = np.ones(bones.depth.shape, dtype=np.int64)
     probability = np.ones(bones.depth.shape)
     rows = np.arange(len(sign))
@@ -236,10 +236,9 @@ def _with_occlusion(
     limbs: list[Float[np.ndarray, "T S _"]],
     bones: ForeshortenedBones,
     hidden: Bool[np.ndarray, "T J"],
-    skeleton: Skeleton,
+    anatomy: Anatomy,
 ) -> list[Float[np.ndarray, "T S _"]]:
     """Costs of the arms with those of hidden joints that would lie before the trunk."""
-    anatomy = anatomy_of(skeleton)
     frames = np.flatnonzero(hidden.any(axis=1))
     if not anatomy.trunk or not len(frames):
         return limbs
@@ -248,10 +247,11 @@ def _with_occlusion(
     result = []
     for limb, cost in zip(anatomy.limbs, limbs, strict=True):
         if limb.kind == "arm":
-            joints = list(skeleton.bones[list(limb.bones), 1])
             shoulder = corners[:, :, 2 if limb.side > 0 else 3]
             vectors = _vectors_of_states(limb.bones, observed)
-            cost[frames] += hidden_cost(corners, shoulder, vectors, hidden[frames][:, joints])
+            cost[frames] += hidden_cost(
+                corners, shoulder, vectors, hidden[frames][:, list(limb.joints)]
+            )
         result.append(cost)
     return result
 

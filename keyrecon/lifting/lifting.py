@@ -20,13 +20,13 @@ from keyrecon.lifting.limb_lengths import (
     BodySize,
     LengthOptions,
     estimate_lengths,
-    marked_joints,
 )
 from keyrecon.lifting.motion_fitting import PlayerModel, fit_motion
 from keyrecon.lifting.preprocessing import (
     PreparedTracks,
     bridge_gaps,
     keyframe_marks,
+    marked_joints,
     prepare_tracks,
     reject_spikes,
 )

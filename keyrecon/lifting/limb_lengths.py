@@ -115,15 +115,6 @@ def joint_noise(
     return options.track_noise / np.sqrt(np.clip(confidence, _MIN_CONFIDENCE, 1.0))
 
 
-def marked_joints(tracks: JointTracks, annotations: Annotations) -> Float[np.ndarray, "T J 2"]:
-    """The tracks with every annotated joint where the person placed it."""
-    joints = tracks.joints.copy()
-    joints[annotations.frames] = np.where(
-        np.isnan(annotations.joints), joints[annotations.frames], annotations.joints
-    )
-    return joints
-
-
 def _length_groups(skeleton: Skeleton) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "m"]]:
     """Which length each bone and breadth has (left and right share one), and the table of them,
     in statures."""

@@ -35,6 +35,15 @@ def keyframe_marks(annotations: Annotations) -> KeyframeMarks:
     return KeyframeMarks(annotations.frames, marked, annotations.visible, annotations.nearer)
 
 
+def marked_joints(tracks: JointTracks, annotations: Annotations) -> Float[np.ndarray, "T J 2"]:
+    """The tracks with every annotated joint where the person placed it."""
+    joints = tracks.joints.copy()
+    joints[annotations.frames] = np.where(
+        np.isnan(annotations.joints), joints[annotations.frames], annotations.joints
+    )
+    return joints
+
+
 @dataclass(frozen=True, eq=False)
 class PreparedTracks:
     """Observed joints, in body heights."""

@@ -1,4 +1,4 @@
-"""Which edge element of a frame corresponds to which element of a template.
+"""Which edge element of a frame corresponds to which element of a posed template.
 
 The nearest one of the same colour in place and direction together: the chord between two unit
 tangents, times `TANGENT_SCALE`, counts like a distance. Elements that differ by 45 degrees are so
@@ -16,10 +16,12 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float32, Int
+from jaxtyping import Bool, Complex, Float, Float32, Int
 
 from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
+from keyrecon.propagation.edge_template import EdgeTemplates
+from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.records import Edges
 
 TANGENT_SCALE = 0.08
@@ -100,6 +102,41 @@ def _find_nearest(
     return nearest, least + np.square(queries).sum(axis=2) < radius**2
 
 
+@dataclass(frozen=True, eq=False)
+class PosedTemplates:
+    """Templates in poses: element e of p lies at joint_weights[p, e] @ joints[p] + offset[p, e]."""
+
+    joint_weights: Float[np.ndarray, "P E J"]
+    offset: Complex[np.ndarray, "P E"]
+    points: Complex[np.ndarray, "P E"]
+    tangent: Complex[np.ndarray, "P E"]
+    color: Int[np.ndarray, "P E"]
+    weight: Float[np.ndarray, "P E"]
+
+
+def pose_templates(
+    templates: EdgeTemplates,
+    rows: Int[np.ndarray, "P"],
+    joints: Complex[np.ndarray, "P J"],
+    stride: int = 1,
+) -> PosedTemplates:
+    """Each n-th element of the templates in `rows` with their joints at `joints`."""
+    elements = templates.elements.take(np.s_[rows, ::stride])
+    weights = templates.joint_weights[rows, ::stride]
+    axis = np.take_along_axis(bone_axes(templates.half, joints), elements.bone, axis=1)
+    offset = elements.offset * axis
+    points = (weights @ joints[..., None])[..., 0] + offset
+    return PosedTemplates(
+        weights, offset, points, elements.bone_tangent * axis, elements.color, elements.weight
+    )
+
+
+def bone_axes(half: BodyHalf, joints: Complex[np.ndarray, "P J"]) -> Complex[np.ndarray, "P B"]:
+    """Unit vectors from parent to child."""
+    bone = joints[:, half.bones[:, 1]] - joints[:, half.bones[:, 0]]
+    return bone / np.maximum(np.abs(bone), 1e-6)
+
+
 @runtime_checkable
 class PlacedElements(Protocol):
     """Elements of P posed templates: position, direction and colour."""
@@ -153,20 +190,3 @@ def match_frame_to_parts(
         nearest[:, number], matched[:, number] = _find_nearest(queries, of_part, radius)
     matched &= (frame_elements >= 0)[:, None]
     return np.where(matched, nearest, 0), matched
-
-
-def choose_evenly(count: int, most: int) -> Int[np.ndarray, "N"]:
-    """At most `most` of `count` numbers, evenly spread."""
-    return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(int)
-
-
-def list_half_elements(edges: tuple[Edges, ...], name: str, most: int) -> Int[np.ndarray, "T F"]:
-    """Rows of the index of each frame's upper or lower elements, at most `most`; -1 pads."""
-    rows = np.full((len(edges), most), -1)
-    first = 0
-    for t, e in enumerate(edges):
-        inside = first + np.flatnonzero(getattr(e, name))
-        inside = inside[choose_evenly(len(inside), most)]
-        rows[t, : len(inside)] = inside
-        first += len(e.points)
-    return rows

@@ -20,7 +20,6 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
-from keyrecon.propagation.correspondence import choose_evenly, list_half_elements
 from keyrecon.propagation.foot_evidence import FootEvidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.records import Edges
@@ -158,6 +157,23 @@ def complete_template(
     return join_elements([elements, added])
 
 
+def choose_evenly(count: int, most: int) -> Int[np.ndarray, "N"]:
+    """At most `most` of `count` numbers, evenly spread."""
+    return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(int)
+
+
+def list_half_elements(edges: tuple[Edges, ...], name: str, most: int) -> Int[np.ndarray, "T F"]:
+    """Rows of the index of each frame's upper or lower elements, at most `most`; -1 pads."""
+    rows = np.full((len(edges), most), -1)
+    first = 0
+    for t, e in enumerate(edges):
+        inside = first + np.flatnonzero(getattr(e, name))
+        inside = inside[choose_evenly(len(inside), most)]
+        rows[t, : len(inside)] = inside
+        first += len(e.points)
+    return rows
+
+
 @dataclass(frozen=True, eq=False)
 class AnnotatedPoses:
     """Annotated joints of one half of the body, in player coordinates, complete."""
@@ -228,38 +244,3 @@ def _pad(
     weights[rows, places, half.bones[elements.bone, 0]] = 1 - elements.along
     weights[rows, places, half.bones[elements.bone, 1]] += elements.along
     return EdgeTemplates(poses, elements, weights, frame_elements)
-
-
-@dataclass(frozen=True, eq=False)
-class PosedTemplates:
-    """Templates in poses: element e of p lies at joint_weights[p, e] @ joints[p] + offset[p, e]."""
-
-    joint_weights: Float[np.ndarray, "P E J"]
-    offset: Complex[np.ndarray, "P E"]
-    points: Complex[np.ndarray, "P E"]
-    tangent: Complex[np.ndarray, "P E"]
-    color: Int[np.ndarray, "P E"]
-    weight: Float[np.ndarray, "P E"]
-
-
-def pose_templates(
-    templates: EdgeTemplates,
-    rows: Int[np.ndarray, "P"],
-    joints: Complex[np.ndarray, "P J"],
-    stride: int = 1,
-) -> PosedTemplates:
-    """Each n-th element of the templates in `rows` with their joints at `joints`."""
-    elements = templates.elements.take(np.s_[rows, ::stride])
-    weights = templates.joint_weights[rows, ::stride]
-    axis = np.take_along_axis(bone_axes(templates.half, joints), elements.bone, axis=1)
-    offset = elements.offset * axis
-    points = (weights @ joints[..., None])[..., 0] + offset
-    return PosedTemplates(
-        weights, offset, points, elements.bone_tangent * axis, elements.color, elements.weight
-    )
-
-
-def bone_axes(half: BodyHalf, joints: Complex[np.ndarray, "P J"]) -> Complex[np.ndarray, "P B"]:
-    """Unit vectors from parent to child."""
-    bone = joints[:, half.bones[:, 1]] - joints[:, half.bones[:, 0]]
-    return bone / np.maximum(np.abs(bone), 1e-6)

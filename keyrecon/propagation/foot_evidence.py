@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.normal_equations import NormalEquations, joint_equations
 
 FOOT_MATCH_DISTANCE = 0.08
 """A foot farther from where the ankle is estimated counts for little, player heights.
@@ -42,13 +41,13 @@ def learn_foot_offsets(
 ) -> FootEvidence:
     """Tracked feet, moved to where the ankles are on annotated frames."""
     ends = np.array([max(side, key=lambda j: half.depth[j]) for side in half.sides])
-    gap = joints[:, ends] - _order_feet(tracked[frames], joints[:, ends])
+    gap = joints[:, ends] - order_feet(tracked[frames], joints[:, ends])
     shift = np.median(gap.real) + 1j * np.median(gap.imag)
     spread = float(np.median(np.abs(gap - shift)))
     return FootEvidence(ends, tracked + shift, max(spread, MIN_FOOT_SPREAD))
 
 
-def _order_feet(
+def order_feet(
     feet: Complex[np.ndarray, "P 2"], ends: Complex[np.ndarray, "P 2"]
 ) -> Complex[np.ndarray, "P 2"]:
     """Feet in the order of the leg ends that they fit better."""
@@ -56,17 +55,6 @@ def _order_feet(
         np.minimum(np.abs(f - ends), FOOT_MATCH_DISTANCE).sum(axis=1) for f in (feet, feet[:, ::-1])
     )
     return np.where((direct <= crossed)[:, None], feet, feet[:, ::-1])
-
-
-def foot_equations(
-    feet: FootEvidence, frames: Int[np.ndarray, "P"], joints: Complex[np.ndarray, "P J"]
-) -> NormalEquations:
-    """Observations of the ends of the legs."""
-    target, weight = np.zeros(joints.shape, complex), np.zeros(joints.shape)
-    target[:, feet.ends] = _order_feet(feet.points[frames], joints[:, feet.ends])
-    distance = np.abs(target[:, feet.ends] - joints[:, feet.ends])
-    weight[:, feet.ends] = 1 / (feet.spread * (1 + (distance / FOOT_MATCH_DISTANCE) ** 2)) ** 2
-    return joint_equations(target, weight)
 
 
 def foot_costs(

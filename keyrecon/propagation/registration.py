@@ -7,6 +7,11 @@ length firmly, their direction softly. Both steps repeat, from far-reaching and 
 supple. A local translation of each joint, the paper's way, is what one step does when limbs only
 shift; here limbs may turn. Matching both ways matters for arms: a bare forearm that the template
 does not cover pulls it over.
+
+Each step is linear least squares over the joints, many poses at once. Every observation is a row
+that says where a weighted sum of joints should be, with a 2x2 weight: strong along a normal and
+weak along the contour for an edge element, strong along the bone and weaker across it for a limb's
+shape. Unknowns of one pose are x of all joints, then y.
 """
 
 from dataclasses import dataclass
@@ -16,12 +21,13 @@ from jaxtyping import Complex, Float, Int
 
 from keyrecon.propagation.correspondence import (
     ElementIndex,
+    bone_axes,
     match_elements,
     match_frame_elements,
+    pose_templates,
 )
-from keyrecon.propagation.edge_template import EdgeTemplates, bone_axes, pose_templates
-from keyrecon.propagation.foot_evidence import foot_equations
-from keyrecon.propagation.normal_equations import NormalEquations, point_equations
+from keyrecon.propagation.edge_template import EdgeTemplates
+from keyrecon.propagation.foot_evidence import FOOT_MATCH_DISTANCE, FootEvidence, order_feet
 
 TANGENTIAL_WEIGHT = 0.15
 """Weight of sliding along a contour against leaving it. Chosen on rendered sequences; see
@@ -29,6 +35,8 @@ benchmarks/sensitivity.py."""
 CONTOUR_SPREAD = 0.03
 """How far a contour tells where an element is, player heights. Neighbours on one contour err
 together, which is why it is more than a contour's own noise of about .01."""
+DAMPING = 1e-9
+"""Keeps a joint that nothing observes from making the equations singular."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +79,64 @@ class TemplateFits:
     def moved(self, joints: Complex[np.ndarray, "P J"]) -> "TemplateFits":
         """The same in other poses."""
         return TemplateFits(self.frames, self.template, joints)
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Normal equations of P poses: `matrix` x = `right`."""
+
+    matrix: Float[np.ndarray, "P N N"]
+    right: Float[np.ndarray, "P N"]
+
+    def __add__(self, other: "NormalEquations") -> "NormalEquations":
+        """Both sets of observations."""
+        return NormalEquations(self.matrix + other.matrix, self.right + other.right)
+
+    def solve(self) -> Complex[np.ndarray, "P J"]:
+        """Joints that fit best."""
+        matrix = self.matrix + DAMPING * np.eye(self.right.shape[1])
+        return joints_from_unknowns(np.linalg.solve(matrix, self.right[..., None])[..., 0])
+
+
+def joints_from_unknowns(unknowns: Float[np.ndarray, "P N"]) -> Complex[np.ndarray, "P J"]:
+    """x + iy of every joint."""
+    half = unknowns.shape[1] // 2
+    return unknowns[:, :half] + 1j * unknowns[:, half:]
+
+
+def point_equations(
+    joint_weights: Float[np.ndarray, "P R J"],
+    target: Complex[np.ndarray, "P R"],
+    axis: Complex[np.ndarray, "P R"],
+    along: Float[np.ndarray, "P R"],
+    across: Float[np.ndarray, "P R"],
+) -> NormalEquations:
+    """Rows joint_weights @ joints = target, weighted `along` the unit `axis` and `across` it."""
+    cosine, sine = axis.real, axis.imag
+    xx = along * cosine**2 + across * sine**2
+    yy = along * sine**2 + across * cosine**2
+    xy = (along - across) * cosine * sine
+    transposed = joint_weights.transpose(0, 2, 1)
+    block_xx = transposed @ (xx[..., None] * joint_weights)
+    block_xy = transposed @ (xy[..., None] * joint_weights)
+    block_yy = transposed @ (yy[..., None] * joint_weights)
+    matrix = np.block([[block_xx, block_xy], [block_xy, block_yy]])
+    right_x = (transposed @ (xx * target.real + xy * target.imag)[..., None])[..., 0]
+    right_y = (transposed @ (xy * target.real + yy * target.imag)[..., None])[..., 0]
+    return NormalEquations(matrix, np.concatenate([right_x, right_y], axis=1))
+
+
+def joint_equations(
+    target: Complex[np.ndarray, "P J"], weight: Float[np.ndarray, "P J"]
+) -> NormalEquations:
+    """Joints themselves, weighted alike in all directions."""
+    count = target.shape[1]
+    matrix = np.zeros((len(target), 2 * count, 2 * count))
+    at = np.arange(count)
+    matrix[:, at, at] = matrix[:, at + count, at + count] = weight
+    return NormalEquations(
+        matrix, np.concatenate([weight * target.real, weight * target.imag], axis=1)
+    )
 
 
 def register_templates(
@@ -142,6 +208,17 @@ def _robust_weight(
     normal = 1j * index.tangent[row]
     distance = np.abs(((index.points[row] - points) * np.conj(normal)).real)
     return weight / (1 + (2 * distance / radius) ** 2) ** 2 / CONTOUR_SPREAD**2
+
+
+def foot_equations(
+    feet: FootEvidence, frames: Int[np.ndarray, "P"], joints: Complex[np.ndarray, "P J"]
+) -> NormalEquations:
+    """Observations of the ends of the legs."""
+    target, weight = np.zeros(joints.shape, complex), np.zeros(joints.shape)
+    target[:, feet.ends] = order_feet(feet.points[frames], joints[:, feet.ends])
+    distance = np.abs(target[:, feet.ends] - joints[:, feet.ends])
+    weight[:, feet.ends] = 1 / (feet.spread * (1 + (distance / FOOT_MATCH_DISTANCE) ** 2)) ** 2
+    return joint_equations(target, weight)
 
 
 def shape_equations(

@@ -12,10 +12,12 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.propagation.correspondence import (
     ElementIndex,
+    bone_axes,
     match_elements,
     match_frame_to_parts,
+    pose_templates,
 )
-from keyrecon.propagation.edge_template import EdgeTemplates, bone_axes, pose_templates
+from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.registration import TemplateFits
 
 SCORE_RADIUS = 0.06

@@ -22,16 +22,14 @@ from keyrecon.numerics.banded_least_squares import (
 from keyrecon.numerics.blocks import in_blocks
 from keyrecon.propagation.correspondence import ElementIndex
 from keyrecon.propagation.edge_template import EdgeTemplates
-from keyrecon.propagation.normal_equations import (
+from keyrecon.propagation.registration import (
     DAMPING,
     NormalEquations,
-    joint_equations,
-    joints_from_unknowns,
-)
-from keyrecon.propagation.registration import (
     RegistrationStep,
     TemplateFits,
     edge_equations,
+    joint_equations,
+    joints_from_unknowns,
     shape_equations,
 )
 

@@ -5,17 +5,17 @@ from capsule_player import scene, standing, turned
 
 from keyrecon.body import LSP14
 from keyrecon.propagation.body_frame import stabilise_player
-from keyrecon.propagation.correspondence import index_elements, match_elements
-from keyrecon.propagation.edge_template import (
-    AnnotatedPoses,
-    assign_to_bones,
-    make_edge_templates,
-    pose_templates,
-)
-from keyrecon.propagation.foot_evidence import foot_equations, learn_foot_offsets
+from keyrecon.propagation.correspondence import index_elements, match_elements, pose_templates
+from keyrecon.propagation.edge_template import AnnotatedPoses, assign_to_bones, make_edge_templates
+from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.normal_equations import joint_equations, point_equations
-from keyrecon.propagation.registration import TemplateFits, register_templates
+from keyrecon.propagation.registration import (
+    TemplateFits,
+    foot_equations,
+    joint_equations,
+    point_equations,
+    register_templates,
+)
 from keyrecon.propagation.scoring import find_unexplained_edges, score_templates
 from keyrecon.propagation.selection import LimbStates, choose_two
 from keyrecon.propagation.trajectory_smoothing import solve_smooth

@@ -13,8 +13,13 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
-from keyrecon.propagation.correspondence import ElementIndex, index_elements, list_half_elements
-from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates, make_edge_templates
+from keyrecon.propagation.correspondence import ElementIndex, index_elements
+from keyrecon.propagation.edge_template import (
+    AnnotatedPoses,
+    EdgeTemplates,
+    list_half_elements,
+    make_edge_templates,
+)
 from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.hypotheses import (
@@ -23,7 +28,6 @@ from keyrecon.propagation.hypotheses import (
     join_hypotheses,
     propose_limbs,
 )
-from keyrecon.propagation.normal_equations import joint_equations
 from keyrecon.propagation.propagation import (
     LEAST_MARKED,
     LIMB_HYPOTHESES,
@@ -32,7 +36,12 @@ from keyrecon.propagation.propagation import (
     gather_poses,
     joint_confidence,
 )
-from keyrecon.propagation.registration import RegistrationStep, TemplateFits, register_templates
+from keyrecon.propagation.registration import (
+    RegistrationStep,
+    TemplateFits,
+    joint_equations,
+    register_templates,
+)
 from keyrecon.propagation.selection import ChosenLimbs, choose_limbs
 from keyrecon.propagation.trajectory_smoothing import (
     FIXED_WEIGHT,

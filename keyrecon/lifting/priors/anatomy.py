@@ -6,17 +6,26 @@ trunk, F = U x R forward (right-handed like the camera's axes). A knee bends bac
 (thigh x shank) . R <= 0. Every cost is capped: a limit speaks against a pose, it does not
 forbid it, since the joints that it is computed from are uncertain themselves.
 
+Joint limits alone leave most depth signs open. The posture says more and tells a pose from its
+mirror image in depth: hands work before the body, elbows hang beside and behind it, a forward thigh
+goes with a bent knee. The directions of a limb's two bones in the axes of the trunk, taken
+together, have a mean and a covariance, which are tabled here over a dance, a kick at a ball,
+jumping jacks with squats and a jog, a forward jump and a golf swing, all weighing the same (CMU
+motion capture, mocap.cs.cmu.edu: 05_12, 10_06, 13_30, 13_32, 64_07), left limbs mirrored, spreads
+widened by 0.2 for other people and unsure trunks. `python benchmarks/posture_table.py` prints the
+tables. Heavy tails (Student) keep rare poses possible.
+
 Groups of bones whose signs depend on each other are decided together: the trunk, each leg,
 each arm. Bones of a skeleton that has no such joints stand alone and are free.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.priors.posture import posture_cost
 from keyrecon.numerics.geometry import unit_vectors
 
 CAP = 8.0
@@ -29,7 +38,38 @@ UPRIGHT = np.array([0.0, -1.0, -TILT]) / np.hypot(1.0, TILT)
 _LEAN_FORWARD, _LEAN_SPREAD, _LEAN_ASIDE = 0.13, 0.2, 0.14
 """How far a trunk of length 1 leans, and how much that varies, with room for unknown tilt: its
 mean is 0.09-0.20 and its deviation 0.08-0.26 in dancing, kicking, jumping and golf alike (CMU
-motion capture, see `posture`)."""
+motion capture, see above)."""
+_MEAN = {
+    "arm": np.array([0.24, -0.74, 0.09, 0.02, -0.22, 0.51]),
+    "leg": np.array([0.04, -0.81, 0.37, -0.01, -0.87, -0.33]),
+}
+"""Mean of the upper and the lower bone's direction: outward, up, forward of each."""
+
+_COVARIANCE = {
+    "arm": np.array(
+        [
+            [0.13, 0.00, -0.03, 0.04, 0.06, 0.02],
+            [0.00, 0.18, 0.09, -0.05, 0.16, -0.05],
+            [-0.03, 0.09, 0.19, -0.08, 0.16, -0.01],
+            [0.04, -0.05, -0.08, 0.20, -0.07, 0.02],
+            [0.06, 0.16, 0.16, -0.07, 0.45, 0.00],
+            [0.02, -0.05, -0.01, 0.02, 0.00, 0.16],
+        ]
+    ),
+    "leg": np.array(
+        [
+            [0.09, 0.02, -0.01, 0.03, 0.01, -0.01],
+            [0.02, 0.11, 0.04, 0.00, -0.01, 0.02],
+            [-0.01, 0.04, 0.13, 0.00, -0.02, 0.05],
+            [0.03, 0.00, 0.00, 0.08, 0.00, 0.01],
+            [0.01, -0.01, -0.02, 0.00, 0.06, -0.03],
+            [-0.01, 0.02, 0.05, 0.01, -0.03, 0.11],
+        ]
+    ),
+}
+_PRECISION = {kind: np.linalg.inv(matrix) for kind, matrix in _COVARIANCE.items()}
+_DEGREES_OF_FREEDOM = 8.0
+"""Of the Student tails. Chosen on rendered sequences; see benchmarks/sensitivity.py."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +77,8 @@ class Limb:
     """Two bones in a row and the kind of joint between them."""
 
     bones: tuple[int, ...]
+    joints: tuple[int, ...]
+    """Far ends of the bones."""
     kind: str
     """'leg', 'arm', 'head' or 'free'."""
     side: int = 0
@@ -66,11 +108,13 @@ def anatomy_of(skeleton: Skeleton) -> Anatomy:
         for kind, names in (("leg", ("knee", "ankle")), ("arm", ("elbow", "wrist"))):
             members = [f"{side}_{name}" for name in names]
             if trunk and all(name in bone_of for name in members):
-                limbs.append(Limb(tuple(bone_of[name] for name in members), kind, sign))
+                bones = tuple(bone_of[name] for name in members)
+                joints = tuple(skeleton.index(name) for name in members)
+                limbs.append(Limb(bones, joints, kind, sign))
     taken = {*trunk, *(bone for limb in limbs for bone in limb.bones)}
     head = bone_of.get("head_top") if trunk else None
     limbs += [
-        Limb((bone,), "head" if bone == head else "free")
+        Limb((bone,), (int(skeleton.bones[bone, 1]),), "head" if bone == head else "free")
         for bone in range(len(skeleton.bones))
         if bone not in taken
     ]
@@ -155,6 +199,27 @@ def limb_axes(
     """Outward on one side, up, forward; at right angles."""
     right = unit_vectors(across - (across * up).sum(-1, keepdims=True) * up)
     return side * right, up, np.cross(up, right)
+
+
+def posture_cost(
+    upper: Float[np.ndarray, "*#n 3"],
+    lower: Float[np.ndarray, "*#n 3"],
+    axes: tuple[Float[np.ndarray, "*#n 3"], ...],
+    kind: Literal["arm", "leg"],
+) -> Float[np.ndarray, "..."]:
+    """Cost of a limb's posture, nats: directions of its two bones by the trunk's axes.
+
+    `axes`: outward on the limb's side, up, forward; they need not be at right angles.
+    """
+    parts = [(bone * axis).sum(-1) for bone in (upper, lower) for axis in axes]
+    off = [part - mean for part, mean in zip(parts, _MEAN[kind], strict=True)]
+    precision = _PRECISION[kind]
+    squared = sum(
+        (1 if i == j else 2) * precision[i, j] * off[i] * off[j]
+        for i in range(6)
+        for j in range(i, 6)
+    )
+    return 0.5 * (_DEGREES_OF_FREEDOM + 6) * np.log1p(squared / _DEGREES_OF_FREEDOM)
 
 
 def head_cost(
