@@ -43,7 +43,7 @@ class MotionState:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearizedTerm:
     """Weighted residuals of a term and their slopes."""
 
     residual: Float[np.ndarray, "T m"]
@@ -53,7 +53,7 @@ class Linear:
     """Value of the term where it is not half the sum of squared residuals (robust terms)."""
 
 
-Term = Callable[[MotionState], Linear]
+Term = Callable[[MotionState], LinearizedTerm]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Smoothness:
 class Evaluation:
     """All terms at a motion, and their sum with the smoothness."""
 
-    lines: Sequence[Linear]
+    linearized: Sequence[LinearizedTerm]
     cost: float
 
 
@@ -83,11 +83,11 @@ def solve(
     """Lower the sum of all terms until a step gains less than the share `tolerance`."""
 
     def evaluate(state: MotionState) -> Evaluation:
-        lines = [term(state) for term in terms]
-        return Evaluation(lines, _cost(state, lines, smoothness))
+        linearized = [term(state) for term in terms]
+        return Evaluation(linearized, _cost(state, linearized, smoothness))
 
     def step(state: MotionState, here: Evaluation, damping: float) -> MotionState:
-        return _move(state, _step(state, here.lines, smoothness, damping))
+        return _move(state, _step(state, here.linearized, smoothness, damping))
 
     def accepts(before: float, after: float) -> bool:
         return after < before
@@ -111,19 +111,22 @@ def _move(state: MotionState, step: Float[np.ndarray, "T D"]) -> MotionState:
     return MotionState(state.root + step[:, :2], unit_vectors(moved))
 
 
-def _cost(state: MotionState, lines: Sequence[Linear], smoothness: Smoothness) -> float:
+def _cost(
+    state: MotionState, linearized: Sequence[LinearizedTerm], smoothness: Smoothness
+) -> float:
     total = sum(
-        0.5 * float((line.residual**2).sum()) if line.cost is None else line.cost for line in lines
+        0.5 * float((term.residual**2).sum()) if term.cost is None else term.cost
+        for term in linearized
     )
     bend = (np.diff(state.directions, 2, axis=0) ** 2).sum(axis=(0, 2)) @ smoothness.bones
     return total + 0.5 * float(bend + smoothness.root * (np.diff(state.root, 2, axis=0) ** 2).sum())
 
 
 def _step(
-    state: MotionState, lines: Sequence[Linear], smoothness: Smoothness, damping: float
+    state: MotionState, linearized: Sequence[LinearizedTerm], smoothness: Smoothness, damping: float
 ) -> Float[np.ndarray, "T D"]:
     basis = tangents(state.directions)
-    hessian, gradient = _gather(lines, basis)
+    hessian, gradient = _gather(linearized, basis)
     frames, size = gradient.shape
     weights = np.concatenate([[smoothness.root] * 2, np.repeat(smoothness.bones, 2)])
     bands = second_difference_bands(frames)
@@ -140,22 +143,22 @@ def _step(
 
 
 def _gather(
-    lines: Sequence[Linear], basis: Float[np.ndarray, "T B 3 2"]
+    linearized: Sequence[LinearizedTerm], basis: Float[np.ndarray, "T B 3 2"]
 ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
     """Sum of J'J and J'r of all terms in tangent coordinates."""
     frames, bones = basis.shape[:2]
     hessian = np.zeros((frames, 2 + 2 * bones, 2 + 2 * bones))
     gradient = np.zeros((frames, 2 + 2 * bones))
-    for line in lines:
-        count = line.residual.shape[1]
+    for term in linearized:
+        count = term.residual.shape[1]
         slope = np.zeros((frames, count, 2 + 2 * bones))
-        turned = np.matmul(line.by_direction.swapaxes(1, 2), basis)  # (T, B, m, 2)
+        turned = np.matmul(term.by_direction.swapaxes(1, 2), basis)  # (T, B, m, 2)
         slope[..., 2:] = turned.swapaxes(1, 2).reshape(frames, count, -1)
-        if line.by_root is not None:
-            slope[..., :2] = line.by_root
+        if term.by_root is not None:
+            slope[..., :2] = term.by_root
         across = slope.swapaxes(1, 2)
         hessian += across @ slope
-        gradient += (across @ line.residual[..., None])[..., 0]
+        gradient += (across @ term.residual[..., None])[..., 0]
     return hessian, gradient
 
 

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from keyrecon.body import Skeleton
 from keyrecon.lifting.preprocessing import PreparedTracks
-from keyrecon.lifting.solver import Linear, MotionState, Term
+from keyrecon.lifting.solver import LinearizedTerm, MotionState, Term
 
 
 def reprojection(
@@ -26,7 +26,7 @@ def reprojection(
     for axis in range(2):
         slope[:, axis, :, axis] = reach
 
-    def term(state: MotionState) -> Linear:
+    def term(state: MotionState) -> LinearizedTerm:
         frames = len(target)
         residual = inverse[..., None] * (state.points(lengths, skeleton)[..., :2] - target)
         size = np.linalg.norm(residual, axis=-1)
@@ -36,7 +36,7 @@ def reprojection(
         weight = inverse * shrink
         by_direction = (weight[:, :, None, None, None] * slope).reshape(frames, -1, len(lengths), 3)
         by_root = (weight[..., None, None] * np.eye(2)).reshape(frames, -1, 2)
-        return Linear(
+        return LinearizedTerm(
             (shrink[..., None] * residual).reshape(frames, -1), by_direction, by_root, float(cost)
         )
 
@@ -55,11 +55,13 @@ def breadth(
     ways = skeleton.ancestry * lengths
     difference = ways[left] - ways[right]
 
-    def term(state: MotionState) -> Linear:
+    def term(state: MotionState) -> LinearizedTerm:
         across = np.einsum("b,tbi->ti", difference, state.directions)
         size = np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
         toward = across / size / spread
-        return Linear((size - length) / spread, (toward[:, None, None, :] * difference[:, None]))
+        return LinearizedTerm(
+            (size - length) / spread, (toward[:, None, None, :] * difference[:, None])
+        )
 
     return term
 
@@ -69,9 +71,9 @@ def alignment(share: Float[np.ndarray, "B"], spread: float) -> Term:
     slope = np.zeros((3, len(share), 3))
     slope[np.arange(3), :, np.arange(3)] = share / spread
 
-    def term(state: MotionState) -> Linear:
+    def term(state: MotionState) -> LinearizedTerm:
         residual = np.einsum("b,tbi->ti", share, state.directions) / spread
-        return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
+        return LinearizedTerm(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
 
     return term
 
@@ -82,9 +84,9 @@ def balance(share: Float[np.ndarray, "B"], tilt: float, spread: float) -> Term:
     slope[0, :, 2] = share / spread
     slope[0, :, 1] = -tilt * share / spread
 
-    def term(state: MotionState) -> Linear:
+    def term(state: MotionState) -> LinearizedTerm:
         residual = np.einsum("mbi,tbi->tm", slope, state.directions)
-        return Linear(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
+        return LinearizedTerm(residual, np.broadcast_to(slope, (len(residual), *slope.shape)))
 
     return term
 
@@ -99,13 +101,13 @@ def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Ter
     for bone in range(bones):
         identity[bone, :, bone] = np.eye(3) / spread
 
-    def term(state: MotionState) -> Linear:
+    def term(state: MotionState) -> LinearizedTerm:
         frames = len(directions)
         off = (state.directions - directions) / spread
         size = np.sqrt(1 + (off**2).sum(axis=-1, keepdims=True))
         weight = 1 / np.sqrt(size)
         by_direction = (weight[..., None, None] * identity).reshape(frames, -1, bones, 3)
         cost = float((size - 1).sum())
-        return Linear((weight * off).reshape(frames, -1), by_direction, None, cost)
+        return LinearizedTerm((weight * off).reshape(frames, -1), by_direction, None, cost)
 
     return term

@@ -1,6 +1,6 @@
 """What hides an arm lies before it.
 
-A person marks elbows and wrists that cannot be seen where they must be. Within the outline of the
+A person marks elbows and wrists that are hidden where they must be. Within the outline of the
 trunk it is nearly always the trunk that hides them, so they are behind it: of all that a mark
 tells beside its place, this says most about depth. A joint that is visible there says less, since
 not every tool records visibility.
