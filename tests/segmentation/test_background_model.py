@@ -1,5 +1,6 @@
 import cv2
 import numpy as np
+import pytest
 from drawn_player import HEIGHT, draw_player, scene
 
 from keyrecon.io.video import open_video
@@ -65,3 +66,20 @@ def test_a_leg_that_the_track_lacks_does_not_become_background(tmp_path):
     left = tuple((head[0] + np.array([-stride, HEIGHT])).round().astype(int)[::-1])
     off = background.color[left].astype(int) - to_lab(scene())[left]
     assert not background.known[left] or np.abs(off).max() < 12
+
+
+def test_the_spread_is_the_distance_from_the_lower_quartile_to_the_median_as_a_deviation():
+    lightness = [90, 92, 94, 96, 100, 100, 110, 120, 130]  # lower quartile 94
+    pictures = [np.full((4, 4, 3), value, np.uint8) for value in lightness]
+    free, paths = [np.ones((4, 4), bool)] * 9, np.tile(np.eye(3), (9, 1, 1))
+    background = median_background(pictures, free, paths, 1.0)
+    assert (background.color == 100).all()
+    assert background.spread == pytest.approx(6 / 0.6745)
+
+
+def test_the_spread_of_normal_noise_is_its_deviation():
+    noise = np.random.default_rng(0).normal(120, 6, (400, 20, 20, 1)).repeat(3, axis=3)
+    pictures = list(noise.round().astype(np.uint8))
+    free, paths = [np.ones((20, 20), bool)] * 400, np.tile(np.eye(3), (400, 1, 1))
+    spread = median_background(pictures, free, paths, 1.0).spread
+    assert np.median(spread) == pytest.approx(6, rel=0.05)
