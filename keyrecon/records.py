@@ -135,11 +135,11 @@ class PoseDistances:
     """Frame number of each row, ascending."""
     row: Int[np.ndarray, "T"]
     """Row that stands for each frame."""
-    detour: Float[np.ndarray, "2 T"]
+    exemplar_distance: Float[np.ndarray, "2 T"]
     """C between each frame and the one that stands for it, upper and lower body."""
-    step: Float[np.ndarray, "2 S"]
+    consecutive_distance: Float[np.ndarray, "2 S"]
     """C between each frame and the next, upper and lower body; S is T - 1."""
-    clarity: Float[np.ndarray, "T"]
+    visibility_score: Float[np.ndarray, "T"]
     """0-1: how well a person could annotate each frame (tracked, not blurred)."""
 
 

@@ -146,8 +146,11 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
 
 def _describe_absence(preparation: Preparation) -> list[str]:
     """Stretches in which no keyframes are asked for."""
-    clarity, reach = preparation.pose_distances.clarity, preparation.keyframes.reach
-    stretches = list_stretches(absent_frames(clarity, reach))
+    visibility_score, reach = (
+        preparation.pose_distances.visibility_score,
+        preparation.keyframes.reach,
+    )
+    stretches = list_stretches(absent_frames(visibility_score, reach))
     if not stretches:
         return []
     listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])

@@ -1,7 +1,7 @@
 """Stretches without the player: nothing to annotate, and nothing that keyframes should stand for.
 
-A frame or two in which the player was not found are bridged like any other gap (Eq. 1). A stretch
-longer than that, in which the player has left the picture or is hidden, is taken out before
+A frame or two in which the player was not detected are bridged like any other gap (Eq. 1). A
+stretch longer than that, in which the player has left the picture or is hidden, is taken out before
 keyframes are chosen, as if the video had been cut there, and put back afterwards.
 """
 
@@ -14,11 +14,11 @@ from scipy.ndimage import binary_opening
 from keyrecon.records import HalfKeyframes, PoseDistances
 
 
-def absent_frames(clarity: Float[np.ndarray, "T"], reach: int) -> Bool[np.ndarray, "T"]:
+def absent_frames(visibility_score: Float[np.ndarray, "T"], reach: int) -> Bool[np.ndarray, "T"]:
     """Frames of stretches longer than `reach` in which nothing can be annotated."""
-    if not clarity.any():
-        return np.zeros(len(clarity), dtype=bool)
-    return binary_opening(clarity == 0, np.ones(reach + 1))
+    if not visibility_score.any():
+        return np.zeros(len(visibility_score), dtype=bool)
+    return binary_opening(visibility_score == 0, np.ones(reach + 1))
 
 
 def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
@@ -27,16 +27,18 @@ def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
     return [(int(first), int(end) - 1) for first, end in turns.reshape(-1, 2)]
 
 
-def take_compared(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> PoseDistances:
-    """What is known of some of the frames, numbered anew; at least one of them is kept.
+def select_frames(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> PoseDistances:
+    """The distances of some of the frames, numbered anew; at least one of them is kept.
 
     An exemplar that is not kept is replaced by the frame most like it of those it stands for.
     """
     if len(kept) == len(comparison.row):
         return comparison
     rows, row = np.unique(comparison.row[kept], return_inverse=True)
-    detour = comparison.detour[:, kept]
-    order = np.lexsort((detour.sum(axis=0), kept != comparison.frames[comparison.row[kept]], row))
+    exemplar_distance = comparison.exemplar_distance[:, kept]
+    order = np.lexsort(
+        (exemplar_distance.sum(axis=0), kept != comparison.frames[comparison.row[kept]], row)
+    )
     first = order[np.unique(row[order], return_index=True)[1]]
     square = np.ix_(rows, rows)
     return PoseDistances(
@@ -44,13 +46,13 @@ def take_compared(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> Pose
         lower=comparison.lower[square],
         frames=first,
         row=row,
-        detour=detour,
-        step=comparison.step[:, kept[:-1][np.diff(kept) == 1]],
-        clarity=comparison.clarity[kept],
+        exemplar_distance=exemplar_distance,
+        consecutive_distance=comparison.consecutive_distance[:, kept[:-1][np.diff(kept) == 1]],
+        visibility_score=comparison.visibility_score[kept],
     )
 
 
-def put_back(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int) -> HalfKeyframes:
+def restore_frames(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int) -> HalfKeyframes:
     """Keyframes of the kept frames as keyframes of all `frames`; the others stay unrepresented.
 
     They are given the keyframe of the last frame before them, for want of a better one.

@@ -1,6 +1,6 @@
 """Which keyframe stands for which frame (Section 4.4).
 
-Every frame is assigned to its nearest keyframe by D, so that joints can be carried to it; only
+Every frame is assigned to its nearest keyframe by D, so that joints can be propagated to it; only
 those nearer than beta count as represented (W), and short gaps between these can be bridged by
 interpolation (J).
 """
@@ -16,7 +16,7 @@ from keyrecon.records import PoseDistances
 def find_neighborhoods(
     smoothed: Float[np.ndarray, "M M"],
     comparison: PoseDistances,
-    detour: Float[np.ndarray, "T"],
+    exemplar_distance: Float[np.ndarray, "T"],
     beta: float,
 ) -> Neighborhoods:
     """w(k): frames whose pose lies within beta of each candidate, itself among them.
@@ -26,7 +26,7 @@ def find_neighborhoods(
     near = smoothed < beta
     np.fill_diagonal(near, True)
     n_frames = len(comparison.row)
-    served = np.flatnonzero(detour < beta).astype(np.int32)
+    served = np.flatnonzero(exemplar_distance < beta).astype(np.int32)
     members = np.bincount(comparison.row[served], minlength=len(near))
     first_member = np.cumsum(members) - members
     candidate, row = np.nonzero(near)
@@ -39,7 +39,7 @@ def find_neighborhoods(
 def assign_frames(
     smoothed: Float[np.ndarray, "M M"],
     comparison: PoseDistances,
-    detour: Float[np.ndarray, "T"],
+    exemplar_distance: Float[np.ndarray, "T"],
     keyframes: Int[np.ndarray, "K"],
 ) -> tuple[Int[np.ndarray, "T"], Float[np.ndarray, "T"]]:
     """(nearest keyframe, distance D to it) for every frame.
@@ -49,9 +49,9 @@ def assign_frames(
     to the nearest in time, and a keyframe stands for itself.
     """
     rows = comparison.row[keyframes]
-    apart = np.maximum(smoothed[rows], detour[keyframes][:, None])
+    apart = np.maximum(smoothed[rows], exemplar_distance[keyframes][:, None])
     nearest = keyframes[apart.argmin(axis=0)][comparison.row]
-    distance = np.maximum(apart.min(axis=0)[comparison.row], detour)
+    distance = np.maximum(apart.min(axis=0)[comparison.row], exemplar_distance)
     for row in np.flatnonzero(np.bincount(rows) > 1):
         near, members = keyframes[rows == row], np.flatnonzero(comparison.row == row)
         closest = near[np.abs(members[:, None] - near).argmin(axis=1)]

@@ -1,18 +1,9 @@
-"""Greedy choice of keyframes whose neighbourhoods cover a sequence (Section 4.3, Eq. 1-4).
+"""Greedy choice of keyframes whose neighbourhoods cover a sequence (Section 4.3, Eq. 1).
 
-W, the frames that a set of keyframes represents, cuts time into gaps. Both objectives here are
-sums over the gaps:
-
-- as printed (Eq. 2), the summed distance of every frame to the represented frames before and
-  after it. With a gap from frame l to frame r and virtual represented frames just outside the
-  sequence this is (r - l)^2 per gap, less (r - l) at either end: minimising Eq. 2 is minimising
-  the sum of squared gaps;
-- uncovered frames, those in gaps longer than T or at the ends: what Eq. 1 counts.
-
-So the gain of a candidate is a sum over the gaps that its frames fall in, and all candidates
-are measured by a few array operations. The printed objective is submodular (a gain never grows
-as the set does), hence lazy evaluation (Minoux 1978) finds the very same keyframes as trying
-all candidates each time.
+W, the frames that a set of keyframes represents, cuts time into gaps, and what Eq. 1 counts, the
+uncovered frames in gaps longer than T or at the ends, is a sum over them (as is the printed
+objective, Eq. 2: see `paper/keyframe_choice.py`). So the gain of a candidate is a sum over the
+gaps that its frames fall in, and all candidates are measured by a few array operations.
 """
 
 from collections.abc import Callable
@@ -23,22 +14,9 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.numerics.ragged import ranges
 
-LAZY_BATCH = 64
-"""Candidates that lazy evaluation measures together."""
-
 Gaps = Int[np.ndarray, "P"]
 GapCost = Callable[[Gaps, Gaps], Gaps]
 """Cost of the gaps between represented frames `left` and `right`, -1 and T at the ends."""
-
-
-def printed_cost(n_frames: int) -> GapCost:
-    """Eq. 2 in closed form, up to a constant."""
-
-    def cost(left: Gaps, right: Gaps) -> Gaps:
-        length = right - left
-        return length * (length - (left < 0) - (right == n_frames))
-
-    return cost
 
 
 def uncovered_cost(n_frames: int, reach: int) -> GapCost:
@@ -73,7 +51,7 @@ class Neighborhoods:
         return represented
 
     def without(self, represented: Bool[np.ndarray, "T"]) -> "Neighborhoods":
-        """The same, less frames that need no more attention."""
+        """The same, less frames that are represented already."""
         kept = ~represented[self.frame]
         first = np.concatenate([[0], np.cumsum(kept)])[self.first]
         return Neighborhoods(first, self.frame[kept], self.n_frames)
@@ -123,9 +101,13 @@ def _bounds(
 
 
 def choose_greedily(
-    hoods: Neighborhoods, reach: int, uncovered: int, most: int, tie: Float[np.ndarray, "M"]
+    hoods: Neighborhoods,
+    reach: int,
+    uncovered: int,
+    max_keyframes: int,
+    tie: Float[np.ndarray, "M"],
 ) -> list[int]:
-    """Candidates that each bridge or represent the most further frames, at most `most`.
+    """Candidates that each bridge or represent the most further frames, at most `max_keyframes`.
 
     Stops when at most `uncovered` frames are left. Among equals the one that represents most
     wins, then the one with the largest `tie` (0-1).
@@ -134,7 +116,7 @@ def choose_greedily(
     everyone = np.arange(len(tie))
     chosen: list[int] = []
     represented = np.zeros(hoods.n_frames, dtype=bool)
-    while total_cost(represented, cost) > uncovered and len(chosen) < most:
+    while total_cost(represented, cost) > uncovered and len(chosen) < max_keyframes:
         hoods = hoods.without(represented)
         gain, added = measure_gains(hoods, everyone, represented, cost)
         if not added.any():
@@ -152,40 +134,3 @@ def largest_gain(
     equals = np.flatnonzero(gain == gain.max())
     equals = equals[added[equals] == added[equals].max()]
     return int(equals[tie[equals].argmax()])
-
-
-def choose_as_printed(hoods: Neighborhoods, reach: int, uncovered: int, most: int) -> list[int]:
-    """Eq. 2-4 as printed: the frame that lowers Eq. 2 most, until Eq. 1 holds.
-
-    Lazy: a gain measured earlier bounds the present one from above, so only candidates whose
-    bound could win are measured again. Ties go to the earliest frame.
-    """
-    cost = printed_cost(hoods.n_frames)
-    left_over = uncovered_cost(hoods.n_frames, reach)
-    bound = np.full(len(hoods.first) - 1, np.iinfo(np.int64).max)
-    chosen: list[int] = []
-    represented = np.zeros(hoods.n_frames, dtype=bool)
-    while total_cost(represented, left_over) > uncovered and len(chosen) < most:
-        hoods = hoods.without(represented)
-        best = _lazily_best(hoods, bound, represented, cost)
-        if bound[best] <= 0:
-            break
-        chosen.append(best)
-        represented[hoods.of(best)] = True
-    return chosen
-
-
-def _lazily_best(
-    open_frames: Neighborhoods,
-    bound: Int[np.ndarray, "M"],
-    represented: Bool[np.ndarray, "T"],
-    cost: GapCost,
-) -> int:
-    """The earliest candidate of largest gain; tightens `bound` on the way."""
-    fresh = np.zeros(len(bound), dtype=bool)
-    while not fresh[best := int(bound.argmax())]:
-        stale = np.flatnonzero(~fresh)
-        top = stale[np.argsort(-bound[stale], kind="stable")[:LAZY_BATCH]]
-        bound[top], _ = measure_gains(open_frames, top, represented, cost)
-        fresh[top] = True
-    return best

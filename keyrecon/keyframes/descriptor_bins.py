@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Complex64, Float, Float32, Int
 
-from keyrecon.keyframes.edge_distance import CONE, align_edges
+from keyrecon.keyframes.edge_distance import MAX_DIRECTION_DIFFERENCE, align_edges
 from keyrecon.numerics.ragged import ranges
 from keyrecon.records import Edges, HalfName, Track
 
-STRIP = 512
+BINS_PER_STRIP = 512
 """Cells whose neighbours are found together."""
 
 
@@ -78,7 +78,7 @@ class _BinGrid:
         self, place: Int[np.ndarray, "n"]
     ) -> tuple[Int[np.ndarray, "n D"], Int[np.ndarray, "n D"]]:
         """Runs of places, from and up to, with all that may correspond."""
-        apart = int(np.ceil(CONE * self.directions / (2 * np.pi)))
+        apart = int(np.ceil(MAX_DIRECTION_DIFFERENCE * self.directions / (2 * np.pi)))
         turn = place // self.layer % self.directions
         turned = (turn[:, None] + np.arange(-apart, apart + 1)) % self.directions
         turned = place[:, None] + (turned - turn[:, None]) * self.layer
@@ -126,8 +126,8 @@ def _neighborhoods(
 ) -> tuple[Int[np.ndarray, "G+1"], Int[np.ndarray, "P"]]:
     """Cells of the same colour, within reach and inside the cone, for each cell."""
     counts, neighbors = [np.zeros(1, int)], []
-    for at in range(0, len(used), STRIP):
-        strip = slice(at, at + STRIP)
+    for at in range(0, len(used), BINS_PER_STRIP):
+        strip = slice(at, at + BINS_PER_STRIP)
         # the cells are in order of their places, so that a run of places is a run of cells
         start, stop = (np.searchsorted(used, p) for p in grid.beside(used[strip]))
         room = (stop - start).sum(axis=1)
@@ -136,7 +136,9 @@ def _neighborhoods(
         away = center[column] - center[strip][row]
         close = np.flatnonzero(away.real**2 + away.imag**2 < reach**2)
         row, column = row[close], column[close]
-        aligned = (heading[column] * np.conj(heading[strip])[row]).real > np.cos(CONE)
+        aligned = (heading[column] * np.conj(heading[strip])[row]).real > np.cos(
+            MAX_DIRECTION_DIFFERENCE
+        )
         neighbors.append(column[aligned].astype(np.int32))
         counts.append(np.bincount(row[aligned], minlength=len(room)))
     return np.cumsum(np.concatenate(counts)), np.concatenate(neighbors)

@@ -30,7 +30,7 @@ from keyrecon.keyframes.descriptor_bins import (
     gather_elements,
     group_elements,
 )
-from keyrecon.keyframes.edge_distance import MATCH_REACH
+from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE
 from keyrecon.keyframes.exemplars import choose_exemplars, distance_in_band, measure_band
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
@@ -38,7 +38,7 @@ from keyrecon.records import Edges, HalfName, PoseDistances, Track
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
 
-BLOCK = 16
+FRAMES_PER_BLOCK = 16
 """Frames whose distances are found together: their maps stay in the processor's cache."""
 
 
@@ -46,7 +46,7 @@ BLOCK = 16
 class CompareOptions:
     """How pose distances are measured."""
 
-    reach: float = MATCH_REACH
+    reach: float = MAX_MATCH_DISTANCE
     """Farthest match of two edge elements, player heights; an element without a match counts
     as much. Larger values let wilder poses match."""
     largest: Literal["reach", "observed"] = "reach"
@@ -88,9 +88,9 @@ def compare_frames(
         lower=lower,
         frames=everyone,
         row=everyone,
-        detour=np.zeros((2, len(edges)), dtype=np.float32),
-        step=np.stack([np.diag(upper, 1), np.diag(lower, 1)]),
-        clarity=measure_clarity(edges, track),
+        exemplar_distance=np.zeros((2, len(edges)), dtype=np.float32),
+        consecutive_distance=np.stack([np.diag(upper, 1), np.diag(lower, 1)]),
+        visibility_score=score_visibility(edges, track),
     )
 
 
@@ -112,9 +112,9 @@ def _compare_exemplars(
         lower=lower,
         frames=frames,
         row=row,
-        detour=distance_in_band(band, np.arange(len(edges)), frames[row]),
-        step=band[:, :-1, 0],
-        clarity=measure_clarity(edges, track),
+        exemplar_distance=distance_in_band(band, np.arange(len(edges)), frames[row]),
+        consecutive_distance=band[:, :-1, 0],
+        visibility_score=score_visibility(edges, track),
     )
 
 
@@ -123,7 +123,7 @@ def take_frames(track: Track, frames: Int[np.ndarray, "M"]) -> Track:
     return Track(**{field.name: getattr(track, field.name)[frames] for field in fields(track)})
 
 
-def measure_clarity(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:
+def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:
     """How well each frame could be annotated, 0-1: confidence of the track times sharpness.
 
     Motion blur dissolves contours: a frame with fewer elements than the median is less sharp.
@@ -175,7 +175,7 @@ def _accumulate(
     start = np.searchsorted(elements.frame, np.arange(elements.n_frames + 1))
 
     def measure(first: int) -> None:
-        frames = range(first, min(first + BLOCK, elements.n_frames))
+        frames = range(first, min(first + FRAMES_PER_BLOCK, elements.n_frames))
         part = slice(start[frames.start], start[frames.stop])
         offered = offer_distances(elements, cells, part, frames, reach)
         total[:, frames.start : frames.stop] = members @ offered
@@ -183,7 +183,7 @@ def _accumulate(
             found = (offered < np.float32(reach)).astype(np.float32)
             matched[:, frames.start : frames.stop] = members @ found
 
-    blocks = range(0, elements.n_frames, BLOCK)
+    blocks = range(0, elements.n_frames, FRAMES_PER_BLOCK)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         for _ in progress(pool.map(measure, blocks), "Comparing frames", len(blocks)):
             pass

@@ -9,9 +9,9 @@ share of elements that found a match and B the mean distance of the matches,
 
     C = A B + (1 - A) max B
 
-is a chamfer distance in which no element counts more than max B. `matrix.py` measures the same
-between all frames at once, with rounded positions; this file is its exact twin, and the source
-of the correspondences that carry joints.
+is a chamfer distance in which no element counts more than max B. `distance_matrix.py` measures the
+same between all frames at once, with rounded positions; this file is its exact twin, and the source
+of the correspondences that propagate joints.
 """
 
 from dataclasses import dataclass
@@ -21,23 +21,23 @@ from jaxtyping import Bool, Float, Int
 
 from keyrecon.records import Edges, HalfName, Track
 
-MATCH_REACH = 0.12
+MAX_MATCH_DISTANCE = 0.12
 """Farthest match, player heights: about the width of a thigh, so that a limb never matches
 its neighbour across a gap."""
-CONE = np.pi / 4
+MAX_DIRECTION_DIFFERENCE = np.pi / 4
 """Matched elements differ by less than this in direction (Section 4.1)."""
 
 
 @dataclass(frozen=True)
 class EdgeDistance:
-    """How one frame's edge elements find themselves in another frame."""
+    """How well one frame's edge elements match those of another frame."""
 
     matched: float
     """A: share of elements with a match, 0-1."""
     mean: float
     """B: mean distance of the matches, player heights; NaN without any."""
 
-    def pooled(self, largest: float = MATCH_REACH) -> float:
+    def pooled(self, largest: float = MAX_MATCH_DISTANCE) -> float:
         """C, with `largest` in place of max B."""
         if self.matched == 0:
             return largest
@@ -60,11 +60,11 @@ def align_edges(edges: Edges, track: Track, frame: int, half: HalfName) -> Edges
 def compatible(one: Edges, other: Edges) -> Bool[np.ndarray, "E F"]:
     """Which elements of two frames may correspond: same colour, direction within the cone."""
     same_color = one.color[:, None] == other.color[None]
-    return same_color & (one.tangent @ other.tangent.T > np.cos(CONE))
+    return same_color & (one.tangent @ other.tangent.T > np.cos(MAX_DIRECTION_DIFFERENCE))
 
 
 def match_edges(
-    one: Edges, other: Edges, reach: float = MATCH_REACH
+    one: Edges, other: Edges, reach: float = MAX_MATCH_DISTANCE
 ) -> tuple[Int[np.ndarray, "E"], Float[np.ndarray, "E"]]:
     """For each element of `one` its nearest compatible element of `other` and the distance.
 
@@ -76,14 +76,14 @@ def match_edges(
     apart[~compatible(one, other)] = np.inf
     nearest = apart.argmin(axis=1)
     distance = apart[np.arange(len(nearest)), nearest]
-    found = distance < reach
-    return np.where(found, nearest, -1), np.where(found, distance, np.inf)
+    near = distance < reach
+    return np.where(near, nearest, -1), np.where(near, distance, np.inf)
 
 
-def edge_distance(one: Edges, other: Edges, reach: float = MATCH_REACH) -> EdgeDistance:
+def edge_distance(one: Edges, other: Edges, reach: float = MAX_MATCH_DISTANCE) -> EdgeDistance:
     """A and B of Section 4.2 from aligned elements of `one` to those of `other`."""
     match, distance = match_edges(one, other, reach)
-    found = match >= 0
-    if not found.any():
+    matched = match >= 0
+    if not matched.any():
         return EdgeDistance(0.0, float("nan"))
-    return EdgeDistance(float(found.mean()), float(distance[found].mean()))
+    return EdgeDistance(float(matched.mean()), float(distance[matched].mean()))

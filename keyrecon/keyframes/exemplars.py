@@ -1,6 +1,6 @@
 """Reduce a long video to exemplars that stand for their neighbours in time.
 
-Frames are compared with those at most `LAG` later: a band along the diagonal of the distance
+Frames are compared with those at most `MAX_LAG` later: a band along the diagonal of the distance
 matrix, whose cost grows with the length of the video alone. Time is then cut into segments
 whose frames all lie within a threshold of one frame among them, the exemplar. The smallest
 threshold that leaves no more than the wanted number of exemplars is found by bisection. While
@@ -14,10 +14,10 @@ from jaxtyping import Float32, Int
 
 from keyrecon.progress import Progress, silent
 
-LAG = 64
+MAX_LAG = 64
 """Longest distance in frames between a frame and its exemplar."""
-WINDOW = 448
-"""Frames compared at a time, the next LAG on top."""
+WINDOW_FRAMES = 448
+"""Frames compared at a time, the next MAX_LAG on top."""
 
 
 def measure_band(
@@ -25,17 +25,17 @@ def measure_band(
     n_frames: int,
     progress: Progress = silent,
 ) -> Float32[np.ndarray, "2 T L"]:
-    """Distance of each frame to those 1..LAG later, both halves; infinite beyond the end.
+    """Distance of each frame to those 1..MAX_LAG later, both halves; infinite beyond the end.
 
     `compare` measures all distances within a window of frames.
     """
-    band = np.full((2, n_frames, LAG), np.inf, dtype=np.float32)
-    starts = range(0, n_frames, WINDOW)
+    band = np.full((2, n_frames, MAX_LAG), np.inf, dtype=np.float32)
+    starts = range(0, n_frames, WINDOW_FRAMES)
     for start in progress(starts, "Comparing neighbours", len(starts)):
-        stop = min(n_frames, start + WINDOW + LAG)
+        stop = min(n_frames, start + WINDOW_FRAMES + MAX_LAG)
         square = compare(slice(start, stop))
-        for lag in range(1, min(LAG, stop - start - 1) + 1):
-            diagonal = np.diagonal(square, lag, axis1=1, axis2=2)[:, :WINDOW]
+        for lag in range(1, min(MAX_LAG, stop - start - 1) + 1):
+            diagonal = np.diagonal(square, lag, axis1=1, axis2=2)[:, :WINDOW_FRAMES]
             band[:, start : start + diagonal.shape[1], lag - 1] = diagonal
     return band
 
@@ -43,20 +43,20 @@ def measure_band(
 def distance_in_band(
     band: Float32[np.ndarray, "2 T L"], one: Int[np.ndarray, "T"], other: Int[np.ndarray, "T"]
 ) -> Float32[np.ndarray, "2 T"]:
-    """Distance between frames that lie at most LAG apart."""
+    """Distance between frames that lie at most MAX_LAG apart."""
     early, lag = np.minimum(one, other), np.abs(one - other)
     return np.where(lag > 0, band[:, early, lag - 1], np.float32(0))
 
 
 def choose_exemplars(
-    band: Float32[np.ndarray, "T L"], most: int
+    band: Float32[np.ndarray, "T L"], max_exemplars: int
 ) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "T"]]:
-    """(frame of each exemplar, exemplar that stands for each frame), at most about `most`."""
+    """(frame of each exemplar, exemplar of each frame), at most about `max_exemplars`."""
     levels = np.unique(np.concatenate([[0], band[np.isfinite(band)]]))
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high) // 2
-        if len(_segment(band, levels[middle])[0]) <= most:
+        if len(_segment(band, levels[middle])[0]) <= max_exemplars:
             high = middle
         else:
             low = middle + 1

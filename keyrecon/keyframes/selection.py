@@ -19,28 +19,29 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.keyframes.absence import absent_frames, put_back, take_compared
+from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
-from keyrecon.keyframes.coverage import choose_as_printed, choose_greedily
+from keyrecon.keyframes.coverage import choose_greedily
 from keyrecon.keyframes.smoothing import smooth_distances
 from keyrecon.keyframes.swaps import (
     CoverageGoal,
-    add_closest,
+    add_medoids,
     drop_redundant,
-    shrink,
-    swap_for_closeness,
+    shrink_by_swaps,
     swap_for_coverage,
+    swap_medoids,
 )
+from keyrecon.paper.keyframe_choice import choose_as_printed
 from keyrecon.progress import Progress, silent
 from keyrecon.records import HalfKeyframes, Keyframes, PoseDistances
 
 BETA_PRECISION = 0.01
 """Beta is searched to one part in a hundred: less than one keyframe in a hundred."""
-LEAST_BETA = 1e-4
-"""Beta is not made smaller, player heights: contours are never found to a tenth of a pixel."""
-BETA_STEP = 0.96
-"""Factor on beta from one attempt of the exchange search to the next."""
-EXCHANGES = 100_000
+MIN_BETA = 1e-4
+"""Beta is not made smaller, player heights: contours are never exact to a tenth of a pixel."""
+BETA_FACTOR = 0.96
+"""Factor on beta from one attempt of the swap search to the next."""
+MAX_SWAP_SIZE = 100_000
 """Keyframes times candidates up to which keyframes are reconsidered one by one: 50 keyframes of
 a 2000-frame video. Larger choices stay as the greedy choice has them, for the sake of time."""
 
@@ -58,7 +59,7 @@ class KeyframeOptions:
     get as much time."""
     beta_upper: float | None = None
     """Pose distance up to which a keyframe represents a frame, upper body, player heights; None
-    finds the smallest that the budget allows. With a value the budget is not looked at."""
+    finds the smallest that the budget allows. With a value the budget does not count."""
     beta_lower: float | None = None
     """The same for the lower body."""
     smoothing: float = 0.6
@@ -80,7 +81,7 @@ class HalfDistances:
     """D of method='coverage'."""
     first_beta: float
     """Where the search for beta starts: frames as alike as neighbours in time."""
-    detour: Float[np.ndarray, "T"]
+    exemplar_distance: Float[np.ndarray, "T"]
     reach: int
     uncovered: int
     options: KeyframeOptions
@@ -93,9 +94,11 @@ class HalfDistances:
 
     def goal(self, beta: float) -> CoverageGoal:
         """What keyframes with `beta` represent, and have to."""
-        hoods = find_neighborhoods(self.distances(beta), self.pose_distances, self.detour, beta)
-        clarity = self.pose_distances.clarity[self.pose_distances.frames]
-        return CoverageGoal(hoods, self.reach, self.uncovered, clarity)
+        hoods = find_neighborhoods(
+            self.distances(beta), self.pose_distances, self.exemplar_distance, beta
+        )
+        visibility_score = self.pose_distances.visibility_score[self.pose_distances.frames]
+        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score)
 
 
 def count_labels(options: KeyframeOptions, n_frames: int) -> int:
@@ -137,16 +140,16 @@ def choose_keyframes(
     frames = len(comparison.row)
     labels = count_labels(options, frames)
     reach = max(1, round(options.reach * fps / 50))
-    kept = np.flatnonzero(~absent_frames(comparison.clarity, reach))
-    comparison = take_compared(comparison, kept)
+    kept = np.flatnonzero(~absent_frames(comparison.visibility_score, reach))
+    comparison = select_frames(comparison, kept)
     halves = []
     wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
-    for index, (name, (most, beta)) in enumerate(zip(names, wanted, strict=True)):
+    for index, (name, (max_keyframes, beta)) in enumerate(zip(names, wanted, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, reach, options)
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
-        halves.append(_choose_half(half, most, beta, also))
-    halves = [put_back(half, kept, frames) for half in halves]
+        halves.append(_choose_half(half, max_keyframes, beta, also))
+    halves = [restore_frames(half, kept, frames) for half in halves]
     return Keyframes(*halves, reach=reach, alpha=options.coverage)
 
 
@@ -157,14 +160,14 @@ def _half(
     reach: int,
     options: KeyframeOptions,
 ) -> HalfDistances:
-    step = comparison.step[index]
+    step = comparison.consecutive_distance[index]
     same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
     return HalfDistances(
         pose_distances=comparison,
         matched=matched,
         smoothed=smooth_distances(matched, same_pose, options.form),
-        first_beta=max(same_pose, LEAST_BETA),
-        detour=comparison.detour[index],
+        first_beta=max(same_pose, MIN_BETA),
+        exemplar_distance=comparison.exemplar_distance[index],
         reach=reach,
         uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
         options=options,
@@ -172,97 +175,107 @@ def _half(
 
 
 def _choose_half(
-    half: HalfDistances, most: int, beta: float | None, also: Int[np.ndarray, "K"]
+    half: HalfDistances, max_keyframes: int, beta: float | None, also: Int[np.ndarray, "K"]
 ) -> HalfKeyframes:
     """Keyframes of one half; `also` are frames that are annotated for the other half anyway."""
     searched = beta is None
     if beta is None:
-        beta, chosen = _smallest_beta(half, most)
+        beta, chosen = _smallest_beta(half, max_keyframes)
     else:
         goal = half.goal(beta)
-        chosen = _choose(half, goal, len(goal.clarity))
-        if half.options.method == "coverage" and len(chosen) * len(half.matched) <= EXCHANGES:
-            chosen = shrink(goal, chosen)
+        chosen = _choose(half, goal, len(goal.visibility_score))
+        if half.options.method == "coverage" and len(chosen) * len(half.matched) <= MAX_SWAP_SIZE:
+            chosen = shrink_by_swaps(goal, chosen)
     goal = half.goal(beta)
     if half.options.method == "coverage":
-        chosen = _center(half, goal, chosen, most if searched else 0, also)
+        chosen = _move_to_medoids(half, goal, chosen, max_keyframes if searched else 0, also)
     return _record(half, goal, beta, half.pose_distances.frames[np.sort(chosen)])
 
 
-def _choose(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
-    """Keyframes by the selected method, at most `most`; the goal may be left unreached."""
+def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list[int]:
+    """Keyframes by the selected method, at most `max_keyframes`; the goal may be left unreached."""
     if half.options.method == "paper":
-        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, most)
+        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, max_keyframes)
     # What the greedy choice takes too many can often be dropped again.
     chosen = choose_greedily(
-        goal.hoods, goal.reach, goal.uncovered, most + most // 5 + 1, goal.clarity
+        goal.hoods,
+        goal.reach,
+        goal.uncovered,
+        max_keyframes + max_keyframes // 5 + 1,
+        goal.visibility_score,
     )
-    return drop_redundant(goal, chosen)[:most]
+    return drop_redundant(goal, chosen)[:max_keyframes]
 
 
-def _smallest_beta(half: HalfDistances, most: int) -> tuple[float, list[int]]:
-    """The smallest beta with which `most` keyframes reach the coverage, and such keyframes."""
+def _smallest_beta(half: HalfDistances, max_keyframes: int) -> tuple[float, list[int]]:
+    """The smallest beta with which so many keyframes reach the coverage, and such keyframes."""
     low, high = 0.0, half.first_beta
-    chosen = _choose(half, half.goal(high), most)
+    chosen = _choose(half, half.goal(high), max_keyframes)
     while not half.goal(high).reached(chosen):
         low, high = high, 1.5 * high
-        chosen = _choose(half, half.goal(high), most)
-    while high - low > max(BETA_PRECISION * high, LEAST_BETA):
+        chosen = _choose(half, half.goal(high), max_keyframes)
+    while high - low > max(BETA_PRECISION * high, MIN_BETA):
         middle = (low + high) / 2
         goal = half.goal(middle)
-        found = _choose(half, goal, most)
-        if goal.reached(found):
-            high, chosen = middle, found
+        fewer = _choose(half, goal, max_keyframes)
+        if goal.reached(fewer):
+            high, chosen = middle, fewer
         else:
             low = middle
-    if half.options.method == "paper" or most * len(half.matched) > EXCHANGES:
+    if half.options.method == "paper" or max_keyframes * len(half.matched) > MAX_SWAP_SIZE:
         return high, chosen
-    return _lower_beta(half, most, high, chosen)
+    return _lower_beta(half, max_keyframes, high, chosen)
 
 
 def _lower_beta(
-    half: HalfDistances, most: int, beta: float, chosen: list[int]
+    half: HalfDistances, max_keyframes: int, beta: float, chosen: list[int]
 ) -> tuple[float, list[int]]:
-    """Exchange keyframes to do with a smaller beta still."""
-    while beta * BETA_STEP > LEAST_BETA:
-        goal = half.goal(beta * BETA_STEP)
-        start = choose_greedily(goal.hoods, goal.reach, goal.uncovered, most, goal.clarity)
-        found = swap_for_coverage(goal, start)
-        if not goal.reached(found):
+    """Swap keyframes to do with a smaller beta still."""
+    while beta * BETA_FACTOR > MIN_BETA:
+        goal = half.goal(beta * BETA_FACTOR)
+        start = choose_greedily(
+            goal.hoods, goal.reach, goal.uncovered, max_keyframes, goal.visibility_score
+        )
+        swapped = swap_for_coverage(goal, start)
+        if not goal.reached(swapped):
             break
-        beta, chosen = beta * BETA_STEP, found
+        beta, chosen = beta * BETA_FACTOR, swapped
     return beta, chosen
 
 
-def _center(
+def _move_to_medoids(
     half: HalfDistances,
     goal: CoverageGoal,
     chosen: list[int],
-    most: int,
+    max_keyframes: int,
     also: Int[np.ndarray, "K"],
 ) -> list[int]:
     """Move keyframes to the middle of what they represent, away from unclear frames.
 
-    What the budget still allows is spent on keyframes that lessen the distance most. A frame
+    What the budget still allows is spent on keyframes that reduce the distance furthest. A frame
     that is annotated for the other half anyway costs the person one frame less to look at,
     which is worth half a percent of the distance.
     """
-    unclear = 2 - goal.clarity - 0.005 * np.isin(half.pose_distances.frames, also)
-    members = np.bincount(half.pose_distances.row, minlength=len(goal.clarity))
+    unclear = 2 - goal.visibility_score - 0.005 * np.isin(half.pose_distances.frames, also)
+    members = np.bincount(half.pose_distances.row, minlength=len(goal.visibility_score))
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
     weight = members.astype(distance.dtype)
-    chosen = add_closest(chosen, most, distance, weight)
-    if len(chosen) * len(half.matched) > EXCHANGES:
+    chosen = add_medoids(chosen, max_keyframes, distance, weight)
+    if len(chosen) * len(half.matched) > MAX_SWAP_SIZE:
         return chosen
-    return swap_for_closeness(goal, chosen, distance, weight)
+    return swap_medoids(goal, chosen, distance, weight)
 
 
 def _record(
     half: HalfDistances, goal: CoverageGoal, beta: float, keyframes: Int[np.ndarray, "K"]
 ) -> HalfKeyframes:
-    comparison, detour = half.pose_distances, half.detour
-    nearest, distance = assign_frames(half.distances(beta), comparison, detour, keyframes)
-    represented = represent_frames(goal.hoods, comparison, detour[keyframes] < beta, keyframes)
+    comparison, exemplar_distance = half.pose_distances, half.exemplar_distance
+    nearest, distance = assign_frames(
+        half.distances(beta), comparison, exemplar_distance, keyframes
+    )
+    represented = represent_frames(
+        goal.hoods, comparison, exemplar_distance[keyframes] < beta, keyframes
+    )
     printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
     return HalfKeyframes(
         frames=keyframes,
@@ -287,16 +300,16 @@ def adopt_keyframes(
     Frames that nobody asked for count like the others, also where the player seemed to be absent.
     Beta stays, so that coverage tells what the missing ones cost or more ones bring.
     """
-    away = absent_frames(comparison.clarity, asked.reach)
+    away = absent_frames(comparison.visibility_score, asked.reach)
     away[np.concatenate(annotated)] = False
     kept, everyone = np.flatnonzero(~away), len(comparison.row)
-    comparison = take_compared(comparison, kept)
+    comparison = select_frames(comparison, kept)
     halves = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
     for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
         beta = getattr(asked, name).beta
         chosen = np.searchsorted(kept, np.unique(frames))
-        found = _record(half, half.goal(beta), beta, chosen)
-        halves.append(put_back(found, kept, everyone))
+        adopted = _record(half, half.goal(beta), beta, chosen)
+        halves.append(restore_frames(adopted, kept, everyone))
     return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)

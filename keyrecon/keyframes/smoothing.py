@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse import csr_matrix
 
-DENSE = 0.1
+MIN_DENSE_SHARE = 0.1
 """Share of neighbours above which a dense product is faster than a sparse one."""
 
 
@@ -36,7 +36,7 @@ def _averaging(
     near = matched < beta
     np.fill_diagonal(near, True)
     share = 1 / near.sum(axis=1, keepdims=True).astype(matched.dtype)
-    if near.mean() > DENSE:
+    if near.mean() > MIN_DENSE_SHARE:
         return near * share
     row, column = np.nonzero(near)
     return csr_matrix((share[row, 0], (row, column)), shape=near.shape)

@@ -1,10 +1,11 @@
-"""Make a choice of keyframes better by exchanging them one at a time.
+"""Make a choice of keyframes better by swapping them one at a time, as k-medoids does.
 
 A greedy choice is never reconsidered. Three moves repair that: drop a keyframe whose frames the
 others cover; replace one by the candidate that leaves fewest frames uncovered, so that fewer
 keyframes (or a smaller beta) suffice; and, with the coverage held, replace one by the candidate
-that brings all frames nearest to their keyframes, as in k-medoids: keyframes move from the edge
-of the poses they stand for to their middle, and away from blurred frames.
+that brings all frames nearest to their keyframes: keyframes move from the edge of the poses they
+stand for to their middle, and away from blurred frames. The last is the swap phase of k-medoids
+(Kaufman and Rousseeuw, "Finding Groups in Data", 1990), `add_medoids` its build phase.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from keyrecon.keyframes.coverage import (
     uncovered_cost,
 )
 
-ROUNDS = 8
+MAX_ROUNDS = 8
 """Times all keyframes are reconsidered at most; two or three usually change nothing more."""
 
 
@@ -33,7 +34,7 @@ class CoverageGoal:
     """T of the paper, frames."""
     uncovered: int
     """Frames that may be left uncovered: (1 - alpha) of all."""
-    clarity: Float[np.ndarray, "M"]
+    visibility_score: Float[np.ndarray, "M"]
     """0-1: how well each candidate could be annotated."""
 
     def left_over(self, represented: Bool[np.ndarray, "T"]) -> int:
@@ -49,7 +50,10 @@ class CoverageGoal:
         represented = self.hoods.union(others)
         cost = uncovered_cost(self.hoods.n_frames, self.reach)
         gain, added = measure_gains(
-            self.hoods.without(represented), np.arange(len(self.clarity)), represented, cost
+            self.hoods.without(represented),
+            np.arange(len(self.visibility_score)),
+            represented,
+            cost,
         )
         return total_cost(represented, cost) - gain, added
 
@@ -67,13 +71,13 @@ def swap_for_coverage(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     """As many keyframes that leave fewer frames uncovered; stops when the goal is reached."""
     chosen = list(chosen)
     left = goal.left_over(goal.hoods.union(chosen))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = left
         for place in range(len(chosen)):
             if left <= goal.uncovered:
                 return chosen
             left_with, added = goal.replacements(chosen[:place] + chosen[place + 1 :])
-            best = largest_gain(-left_with, added, goal.clarity)
+            best = largest_gain(-left_with, added, goal.visibility_score)
             if left_with[best] < left:
                 chosen[place], left = best, int(left_with[best])
         if left == before:
@@ -81,8 +85,8 @@ def swap_for_coverage(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     return chosen
 
 
-def shrink(goal: CoverageGoal, chosen: list[int]) -> list[int]:
-    """Fewer keyframes by dropping one and exchanging the others, as long as that succeeds."""
+def shrink_by_swaps(goal: CoverageGoal, chosen: list[int]) -> list[int]:
+    """Fewer keyframes by dropping one and swapping the others, as long as that succeeds."""
     while len(chosen) > 1:
         others = [chosen[:place] + chosen[place + 1 :] for place in range(len(chosen))]
         least = min(others, key=lambda kept: goal.left_over(goal.hoods.union(kept)))
@@ -93,15 +97,15 @@ def shrink(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     return chosen
 
 
-def add_closest(
+def add_medoids(
     chosen: list[int],
-    most: int,
+    max_keyframes: int,
     distance: Float[np.ndarray, "M M"],
     weight: Float[np.ndarray, "M"],
 ) -> list[int]:
-    """`most` keyframes: each further one brings frames nearest to their keyframes."""
+    """`max_keyframes` keyframes: each further one brings frames nearest to their keyframes."""
     chosen = list(chosen)
-    while len(chosen) < min(most, len(weight)):
+    while len(chosen) < min(max_keyframes, len(weight)):
         nearest = distance[chosen].min(axis=0, initial=np.inf)
         total = np.minimum(distance, nearest) @ weight
         total[chosen] = np.inf
@@ -109,7 +113,7 @@ def add_closest(
     return chosen
 
 
-def swap_for_closeness(
+def swap_medoids(
     goal: CoverageGoal,
     chosen: list[int],
     distance: Float[np.ndarray, "M M"],
@@ -121,7 +125,7 @@ def swap_for_closeness(
     row i stands for.
     """
     chosen = list(chosen)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         changed = False
         for place, present in enumerate(chosen):
             others = chosen[:place] + chosen[place + 1 :]

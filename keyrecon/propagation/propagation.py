@@ -226,9 +226,9 @@ def distances_to(
 ) -> Float[np.ndarray, "T K"]:
     """Pose distance of every frame to a few, player heights; by way of their exemplars."""
     table = distances.upper if name == "upper" else distances.lower
-    detour = distances.detour[0 if name == "upper" else 1]
+    exemplar_distance = distances.exemplar_distance[0 if name == "upper" else 1]
     result = table[distances.row[:, None], distances.row[frames]]
-    result = result + detour[:, None] + detour[frames]
+    result = result + exemplar_distance[:, None] + exemplar_distance[frames]
     result[frames, np.arange(len(frames))] = 0
     return result
 

@@ -44,11 +44,11 @@ def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
 
 
 def test_a_player_missed_for_a_moment_is_not_away():
-    clarity = np.ones(100)
-    clarity[40:50] = 0
-    assert not absent_frames(clarity, reach=10).any()
-    clarity[50] = 0
-    assert list_stretches(absent_frames(clarity, reach=10)) == [(40, 50)]
+    visibility_score = np.ones(100)
+    visibility_score[40:50] = 0
+    assert not absent_frames(visibility_score, reach=10).any()
+    visibility_score[50] = 0
+    assert list_stretches(absent_frames(visibility_score, reach=10)) == [(40, 50)]
 
 
 def test_stretches_at_either_end_are_listed_whole():
@@ -67,8 +67,8 @@ def test_what_a_person_marked_counts_wherever_it_is(poses):
 
 def test_a_comparison_of_present_frames_alone_is_left_as_it_is(poses):
     one, other = (
-        choose_keyframes(comparison_of(*poses, clarity), 50.0, SPARSE).upper
-        for clarity in (None, np.full(400, 0.5))
+        choose_keyframes(comparison_of(*poses, visibility_score), 50.0, SPARSE).upper
+        for visibility_score in (None, np.full(400, 0.5))
     )
     for field in fields(HalfKeyframes):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))

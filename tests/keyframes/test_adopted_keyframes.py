@@ -21,12 +21,12 @@ def chosen(comparison):
 
 
 def every_second_frame_is_an_exemplar(poses):
-    """A comparison in which each frame stands for itself and the next, and the detour between."""
+    """A comparison in which each frame stands for itself and the next, and the distance between."""
     comparison = comparison_of(poses[::2], row=np.repeat(np.arange(len(poses) // 2), 2))
     step = np.linalg.norm(poses[1::2] - poses[::2], axis=1)
-    detour = np.zeros((2, len(poses)), dtype=np.float32)
-    detour[:, 1::2] = step
-    return replace(comparison, detour=detour)
+    exemplar_distance = np.zeros((2, len(poses)), dtype=np.float32)
+    exemplar_distance[:, 1::2] = step
+    return replace(comparison, exemplar_distance=exemplar_distance)
 
 
 def test_adopting_the_choice_gives_the_choice_back(comparison, chosen):
@@ -72,4 +72,4 @@ def test_a_keyframe_is_no_distance_from_itself_even_where_an_exemplar_stands_for
     comparison = every_second_frame_is_an_exemplar(sporting_poses(100, seed=5))
     apart = distances_to(comparison, "upper", np.array([31, 60]))
     assert apart[31, 0] == apart[60, 1] == 0
-    assert (np.delete(apart[:, 0], 31) >= comparison.detour[0, 31]).all()
+    assert (np.delete(apart[:, 0], 31) >= comparison.exemplar_distance[0, 31]).all()

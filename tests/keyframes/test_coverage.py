@@ -3,13 +3,12 @@ import pytest
 
 from keyrecon.keyframes.coverage import (
     Neighborhoods,
-    choose_as_printed,
     choose_greedily,
     measure_gains,
-    printed_cost,
     total_cost,
     uncovered_cost,
 )
+from keyrecon.paper.keyframe_choice import choose_as_printed, printed_cost
 
 
 def hoods_from(near):
@@ -118,5 +117,5 @@ def test_choosing_for_coverage_takes_no_more_keyframes_than_the_printed_choice()
 
 def test_among_equal_candidates_the_clearer_frame_is_chosen():
     near = np.ones((5, 5), dtype=bool)
-    clarity = np.array([0.1, 0.4, 0.2, 0.9, 0.3])
-    assert choose_greedily(hoods_from(near), 3, 0, 5, clarity) == [3]
+    visibility_score = np.array([0.1, 0.4, 0.2, 0.9, 0.3])
+    assert choose_greedily(hoods_from(near), 3, 0, 5, visibility_score) == [3]

@@ -7,7 +7,7 @@ from stick_figure import moving_figure
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames, measure_matrix
 from keyrecon.keyframes.edge_distance import align_edges, edge_distance
-from keyrecon.keyframes.exemplars import LAG, choose_exemplars, measure_band
+from keyrecon.keyframes.exemplars import MAX_LAG, choose_exemplars, measure_band
 from keyrecon.records import Edges
 
 
@@ -83,7 +83,7 @@ def test_distances_are_symmetric_bounded_and_zero_to_themselves(clip):
         assert (np.diag(matrix) == 0).all()
         assert matrix.min() >= 0
         assert matrix.max() <= np.float32(0.12)
-    assert np.array_equal(comparison.step[0], np.diag(comparison.upper, 1))
+    assert np.array_equal(comparison.consecutive_distance[0], np.diag(comparison.upper, 1))
 
 
 def test_a_frame_without_edges_is_as_far_as_can_be_from_all_others(some_frames):
@@ -94,7 +94,7 @@ def test_a_frame_without_edges_is_as_far_as_can_be_from_all_others(some_frames):
     comparison = compare_frames((*edges[:5], nothing, *edges[6:]), track)
     others = np.delete(comparison.upper[5], 5)
     assert np.allclose(others, 0.12)
-    assert comparison.clarity[5] == 0
+    assert comparison.visibility_score[5] == 0
 
 
 def test_a_video_without_edges_says_what_would_help(some_frames):
@@ -108,16 +108,16 @@ def test_frames_of_no_confidence_are_not_clear(some_frames):
     edges, track = some_frames
     confidence = np.ones(len(edges))
     confidence[3] = 0
-    clarity = compare_frames(edges, replace(track, confidence=confidence)).clarity
-    assert clarity[3] == 0
-    assert clarity[4] > 0.5
+    visibility_score = compare_frames(edges, replace(track, confidence=confidence)).visibility_score
+    assert visibility_score[3] == 0
+    assert visibility_score[4] > 0.5
 
 
 def test_the_band_holds_the_matrix_along_its_diagonal():
     rng = np.random.default_rng(0)
     full = rng.random((2, 700, 700)).astype(np.float32)
     band = measure_band(lambda window: full[:, window, window], 700)
-    assert band.shape == (2, 700, LAG)
+    assert band.shape == (2, 700, MAX_LAG)
     for frame, lag in ((0, 1), (447, 1), (448, 64), (635, 64), (450, 30)):
         assert np.array_equal(band[:, frame, lag - 1], full[:, frame, frame + lag])
     assert np.isinf(band[:, 690, 9:]).all()
@@ -146,4 +146,4 @@ def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(clip):
     for half in ("upper", "lower"):
         direct, by_exemplars = getattr(full, half), getattr(short, half)[spread]
         assert np.corrcoef(direct.ravel(), by_exemplars.ravel())[0, 1] > 0.97
-    assert np.allclose(short.step, full.step, atol=2e-3)
+    assert np.allclose(short.consecutive_distance, full.consecutive_distance, atol=2e-3)

@@ -100,14 +100,14 @@ def test_the_longest_gap_is_a_time_not_a_number_of_frames(comparison):
 
 def test_unclear_frames_are_left_to_clear_ones_as_good():
     poses = sporting_poses(300, seed=3)
-    clarity = np.ones(300)
-    clarity[::2] = 0.2
-    chosen = choose_keyframes(comparison_of(poses, clarity=clarity), 50.0)
-    assert (clarity[chosen.frames] == 1).mean() > 0.7
+    visibility_score = np.ones(300)
+    visibility_score[::2] = 0.2
+    chosen = choose_keyframes(comparison_of(poses, visibility_score=visibility_score), 50.0)
+    assert (visibility_score[chosen.frames] == 1).mean() > 0.7
 
 
 def test_exchanging_keyframes_never_covers_less(comparison):
-    hoods = find_neighborhoods(comparison.upper, comparison, comparison.detour[0], 0.01)
+    hoods = find_neighborhoods(comparison.upper, comparison, comparison.exemplar_distance[0], 0.01)
     goal = CoverageGoal(hoods, 10, 0, np.ones(400))
     start = [0, 100, 200, 300]
     better = swap_for_coverage(goal, start)
@@ -162,7 +162,13 @@ def test_a_damaged_keyframes_json_says_what_is_wrong(comparison):
 
 def test_inputs_are_left_as_they_were(comparison):
     frozen = replace(comparison, upper=comparison.upper.copy())
-    for array in (frozen.upper, frozen.lower, frozen.step, frozen.clarity, frozen.row):
+    for array in (
+        frozen.upper,
+        frozen.lower,
+        frozen.consecutive_distance,
+        frozen.visibility_score,
+        frozen.row,
+    ):
         array.setflags(write=False)
     choose_keyframes(frozen, 50.0)
 

@@ -61,10 +61,10 @@ def compare(points2d):
     flat = (points2d - points2d[:, 12:13]).reshape(len(points2d), -1) / SCALE
     distances = np.linalg.norm(flat[:, None] - flat[None], axis=2).astype(np.float32) / 10
     everything = np.arange(len(flat))
-    detour = np.zeros((2, len(flat)))
+    exemplar_distance = np.zeros((2, len(flat)))
     step = np.stack([distances[everything[:-1], everything[1:]]] * 2).astype(float)
     return PoseDistances(
-        distances, distances, everything, everything, detour, step, np.ones(len(flat))
+        distances, distances, everything, everything, exemplar_distance, step, np.ones(len(flat))
     )
 
 

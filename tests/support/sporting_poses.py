@@ -6,7 +6,7 @@ from scipy.ndimage import uniform_filter1d
 from keyrecon.records import PoseDistances
 
 
-def comparison_of(upper, lower=None, clarity=None, row=None):
+def comparison_of(upper, lower=None, visibility_score=None, row=None):
     """A comparison from poses (M, dimensions), all frames compared unless `row` tells."""
     lower = upper if lower is None else lower
     matrices = [
@@ -20,9 +20,9 @@ def comparison_of(upper, lower=None, clarity=None, row=None):
         lower=matrices[1],
         frames=np.flatnonzero(np.diff(row, prepend=-1)),
         row=row,
-        detour=np.zeros((2, len(row)), dtype=np.float32),
-        step=np.stack(step),
-        clarity=np.ones(len(row)) if clarity is None else clarity,
+        exemplar_distance=np.zeros((2, len(row)), dtype=np.float32),
+        consecutive_distance=np.stack(step),
+        visibility_score=np.ones(len(row)) if visibility_score is None else visibility_score,
     )
 
 

@@ -157,7 +157,9 @@ def suggest_frames(
     """
     halves = [_measure_half(distances, motion, annotations, half) for half in HALVES]
     totals = [half.total for half in halves]
-    open_rows = distances.clarity[distances.frames] * ~np.isin(distances.frames, list(taken))
+    open_rows = distances.visibility_score[distances.frames] * ~np.isin(
+        distances.frames, list(taken)
+    )
     suggestions: list[Suggestion] = []
     while len(suggestions) < count:
         gains = [

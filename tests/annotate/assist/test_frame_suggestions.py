@@ -96,9 +96,9 @@ def test_taken_frames_are_never_suggested_and_none_twice(comparison):
 
 
 def test_unclear_frames_are_not_suggested_while_clear_ones_do_as_well(comparison):
-    clarity = np.ones(COUNT)
-    clarity[::2] = 0.3
-    blurred = replace(comparison, clarity=clarity)
+    visibility_score = np.ones(COUNT)
+    visibility_score[::2] = 0.3
+    blurred = replace(comparison, visibility_score=visibility_score)
     found = suggest_frames(blurred, result(np.full((COUNT, 14), 0.5)), annotated([3]))
     assert all(s.frame % 2 for s in found)
 
