@@ -83,7 +83,7 @@ class Colors:
 
     names: tuple[str, ...]
     """The parts picked: 'head', 'foot' and the regions. Labels and edges count in this order."""
-    seen: Float[np.ndarray, "C bins"]
+    histograms: Float[np.ndarray, "C bins"]
     """Share of each part's pixels in each colour bin (see `keyrecon.segmentation.color_model`)."""
     surroundings: Float[np.ndarray, "bins"]
     """Share of the pixels around the player in each colour bin."""

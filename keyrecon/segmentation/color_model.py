@@ -30,21 +30,21 @@ if TYPE_CHECKING:
 
 BINS = (16, 32, 32)
 """Of L, a and b: chroma tells skin from clay, lightness varies with folds and shade."""
-SMOOTHING = (0.8, 0.8, 0.8)
+HISTOGRAM_SPREAD = (0.8, 0.8, 0.8)
 """Standard deviation that spreads a sample over neighbouring bins, bins."""
-GROWTH = (22, 9, 9)
+MAX_COLOR_DIFFERENCE = (22, 9, 9)
 """How far L, a and b may lie from the click's colour, of 255: shading within one material."""
 PATCH_RADIUS = {"head": 0.05, "foot": 0.06}
-"""How far a click speaks, player heights: half a head, half a shoe."""
-OTHER_RADIUS = 0.08
+"""How far around a click a part goes, player heights: half a head, half a shoe."""
+REGION_RADIUS = 0.08
 """The same for regions of clothing and skin, player heights."""
-CORE = 0.45
+HEAD_CORE = 0.45
 """Share of a head's radius within which everything is head: hair beside skin."""
-NEVER_SEEN = 1e-5
-"""Density below which a colour counts as seen nowhere, and belongs to nobody."""
-EXPLAINED = 0.4
+MIN_DENSITY = 1e-5
+"""Density below which a colour counts as observed nowhere, and belongs to nobody."""
+MAX_SHARED_WITH_PARTS = 0.4
 """Share of the head's colours found in other parts that makes it no colour of its own."""
-ALIKE = 0.35
+MAX_COMMON_SHARE = 0.35
 """Two parts with this share of their colours in common cannot be told apart pixel by pixel."""
 SURROUNDINGS_RADIUS = 0.75
 """Nothing of the player lies farther sideways from the head-feet axis, player heights."""
@@ -72,7 +72,7 @@ def learn_colors(
     _check_picks(video, picks)
     height = picked_height(picks)
     names = tuple(dict.fromkeys(("head", "foot", *sorted({p.part for p in picks}))))
-    seen = np.zeros((len(names), *BINS))
+    counts = np.zeros((len(names), *BINS))
     around = np.zeros(BINS)
     for frame in progress(sorted({p.frame for p in picks}), "Learning colours"):
         lab = to_lab(video.frame(frame))
@@ -80,7 +80,7 @@ def learn_colors(
         here = [p for p in picks if p.frame == frame]
         for pick in here:
             patch = grow_patch(lab, pick, height)
-            seen[names.index(pick.part)] += _count(bins[patch])
+            counts[names.index(pick.part)] += _count(bins[patch])
         around += _count(bins[_outside(lab.shape[:2], here, height)])
     if not around.any():
         raise KeyreconError(
@@ -89,7 +89,7 @@ def learn_colors(
         )
     return Colors(
         names=names,
-        seen=np.stack([_smooth(s) for s in seen]).astype(np.float32),
+        histograms=np.stack([_smooth(count) for count in counts]).astype(np.float32),
         surroundings=(_smooth(around) * options.surroundings).astype(np.float32),
         height=height,
     )
@@ -144,7 +144,7 @@ def color_bins(lab: UInt8[np.ndarray, "*n 3"]) -> UInt16[np.ndarray, "*n"]:
 
 def posterior_tables(colors: Colors) -> Float[np.ndarray, "C bins"]:
     """Probability of each part rather than the surroundings, by colour bin."""
-    return colors.seen / (colors.seen + colors.surroundings + NEVER_SEEN)
+    return colors.histograms / (colors.histograms + colors.surroundings + MIN_DENSITY)
 
 
 def distinct_parts(colors: Colors) -> dict[int, list[int]]:
@@ -156,14 +156,15 @@ def distinct_parts(colors: Colors) -> dict[int, list[int]]:
     """
     head = colors.names.index("head")
     others = [c for c in range(len(colors.names)) if c != head]
-    explained = np.minimum(colors.seen[head], colors.seen[others].max(axis=0)).sum()
-    parts = others if explained > EXPLAINED else [head, *others]
+    explained = np.minimum(colors.histograms[head], colors.histograms[others].max(axis=0)).sum()
+    parts = others if explained > MAX_SHARED_WITH_PARTS else [head, *others]
     groups: dict[int, list[int]] = {}
     for part in parts:
         alike = [
             first
             for first, members in groups.items()
-            if max(np.minimum(colors.seen[part], colors.seen[m]).sum() for m in members) > ALIKE
+            if max(np.minimum(colors.histograms[part], colors.histograms[m]).sum() for m in members)
+            > MAX_COMMON_SHARE
         ]
         if not alike:
             groups[part] = [part]
@@ -176,17 +177,17 @@ def distinct_parts(colors: Colors) -> dict[int, list[int]]:
 
 def foot_table(colors: Colors) -> Float[np.ndarray, "bins"]:
     """Probability of a shoe rather than the surroundings or the skin and clothes above it."""
-    foot = colors.seen[colors.names.index("foot")]
+    foot = colors.histograms[colors.names.index("foot")]
     rest = [c for c, name in enumerate(colors.names) if name not in ("foot", "head")]
-    other = 0.5 * colors.seen[rest].max(axis=0) if rest else 0.0
-    return foot / (foot + colors.surroundings + other + NEVER_SEEN)
+    other = 0.5 * colors.histograms[rest].max(axis=0) if rest else 0.0
+    return foot / (foot + colors.surroundings + other + MIN_DENSITY)
 
 
 def grow_patch(
     lab: UInt8[np.ndarray, "h w 3"], pick: Pick, height: float
 ) -> Bool[np.ndarray, "h w"]:
     """Pixels that a click stands for: like-coloured and connected, near the click."""
-    radius = max(2.0, PATCH_RADIUS.get(pick.part, OTHER_RADIUS) * height)
+    radius = max(2.0, PATCH_RADIUS.get(pick.part, REGION_RADIUS) * height)
     rows, columns = lab.shape[:2]
     x, y = min(round(pick.x), columns - 1), min(round(pick.y), rows - 1)
     reach = int(np.ceil(radius))
@@ -194,11 +195,13 @@ def grow_patch(
     crop = cv2.GaussianBlur(lab[y0 : y + reach + 1, x0 : x + reach + 1], (3, 3), 0)
     mask = np.zeros((crop.shape[0] + 2, crop.shape[1] + 2), np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)
-    cv2.floodFill(crop, mask, (x - x0, y - y0), 0, GROWTH, GROWTH, flags)
+    cv2.floodFill(
+        crop, mask, (x - x0, y - y0), 0, MAX_COLOR_DIFFERENCE, MAX_COLOR_DIFFERENCE, flags
+    )
     yy, xx = np.mgrid[: crop.shape[0], : crop.shape[1]]
     distance = np.hypot(xx - (x - x0), yy - (y - y0))
     inside = (mask[1:-1, 1:-1] > 0) & (distance <= radius)
-    inside |= distance <= (CORE * radius if pick.part == "head" else 1.0)
+    inside |= distance <= (HEAD_CORE * radius if pick.part == "head" else 1.0)
     patch = np.zeros((rows, columns), bool)
     patch[y0 : y0 + crop.shape[0], x0 : x0 + crop.shape[1]] = inside
     return patch
@@ -226,5 +229,5 @@ def _count(bins: UInt16[np.ndarray, "n"]) -> Float[np.ndarray, "l a b"]:
 
 
 def _smooth(counts: Float[np.ndarray, "l a b"]) -> Float[np.ndarray, "bins"]:
-    spread = gaussian_filter(counts, SMOOTHING, mode="constant")
+    spread = gaussian_filter(counts, HISTOGRAM_SPREAD, mode="constant")
     return (spread / max(spread.sum(), 1e-9)).ravel()

@@ -1,8 +1,8 @@
 """Coloured regions of the player and their directed edges (Section 4.1).
 
 Every frame is cut out around the player and brought to a common player height, and its pixels are
-told which part of the player they show (`part_labels.py`). Contours of each region, inner borders
-between two colours included, are walked so that the region lies on the left as seen on the
+labelled with the part of the player that they show (`part_labels.py`). Contours of each region,
+inner borders between two colours included, are walked so that the region lies on the left in the
 picture, and sampled at regular arc length: each sample is an edge element, a point with a unit
 tangent.
 """
@@ -21,25 +21,25 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
-from keyrecon.segmentation.part_labels import label_crop, mix_palette
+from keyrecon.segmentation.part_labels import build_part_tables, label_crop
 from keyrecon.segmentation.player_crops import Cropping
 
 CROP_WIDTH, CROP_HEIGHT = 1.75, 1.5
 """Size of the crop, player heights: a lunge with an arm stretched out; a raised arm."""
-WAIST = 0.42
+WAIST_SHARE = 0.42
 """Where the body is cut, shares of the way from head to mid-feet: hips .44, waist .37."""
 OVERLAP = 0.05
 """Width of the band that counts for both halves, in the same shares."""
-LEAST_SAMPLES = 6
+MIN_SAMPLES = 6
 """Contours with fewer samples have no direction to speak of."""
-SMOOTHING = np.exp(-0.5 * np.arange(-3, 4) ** 2)
-SMOOTHING /= SMOOTHING.sum()
+SMOOTHING_KERNEL = np.exp(-0.5 * np.arange(-3, 4) ** 2)
+SMOOTHING_KERNEL /= SMOOTHING_KERNEL.sum()
 """Low-pass along a contour, over samples: pixels make stairs."""
 
 
 @dataclass(frozen=True)
 class EdgeOptions:
-    """How regions and edges are found."""
+    """How regions and edges are traced."""
 
     player: int = 112
     """Player height in the crops, px; smaller is faster and coarser."""
@@ -60,7 +60,7 @@ def find_edges(
 ) -> PlayerContours:
     """Label crops and directed edges of every frame; edges in px of the full picture."""
     scene = ForegroundModel(background, camera)
-    palette = mix_palette(colors)
+    tables = build_part_tables(colors)
     size = (round(CROP_HEIGHT * options.player), round(CROP_WIDTH * options.player))
     cropping = Cropping.around_boxes(track, float(options.player), size)
     width = cropping.reading_width(video)
@@ -75,7 +75,7 @@ def find_edges(
         foreground = scene.foreground(crop, t, to_picture)
         foreground = foreground * _inside_picture(way, size, picture.shape[:2])
         axis = cropping.from_picture(np.stack([track.head[t], track.mid_feet[t]]), t)
-        labels[t] = label_crop(crop, foreground, palette, axis, options.player)
+        labels[t] = label_crop(crop, foreground, tables, axis, options.player)
         elements = trace_edges(labels[t], options)
         return _to_picture(elements, cropping, track, t)
 
@@ -119,30 +119,30 @@ class _Contours:
 def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elements:
     """Contours of all regions as elements with the region on their left, in crop pixels."""
     step = options.step * options.player
-    contours = _find_contours(labels, (LEAST_SAMPLES - 0.5) * step)
+    contours = _find_contours(labels, (MIN_SAMPLES - 0.5) * step)
     walks, lengths = _resample(contours, step)
     points, tangent = _smooth_walks(walks, lengths)
-    found = _Elements(points, tangent, np.repeat(contours.color, lengths))
+    elements = _Elements(points, tangent, np.repeat(contours.color, lengths))
     size = np.array(labels.shape[::-1])
     keep = ((points > 1) & (points < size - 2)).all(axis=1) & tangent.any(axis=1)
-    return _thin(found, keep, options.most)
+    return _thin(elements, keep, options.most)
 
 
-def _find_contours(labels: UInt8[np.ndarray, "h w"], shortest: float) -> _Contours:
+def _find_contours(labels: UInt8[np.ndarray, "h w"], min_length: float) -> _Contours:
     """Contours and holes of all regions, but for those too short to have a direction."""
-    found, backwards, color = [np.zeros((0, 1, 2), np.int32)], [], []
+    pixels, backwards, color = [np.zeros((0, 1, 2), np.int32)], [], []
     for value in range(1, int(labels.max(initial=0)) + 1):
         mask = (labels == value).view(np.uint8)
         contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
         for contour, place in zip(contours, tree[0] if contours else (), strict=True):
-            if len(contour) * np.sqrt(2) >= shortest:
-                # Seen on the picture, the signed area is negative when walking counter-clockwise.
+            if len(contour) * np.sqrt(2) >= min_length:
+                # On the picture, the signed area is negative when walking counter-clockwise.
                 outside = cv2.contourArea(contour, oriented=True) > 0
-                found.append(contour)
+                pixels.append(contour)
                 backwards.append(outside != (place[3] >= 0))
                 color.append(value - 1)
-    x, y = np.concatenate(found)[:, 0].T
-    sizes = np.array([len(contour) for contour in found[1:]], int)
+    x, y = np.concatenate(pixels)[:, 0].T
+    sizes = np.array([len(contour) for contour in pixels[1:]], int)
     return _Contours(x + 1j * y, sizes, np.array(backwards, bool), np.array(color, int))
 
 
@@ -163,7 +163,7 @@ def _resample(
     start = along[first + np.arange(len(first))]
     length = along[last] - start
     count = np.rint(length / step).astype(int)
-    count[count < LEAST_SAMPLES] = 0
+    count[count < MIN_SAMPLES] = 0
     within = ranges(np.zeros_like(count), count)
     back = np.repeat(contours.backwards, count)
     within = np.where(back, np.repeat(count, count) - 1 - within, within)
@@ -180,7 +180,7 @@ def _smooth_walks(
     first = np.repeat(np.cumsum(lengths) - lengths, lengths)
     within, room = np.arange(len(walks)) - first, np.repeat(lengths, lengths)
     around = first[:, None] + (within[:, None] + np.arange(-3, 4)) % room[:, None]
-    smooth = walks[around] @ SMOOTHING
+    smooth = walks[around] @ SMOOTHING_KERNEL
     tangent = smooth[around[:, 5]] - smooth[around[:, 1]]
     size = np.abs(tangent)
     tangent = np.divide(tangent, size, out=np.zeros_like(tangent), where=size > 1e-6)
@@ -189,16 +189,16 @@ def _smooth_walks(
     return from_complex(smooth), from_complex(tangent)
 
 
-def _thin(found: _Elements, keep: Bool[np.ndarray, "E"], most: int) -> _Elements:
-    """The elements to keep, evenly thinned to `most`."""
+def _thin(elements: _Elements, keep: Bool[np.ndarray, "E"], max_elements: int) -> _Elements:
+    """The elements to keep, evenly thinned to `max_elements`."""
     chosen = np.flatnonzero(keep)
-    if len(chosen) > most:
-        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(int)]
-    return _Elements(found.points[chosen], found.tangent[chosen], found.color[chosen])
+    if len(chosen) > max_elements:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, max_elements).round().astype(int)]
+    return _Elements(elements.points[chosen], elements.tangent[chosen], elements.color[chosen])
 
 
 def _to_picture(elements: _Elements, cropping: Cropping, track: Track, frame: int) -> Edges:
-    """Elements in pixels of the full picture, told which half of the body they belong to."""
+    """Elements in pixels of the full picture, with the half of the body they belong to."""
     points = cropping.to_picture(elements.points, frame)
     head, way = track.head[frame], track.mid_feet[frame] - track.head[frame]
     share = (points - head) @ way / max(float(way @ way), 1e-9)
@@ -206,6 +206,6 @@ def _to_picture(elements: _Elements, cropping: Cropping, track: Track, frame: in
         points=points,
         tangent=elements.tangent,
         color=elements.color,
-        upper=share < WAIST + OVERLAP / 2,
-        lower=share > WAIST - OVERLAP / 2,
+        upper=share < WAIST_SHARE + OVERLAP / 2,
+        lower=share > WAIST_SHARE - OVERLAP / 2,
     )

@@ -241,18 +241,18 @@ def _match(key: _KeyPicture, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Ma
     if inside.sum() < MIN_INLIERS:
         return None
     source = np.ascontiguousarray(key.corners[inside])
-    found, status, _ = cv2.calcOpticalFlowPyrLK(
+    tracked, status, _ = cv2.calcOpticalFlowPyrLK(
         key.picture, grey, source, start[inside].copy(), winSize=(15, 15), maxLevel=3,
         criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.02),
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )  # fmt: skip
     good = status.ravel() > 0
-    source, found = source[good], found[good]
-    model = _fit(source, found)
+    source, tracked = source[good], tracked[good]
+    model = _fit(source, tracked)
     if model is None:
         return None
     put = warp_points(model, source)
-    agrees = np.linalg.norm(put - found, axis=1) < 1.5 * INLIER_DISTANCE
+    agrees = np.linalg.norm(put - tracked, axis=1) < 1.5 * INLIER_DISTANCE
     if agrees.sum() < MIN_INLIERS:
         return None
     moved = np.linalg.norm(put - source, axis=1) > MIN_SCENE_MOTION

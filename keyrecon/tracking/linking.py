@@ -96,9 +96,9 @@ def link_head(
     detections: list[Detections], camera: CameraPath, cropping: Cropping, sigma: float
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
     """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px."""
-    places = [cropping.to_picture(found.heads, t) for t, found in enumerate(detections)]
+    places = [cropping.to_picture(detected.heads, t) for t, detected in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
-    costs = [part_costs(found.head_strength) for found in detections]
+    costs = [part_costs(detected.head_strength) for detected in detections]
     chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
     from_reference = np.linalg.inv(camera.to_reference)
     head = fill_gaps(taken_states(stable, chosen), np.arange(len(detections)), from_reference)
@@ -114,14 +114,14 @@ def link_feet(
     motion: FootMotionModel,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
     """Both feet in the picture of every frame, and their confidence; `height` of the player, px."""
-    places = [cropping.to_picture(found.feet, t) for t, found in enumerate(detections)]
+    places = [cropping.to_picture(detected.feet, t) for t, detected in enumerate(detections)]
     from_reference = np.linalg.inv(camera.to_reference)
     stable = to_reference_frame(places, camera.to_reference)
     hidden = propagate_feet(detections, stable, from_reference, cropping, height, motion.memory)
     pairs = []
-    for t, found in enumerate(detections):
+    for t, detected in enumerate(detections):
         propagated = np.full(len(hidden[t]), PROPAGATED_COST)
-        cost = np.concatenate([part_costs(found.foot_strength), propagated])
+        cost = np.concatenate([part_costs(detected.foot_strength), propagated])
         feet = np.concatenate([stable[t], hidden[t]])
         in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
         both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
@@ -166,24 +166,24 @@ def propagate_feet(
 ) -> list[Float[np.ndarray, "_ 2"]]:
     """Strong feet of frames nearby, where the player covers them in each frame, stabilised."""
     strong = [
-        places[found.foot_strength > EVEN_STRENGTH]
-        for places, found in zip(stable, detections, strict=True)
+        places[detected.foot_strength > EVEN_STRENGTH]
+        for places, detected in zip(stable, detections, strict=True)
     ]
     offsets = np.unique(np.rint(np.geomspace(1, max(1, memory), MEMORY_SAMPLES)).astype(int))
     hidden = []
-    for t, found in enumerate(detections):
+    for t, detected in enumerate(detections):
         near = [t + sign * k for k in offsets for sign in (-1, 1)]
         near = [u for u in near if 0 <= u < len(detections)]
         known = np.concatenate([strong[u] for u in near]) if near else np.zeros((0, 2))
         if len(known):
-            known = known[_on_player(known, found, from_reference[t], cropping, t)]
+            known = known[_on_player(known, detected, from_reference[t], cropping, t)]
         hidden.append(_new_places(known, stable[t], MIN_FOOT_SEPARATION * float(height[t])))
     return hidden
 
 
 def _on_player(
     places: Float[np.ndarray, "m 2"],
-    found: Detections,
+    detected: Detections,
     from_reference: Float[np.ndarray, "3 3"],
     cropping: Cropping,
     t: int,
@@ -191,9 +191,9 @@ def _on_player(
     """Which stabilised places the player covers in frame t."""
     spots = cropping.from_picture(warp_points(from_reference, places), t)
     x, y = np.rint((spots - 0.5) / 2).astype(int).T
-    rows, columns = found.covered.shape
+    rows, columns = detected.covered.shape
     inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-    return inside & found.covered[y.clip(0, rows - 1), x.clip(0, columns - 1)]
+    return inside & detected.covered[y.clip(0, rows - 1), x.clip(0, columns - 1)]
 
 
 def _new_places(

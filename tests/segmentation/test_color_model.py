@@ -48,7 +48,7 @@ def test_a_part_is_told_from_the_surroundings(video):
 
 def test_histograms_are_shares(video):
     colors = learn_colors(video, picks(4))
-    assert colors.seen.sum(axis=1) == pytest.approx(1, abs=1e-3)
+    assert colors.histograms.sum(axis=1) == pytest.approx(1, abs=1e-3)
 
 
 def test_the_players_size_is_the_length_from_head_to_mid_feet(video):
