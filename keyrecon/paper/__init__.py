@@ -1,1 +1,1 @@
-"""The stages as the two papers print them."""
+"""The stages as the two papers print them; `choices.md`: what was chosen where they are open."""

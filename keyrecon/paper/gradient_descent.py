@@ -8,23 +8,9 @@ point lies where a single pass still has H = 0.707 / (lambda + 0.707 (1 - lambda
 lambda = 0.2. The low-pass acts on the depth too, where no data pull: the longer the descent, the
 flatter the motion.
 
-Section  | what is open              | chosen                          | why
--------- | ------------------------- | ------------------------------- | -------------------------
-Eq. 6    | joints that are missing   | they do not pull                | "revert to the smooth
-         |                           |                                 | interpolation" (Section 7)
-Fig. 9/1 | one similarity or one per | translation per frame, one      | a player moves about and
-         | frame                     | rotation in the image; scale of | the camera pans; one turn
-         |                           | each frame from limb lengths    | of the camera
-Fig. 9/3 | the gradient's factor 2   | E with a factor one half        | with it 0 < lambda <= 1
-         |                           |                                 | ends on the data
-Fig. 9/4 | how lengths are reset     | from the root to the leaves     | keeps all directions
-Fig. 9/4 | the low-pass              | Gaussian, 0.5 frames, no phase  | not named in the text
-Fig. 9/4 | which comes first         | lengths, then low-pass, and     | the order of the text; the
-         |                           | lengths once more at the end    | result has exact lengths
-Fig. 9/5 | when it has converged     | rms change below 1e-5 body      | a fiftieth of a millimetre
-         |                           | heights                         |
-7        | how outliers are detected | spikes against the initial      | "discontinuities in the 3D
-         |                           | motion, before the descent      | motion"
+What the text leaves open here (missing joints, the gradient's factor, how lengths are reset, the
+low-pass, what comes first, when it has converged) and what was chosen: `choices.md`, rows of Eq. 6
+and Fig. 9.
 """
 
 import logging

@@ -9,25 +9,8 @@ the limb between them has the keyframe's length times the common change of scale
 best choice for all joints of a tree is found exactly, from the leaves to the root (Felzenszwalb and
 Huttenlocher, IJCV 61, 2005).
 
-Section | what is open                 | chosen                         | why
-------- | ---------------------------- | ------------------------------ | --------------------------
-5       | how a keyframe is aligned    | head (upper) or mid-feet       | as its pose distance is
-        |                              | (lower), scaled by height      | (Section 4.2)
-5       | the vicinity of a joint      | .12 player heights, weights    | about a thigh's width
-        |                              | fall off with a spread of .06  |
-5       | the translation from several | weighted geometric median      | a minority of wrong ones
-        | correspondences              |                                | does not move it
-5       | too few correspondences      | the joint is missing           | Section 6.2 has missing
-        |                              |                                | estimates
-5       | joints hidden in a keyframe  | missing                        | "due to self-occlusion",
-        |                              |                                | Section 6.2
-5       | appearance of a joint        | normalised cross-correlation   | invariant to lighting
-        |                              | of a patch turned with the limb|
-5       | how limb length ratios are   | Gaussian of their logarithm on | exact optimum of both;
-        | enforced                     | a tree of joints               | [14] gives no numbers
-5       | bones between the halves     | not compared                   | each half has keyframes of
-        |                              |                                | its own (Section 4.3)
-5       | frames far from any keyframe | limb lengths twice as free     | theirs is another pose
+What the text leaves open here and what was chosen: `choices.md`, rows of Section 5. Lengths are in
+player heights.
 """
 
 from collections.abc import Iterator

@@ -10,35 +10,7 @@ and normalised time and root pose of every frame. Minimised is
 with plain squares, observations of the foreground (4.1), of joints and hands (4.2) and of matched
 points (4.3), and the predictions G^_t = G_(t-1) + dG_(t-1) and mu^_t = mu_(t-1) + dmu_(t-1).
 
-Where the text leaves a choice:
-
-Where       | what is open               | chosen                        | why
-------------|----------------------------|-------------------------------|--------------------------
-Section 3   | the database               | two swings and variations     | CMU's ten are not shipped
-Section 3   | coordinates of the angles  | rotation vectors              | no wrap-around
-Section 3   | mu between two samples     | Catmull-Rom, not linear       | a continuous derivative
-Section 3   | mu outside of [0, 1)       | the player stands still       | nothing is learnt there
-Eq. 2       | m                          | 4                             | TR, Section 3
-Section 4   | f; how far groups slide    | 3; by one frame               | 5.1; "sliding groups"
-Section 4   | what decides a frame       | the last group that has it    | it begins from the others
-Section 4   | the minimiser              | Levenberg-Marquardt           | "hill-climbing"
-Eq. 4       | squares in E_D             | squares, as in CVPR           | TR omits them, a slip
-Eq. 4       | t of both predictions      | every frame of the group      | one formula for all t
-Eq. 4       | what they start from       | the group before              | "in the previous set"
-Eq. 4       | those of the first group   | G of frame 0, guessed mu      | no speed is observed yet
-Eq. 4       | alpha^                     | the group before, 0 at first  | Section 5.1
-Eq. 4       | distance of two root poses | m and rad, one like the other | limbs are about a metre
-Eq. 4       | w_type                     | equal traces of J'J           | "commensurate"
-Eq. 4       | w_G, w_mu, w_alpha         | see `WindowOptions`           | not printed
-Section 4.1 | the body; samples          | capsules; a grid in the mask  | not printed
-Section 4.1 | the background             | GrabCut, then a median        | no empty scene is filmed
-Section 4.2 | hands from the club        | grip: the shaft's hand end    | both hands hold it
-Section 4.2 | WSL's image filters        | Lab colours                   | see `appearance_tracker`
-Section 4.3 | samples                    | of the mask, once             | shared with our fit
-Section 4.3 | correlation                | Lucas-Kanade, both ways       | the same, in sub-pixels
-Section 5.1 | the spline of mu           | monotone (PCHIP)              | a free one overshoots
-Section 5.1 | where mu begins            | spline if new, else estimate  | "initialize", then refine
-Section 5.1 | where G begins             | prediction if new             | nothing else is known
+Where the text leaves a choice, and what was chosen: `choices.md`, rows of U.
 """
 
 from collections.abc import Sequence
