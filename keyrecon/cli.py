@@ -110,6 +110,7 @@ def keyframes(
     budget: float | None = None,
     coverage: float | None = None,
     reach: int | None = None,
+    method: Literal["best", "paper"] | None = None,
     force: bool = False,
     options: Advanced = Options(),
 ) -> None:
@@ -123,10 +124,12 @@ def keyframes(
             (default 0.015).
         coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
         reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
+        method: 'paper' tracks, compares and chooses as the paper prints it (Eq. 2-4), for
+            keyrecon run --method paper; 'best' is ours (default).
         force: Make every stage again.
     """
     chosen = {"budget": budget, "coverage": coverage, "reach": reach}
-    print(work.find_keyframes(Workspace(project, force), options, chosen, show))
+    print(work.find_keyframes(Workspace(project, force), options, chosen, show, method == "paper"))
 
 
 @app.command

@@ -173,6 +173,8 @@ class Keyframes:
     """T of the paper, frames."""
     alpha: float
     """Coverage asked for."""
+    method: str = "coverage"
+    """How they were chosen: 'coverage', or 'paper' for Eq. 2-4 as printed."""
 
     @property
     def frames(self) -> Int[np.ndarray, "K"]:

@@ -19,7 +19,7 @@ from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, as_printed
 from keyrecon.progress import silent
 from keyrecon.synthetic.cameras import CameraPlanOptions
 from keyrecon.synthetic.clips import JoinOptions
@@ -111,13 +111,37 @@ def test_a_second_run_makes_no_stage_again(clip, solved):
     assert set(workspace.stages.seconds) <= {"lift"}
 
 
-def test_the_paper_form_runs_too(clip, solved, tmp_path):
+def test_the_paper_form_runs_too(clip, solved, capsys):
     _, truth = solved
     assert keyrecon("run", clip / "project", "--method", "paper") == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "Eq. 2-4" in line]
+    assert len(said) == 1
+    assert said[0].startswith("The keyframes of this project were not chosen by Eq. 2-4 as printed")
+    assert f"keyrecon keyframes {clip / 'project'} --method paper" in said[0]
     motion = read_motion(clip / "project" / "motion.npz")
     assert motion.units == "m"  # the height of the run before is remembered
     scores = evaluate_motion(motion, truth)
     assert scores.pa_mpjpe <= 250
+
+
+def test_a_run_by_the_paper_takes_the_keyframes_that_the_paper_chose(clip, tmp_path, capsys):
+    made, truth = tmp_path / "p", read_truth(clip / "truth.npz")
+    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
+    Workspace(made).add_picks(read_picks(clip / "picks.json"))
+    assert keyrecon("keyframes", made, "--budget", "0.06", "--method", "paper") == 0
+    assert "chosen by Eq. 2-4 as printed" in capsys.readouterr().out
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    assert asked.method == "paper"
+    marks = mark_from_truth(
+        asked, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(noise=1.0)
+    )
+    write_coco(made / "annotations.json", marks, SIZE)
+    workspace = Workspace(made)
+    options = project.settings(workspace, Options())
+    assert options.keyframes.method == "coverage"  # a run by our forms is not bound
+    said = project.run(workspace, as_printed(options), silent)
+    assert "Eq. 2-4" not in said
+    assert set(workspace.stages.seconds) == {"propagate", "lift"}
 
 
 def test_keyframes_without_marks_are_named(clip, solved):

@@ -28,9 +28,9 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, prepare, with_height
+from keyrecon.pipeline import Options, as_printed, prepare, with_height
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
+from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.report.summary import annotation_cost
@@ -106,14 +106,23 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
 
 
 def find_keyframes(
-    workspace: Workspace, options: Options, chosen: dict[str, object], progress: Progress
+    workspace: Workspace,
+    options: Options,
+    chosen: dict[str, object],
+    progress: Progress,
+    printed: bool = False,
 ) -> str:
-    """Run the automatic part; write keyframes.json and a picture of each keyframe."""
+    """Run the automatic part; write keyframes.json and a picture of each keyframe.
+
+    `printed` takes the forms that the paper prints. The project remembers its options without
+    them, so that a run by the same forms finds the same stages, and one by ours is not bound.
+    """
     wanted = {name: value for name, value in chosen.items() if value is not None}
     options = workspace.options(options, Options())
     options = replace(options, keyframes=replace(options.keyframes, **wanted))
     keep = workspace.stages.keep
-    preparation = prepare(workspace.video(), workspace.picks(), options, keep, progress)
+    forms = as_printed(options) if printed else options
+    preparation = prepare(workspace.video(), workspace.picks(), forms, keep, progress)
     workspace.remember(options, Options())
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
@@ -127,8 +136,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     seen = float((preparation.track.confidence > 0).mean())
     halves = [
         f"{name} body: {_counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
-        f"frames (beta {half.beta:.4f}; as printed in the paper it would take "
-        f"{half.printed_count})."
+        f"frames (beta {half.beta:.4f}; {_compare_with_printed(found, half)})."
         for name, half in (("Upper", found.upper), ("Lower", found.lower))
     ]
     return "\n".join(
@@ -142,6 +150,12 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
             f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
         ]
     )
+
+
+def _compare_with_printed(found: Keyframes, half: HalfKeyframes) -> str:
+    if found.method == "paper":
+        return "chosen by Eq. 2-4 as printed"
+    return f"as printed in the paper it would take {half.printed_count}"
 
 
 def _describe_absence(preparation: Preparation) -> list[str]:
@@ -253,11 +267,24 @@ def run(
         options=options,
     )
     write_report(workspace.report_file, material, progress)
-    return (
-        f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.\n"
-        f"{workspace.report_file}: open it in a browser.\n"
-        f"Took {time.perf_counter() - started:.0f} s."
+    return "\n".join(
+        [
+            f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
+            f"{workspace.report_file}: open it in a browser.",
+            *_other_choice(workspace, options, preparation.keyframes),
+            f"Took {time.perf_counter() - started:.0f} s.",
+        ]
     )
+
+
+def _other_choice(workspace: Workspace, options: Options, asked: Keyframes) -> list[str]:
+    """What a run by the printed forms says of keyframes that were not chosen by them."""
+    if options.keyframes.method != "paper" or asked.method == "paper":
+        return []
+    return [
+        "The keyframes of this project were not chosen by Eq. 2-4 as printed; for that: "
+        f"keyrecon keyframes {quoted(workspace.folder)} --method paper, and mark what it asks for."
+    ]
 
 
 def prepared(workspace: Workspace, options: Options, progress: Progress) -> Preparation:

@@ -150,7 +150,7 @@ def choose_keyframes(
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
         halves.append(_choose_half(half, max_keyframes, beta, also))
     halves = [restore_frames(half, kept, frames) for half in halves]
-    return Keyframes(*halves, reach=reach, alpha=options.coverage)
+    return Keyframes(*halves, reach=reach, alpha=options.coverage, method=options.method)
 
 
 def _half(
@@ -312,4 +312,4 @@ def adopt_keyframes(
         chosen = np.searchsorted(kept, np.unique(frames))
         adopted = _record(half, half.goal(beta), beta, chosen)
         halves.append(restore_frames(adopted, kept, everyone))
-    return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha)
+    return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha, method=asked.method)

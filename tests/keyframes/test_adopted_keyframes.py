@@ -38,6 +38,15 @@ def test_adopting_the_choice_gives_the_choice_back(comparison, chosen):
         assert ours.coverage == theirs.coverage
 
 
+@pytest.mark.parametrize("method", ["coverage", "paper"])
+def test_keyframes_that_were_annotated_tell_how_those_asked_for_were_chosen(comparison, method):
+    asked = choose_keyframes(comparison, 50.0, KeyframeOptions(method=method))
+    assert (
+        adopt_keyframes(comparison, asked, (asked.upper.frames[1:], asked.lower.frames)).method
+        == method
+    )
+
+
 def test_one_more_keyframe_stands_for_what_it_is_nearest_to(comparison, chosen):
     worst = int(chosen.upper.distance.argmax())
     frames = np.union1d(chosen.upper.frames, [worst]), chosen.lower.frames

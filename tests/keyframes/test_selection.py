@@ -126,12 +126,14 @@ def test_exemplars_choose_as_their_frames_would():
     assert by_exemplars.upper.coverage >= 0.95
 
 
-def test_keyframes_json_gives_back_what_was_written(comparison):
-    chosen = choose_keyframes(comparison, 50.0)
+@pytest.mark.parametrize("method", ["coverage", "paper"])
+def test_keyframes_json_gives_back_what_was_written(comparison, method):
+    chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(method=method))
     text = keyframes_to_json(chosen)
     again = keyframes_from_json(text)
     assert again.reach == chosen.reach
     assert again.alpha == chosen.alpha
+    assert again.method == chosen.method == method
     for one, other in ((chosen.upper, again.upper), (chosen.lower, again.lower)):
         assert np.array_equal(one.frames, other.frames)
         assert np.array_equal(one.nearest, other.nearest)
@@ -145,6 +147,14 @@ def test_keyframes_json_gives_back_what_was_written(comparison):
     data = json.loads(text)
     assert data["frames"] == sorted({*data["upper"], *data["lower"]})
     assert data["cost"] <= 0.015
+
+
+def test_keyframes_of_a_version_that_did_not_tell_were_chosen_for_coverage(comparison):
+    data = json.loads(keyframes_to_json(choose_keyframes(comparison, 50.0)))
+    del data["method"]
+    assert keyframes_from_json(json.dumps(data)).method == "coverage"
+    with pytest.raises(KeyreconError, match="'method' must be one of coverage, paper"):
+        keyframes_from_json(json.dumps(data | {"method": "luck"}))
 
 
 def test_a_damaged_keyframes_json_says_what_is_wrong(comparison):

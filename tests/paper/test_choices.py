@@ -1,4 +1,4 @@
-"""The table of choices: whole rows, flags that exist, and the numbers that the printed form uses."""
+"""The table of choices: whole rows, flags that exist, and the numbers of the printed form."""
 
 import re
 import sys

@@ -1,10 +1,11 @@
 """keyframes.json: the frames that a person is asked to annotate, and what each stands for.
 
     {"n_frames": 1800, "upper": [..], "lower": [..], "frames": [union, sorted],
-     "beta": {"upper": .., "lower": ..}, "T": 10, "alpha": 0.95, "coverage": {..},
-     "cost": 0.015, "printed_count": {..}, "nearest": {..}, "distance": {..},
-     "represented": {..}}
+     "beta": {"upper": .., "lower": ..}, "T": 10, "alpha": 0.95,
+     "method": "coverage", "coverage": {..}, "cost": 0.015, "printed_count": {..},
+     "nearest": {..}, "distance": {..}, "represented": {..}}
 
+`method` tells how they were chosen, "paper" by Eq. 2-4 as printed; older files are without it.
 `cost` is the share of frames to mark, a half body counted half, `printed_count` the keyframes
 that the choice as printed (Eq. 2-4) would take at the same beta. `nearest` has the keyframe of
 every frame, `distance` how far it is (player heights), `represented` the frames closer than beta,
@@ -21,6 +22,8 @@ from keyrecon.errors import KeyreconError, explain
 from keyrecon.records import HalfKeyframes, Keyframes
 
 HALVES = ("upper", "lower")
+METHODS = ("coverage", "paper")
+"""Ways to choose keyframes; files of versions that wrote none were chosen by the first."""
 
 
 def keyframes_to_json(keyframes: Keyframes) -> str:
@@ -36,6 +39,7 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
         "beta": {name: float(half.beta) for name, half in halves.items()},
         "T": keyframes.reach,
         "alpha": keyframes.alpha,
+        "method": keyframes.method,
         "coverage": {name: float(half.coverage) for name, half in halves.items()},
         "cost": labels / 2 / n_frames,
         "printed_count": {name: half.printed_count for name, half in halves.items()},
@@ -59,12 +63,20 @@ def keyframes_from_json(text: str) -> Keyframes:
             lower=halves["lower"],
             reach=int(data["T"]),
             alpha=float(data["alpha"]),
+            method=_method(data),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as fault:
         raise KeyreconError(
             f"keyframes.json cannot be read ({explain(fault)}); make it again with keyrecon "
             "keyframes."
         ) from fault
+
+
+def _method(data: dict[str, Any]) -> str:
+    method = data.get("method", METHODS[0])
+    if method not in METHODS:
+        raise ValueError(f"'method' must be one of {', '.join(METHODS)}")
+    return method
 
 
 def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
