@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from typing import TypeVar
 
 from rich.console import Console
@@ -30,7 +30,7 @@ def show(items: Iterable[Item], description: str, total: int | None = None) -> I
 
 
 def _length(items: Iterable[Item]) -> int | None:
-    return len(items) if hasattr(items, "__len__") else None
+    return len(items) if isinstance(items, Sized) else None
 
 
 def _bar(items: Iterable[Item], description: str, total: int | None) -> Iterator[Item]:

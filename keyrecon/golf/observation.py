@@ -194,9 +194,9 @@ def _silhouette_distance(
 ) -> Float[np.ndarray, "y x"]:
     """Distance to the player in px of the video, on a coarser grid."""
     outside = (~(player | (foreground.mask() > 0))).astype(np.uint8)
-    distance = cv2.distanceTransform(outside, cv2.DIST_L2, 3) / foreground.shrink
+    distance: Float[np.ndarray, "h w"] = cv2.distanceTransform(outside, cv2.DIST_L2, 3)
     rows, columns = (max(2, round(s / foreground.shrink / SILHOUETTE_STEP)) for s in outside.shape)
-    return cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_AREA)
+    return cv2.resize(distance / foreground.shrink, (columns, rows), interpolation=cv2.INTER_AREA)
 
 
 def _match_all(

@@ -92,7 +92,7 @@ def fit_observations(
         fit = fit_swing(mirrored, initial, video.fps, options.fit)
     else:
         fit = fit_sliding_windows(mirrored, initial, options.windows, progress)
-    if mirrored.marks is not None and options.method == "swing":
+    if options.method == "swing":
         fit = refit_proportions(fit, mirrored, initial, video.fps, options.fit, options.proportions)
     return describe_fit(fit, observations, video.time)
 

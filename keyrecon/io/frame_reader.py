@@ -7,7 +7,7 @@ the cores share the load.
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from queue import Full, Queue
@@ -36,7 +36,7 @@ def read_small(
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The frames (or the wanted ones) of a video, reduced to a width, in order."""
 
-    def small() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    def small() -> Generator[UInt8[np.ndarray, "h w 3"], None, None]:
         pictures = video.frames() if wanted is None else video.chosen_frames(wanted, max(wanted))
         for picture in pictures:
             yield reduce_picture(picture, width)
@@ -47,7 +47,7 @@ def read_small(
 def read_grey(video: Video, width: int) -> Iterator[UInt8[np.ndarray, "h w"]]:
     """The brightness of all frames of a video, reduced to a width, in order."""
 
-    def small() -> Iterator[UInt8[np.ndarray, "h w"]]:
+    def small() -> Generator[UInt8[np.ndarray, "h w"], None, None]:
         for picture in video.grey_frames():
             yield np.ascontiguousarray(reduce_picture(picture, width))
 
@@ -94,7 +94,7 @@ def shrinking(shrink: float) -> Float[np.ndarray, "3 3"]:
 Entry = tuple[np.ndarray | None, Exception | None]
 
 
-def _ahead(make: Callable[[], Iterator[np.ndarray]]) -> Iterator[np.ndarray]:
+def _ahead(make: Callable[[], Generator[np.ndarray, None, None]]) -> Iterator[np.ndarray]:
     """Items of an iterator, made in a thread a few ahead of their use."""
     waiting: Queue[Entry] = Queue(AHEAD)
     unwanted = Event()
@@ -114,7 +114,7 @@ def _ahead(make: Callable[[], Iterator[np.ndarray]]) -> Iterator[np.ndarray]:
 
 
 def _produce(
-    make: Callable[[], Iterator[np.ndarray]], waiting: Queue[Entry], unwanted: Event
+    make: Callable[[], Generator[np.ndarray, None, None]], waiting: Queue[Entry], unwanted: Event
 ) -> None:
     """Put items into the queue until they end, fail or are no longer wanted."""
     try:

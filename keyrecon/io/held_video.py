@@ -107,10 +107,13 @@ class _HeldFrames:
         frame = av.VideoFrame(stored.width, stored.height, stored.format)
         frame.colorspace, frame.color_range = stored.colorspace, stored.color_range
         with self._lock:
+            if self._file is None:
+                raise ValueError("no frame was stored")
             self._file.seek(stored.place)
             planes = [self._file.read(rows * size) for rows, size in stored.planes]
         for plane, pixels, (rows, size) in zip(frame.planes, planes, stored.planes, strict=True):
-            target = np.frombuffer(plane, np.uint8)[: rows * plane.line_size].reshape(rows, -1)
+            target = np.frombuffer(memoryview(plane), np.uint8)
+            target = target[: rows * plane.line_size].reshape(rows, -1)
             source = np.frombuffer(pixels, np.uint8).reshape(rows, size)
             width = min(size, plane.line_size)  # both have all pixels and some padding
             target[:, :width] = source[:, :width]

@@ -28,7 +28,7 @@ def save_record(path: Path, value: object) -> None:
     text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     make_folder(path.parent)
     with replacing(path, durably=False) as file:
-        np.savez(file, tree=text, **arrays)
+        np.savez(file, tree=text, **arrays)  # type: ignore[arg-type]  # no name is a flag of savez
 
 
 def load_record(path: Path) -> Any:

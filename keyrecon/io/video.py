@@ -77,11 +77,12 @@ class Video:
 
     def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
         """The brightness of all frames in order, in the range that the file stores."""
+        grey: UInt8[np.ndarray, "h w"]
         for frame in self._decoded(0, None):
             if frame.format.name in LUMA_FIRST:
                 plane = frame.planes[0]
-                rows = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
-                grey = rows[:, : plane.width]
+                pixels = np.frombuffer(memoryview(plane), np.uint8)
+                grey = pixels.reshape(plane.height, plane.line_size)[:, : plane.width]
             else:
                 grey = frame.to_ndarray(format="gray")
             yield np.ascontiguousarray(np.rot90(grey, self.turns)) if self.turns else grey
@@ -159,7 +160,7 @@ def open_video(
             raise KeyreconError(f"{path}: no picture can be decoded; the file is damaged.")
         if first.pts is not None:  # where a file was cut, pictures before lack what they refer to
             stamps = stamps[stamps >= first.pts]
-        seconds_per_tick = float(stream.time_base)
+        seconds_per_tick = _seconds_per_tick(stream)
     turns = round(first.rotation / 90) % 4
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
     if not 0 <= start < (end or len(stamps)) <= len(stamps):
@@ -209,6 +210,13 @@ def _shown_stamps(container: av.container.InputContainer, path: Path) -> list[in
     return stamps
 
 
+def _seconds_per_tick(stream: av.VideoStream) -> float:
+    """Unit of a stream's presentation times."""
+    if stream.time_base is None:
+        raise KeyreconError("The video has no clock: it does not say when its pictures are shown.")
+    return float(stream.time_base)
+
+
 def _decode_from(container: av.container.InputContainer, stamp: int) -> Iterator[av.VideoFrame]:
     """Decode in presentation order from a key frame at or before a presentation time."""
     import av
@@ -219,7 +227,7 @@ def _decode_from(container: av.container.InputContainer, stamp: int) -> Iterator
         if back is None:
             container.seek(0)
         else:
-            before = stamp - int(back / float(stream.time_base))
+            before = stamp - int(back / _seconds_per_tick(stream))
             container.seek(before, stream=stream, backward=True, any_frame=False)
         frames = container.decode(stream)
         try:

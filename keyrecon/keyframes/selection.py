@@ -142,15 +142,15 @@ def choose_keyframes(
     reach = max(1, round(options.reach * fps / 50))
     kept = np.flatnonzero(~absent_frames(comparison.visibility_score, reach))
     comparison = select_frames(comparison, kept)
-    halves = []
+    halves: list[HalfKeyframes] = []
     wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
     for index, (name, (max_keyframes, beta)) in enumerate(zip(names, wanted, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, reach, options)
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
         halves.append(_choose_half(half, max_keyframes, beta, also))
-    halves = [restore_frames(half, kept, frames) for half in halves]
-    return Keyframes(*halves, reach=reach, alpha=options.coverage, method=options.method)
+    upper, lower = (restore_frames(half, kept, frames) for half in halves)
+    return Keyframes(upper, lower, reach=reach, alpha=options.coverage, method=options.method)
 
 
 def _half(
@@ -304,7 +304,7 @@ def adopt_keyframes(
     away[np.concatenate(annotated)] = False
     kept, everyone = np.flatnonzero(~away), len(comparison.row)
     comparison = select_frames(comparison, kept)
-    halves = []
+    halves: list[HalfKeyframes] = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
     for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
@@ -312,4 +312,5 @@ def adopt_keyframes(
         chosen = np.searchsorted(kept, np.unique(frames))
         adopted = _record(half, half.goal(beta), beta, chosen)
         halves.append(restore_frames(adopted, kept, everyone))
-    return Keyframes(*halves, reach=asked.reach, alpha=asked.alpha, method=asked.method)
+    upper, lower = halves
+    return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)

@@ -85,7 +85,7 @@ def _arrive(
 ) -> tuple[Float[np.ndarray, "*S"], _Predecessors]:
     """Cheapest way to each state of frame t; `recent` has the totals of the frames before it."""
     best = np.full(shape, _times(t, skip_cost))
-    step = np.zeros(shape, np.min_scalar_type(recent.maxlen))
+    step = np.zeros(shape, np.min_scalar_type(len(recent)))
     oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r in recent), default=0)))
     for gap, before in zip(count(1), recent):
         skipped = _times(gap - 1, skip_cost)

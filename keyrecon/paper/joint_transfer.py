@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.video import Video
+from keyrecon.keyframes.distance_matrix import HALVES
 from keyrecon.keyframes.edge_distance import align_edges, match_edges
 from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
@@ -215,8 +216,9 @@ def transfer_joints(
     source = np.zeros(shape, dtype=np.int64)
     bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
     frames = progress(_grey_pictures(preparation), "propagating joints", shape[0])
+    halves: tuple[tuple[HalfName, np.ndarray], ...] = (("upper", ~is_lower), ("lower", is_lower))
     for t, picture in enumerate(frames):
-        for name, members in (("upper", ~is_lower), ("lower", is_lower)):
+        for name, members in halves:
             keyframes = getattr(preparation.keyframes, name)
             source[t, members] = keyframes.nearest[t]
             model = models.get((name, int(keyframes.nearest[t])))
@@ -250,13 +252,14 @@ def _gather_models(
     preparation: Preparation, annotations: Annotations
 ) -> dict[tuple[HalfName, int], TransferModel]:
     """Annotated keyframes by half and frame number."""
-    models, video = {}, preparation.video
+    models: dict[tuple[HalfName, int], TransferModel] = {}
+    video = preparation.video
     width = PatchSource.width_for(video, preparation.track.height)
     for row, frame in enumerate(annotations.frames.tolist()):
         height = float(preparation.track.height[frame])
         picture = crop_patches(video.frame(frame, width), video.width, height)
         visible = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
-        for name in ("upper", "lower"):
+        for name in HALVES:
             half: HalfKeyframes = getattr(preparation.keyframes, name)
             if frame not in half.frames:
                 continue

@@ -156,6 +156,8 @@ def _begin(
 def _enter(estimate: SwingState, best: SwingState, window: slice) -> SwingState:
     """The estimate with the frames of a window as it was fitted."""
     rows = np.arange(window.start, window.stop)
+    if estimate.frame_coefficients is None:
+        raise ValueError("the estimate of windows has coefficients of every frame")
     phase, rotation, position, coefficients = (
         values.copy()
         for values in (

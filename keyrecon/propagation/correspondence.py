@@ -141,10 +141,20 @@ def bone_axes(half: BodyHalf, joints: Complex[np.ndarray, "P J"]) -> Complex[np.
 class PlacedElements(Protocol):
     """Elements of P posed templates: position, direction and colour."""
 
-    points: Complex[np.ndarray, "P E"]
-    tangent: Complex[np.ndarray, "P E"]
-    color: Int[np.ndarray, "P E"]
-    """-1 matches nothing."""
+    @property
+    def points(self) -> Complex[np.ndarray, "P E"]:
+        """Player coordinates."""
+        ...
+
+    @property
+    def tangent(self) -> Complex[np.ndarray, "P E"]:
+        """Unit vectors along the edge."""
+        ...
+
+    @property
+    def color(self) -> Int[np.ndarray, "P E"]:
+        """-1 matches nothing."""
+        ...
 
 
 def match_elements(

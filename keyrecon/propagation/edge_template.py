@@ -13,7 +13,7 @@ frames have at each place of a bone makes the average outline, which stands in f
 template lacks.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -151,10 +151,7 @@ def complete_template(
     present = np.bincount(elements.bone, elements.weight, n_bones)
     expected = np.bincount(average.bone, average.weight, n_bones)
     added = average.take(np.flatnonzero((present < expected / 2)[average.bone]))
-    added = TemplateElements(
-        *(getattr(added, f.name) for f in fields(TemplateElements)[:-1]), added.weight / 2
-    )
-    return join_elements([elements, added])
+    return join_elements([elements, replace(added, weight=added.weight / 2)])
 
 
 def choose_evenly(count: int, most: int) -> Int[np.ndarray, "N"]:

@@ -68,7 +68,8 @@ def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
     groups = [half.middle, *half.sides]
     states = [_limb_states(templates, hypotheses, group, fps) for group in groups]
     paths = [choose_one(states[0]) if half.middle else _best_trunk(hypotheses, half)]
-    paths += choose_two(*states[1:], _unexplained_costs(templates, hypotheses, paths[0]))
+    _, one, other = states
+    paths += choose_two(one, other, _unexplained_costs(templates, hypotheses, paths[0]))
     for group, state, path in zip(groups, states, paths, strict=True):
         joints[:, group] = state.joints[frames, path]
         row = hypotheses.template[frames, path % hypotheses.prior_cost.shape[1]]
@@ -89,10 +90,10 @@ def _limb_states(
     fps: float,
 ) -> LimbStates:
     """The same side of every hypothesis, then the other side."""
-    half, poses, group = templates.half, templates.poses, np.array(group, int)
-    mirrored = half.mirror[group]
-    sides = [group] if np.array_equal(group, mirrored) else [group, mirrored]
-    costs = []
+    half, poses, members = templates.half, templates.poses, np.array(group, int)
+    mirrored = half.mirror[members]
+    sides = [members] if np.array_equal(members, mirrored) else [members, mirrored]
+    costs: list[Float[np.ndarray, "T P"]] = []
     foot_cost = None if templates.feet is None else foot_costs(templates.feet, hypotheses.joints)
     for side in sides:
         bones = np.isin(half.bones[:, 1], side)
@@ -105,8 +106,8 @@ def _limb_states(
     # all states of an annotated frame are the annotation
     states[poses.frames] = 0
     joints = np.concatenate([hypotheses.joints[:, :, side] for side in sides], axis=1)
-    joints[poses.frames] = poses.joints[:, None, group]
-    depth = np.clip(half.depth[group] - 1, 0, None)
+    joints[poses.frames] = poses.joints[:, None, members]
+    depth = np.clip(half.depth[members] - 1, 0, None)
     return LimbStates(joints, states, STEP_SPEED / fps * 2.0**depth)
 
 

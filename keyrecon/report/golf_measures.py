@@ -46,12 +46,12 @@ def measure_swing(fitted: FittedSwing, observations: Observations) -> SwingMeasu
     times = np.interp([start, top, hit], np.arange(len(motion.time)), motion.time)
     up = fitted.state.rotation[..., 1] * ([-1, 1, 1] if observations.left_handed else [1, 1, 1])
     sign = -1.0 if observations.left_handed else 1.0
-    turns = [
+    shoulders, hips = (
         sign * _turn(motion.points3d, _pair(motion, part), up, round(start))
         for part in ("shoulder", "hip")
-    ]
+    )
     detected = float(np.isfinite(observations.club[:, 0, 0]).mean())
-    return SwingMeasures(times[1] - times[0], times[2] - times[1], *turns, detected)
+    return SwingMeasures(times[1] - times[0], times[2] - times[1], shoulders, hips, detected)
 
 
 def _pair(motion: Motion, part: str) -> tuple[int, int]:

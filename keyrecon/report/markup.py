@@ -95,4 +95,5 @@ def pack(values: Float[np.ndarray, "*n"]) -> dict[str, object]:
     known = np.isfinite(values)
     step = float(np.abs(values[known]).max(initial=1e-9)) / 32000
     whole = np.where(known, np.round(np.where(known, values, 0) / step), -32768).astype("<i2")
-    return {"step": step, "shape": list(values.shape), "data": base64.b64encode(whole).decode()}
+    data = base64.b64encode(whole.tobytes()).decode()
+    return {"step": step, "shape": list(values.shape), "data": data}

@@ -58,8 +58,9 @@ class Windows:
         rows = np.clip(corner[1] + np.arange(side), 0, height - 1)
         x0, x1, y0, y1 = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
         border = (y0 - corner[1], corner[1] + side - y1, x0 - corner[0], corner[0] + side - x1)
+        top, bottom, left, right = np.maximum(border, 0).tolist()
         inner = cv2.copyMakeBorder(
-            picture[y0:y1, x0:x1], *np.maximum(border, 0).tolist(), cv2.BORDER_REPLICATE
+            picture[y0:y1, x0:x1], top, bottom, left, right, cv2.BORDER_REPLICATE
         )[:side, :side]
         return reduce_picture(inner, size)
 

@@ -117,6 +117,8 @@ def option_table(options: object) -> str:
 
 
 def _flat_options(options: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    if not is_dataclass(options):
+        return
     for field in fields(options):
         value = getattr(options, field.name)
         if is_dataclass(value):

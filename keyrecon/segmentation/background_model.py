@@ -59,8 +59,8 @@ NORMAL_QUARTILE = 0.6745
 """Distance of the quartiles of a normal distribution from its mean, standard deviations."""
 CHROMA_WEIGHT = 1.6
 """Weight of a and b against L: chroma varies less with light."""
-SQUARES = np.arange(256, dtype=np.float32)[:, None, None] * np.float32(
-    (1, CHROMA_WEIGHT, CHROMA_WEIGHT)
+SQUARES = np.arange(256, dtype=np.float32)[:, None, None] * np.array(
+    (1, CHROMA_WEIGHT, CHROMA_WEIGHT), np.float32
 )
 SQUARES *= SQUARES
 """Weighted square of a difference in L, a and b."""
@@ -197,7 +197,8 @@ class ForegroundModel:
         squares = cv2.LUT(cv2.max(under, cv2.subtract(lab, high)), SQUARES)
         light, a, b = cv2.split(squares)
         # A shadow darkens by a share; deeper than any shadow counts fully again.
-        floor = cv2.multiply(cv2.extractChannel(low, 0), MIN_SHADOW_LIGHT)
+        # OpenCV's stubs leave out that a number may be the second factor
+        floor = cv2.multiply(cv2.extractChannel(low, 0), MIN_SHADOW_LIGHT)  # type: ignore[call-overload]
         shadow = (under[..., 0] > 0) & (cv2.extractChannel(lab, 0) > floor)
         np.multiply(light, SHADOW_WEIGHT**2, out=light, where=shadow)
         square = light + a + b

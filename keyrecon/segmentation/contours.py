@@ -124,8 +124,8 @@ def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elem
     points, tangent = _smooth_walks(walks, lengths)
     elements = _Elements(points, tangent, np.repeat(contours.color, lengths))
     size = np.array(labels.shape[::-1])
-    keep = ((points > 1) & (points < size - 2)).all(axis=1) & tangent.any(axis=1)
-    return _thin(elements, keep, options.most)
+    inside = ((points > 1) & (points < size - 2)).all(axis=1)
+    return _thin(elements, np.logical_and(inside, tangent.any(axis=1)), options.most)
 
 
 def _find_contours(labels: UInt8[np.ndarray, "h w"], min_length: float) -> _Contours:

@@ -103,9 +103,9 @@ def cut_crops(
         t, picture = entry
         to_picture = cropping.crop_to_picture(t)
         way = (to_small @ to_picture)[:2]
-        inside = np.full(picture.shape[:2], 255, np.uint8)
+        whole = np.full(picture.shape[:2], 255, np.uint8)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        inside = cv2.warpAffine(inside, way, size[::-1], flags=flags)
+        inside = cv2.warpAffine(whole, way, size[::-1], flags=flags)
         lab[t] = to_lab(cut_affine(picture, way, size))
         foreground[t] = np.rint(scene.foreground(lab[t], t, to_picture) * inside)
 

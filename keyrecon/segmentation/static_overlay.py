@@ -47,6 +47,8 @@ class StaticOverlay:
 
     def mask(self) -> Bool[np.ndarray, "h w"]:
         """Where persistent edges lie, if they are few against those that do not persist."""
+        if self.gradient is None or self.strength is None:
+            raise ValueError("no picture was added")
         strong = self.strength > np.percentile(self.strength, 90)
         persistent = strong & (np.hypot(*self.gradient) > MIN_PERSISTENCE * self.strength)
         if persistent.sum() > 0.5 * strong.sum():

@@ -117,7 +117,7 @@ def plan_camera(
     across = distance + away * spread[1]
     center = np.array([middle[0] + across * np.sin(angle), 0, middle[2] + across * np.cos(angle)])
     center[1] = height + rise * spread[2]
-    focal = options.player_px * np.linalg.norm(center - middle) / stature
+    focal = options.player_px * float(np.linalg.norm(center - middle)) / stature
     size = (options.width, options.height)
     if options.pan:
         return _follow(points, fps, center, focal, (size, rng))

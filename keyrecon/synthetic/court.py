@@ -150,9 +150,10 @@ def _paint_floor(
         light *= 1 + 0.05 * np.sign(np.sin(x * np.pi / 1.8))
     far = z > NET_Z - LENGTH / 2 - 0.05
     inside = far & (z < 0.05) & (np.abs(x) < HALF_DOUBLES + 0.05)
-    color = np.where(inside[..., None], np.float32(court.inside), np.float32(court.outside))
+    floor, ground = np.array((court.inside, court.outside), np.float32)
+    color = np.where(inside[..., None], floor, ground)
     cover = _lines(x, z) * (0.9 + 0.06 * sample(broad, z, x, 0.015))
-    color = color + cover[..., None] * (np.float32(court.line) - color)
+    color = color + cover[..., None] * (np.array(court.line, np.float32) - color)
     return (color * light[..., None]).astype(np.float32)
 
 
@@ -191,21 +192,21 @@ def _paint_wall(
     grain, broad = tiles
     weave = 1 + 0.05 * sample(grain, along, height, 0.015)
     weave += 0.06 * sample(broad, along, height, 0.03)
-    screen = np.float32(court.wall) * weave[..., None]
+    screen = np.array(court.wall, np.float32) * weave[..., None]
     post = (np.abs((along + 1.1) % 3.0 - 1.5) < 0.035) | (np.abs(height - WALL_HEIGHT) < 0.04)
     screen[post] *= 0.55
     place = np.floor(along / 6.0)
     board = (np.abs(along % 6.0 - 2.4) < 1.3) & (np.abs(height - 0.75) < 0.42) & (place % 2 == 0)
     letters = board & (np.abs(height - 0.75) < 0.2) & (sample(broad, along, place, 0.006) > 0.1)
-    screen[board] = np.float32(court.board) * weave[board][:, None]
-    screen[letters] = np.float32(court.line) * weave[letters][:, None]
+    screen[board] = np.array(court.board, np.float32) * weave[board][:, None]
+    screen[letters] = np.array(court.line, np.float32) * weave[letters][:, None]
     crown = 4.6 + 1.3 * sample(broad, along, 0 * along, 0.05)
     crown += 0.25 * sample(grain, along, height, 0.02)
     leaves = 1 + 0.2 * sample(grain, along, height, 0.03)
     leaves += 0.25 * sample(broad, along, height, 0.02)
-    trees = np.float32(court.trees) * np.clip(leaves, 0.25, 2)[..., None]
+    trees = np.array(court.trees, np.float32) * np.clip(leaves, 0.25, 2)[..., None]
     haze = np.clip((height - 3) / 40, 0, 1)[..., None]
-    sky = np.float32(court.sky) * (1 - 0.25 * haze)
+    sky = np.array(court.sky, np.float32) * (1 - 0.25 * haze)
     foot = np.abs(np.gradient(height, axis=0)) + 1e-3
     cover = np.clip((crown - height) / foot + 0.5, 0, 1)[..., None]
     above = sky + cover * (trees - sky)
@@ -231,11 +232,12 @@ def _seat_crowd(
     number = np.abs(np.sin(seat * 12.9898 + row * 78.233) * 43758.5453) % 1.0
     x, y = (shifted - seat - 0.5) * SEAT, (up - row) * ROW
     clothes = np.stack([(number * k) % 1.0 for k in (7.0, 13.0, 29.0)], axis=-1) * 190 + 45
-    skin = np.float32((205, 155, 122)) * (0.45 + 0.6 * ((number * 41) % 1.0))[..., None]
+    skin = np.array((205, 155, 122), np.float32) * (0.45 + 0.6 * ((number * 41) % 1.0))[..., None]
     taken = (number > 0.22) & (row >= 0) & (row < 5)
     body = taken & (np.abs(x) < 0.2) & (y < 0.36)
     head = taken & (x**2 + (y - 0.45) ** 2 < 0.0121)
-    picture = np.where(((row >= 0) & (row < 5))[..., None], np.float32((74, 78, 84)), picture)
+    stand = np.array((74, 78, 84), np.float32)
+    picture = np.where(((row >= 0) & (row < 5))[..., None], stand, picture)
     picture = np.where(body[..., None], clothes, picture)
     return np.where(head[..., None], skin, picture)
 

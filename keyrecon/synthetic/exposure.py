@@ -97,7 +97,7 @@ def _draw_racket(stage: Stage, frame: int, span: tuple[float, float], scale: flo
     count = int(np.clip(np.ceil(way / RACKET_STEP), 1, RACKET_MOST))
     poses = at(time + length * ((np.arange(count) + 0.5) / count - 0.5))
     view = (focal, stage.move.principal, stage.move.size, scale)
-    return draw_implement(stage.held, poses, view, np.float32(stage.look.racket))
+    return draw_implement(stage.held, poses, view, np.array(stage.look.racket, np.float32))
 
 
 def _hide(racket: Layer | None, surface: Surface) -> Layer | None:
@@ -137,16 +137,16 @@ def lay_over(picture: Float[np.ndarray, "h w 3"], drawn: list[Instant]) -> None:
             part *= 1 - one.racket.color[..., 3:]
             part += one.racket.color
         total += layer
-    total = cv2.GaussianBlur(total / len(drawn), (3, 3), 0.55)
+    mean = cv2.GaussianBlur(total / len(drawn), (3, 3), 0.55)
     region = picture[top:bottom, left:right]
-    region *= 1 - total[..., 3:]
-    region += total[..., :3]
+    region *= 1 - mean[..., 3:]
+    region += mean[..., :3]
 
 
 def _union(drawn: list[Instant], shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    boxes = [(i.surface.left, i.surface.top, *i.surface.solid.shape[::-1]) for i in drawn]
+    bodies = [(i.surface.left, i.surface.top, *i.surface.solid.shape[::-1]) for i in drawn]
     rackets = [i.racket for i in drawn if i.racket]
-    boxes = np.array(boxes + [(r.left, r.top, *r.depth.shape[::-1]) for r in rackets])
+    boxes = np.array(bodies + [(r.left, r.top, *r.depth.shape[::-1]) for r in rackets])
     left, top = boxes[:, :2].min(axis=0).tolist()
     right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0).tolist()
     return max(left - 2, 0), max(top - 2, 0), min(right + 2, shape[1]), min(bottom + 2, shape[0])

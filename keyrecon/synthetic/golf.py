@@ -66,10 +66,10 @@ def _paint_grass(
     grain, broad = tiles
     light = 1 + 0.10 * sample(grain, x, z, 0.012) + 0.07 * sample(broad, x, z, 0.03)
     light += 0.06 * np.sign(np.sin((x + 0.3 * z) * np.pi / 2.2))
-    color = np.float32(GRASS) * light[..., None]
+    color = np.array(GRASS, np.float32) * light[..., None]
     mat = (np.abs(x) < MAT[0]) & (np.abs(z + 0.2) < MAT[1])
     weave = 1 + 0.06 * sample(grain, z, x, 0.006)
-    return np.where(mat[..., None], np.float32(MAT_COLOR) * weave[..., None], color)
+    return np.where(mat[..., None], np.array(MAT_COLOR, np.float32) * weave[..., None], color)
 
 
 def _paint_trees(
@@ -82,8 +82,9 @@ def _paint_trees(
     crown += 0.4 * sample(grain, along, height, 0.04)
     leaves = 1 + 0.22 * sample(grain, along, height, 0.05)
     leaves += 0.25 * sample(broad, along, height, 0.03)
-    trees = np.float32(look.court.trees) * np.clip(leaves, 0.25, 2)[..., None]
-    sky = np.float32(look.court.sky) * (1 - 0.2 * np.clip((height - 4) / 40, 0, 1)[..., None])
+    trees = np.array(look.court.trees, np.float32) * np.clip(leaves, 0.25, 2)[..., None]
+    haze = np.clip((height - 4) / 40, 0, 1)[..., None]
+    sky = np.array(look.court.sky, np.float32) * (1 - 0.2 * haze)
     foot = np.abs(np.gradient(height, axis=0)) + 1e-3
     cover = np.clip((crown - height) / foot + 0.5, 0, 1)[..., None]
     picture = sky + cover * (trees - sky)

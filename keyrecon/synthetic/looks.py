@@ -106,7 +106,8 @@ def choose_look(seed: int) -> Look:
 
 def _jitter(color: Rgb, rng: np.random.Generator, spread: float = 12.0) -> Rgb:
     """A colour close to another."""
-    return tuple(float(c) for c in np.clip(np.add(color, rng.normal(0, spread, 3)), 12, 246))
+    red, green, blue = np.clip(np.add(color, rng.normal(0, spread, 3)), 12, 246).tolist()
+    return red, green, blue
 
 
 def _choose_sun(rng: np.random.Generator) -> tuple[float, float, float]:

@@ -135,7 +135,8 @@ def _feet(
             way = np.array(step.place) - before.place
             place += ease(share)[:, None] * way
             turn += ease(share) * np.radians(step.heading - before.heading)
-            rise += (0.05 + 0.13 * min(np.linalg.norm(way), 1.5)) * np.sin(np.pi * share) ** 2
+            length = float(np.linalg.norm(way))
+            rise += (0.05 + 0.13 * min(length, 1.5)) * np.sin(np.pi * share) ** 2
         ankles[:, foot] = np.stack(
             [place[:, 0], (ANKLE_HEIGHT + rise) * scale, -place[:, 1]], axis=1
         )

@@ -187,7 +187,7 @@ def plan_points(seconds: float, rng: np.random.Generator) -> PointPlan:
     return plan
 
 
-def ease(share: np.ndarray | float) -> np.ndarray | float:
+def ease(share: Float[np.ndarray, "*t"]) -> Float[np.ndarray, "*t"]:
     """Minimum-jerk course from 0 to 1 (Flash and Hogan 1985)."""
     s = np.clip(share, 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
@@ -199,7 +199,7 @@ def _rally(plan: PointPlan, rng: np.random.Generator, forehand: bool) -> None:
     _split_step(plan, start, rng)
     side = 1.0 if forehand else -1.0
     way = np.array([side * rng.uniform(0.7, 2.4), rng.uniform(-0.5, 0.6)]) - plan.place * [0.6, 0.8]
-    duration = 0.35 + np.linalg.norm(way) / 2.5
+    duration = 0.35 + float(np.linalg.norm(way)) / 2.5
     arrive = start + 0.34 + duration
     stance = _STANCES["forehand" if forehand else "backhand"]
     _run(plan, (start + 0.34, arrive), way, stance)

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.body import LSP14
+from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.synthetic.exposure import Instant, choose_instants, draw_figure, lay_over
 from keyrecon.synthetic.figure import PARTS, FigureSolids
 from keyrecon.synthetic.stage import Stage, pose_figure
@@ -156,9 +157,9 @@ def _see_club(stage: Stage, frame: int, change: Float[np.ndarray, "h w"]) -> flo
     """Share of the axis of what is swung along which it changes the picture visibly."""
     start, way, _ = stage.racket[frame]
     along = np.linspace(FIST, stage.held.reach, 40)[:, None]
-    pixels = stage.project(start + along * way, frame).astype(np.float32)
+    pixels = stage.project(start + along * way, frame)
     there = cv2.dilate(change, np.ones((3, 3), np.uint8))
-    return float((cv2.remap(there, pixels[:, None], None, cv2.INTER_LINEAR) > STANDS_OUT).mean())
+    return float((sample_picture(there, pixels[:, None]) > STANDS_OUT).mean())
 
 
 def _develop(stage: Stage, frame: int, picture: Float[np.ndarray, "h w 3"]) -> np.ndarray:

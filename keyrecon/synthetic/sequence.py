@@ -166,6 +166,8 @@ def _enter(stage: Stage) -> None:
 
 
 def _draw_chunk(frames: range, labelled: frozenset[int]) -> list[Frame]:
+    if _stage is None:
+        raise RuntimeError("a worker draws only after _enter gave it the stage")
     return [_without_labels(draw_frame(_stage, t), t in labelled) for t in frames]
 
 

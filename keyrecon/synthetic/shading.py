@@ -111,7 +111,8 @@ def _light(
     ambient = to_sky[:, None] * sky + (1 - to_sky)[:, None] * floor
     half = light.sun - np.array([0, 0, 1.0])
     shine = np.clip(normal @ (half / np.linalg.norm(half)).astype(np.float32), 0, 1) ** 12
-    direct = (to_sun + gloss.astype(np.float32) * shine)[:, None] * np.float32(light.color)
+    sun = np.array(light.color, np.float32)
+    direct = (to_sun + gloss.astype(np.float32) * shine)[:, None] * sun
     share = np.float32(light.sunshine)
     return ambient * (1.08 - 0.42 * share) + direct * (0.14 + 0.72 * share)
 

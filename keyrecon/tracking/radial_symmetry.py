@@ -78,7 +78,7 @@ def radial_symmetry(
     vx, vy = (a * across + b * along) / length, (c * across + d * along) / length
     size = np.hypot(slope.gx, slope.gy)
     total = np.zeros((rows, columns), np.float32)
-    for radius in np.float32(radii):
+    for radius in np.array(radii, np.float32):
         x = np.rint(slope.x + radius * vx).astype(np.int32)
         y = np.rint(slope.y + radius * vy).astype(np.int32)
         inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)

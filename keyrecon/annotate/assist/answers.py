@@ -80,6 +80,8 @@ def describe_suggestion(cache: ProjectCache, annotations: Annotations, frame: in
 def _certain_signs(cache: ProjectCache, annotations: Annotations, frame: int) -> Signs:
     """Depth signs that are nearly certain from the suggestion for a frame."""
     body, names = cache.body(annotations), _limb_names(annotations.skeleton)
+    if body is None:
+        return {}
     observation = _observe(cache, body, annotations, frame, {}, {})
     pose = estimate_pose(observation, body.size, annotations.skeleton, body.exemplars(frame))
     certain = np.flatnonzero(pose.certainty >= MIN_CERTAINTY)

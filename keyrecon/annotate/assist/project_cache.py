@@ -66,9 +66,15 @@ class ProjectCache:
         self._suggestions: dict[int, tuple[str, PoseSuggestion]] = {}
         self._estimating: tuple[str, Future[BodyEstimate]] | None = None
         self._body: BodyEstimate | None = None
-        self._neighbours = LatestResult(lambda _, *inputs: find_neighbours(*inputs))
-        self._colors = LatestResult(lambda picks: learn_colors(self.video, picks))
-        self._strip = LatestResult(self._cut_strip)
+        self._neighbours: LatestResult[str, tuple[Neighbours, ...]] = LatestResult(
+            lambda _, *inputs: find_neighbours(*inputs)
+        )
+        self._colors: LatestResult[tuple[Pick, ...], Colors] = LatestResult(
+            lambda picks: learn_colors(self.video, picks)
+        )
+        self._strip: LatestResult[tuple[int, ...], tuple[Strip, CameraPath]] = LatestResult(
+            self._cut_strip
+        )
         # ready when the page asks, and in nobody's way when the server is stopped
         Thread(target=self.preparation, daemon=True).start()
 

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from keyrecon.annotate.server.jobs import Job
-from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_kind, picks_of
+from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_body, of_kind, picks_of
 from keyrecon.annotate.store.journal import Entry, JournalState
 from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
 from keyrecon.body import Skeleton
@@ -74,14 +74,14 @@ def _chain(skeleton: Skeleton, joint: int) -> list[int]:
 def halves_marked(cells: Cells, skeleton: Skeleton) -> dict[int, str]:
     """Which half of the body has marks on each frame that has any."""
     halves: dict[int, str] = {}
-    for _, frame, joint in of_kind(cells, "mark"):
+    for frame, joint in of_body(cells, "mark"):
         half = "lower" if skeleton.is_lower[skeleton.index(joint)] else "upper"
         halves[frame] = join_halves(halves.get(frame), half)
     return halves
 
 
 def describe_keyframes(
-    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, details: Json
+    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, details: dict[int, Json]
 ) -> list[Json]:
     """All frames to annotate: those chosen, those a person added, and others that bear marks.
 

@@ -8,7 +8,7 @@ A process whose server is gone ends at its next report of progress.
 import itertools
 import multiprocessing
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -117,7 +117,7 @@ def _work(command: Command, options: dict[str, Any], reports: Connection) -> Non
     def progress(
         items: Iterable[Item], description: str, total: int | None = None
     ) -> Iterator[Item]:
-        total = len(items) if total is None and hasattr(items, "__len__") else total
+        total = len(items) if total is None and isinstance(items, Sized) else total
         before = 0.0
         for done, item in enumerate(items):
             if time.monotonic() - before > PROGRESS_SECONDS:

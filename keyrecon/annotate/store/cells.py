@@ -94,6 +94,11 @@ def of_kind(cells: Mapping[Key, Value], *kinds: str) -> Cells:
     return {key: value for key, value in cells.items() if key[0] in kinds}
 
 
+def of_body(cells: Mapping[Key, Value], kind: str) -> dict[tuple[int, str], Value]:
+    """The cells of one of the FILE_CELLS by frame and name."""
+    return {(int(key[1]), str(key[2])): value for key, value in of_kind(cells, kind).items()}
+
+
 def by_frame(cells: Mapping[Key, Value], kind: str) -> dict[str, Any]:
     """Cells of one kind as {frame: {name: value}} or {frame: value}, frames as text for JSON."""
     table: dict[str, Any] = {}
@@ -142,29 +147,32 @@ def annotations_from_cells(cells: Cells, skeleton: Skeleton) -> Annotations:
     placed = {
         key: value for key, value in of_kind(cells, *FILE_CELLS).items() if not is_absent(value)
     }
-    frames = sorted({key[1] for key in placed})
+    frames = sorted({*marked_frames(placed)})
     row = {frame: k for k, frame in enumerate(frames)}
     limbs = [skeleton.names[child] for _, child in skeleton.bones.tolist()]
-    marks = _table(of_kind(placed, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
-    signs = _table(of_kind(placed, "nearer"), row, limbs, [0.0])
+    marks = _table(of_body(placed, "mark"), row, skeleton.names, [np.nan, np.nan, 0.0])
+    signs = _table(of_body(placed, "nearer"), row, limbs, [0.0])
     return Annotations(
         skeleton,
         np.array(frames, dtype=np.int64),
         marks[..., :2],
         marks[..., 2] == 2,
         signs[..., 0].astype(np.int64),
-        tuple(sorted(key[1:] for key, value in of_kind(cells, "mark").items() if is_absent(value))),
+        tuple(sorted(key for key, value in of_body(cells, "mark").items() if is_absent(value))),
     )
 
 
 def _table(
-    cells: Cells, row: Mapping[int, int], names: Sequence[str], empty: list[float]
+    cells: Mapping[tuple[int, str], Value],
+    row: Mapping[int, int],
+    names: Sequence[str],
+    empty: list[float],
 ) -> Float[np.ndarray, "K N C"]:
     """Values of cells by frame and name."""
     column = {name: n for n, name in enumerate(names)}
     table = np.tile(np.array(empty, dtype=float), (len(row), len(names), 1))
     if cells:
-        where = np.array([(row[key[1]], column[key[2]]) for key in cells])
+        where = np.array([(row[frame], column[name]) for frame, name in cells])
         table[where[:, 0], where[:, 1]] = np.array([*cells.values()]).reshape(len(cells), -1)
     return table
 

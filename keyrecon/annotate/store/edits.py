@@ -127,8 +127,8 @@ def _cells(edit: AnyEdit) -> list[tuple[Key, Value, Value]]:
             was, to = edit.was.get, edit.to.get
             return [(("mark", frame, n), _listed(was(n)), _listed(to(n))) for n in names]
         case NearerEdit(frame=frame):
-            names = {**edit.was, **edit.to}
-            return [(("nearer", frame, n), edit.was.get(n), edit.to.get(n)) for n in names]
+            limbs = {**edit.was, **edit.to}
+            return [(("nearer", frame, n), edit.was.get(n), edit.to.get(n)) for n in limbs]
         case PickEdit():
             return _pick_cells(edit)
         case OwnKeyframeEdit(frame=frame):

@@ -73,6 +73,8 @@ def _move(undoable: Stack, redoable: Stack, entry: Entry) -> tuple[Stack, Stack]
     """Both stacks after an entry."""
     if entry.role == "edit":
         return (*undoable[-MAX_UNDOABLE:], entry.revision), ()
+    if entry.of is None:
+        return undoable, redoable
     if entry.role == "undo":
         return undoable[:-1], (*redoable, entry.of)
     if entry.role == "redo":
@@ -188,6 +190,6 @@ class Journal:
             ) from fault
 
 
-def _entry(revision: int, id_: str, role: str, of: int | None, label: str, changes: str) -> Entry:
+def _entry(revision: int, id_: str, role: Role, of: int | None, label: str, changes: str) -> Entry:
     parsed = tuple(Change(tuple(key), old, new) for key, old, new in json.loads(changes))
     return Entry(revision, id_, role, of, label, parsed)

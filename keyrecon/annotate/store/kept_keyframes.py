@@ -64,5 +64,5 @@ def halves_by_frame(keyframes: Keyframes | None) -> dict[int, str]:
 
 def join_halves(one: str | None, other: str | None) -> str:
     """What two requests for a frame, not both empty, ask for together."""
-    halves = {one, other} - {None}
+    halves = {half for half in (one, other) if half is not None}
     return halves.pop() if len(halves) == 1 else "both"

@@ -56,7 +56,9 @@ def accept_edits(
     An edit whose id the journal `knows`, or that came earlier in the same batch, is accepted and
     does nothing more.
     """
-    now, drafts, results = dict(cells), [], []
+    now = dict(cells)
+    drafts: list[Draft] = []
+    results: list[Result] = []
     for edit in edits:
         known = knows(edit.id) or edit.id in {draft.id for draft in drafts}
         result, draft = ({"ok": True}, None) if known else _accept_one(edit, now, limits)
@@ -77,7 +79,7 @@ def _accept_one(edit: AnyEdit, cells: Cells, limits: Limits) -> tuple[Result, Dr
     if resolved is None:
         current = {str(change.key[-1]): cells.get(change.key) for change in changes}
         return {"ok": False, "status": 409, "current": current}, None
-    label = type(edit).__struct_config__.tag
+    label = str(type(edit).__struct_config__.tag)
     return {"ok": True}, Draft(edit.id, label, resolved) if resolved else None
 
 

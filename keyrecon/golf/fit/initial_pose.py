@@ -6,6 +6,7 @@ headings and keeps the best one.
 """
 
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from jaxtyping import Float
@@ -70,16 +71,15 @@ def estimate_initial_pose(
         off = ((projected - pixels) / JOINT_SPREAD).ravel()
         return np.concatenate([off, up[[0, 2]] / LEAN_SPREAD])
 
-    best, least = None, np.inf
+    placements: list[tuple[float, Placement]] = []
     for heading in np.linspace(0, 2 * np.pi, HEADINGS, endpoint=False):
         base = LEVEL @ Rotation.from_euler("y", heading).as_matrix()
         start = np.append(middle, depth) - base @ points.mean(axis=0)
         fit = least_squares(errors, np.concatenate([np.zeros(3), start]), args=(base,),
                             loss="soft_l1", max_nfev=60)  # fmt: skip
-        if best is None or fit.cost < least:
-            turn = Rotation.from_rotvec(fit.x[:3]).as_matrix()
-            best, least = Placement(turn @ base, fit.x[3:]), fit.cost
-    return best
+        turn = Rotation.from_rotvec(fit.x[:3]).as_matrix()
+        placements.append((fit.cost, Placement(turn @ base, fit.x[3:])))
+    return min(placements, key=itemgetter(0))[1]
 
 
 def _mean_points(

@@ -50,6 +50,8 @@ def refit_proportions(
     options: ProportionOptions,
 ) -> SwingFit:
     """A fitted swing with the proportions that its marks tell, and the fit with them, in turns."""
+    if observations.marks is None:
+        return fit
     average = fit.body
     for _ in range(options.rounds):
         pose = fitted_pose(fit)

@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from keyrecon.numerics.picture_points import sample_picture
+
 PATCH_SIDE = 21
 """Pixels of a patch along each side. Chosen on rendered swings, like all values here; see
 benchmarks/golf_tracks.py."""
@@ -129,9 +131,9 @@ def _read(
     places: Float[np.ndarray, "n 2"],
 ) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n"]]:
     """Lab layers of a picture at some places, chroma strengthened, and the weights there."""
-    at = places.astype(np.float32)[:, None]
-    read = cv2.remap(picture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(weight, at, None, cv2.INTER_LINEAR)
+    at = places[:, None]
+    read = sample_picture(picture, at, cv2.BORDER_REPLICATE)
+    inside = sample_picture(weight, at)
     strength = np.tile((1.0, CHROMA_WEIGHT, CHROMA_WEIGHT), read.shape[2] // 3)
     return read[:, 0].astype(float) * strength, inside.ravel() / 255.0
 

@@ -23,6 +23,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.io.frame_reader import read_grey, read_small, reduce_picture, side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath
 from keyrecon.segmentation.background_model import ForegroundModel, median_background
@@ -43,6 +44,8 @@ CUT_HEIGHT = 160.0
 """Height of the player in the pictures that are cut out, px; time goes with its square."""
 LIMB_WIDTH, HAND_LENGTH = 0.032, 0.03
 """A forearm is thicker, and a hand reaches no farther from it, player heights."""
+NO_FRAME = (0, 0, 0, 0)
+"""GrabCut reads its rectangle only where there is no mask."""
 GRABCUT_RIM = 2
 """Scenery around the reach that GrabCut is given, px."""
 ISLAND_GAP = 0.06
@@ -100,8 +103,8 @@ class FrameForeground:
         """Probability at points given in pixels of the video; 0 outside the picture."""
         if not points.size:
             return np.zeros(points.shape[:-1])
-        flat = self.to_mask(points.reshape(-1, 2)).astype(np.float32)
-        read = cv2.remap(self.likely, flat[:, None], None, cv2.INTER_LINEAR)
+        flat = self.to_mask(points.reshape(-1, 2))
+        read = sample_picture(self.likely, flat[:, None])
         return (read.ravel() / 255.0).reshape(points.shape[:-1])
 
     def mask(self) -> UInt8[np.ndarray, "h w"]:
@@ -163,9 +166,9 @@ class _Cutter:
         trimap = np.full(mask.shape, cv2.GC_BGD, np.uint8)
         trimap[y0:y1, x0:x1] = cv2.GC_PR_FGD
         trimap = np.ascontiguousarray(trimap[part])
-        models = (m.copy() for m in self.models)
+        scene, player = (m.copy() for m in self.models)
         cropped = np.ascontiguousarray(small[part])
-        cv2.grabCut(cropped, trimap, None, *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
+        cv2.grabCut(cropped, trimap, NO_FRAME, scene, player, 1, cv2.GC_EVAL_FREEZE_MODEL)
         mask[part] = trimap == cv2.GC_PR_FGD
         return cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_NEAREST) > 0
 
@@ -238,11 +241,11 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], pose: ClickedPose) -> _Cu
     shrink = picture.shape[1] / pose.size[0]
     width = max(16, round(pose.size[0] * min(shrink, CUT_HEIGHT / pose.height)))
     small = reduce_picture(picture, width)
-    models = np.zeros((1, 65)), np.zeros((1, 65))
+    scene, player = np.zeros((1, 65)), np.zeros((1, 65))
     trimap = _seed(small.shape[:2], pose)
     cv2.setRNGSeed(0)  # its clusters begin at random; the same clicks give the same player
-    cv2.grabCut(small, trimap, None, *models, 5, cv2.GC_INIT_WITH_MASK)
-    cutter = _Cutter(pose, width, models)
+    cv2.grabCut(small, trimap, NO_FRAME, scene, player, 5, cv2.GC_INIT_WITH_MASK)
+    cutter = _Cutter(pose, width, (scene, player))
     _check_player(cutter(small), pose)
     return cutter
 

@@ -24,6 +24,7 @@ from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.numerics.viterbi import find_cheapest_path
 
 SAMPLES_ALONG = 32
@@ -229,9 +230,7 @@ def _stand_out(
 def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndarray, "n p"]:
     if not len(points):
         return np.zeros(points.shape[:2], np.float32)
-    return cv2.remap(
-        picture, points.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    return sample_picture(picture, points, cv2.BORDER_REPLICATE)
 
 
 def _weigh(

@@ -21,6 +21,7 @@ from skimage.transform import probabilistic_hough_line
 
 from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.picture_points import sample_picture
 
 PARALLEL = np.deg2rad(6.0)
 """Two sides of a shaft differ by no more."""
@@ -127,8 +128,7 @@ def _stand_alone(
     across = np.stack([-way[:, 1], way[:, 0]], axis=1)
     across *= beside / np.linalg.norm(across, axis=1, keepdims=True)
     along, one, other = (
-        cv2.remap(likely, (points + k * across[:, None]).astype(np.float32), None, cv2.INTER_LINEAR)
-        .astype(float).mean(axis=1)
+        sample_picture(likely, points + k * across[:, None]).astype(float).mean(axis=1)
         for k in (0, -1, 1)
     )  # fmt: skip
     return np.maximum(one, other) < FREE_SHARE * along

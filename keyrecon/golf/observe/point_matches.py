@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from keyrecon.numerics.picture_points import track_there_and_back
+
 
 @dataclass(frozen=True)
 class MatchOptions:
@@ -41,11 +43,8 @@ def match_points(
     if not len(start):
         return np.zeros((0, 2)), np.zeros((0, 2))
     side = max(7, round(options.window * height)) | 1
-    flow = {"winSize": (side, side), "maxLevel": 3}
-    end, tracked, _ = cv2.calcOpticalFlowPyrLK(grey, following, start, None, **flow)
-    back, again, _ = cv2.calcOpticalFlowPyrLK(following, grey, end, None, **flow)
-    near = np.linalg.norm(back - start, axis=1) < max(0.5, options.back * height)
-    good = near & (tracked.ravel() > 0) & (again.ravel() > 0)
+    end, off, tracked = track_there_and_back(grey, following, start, side)
+    good = (off < max(0.5, options.back * height)) & tracked
     return start[good].astype(float), end[good].astype(float)
 
 

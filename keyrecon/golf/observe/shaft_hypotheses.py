@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.golf.observe.line_segments import LineSegments
+from keyrecon.numerics.picture_points import sample_picture
 
 SAMPLE_STEP = 0.01
 """Places at which a line is sampled, player heights apart."""
@@ -161,10 +162,8 @@ def _read(
     points: Float[np.ndarray, "n 2"],
 ) -> Float[np.ndarray, "n"]:
     """Values of a picture of the mask's size at points in px of the video."""
-    places = foreground.to_mask(points).astype(np.float32)
-    read = cv2.remap(
-        picture, places[:, None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    places = foreground.to_mask(points)
+    read = sample_picture(picture, places[:, None], cv2.BORDER_REPLICATE)
     return read.ravel().astype(float)
 
 

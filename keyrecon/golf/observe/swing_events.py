@@ -21,7 +21,6 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.interpolate import PchipInterpolator
@@ -33,6 +32,7 @@ from keyrecon.golf.observe.club import Club
 from keyrecon.golf.prior.key_postures import REST_SPEED, SMOOTH
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.video import Video
+from keyrecon.numerics.picture_points import track_there_and_back
 
 LARGEST_NOISE = 0.15
 """What is farther from the address, player heights, is no noise."""
@@ -174,9 +174,9 @@ def _return_to_address(
         one, other = (ends[k, 1] - ends[k, 0] for k in (t, t + 1))
         step = other - one
         share = float(np.clip((target - one) @ step / max(step @ step, 1e-9), 0, 1))
-        apart = np.linalg.norm(one + share * step - target)
+        apart = float(np.linalg.norm(one + share * step - target))
         hands = (1 - share) * ends[t, 0] + share * ends[t + 1, 0]
-        apart += np.linalg.norm(hands - address[0])
+        apart += float(np.linalg.norm(hands - address[0]))
         if apart < best:
             best, hit = apart, t + share
     return hit
@@ -269,7 +269,7 @@ def _resting_share(
     one, other = np.clip(np.round((first, last)).astype(int), 0, len(fitted.club) - 1)
     real = np.linalg.norm(fitted.club[other, 0] - fitted.club[one, 0]) / fitted.body.stature
     shown = np.linalg.norm(fitted.club2d[other, 0] - fitted.club2d[one, 0]) / height
-    return max(REST_SPEED * float(shown / max(real, 1e-9)), options.least)
+    return max(REST_SPEED * float(shown / max(float(real), 1e-9)), options.least)
 
 
 def _hand_speeds(
@@ -317,10 +317,8 @@ def _find_step(
         return np.full(2, np.nan)
     side = max(5, round(options.patch * height)) | 1
     start = points.astype(np.float32)[:, None]
-    there, tracked, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, winSize=(side, side))
-    back, again, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, winSize=(side, side))
-    kept = (tracked.ravel() > 0) & (again.ravel() > 0)
-    kept &= np.linalg.norm(back - start, axis=2).ravel() < options.return_error * height
+    there, off, tracked = track_there_and_back(before, after, start, side)
+    kept = tracked & (off < options.return_error * height)
     if kept.sum() < FEWEST_POINTS:
         return np.full(2, np.nan)
     return np.median((there - start)[kept, 0], axis=0) / height

@@ -231,7 +231,8 @@ def _movement(
         return node.place, (0.0, 0.0, 0.0)
     local = np.einsum("tji,tj->ti", parent.turn, node.place - parent.place)
     length = _length(local)
-    offset = tuple(length * direction for direction in node.rest)
+    x, y, z = node.rest
+    offset = (length * x, length * y, length * z)
     # A place that the parent's turn does not bring about needs channels of its own.
     steady = np.linalg.norm(local - np.array(offset), axis=1).max() <= STEADY * length + 1e-9
     return (None if steady else local), offset

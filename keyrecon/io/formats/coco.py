@@ -50,7 +50,9 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
         data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         images = {image["id"]: image for image in data["images"]}
         categories = {c["id"]: c for c in data["categories"] if c.get("keypoints")}
-        marks, nearer, absent = [], {}, set()
+        marks: list[Mark] = []
+        nearer: dict[int, Int[np.ndarray, "B"]] = {}
+        absent: set[tuple[int, str]] = set()
         for annotation in data["annotations"]:
             if annotation.get("category_id") in categories and "keypoints" in annotation:
                 category = categories[annotation["category_id"]]
@@ -173,7 +175,9 @@ def _frame_rows(annotations: Annotations, size: tuple[int, int]) -> dict[int, tu
     places = np.concatenate([joints, v[..., None]], axis=2)
     nothing = np.zeros((len(skeleton.names), 3)), np.zeros(len(skeleton.bones), dtype=np.int64)
     pairs = zip(places, annotations.nearer, strict=True)
-    told = dict(zip(annotations.frames.tolist(), pairs, strict=True))
+    told: dict[int, tuple[np.ndarray, np.ndarray]] = dict(
+        zip(annotations.frames.tolist(), pairs, strict=True)
+    )
     absent: dict[int, list[str]] = {}
     for frame, name in annotations.absent:
         absent.setdefault(frame, []).append(name)

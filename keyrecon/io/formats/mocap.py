@@ -83,7 +83,8 @@ def read_capture(path: Path, trim: int = 0) -> Capture:
 
 def _read(path: Path) -> Capture:
     suffix = path.suffix.lower()
-    club = None
+    toes: Float[np.ndarray, "T 2 3"] | None
+    club: Float[np.ndarray, "T 2 3"] | None = None
     if suffix == ".c3d":
         markers = read_markers(path)
         joints, toes, club, fps = markers.joints, markers.toes, markers.club, markers.fps

@@ -33,8 +33,9 @@ def write_model(
     """Write arrays and where they come from; the folder is made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
     single = {name: values.astype(np.float32) for name, values in arrays.items()}
+    described = {"version": np.array(version), "provenance": np.array(provenance)}
     with path.open("wb") as file:
-        np.savez_compressed(file, version=version, provenance=np.array(provenance), **single)
+        np.savez_compressed(file, **described, **single)  # type: ignore[arg-type]  # as in storage.py
 
 
 def read_model(
@@ -73,7 +74,7 @@ def write_depth_model(path: Path, model: DepthModel) -> None:
 def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
     provenance, arrays = read_model(path, _DEPTH_MODEL, ("coefficients",))
-    return DepthModel(provenance=provenance, **arrays)
+    return DepthModel(arrays["coefficients"], provenance)
 
 
 BUILT_IN_SWING_PRIOR = PACKAGE / "golf" / "prior" / "prior.npz"

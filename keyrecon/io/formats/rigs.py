@@ -189,9 +189,9 @@ def _toes(
     figure: CapturedFigure, names: dict[str, int], rig: Rig
 ) -> Float[np.ndarray, "T 2 3"] | None:
     for toe in rig.toes:
-        pair = [names.get(toe.format(side)) for side in rig.sides]
-        if None not in pair:
-            return figure.positions[:, pair]
+        pair = [toe.format(side) for side in rig.sides]
+        if all(name in names for name in pair):
+            return figure.positions[:, [names[name] for name in pair]]
     return None
 
 

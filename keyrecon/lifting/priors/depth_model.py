@@ -176,7 +176,7 @@ def _draw(
     chance = np.concatenate([np.full(len(c), len(c) ** -0.5) for c in captures])
     rows = rng.choice(len(chance), _BATCH, p=chance / chance.sum())
     poses = np.concatenate(captures)[rows]
-    mirrored = poses[:, _MIRROR] * np.float32([-1, 1, 1])
+    mirrored = poses[:, _MIRROR] * np.array([-1, 1, 1], np.float32)
     poses = np.where((rng.random(len(poses)) < 0.5)[:, None, None], mirrored, poses)
     filmed = _film(_vary(poses, rng, options.limb_turn), rng, options)
     error = 1 + options.length_error * rng.standard_normal((*filmed.shape[:2], 1))
