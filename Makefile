@@ -15,6 +15,7 @@ test: $(STAMP)
 lint: $(STAMP)
 	$(VENV)/bin/ruff check keyrecon tests benchmarks
 	$(VENV)/bin/ruff format --check keyrecon tests benchmarks
+	$(VENV)/bin/mypy
 	$(VENV)/bin/oxlint --quiet keyrecon tests
 
 $(STAMP): pyproject.toml
