@@ -187,10 +187,10 @@ def plan_points(seconds: float, rng: np.random.Generator) -> PointPlan:
     return plan
 
 
-def ease(share: Float[np.ndarray, "*t"]) -> Float[np.ndarray, "*t"]:
+def ease(share: np.ndarray | float) -> np.ndarray:
     """Minimum-jerk course from 0 to 1 (Flash and Hogan 1985)."""
     s = np.clip(share, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    return np.asarray(s**3 * (10 - 15 * s + 6 * s**2))
 
 
 def _rally(plan: PointPlan, rng: np.random.Generator, forehand: bool) -> None:
