@@ -32,5 +32,5 @@ def test_a_shifted_texture_is_tracked_there_and_back(texture):
     start = np.array([[30, 30], [45, 25]], np.float32)
     there, off, tracked = track_there_and_back(texture, shifted, start, 15)
     assert tracked.all()
-    np.testing.assert_allclose(there, start + [3, 2], atol=0.1)
+    np.testing.assert_allclose(there, np.add(start, (3, 2)), atol=0.1)
     assert off.max() < 0.1
