@@ -128,7 +128,7 @@ def keyframes(
             keyrecon run --method paper; 'best' is ours (default).
         force: Make every stage again.
     """
-    chosen = {"budget": budget, "coverage": coverage, "reach": reach}
+    chosen = work.KeyframeSettings(budget, coverage, reach)
     print(work.find_keyframes(Workspace(project, force), options, chosen, show, method == "paper"))
 
 

@@ -102,11 +102,9 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
 
 def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     reach = options.get("reach")
-    chosen = {
-        "budget": options.get("budget"),
-        "coverage": options.get("coverage"),
-        "reach": None if reach is None else round(reach),
-    }
+    chosen = project.KeyframeSettings(
+        options.get("budget"), options.get("coverage"), None if reach is None else round(reach)
+    )
     return project.find_keyframes(Workspace(folder), Options(), chosen, progress)
 
 

@@ -13,7 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.project import evaluate, find_keyframes, prepared, run, settings, start
+from keyrecon.app.project import (
+    KeyframeSettings,
+    evaluate,
+    find_keyframes,
+    prepared,
+    run,
+    settings,
+    start,
+)
 from keyrecon.body import LSP14
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.io.formats.coco import read_coco, write_coco
@@ -44,7 +52,7 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     truth = read_truth(sequence / "truth.npz")
     workspace = _project(sequence / "video.mp4", out / "project")
     workspace.add_picks(read_picks(KEPT / f"demo_{name}.picks.json"))
-    say(find_keyframes(workspace, Options(), {}, progress).split("\nNext")[0])
+    say(find_keyframes(workspace, Options(), KeyframeSettings(), progress).split("\nNext")[0])
     say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
     options = settings(workspace, Options(), round(float(truth["height_m"]), 2))
     say(run(workspace, options, progress, truth=truth))

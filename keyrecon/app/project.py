@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, as_printed, prepare, with_height
@@ -48,7 +49,7 @@ def start(
     opened = open_video(video, first, end, slow_motion)
     if skeleton is not None:
         read_skeleton(skeleton)
-    told = {"start": first or None, "end": end}
+    told: dict[str, float | None] = {"start": first or None, "end": end}
     told["slow_motion"] = None if slow_motion == 1 else slow_motion
     Workspace.create(folder, opened, video, told)
     if skeleton is not None:
@@ -105,10 +106,28 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
     return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {quoted(workspace.folder)}"
 
 
+@dataclass(frozen=True)
+class KeyframeSettings:
+    """The options of keyframes that commands and page offer; None leaves the project's."""
+
+    budget: float | None = None
+    coverage: float | None = None
+    reach: int | None = None
+
+    def over(self, options: KeyframeOptions) -> KeyframeOptions:
+        """Options with those that are given here in their place."""
+        return replace(
+            options,
+            budget=options.budget if self.budget is None else self.budget,
+            coverage=options.coverage if self.coverage is None else self.coverage,
+            reach=options.reach if self.reach is None else self.reach,
+        )
+
+
 def find_keyframes(
     workspace: Workspace,
     options: Options,
-    chosen: dict[str, object],
+    chosen: KeyframeSettings,
     progress: Progress,
     printed: bool = False,
 ) -> str:
@@ -117,9 +136,8 @@ def find_keyframes(
     `printed` takes the forms that the paper prints. The project remembers its options without
     them, so that a run by the same forms finds the same stages, and one by ours is not bound.
     """
-    wanted = {name: value for name, value in chosen.items() if value is not None}
     options = workspace.options(options, Options())
-    options = replace(options, keyframes=replace(options.keyframes, **wanted))
+    options = replace(options, keyframes=chosen.over(options.keyframes))
     keep = workspace.stages.keep
     forms = as_printed(options) if printed else options
     preparation = prepare(workspace.video(), workspace.picks(), forms, keep, progress)

@@ -44,7 +44,7 @@ def untouched(tmp_path_factory):
 def prepared(untouched):
     """(help, keyframes) of a project whose keyframes were chosen."""
     untouched.add_picks(picks(COUNT))
-    project.find_keyframes(untouched, Options(), {"budget": 0.1}, silent)
+    project.find_keyframes(untouched, Options(), project.KeyframeSettings(budget=0.1), silent)
     return make_assistant(Workspace(untouched.folder))
 
 
