@@ -6,14 +6,33 @@ value where a number belongs is named in one line with what is allowed.
 """
 
 import types
-from dataclasses import fields, is_dataclass, replace
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from dataclasses import Field, fields, replace
+from typing import (
+    Any,
+    ClassVar,
+    Literal,
+    Protocol,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    runtime_checkable,
+)
 
 import msgspec
 
 from keyrecon.errors import KeyreconError
 
-Record = TypeVar("Record")
+
+@runtime_checkable
+class OptionRecord(Protocol):
+    """Any dataclass of options."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+
+Record = TypeVar("Record", bound=OptionRecord)
 FORMER_NAMES = {
     "lift.flips": "lift.depth_signs",
     "lift.depth_signs.confirmed": "lift.depth_signs.annotated",
@@ -29,12 +48,14 @@ FORMER_NAMES = {
 NUMBERS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 
 
-def changed_options(options: object, defaults: object, prefix: str = "") -> dict[str, Any]:
+def changed_options(
+    options: OptionRecord, defaults: OptionRecord, prefix: str = ""
+) -> dict[str, Any]:
     """Dotted names and values of the options that differ from the defaults."""
     changed: dict[str, Any] = {}
-    for field in fields(options):  # type: ignore[arg-type]
+    for field in fields(options):
         value, default = getattr(options, field.name), getattr(defaults, field.name)
-        if is_dataclass(value):
+        if isinstance(value, OptionRecord):
             changed |= changed_options(value, default, f"{prefix}{field.name}.")
         elif value != default and value is not None:
             changed[prefix + field.name] = value
@@ -90,7 +111,7 @@ def with_changes(options: Record, changes: object, where: str = "options") -> Re
     """Options with the fields of nested tables set; KeyreconError names key, value and choice."""
     if not isinstance(changes, dict):
         raise KeyreconError(f"project.toml: {where} must be a table; found {changes!r}.")
-    known = {field.name for field in fields(options)}  # type: ignore[arg-type]
+    known = {field.name for field in fields(options)}
     allowed = get_type_hints(type(options))
     new: dict[str, Any] = {}
     for name, value in changes.items():
@@ -100,11 +121,11 @@ def with_changes(options: Record, changes: object, where: str = "options") -> Re
                 f"{where} has {', '.join(sorted(known))}."
             )
         current = getattr(options, name)
-        if is_dataclass(current):
+        if isinstance(current, OptionRecord):
             new[name] = with_changes(current, value, f"{where}.{name}")
         else:
             new[name] = _checked(value, allowed[name], f"{where}.{name}")
-    return replace(options, **new)  # type: ignore[type-var]
+    return replace(options, **new)
 
 
 def _checked(value: object, allowed: Any, where: str) -> Any:

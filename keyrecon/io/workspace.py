@@ -220,7 +220,7 @@ class Workspace:
         kept = with_changes(defaults, with_current_names(self.project.get("options", {})))
         return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
-    def remember(self, options: object, defaults: object) -> None:
+    def remember(self, options: Record, defaults: Record) -> None:
         """Write the options that differ from the defaults into project.toml."""
         text = self.project_file.read_text().split(OPTIONS_TABLE)[0]
         changed = changed_options(options, defaults)

@@ -197,8 +197,7 @@ class ForegroundModel:
         squares = cv2.LUT(cv2.max(under, cv2.subtract(lab, high)), SQUARES)
         light, a, b = cv2.split(squares)
         # A shadow darkens by a share; deeper than any shadow counts fully again.
-        # OpenCV's stubs leave out that a number may be the second factor
-        floor = cv2.multiply(cv2.extractChannel(low, 0), MIN_SHADOW_LIGHT)  # type: ignore[call-overload]
+        floor = cv2.multiply(cv2.extractChannel(low, 0), MIN_SHADOW_LIGHT)  # type: ignore[call-overload]  # stubs want an array
         shadow = (under[..., 0] > 0) & (cv2.extractChannel(lab, 0) > floor)
         np.multiply(light, SHADOW_WEIGHT**2, out=light, where=shadow)
         square = light + a + b
