@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, ParamSpec, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from jaxtyping import Int
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.records import MotionModel
@@ -35,10 +36,13 @@ from keyrecon.records import (
     Motion,
     Pick,
     Preparation,
+    TrackAnchors,
 )
 from keyrecon.segmentation.background_model import BackgroundOptions, build_background
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
 from keyrecon.segmentation.contours import EdgeOptions, find_edges
+from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
+from keyrecon.tracking.anchors import contradicted_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
 from keyrecon.tracking.tracker import TrackOptions, track_player
@@ -116,21 +120,26 @@ def prepare(
     options: Options = Options(),
     keep: Keep = call_stage,
     progress: Progress = silent,
+    marks: Annotations | None = None,
 ) -> Preparation:
     """Find the player, compare all frames and choose the keyframes to annotate.
 
-    ECCV 2004, Section 4. Raises KeyreconError when a pick is off the picture, the player is not
+    ECCV 2004, Section 4. What the player looks like is told by picks, by the bodies of `marks`,
+    or by both; marked heads and feet are fixed points of the track.
+    Raises KeyreconError when a pick is off the picture, the player is not
     found in most frames, or the annotation budget cannot be met.
     """
     count_labels(options.keyframes, len(video))  # a person waits minutes for the choice itself
+    clicks, anchors = tuple(picks), TrackAnchors.none()
+    if marks is not None:
+        clicks += picks_from_bodies(marks, (video.width, video.height))
+        anchors = anchors_from_bodies(marks)
     camera = keep(
         "camera", estimate_camera_motion, video, options=options.camera, progress=progress
     )
-    colors = keep(
-        "colors", learn_colors, video, tuple(picks), options=options.colors, progress=progress
-    )
+    colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
     detected = keep(
-        "find", find_player, video, colors, camera, options=options.find, progress=progress
+        "find", find_player, video, colors, camera, anchors, options=options.find, progress=progress
     )
     background = keep(
         "background",
@@ -149,6 +158,7 @@ def prepare(
         camera,
         background,
         colors,
+        anchors,
         options=options.track,
         progress=progress,
     )
@@ -180,6 +190,14 @@ def prepare(
         progress=progress,
     )
     return Preparation(video, camera, colors, track, background, contours, distances, keyframes)
+
+
+def frames_off_marks(preparation: Preparation, marks: Annotations) -> Int[np.ndarray, "n"]:
+    """Marked frames in which the track has the head or a foot elsewhere.
+
+    Where there are any, `prepare` with these marks follows the player anew.
+    """
+    return contradicted_frames(preparation.track, anchors_from_bodies(marks))
 
 
 def reconstruct(

@@ -60,6 +60,23 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
+class TrackAnchors:
+    """Where a person marked the player's head and feet: fixed points of the track."""
+
+    frames: Int[np.ndarray, "A"]
+    """Ascending."""
+    head: Float[np.ndarray, "A 2"]
+    """Centre of the head, px; NaN where not marked."""
+    feet: Float[np.ndarray, "A 2 2"]
+    """Both shoes, px; NaN where not both are marked."""
+
+    @classmethod
+    def none(cls) -> "TrackAnchors":
+        """Nothing was marked."""
+        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+
+
+@dataclass(frozen=True, eq=False)
 class Edges:
     """Directed edge elements of one frame: contour samples with the region on their left.
 

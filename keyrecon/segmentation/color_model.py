@@ -46,6 +46,11 @@ MAX_SHARED_WITH_PARTS = 0.4
 """Share of the head's colours found in other parts that makes it no colour of its own."""
 MAX_COMMON_SHARE = 0.35
 """Two parts with this share of their colours in common cannot be told apart pixel by pixel."""
+SURROUNDINGS_MARGINS = 1.0, 0.6, 0.35
+"""Shares of the room around the player that are left out of the surroundings, tried in turn: a
+player who fills the picture shows them close by only, where an arm may reach now and then."""
+MIN_SURROUNDINGS = 0.02
+"""Pixels that tell the surroundings' colours at least, squared player heights."""
 SURROUNDINGS_RADIUS = 0.75
 """Nothing of the player lies farther sideways from the head-feet axis, player heights."""
 
@@ -73,7 +78,7 @@ def learn_colors(
     height = picked_height(picks)
     names = tuple(dict.fromkeys(("head", "foot", *sorted({p.part for p in picks}))))
     counts = np.zeros((len(names), *BINS))
-    around = np.zeros(BINS)
+    around = np.zeros((len(SURROUNDINGS_MARGINS), *BINS))
     for frame in progress(sorted({p.frame for p in picks}), "Learning colours"):
         lab = to_lab(video.frame(frame))
         bins = color_bins(lab)
@@ -81,16 +86,18 @@ def learn_colors(
         for pick in here:
             patch = grow_patch(lab, pick, height)
             counts[names.index(pick.part)] += _count(bins[patch])
-        around += _count(bins[_outside(lab.shape[:2], here, height)])
-    if not around.any():
+        for row, margin in enumerate(SURROUNDINGS_MARGINS):
+            around[row] += _count(bins[_outside(lab.shape[:2], here, margin * height)])
+    enough = around.sum(axis=(1, 2, 3)) >= MIN_SURROUNDINGS * height**2
+    if not enough.any():
         raise KeyreconError(
             "The player fills the picture in every picked frame, so nothing shows the "
             "surroundings; pick also in a frame where the player is farther from its edges."
         )
     return Colors(
         names=names,
-        histograms=np.stack([_smooth(count) for count in counts]).astype(np.float32),
-        surroundings=(_smooth(around) * options.surroundings).astype(np.float32),
+        histograms=np.stack([_smooth(c) for c in counts]).astype(np.float32),
+        surroundings=(_smooth(around[enough.argmax()]) * options.surroundings).astype(np.float32),
         height=height,
     )
 

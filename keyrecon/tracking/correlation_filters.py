@@ -91,24 +91,42 @@ def peaks_at(
     return np.exp(-np.min(squares, axis=0) / (2 * spread**2))
 
 
-def train_filters(
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """What filters are trained on: crops, and where head and feet are in them."""
+
+    spectra: Complex64[np.ndarray, "N C h f"]
+    places: Float[np.ndarray, "N 3 2"]
+    """Head and both feet, px of the crop."""
+
+    def joined(self, other: "Examples") -> "Examples":
+        """These and others."""
+        return Examples(
+            np.concatenate([self.spectra, other.spectra]),
+            np.concatenate([self.places, other.places]),
+        )
+
+
+def make_examples(
     crops: Crops,
     channels: Channels,
     cropping: Cropping,
-    player: float,
-    track: Track,
-    chosen: Int[np.ndarray, "n"],
-) -> Filters:
-    """Filters of head and foot whose usual response is 1, from chosen frames of a track.
+    frames: Int[np.ndarray, "n"],
+    parts: Float[np.ndarray, "n 3 2"],
+) -> Examples:
+    """Examples from some frames with head and feet in the picture, px."""
+    numbers = frames.tolist()
+    features = [channels.compute(crops.lab[t], crops.foreground[t]) for t in numbers]
+    places = [cropping.from_picture(p, t) for p, t in zip(parts, numbers, strict=True)]
+    return Examples(np.stack([spectrum(f) for f in features]), np.stack(places))
 
-    The player is `player` px tall in the crops.
+
+def train_filters(examples: Examples, size: tuple[int, int], player: float) -> Filters:
+    """Filters of head and foot whose usual response is 1.
+
+    The player is `player` px tall in the crops, which have `size` rows and columns.
     """
-    frames = chosen.tolist()
-    examples = [channels.compute(crops.lab[t], crops.foreground[t]) for t in frames]
-    spectra = np.stack([spectrum(example) for example in examples])
-    joints = np.concatenate([track.head[:, None], track.feet], axis=1)
-    places = np.stack([cropping.from_picture(joints[t], t) for t in frames])
-    size, spread = cropping.size, PEAK_SPREAD * player
+    spectra, places, spread = examples.spectra, examples.places, PEAK_SPREAD * player
     targets = [[peaks_at(p, size, spread) for p in (parts[:1], parts[1:])] for parts in places]
     filters = solve_filters(spectra, np.stack([np.stack(t) for t in targets]))
     usual = np.median([_strength(filters, *e) for e in zip(spectra, places, strict=True)], axis=0)

@@ -23,10 +23,11 @@ from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.progress import Progress, silent
-from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
 from keyrecon.segmentation.part_evidence import Reader, evaluate_evidence, model_scene_by_colour
+from keyrecon.tracking.anchors import anchored_states, marked_places
 from keyrecon.tracking.candidates import PartCandidates, search_frame
 from keyrecon.tracking.foot_pairs import (
     COLOR_PRIOR,
@@ -79,18 +80,21 @@ def find_player(
     video: Video,
     colors: Colors,
     camera: CameraPath,
+    anchors: TrackAnchors,
     options: FindOptions = FindOptions(),
     progress: Progress = silent,
 ) -> Track:
     """Head, feet, standing height, box and confidence in every frame, by colour and shape alone.
 
-    Raises KeyreconError where no head is found in most frames.
+    The path passes through the heads and feet that a person marked. Raises KeyreconError where
+    no head is found in most frames.
     """
     width = reduced_width(video, colors.height, BackgroundOptions(player=options.player))
     shrink = width / video.width
     parts = posterior_tables(colors)
     every = max(1, round(video.fps / options.pace))
-    numbers = np.unique(np.append(np.arange(0, len(video), every), len(video) - 1))
+    paced = np.append(np.arange(0, len(video), every), len(video) - 1)
+    numbers = np.unique(np.concatenate([paced, anchors.frames]))
     pictures = _read_pictures(video, width, numbers, progress)
     scene = model_scene_by_colour(pictures, numbers, camera, shrink, parts.max(axis=0))
     tall = colors.height * shrink
@@ -106,7 +110,7 @@ def find_player(
     searched = progress(pictures(numbers), "Detecting the player", len(numbers))
     reduced = list(side_by_side(search, zip(numbers.tolist(), searched, strict=True)))
     candidates = [_enlarge(c, shrink) for c in reduced]
-    return _link(candidates, numbers, video, camera, colors.height, options)
+    return _link(candidates, numbers, video, camera, colors.height, anchors, options)
 
 
 def _read_pictures(
@@ -134,14 +138,17 @@ def _link(
     video: Video,
     camera: CameraPath,
     height: float,
+    anchors: TrackAnchors,
     options: FindOptions,
 ) -> Track:
     """The path of the head, then that of the feet."""
     from_reference = np.linalg.inv(camera.to_reference)
     searched = camera.to_reference[numbers]
     step = height / video.fps * float(np.median(np.diff(numbers))) if len(numbers) > 1 else height
+    marked_head, marked_feet = marked_places(anchors, numbers, camera)
     head_cost = _costs([c.head_score for c in candidates])
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
+    stable, head_cost = anchored_states(stable, head_cost, marked_head)
     chosen = find_cheapest_track(head_cost, stable, TransitionModel(options.head_speed * step))
     if (chosen >= 0).mean() < MIN_DETECTED_SHARE:
         raise _missed_head(chosen, numbers)
@@ -149,6 +156,7 @@ def _link(
     pairs, costs = _pair(candidates, head[numbers], height)
     stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
+    stable, costs = anchored_states(stable, costs, marked_feet)
     model = TransitionModel(
         options.foot_speed * step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST
     )

@@ -16,6 +16,7 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
+from keyrecon.tracking.anchors import ANCHOR_FOOT_COST, anchored_states
 from keyrecon.tracking.candidates import MIN_FOOT_SEPARATION
 from keyrecon.tracking.foot_pairs import (
     FILTER_PRIOR,
@@ -93,12 +94,20 @@ def part_costs(strength: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
 
 
 def link_head(
-    detections: list[Detections], camera: CameraPath, cropping: Cropping, sigma: float
+    detections: list[Detections],
+    camera: CameraPath,
+    cropping: Cropping,
+    marked: Float[np.ndarray, "T 1 2"],
+    sigma: float,
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
-    """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px."""
+    """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px.
+
+    `marked` heads, in the reference frame, are passed through; NaN where there is none.
+    """
     places = [cropping.to_picture(detected.heads, t) for t, detected in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(detected.head_strength) for detected in detections]
+    stable, costs = anchored_states(stable, costs, marked)
     chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
     from_reference = np.linalg.inv(camera.to_reference)
     head = fill_gaps(taken_states(stable, chosen), np.arange(len(detections)), from_reference)
@@ -111,9 +120,13 @@ def link_feet(
     cropping: Cropping,
     head: Float[np.ndarray, "T 2"],
     height: Float[np.ndarray, "T"],
+    marked: Float[np.ndarray, "T 2 2"],
     motion: FootMotionModel,
 ) -> tuple[Float[np.ndarray, "T 2 2"], Float[np.ndarray, "T"]]:
-    """Both feet in the picture of every frame, and their confidence; `height` of the player, px."""
+    """Both feet in the picture of every frame, and their confidence; `height` of the player, px.
+
+    `marked` feet, in the reference frame, are passed through; NaN where there are none.
+    """
     places = [cropping.to_picture(detected.feet, t) for t, detected in enumerate(detections)]
     from_reference = np.linalg.inv(camera.to_reference)
     stable = to_reference_frame(places, camera.to_reference)
@@ -126,10 +139,13 @@ def link_feet(
         in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
         both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
-    costs, places = [p.cost for p in pairs], [p.places for p in pairs]
+    places, costs = anchored_states([p.places for p in pairs], [p.cost for p in pairs], marked)
+    fixed = np.isfinite(marked).all(axis=(1, 2))
+    sure = np.full((1, 2), ANCHOR_FOOT_COST)
+    alone = [sure if f else p.each for p, f in zip(pairs, fixed, strict=True)]
     model = TransitionModel(motion.step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, places, model)
-    each = taken_states([p.each for p in pairs], taken)
+    each = taken_states(alone, taken)
     smooth = smooth_pairs(taken_states(places, taken), each, motion.stiffness)
     feet = warp_points(from_reference[:, None], smooth)
     return feet, state_confidence([c / 2 for c in costs], taken)

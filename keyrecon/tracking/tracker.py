@@ -21,12 +21,15 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Background, CameraPath, Colors, Track
+from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
+from keyrecon.tracking.anchors import marked_places
 from keyrecon.tracking.correlation_filters import (
+    Examples,
     Filters,
     clear_frames,
+    make_examples,
     respond,
     sound_frames,
     spectrum,
@@ -59,6 +62,8 @@ MEMORY_SECONDS = 0.24
 FIRST_OCCLUSION_COST, OCCLUSION_COST = 2.0, 1.0
 """Costs of taking a foot for hidden behind the other: filters trained on clear frames only respond
 weakly to a foot in a rarer place, the next ones do not."""
+MARK_WEIGHT = 3
+"""Examples that a marked frame counts for: it is right, a tracked one may not be."""
 MAX_HEADS, MAX_FEET = 4, 8
 """Candidates kept of each, per frame."""
 
@@ -89,23 +94,32 @@ def track_player(
     camera: CameraPath,
     background: Background,
     colors: Colors,
+    anchors: TrackAnchors,
     options: TrackOptions = TrackOptions(),
     progress: Progress = silent,
 ) -> Track:
-    """Head, feet, standing height, box and confidence in every frame."""
+    """Head, feet, standing height, box and confidence in every frame.
+
+    Heads and feet that a person marked are passed through, and examples for the filters.
+    """
     if options.method == "paper":
         return rough
     cropping = Cropping.below_heads(rough, options.player)
     crops = cut_crops(video, cropping, ForegroundModel(background, camera), progress)
     zooming = zoom(camera, video)
-    frames = _CroppedFrames(crops, cropping, options.player, rough, camera, zooming, video.fps)
+    head, feet = marked_places(anchors, np.arange(len(video)), camera)
+    frames = _CroppedFrames(
+        crops, cropping, options.player, rough, camera, zooming, head, feet, video.fps
+    )
     channels = Channels.of(colors, cropping.size)
+    marked = _marked_examples(frames, channels, anchors)
     sparse = frames.every(max(1, round(video.fps / TRAINING_RATE)))
-    filters = _train(sparse, channels, sparse.rough, clear_frames(sparse.rough), options)
+    filters = _train(sparse, channels, sparse.rough, clear_frames(sparse.rough), marked, options)
     detections = _detect(sparse, channels, filters, progress)
     first = _link(detections, sparse, FIRST_OCCLUSION_COST, options)
-    filters = _train(sparse, channels, first, sound_frames(first), options)
-    return _link(_detect(frames, channels, filters, progress), frames, OCCLUSION_COST, options)
+    filters = _train(sparse, channels, first, sound_frames(first), marked, options)
+    track = _link(_detect(frames, channels, filters, progress), frames, OCCLUSION_COST, options)
+    return _through_marks(track, anchors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +135,10 @@ class _CroppedFrames:
     camera: CameraPath
     magnification: Float[np.ndarray, "T"]
     """By the camera's zoom."""
+    marked_head: Float[np.ndarray, "T 1 2"]
+    """Heads that a person marked, in the reference frame; else NaN."""
+    marked_feet: Float[np.ndarray, "T 2 2"]
+    """The same of both feet."""
     fps: float
 
     def every(self, step: int) -> "_CroppedFrames":
@@ -132,6 +150,8 @@ class _CroppedFrames:
             _thinned(self.rough, step),
             _thinned(self.camera, step),
             self.magnification[::step],
+            self.marked_head[::step],
+            self.marked_feet[::step],
             self.fps / step,
         )
 
@@ -146,12 +166,40 @@ def _train(
     channels: Channels,
     track: Track,
     usable: Int[np.ndarray, "n"],
+    marked: Examples | None,
     options: TrackOptions,
 ) -> Filters:
-    """Filters from some of the usable frames, spread evenly."""
+    """Filters from marked frames and from some of the usable ones, spread evenly."""
     rows = np.linspace(0, len(usable) - 1, min(options.examples, len(usable)))
     chosen = usable[np.unique(rows.astype(int))]
-    return train_filters(frames.crops, channels, frames.cropping, frames.player, track, chosen)
+    parts = np.concatenate([track.head[:, None], track.feet], axis=1)[chosen]
+    examples = make_examples(frames.crops, channels, frames.cropping, chosen, parts)
+    examples = examples if marked is None else examples.joined(marked)
+    return train_filters(examples, frames.cropping.size, frames.player)
+
+
+def _marked_examples(
+    frames: _CroppedFrames, channels: Channels, anchors: TrackAnchors
+) -> Examples | None:
+    """Examples of the frames on which head and feet are marked, each several times over."""
+    whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
+    if not whole.any():
+        return None
+    parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[whole]
+    numbers = np.repeat(anchors.frames[whole], MARK_WEIGHT)
+    parts = np.repeat(parts, MARK_WEIGHT, axis=0)
+    return make_examples(frames.crops, channels, frames.cropping, numbers, parts)
+
+
+def _through_marks(track: Track, anchors: TrackAnchors) -> Track:
+    """The track with head and feet where they were marked, and sure of them."""
+    head, feet, confidence = track.head.copy(), track.feet.copy(), track.confidence.copy()
+    for row, frame in enumerate(anchors.frames.tolist()):
+        if np.isfinite(anchors.head[row]).all():
+            head[frame], confidence[frame] = anchors.head[row], 1.0
+        if np.isfinite(anchors.feet[row]).all():
+            feet[frame], confidence[frame] = anchors.feet[row], 1.0
+    return replace(track, head=head, feet=feet, confidence=confidence)
 
 
 def _detect(
@@ -179,12 +227,14 @@ def _link(
     """The track through the detections; a foot behind the other one costs `occlusion_cost`."""
     camera, cropping, fps = frames.camera, frames.cropping, frames.fps
     step = float(np.median(frames.rough.height)) / fps
-    head, head_confidence = link_head(detections, camera, cropping, options.head_speed * step)
+    head, head_confidence = link_head(
+        detections, camera, cropping, frames.marked_head, options.head_speed * step
+    )
     stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
     memory = round(MEMORY_SECONDS * fps)
     motion = FootMotionModel(options.foot_speed * step, memory, occlusion_cost, stiffness)
     feet, feet_confidence = link_feet(
-        detections, camera, cropping, head, frames.rough.height, motion
+        detections, camera, cropping, head, frames.rough.height, frames.marked_feet, motion
     )
     window = round(options.envelope * fps)
     height = standing_height(head, feet.mean(axis=1), frames.magnification, window)

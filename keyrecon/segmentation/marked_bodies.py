@@ -1,0 +1,98 @@
+"""What a marked body tells of the player's colours: picks along its limbs.
+
+A person who has marked the joints of a body in one frame has shown where head, shoes, clothes and
+skin are. Points along the limbs of every marked body stand for clicks there: the centre of the
+head, the shoes a little beyond the ankles, three points down the trunk, and the middles of the
+limbs. Hidden joints and their limbs tell nothing of colours.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from keyrecon.records import Annotations, Pick, TrackAnchors
+
+SHOE_BEYOND_ANKLE = 0.18
+"""The middle of a shoe lies beyond the ankle along the shank by this share of the shank: the ankle
+is .039 of the stature above the floor, the shank .246 long (Drillis and Contini 1966)."""
+HEAD_CENTRE = 0.55
+"""The middle of the head on the way from the base of the neck to the top of the skull."""
+LEG_JOINTS = ("right_knee", "left_knee", "right_ankle", "left_ankle")
+ALONG_TRUNK = 0.2, 0.45, 0.7
+"""From neck to hips: the shirt, and not its collar or the belt."""
+LIMB_PARTS = (
+    ("upper arm", "shoulder", "elbow", (0.35, 0.6)),
+    ("forearm", "elbow", "wrist", (0.4, 0.7)),
+    ("thigh", "hip", "knee", (0.3, 0.55, 0.8)),
+    ("shank", "knee", "ankle", (0.3, 0.5, 0.7)),
+)
+"""Name of the region, its ends, and where between them it is clicked."""
+
+
+def picks_from_bodies(annotations: Annotations, size: tuple[int, int]) -> tuple[Pick, ...]:
+    """Clicks that a person would make along the limbs of every marked body, on pictures of a size."""
+    picks: list[Pick] = []
+    for row, frame in enumerate(annotations.frames.tolist()):
+        body = _Body(annotations, annotations.joints[row], annotations.visible[row])
+        picks += [
+            Pick(frame, part, x, y)
+            for part, x, y in body.points()
+            if 0 <= x < size[0] and 0 <= y < size[1]
+        ]
+    return tuple(picks)
+
+
+def anchors_from_bodies(annotations: Annotations) -> TrackAnchors:
+    """Heads and shoes of every frame on which they are marked, hidden ones too."""
+    names, joints = annotations.skeleton.names, annotations.joints
+    if not {"neck", "head_top", *LEG_JOINTS} <= set(names):
+        return TrackAnchors.none()
+    place = {name: joints[:, names.index(name)] for name in ("neck", "head_top", *LEG_JOINTS)}
+    head = place["neck"] * (1 - HEAD_CENTRE) + place["head_top"] * HEAD_CENTRE
+    shoes = [
+        place[f"{side}_ankle"]
+        + SHOE_BEYOND_ANKLE * (place[f"{side}_ankle"] - place[f"{side}_knee"])
+        for side in ("right", "left")
+    ]
+    feet = np.stack(shoes, axis=1)
+    feet[~np.isfinite(feet).all(axis=(1, 2))] = np.nan
+    useful = np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
+    return TrackAnchors(annotations.frames[useful], head[useful], feet[useful])
+
+
+class _Body:
+    """The visible joints of one frame by name."""
+
+    def __init__(
+        self,
+        annotations: Annotations,
+        joints: Float[np.ndarray, "J 2"],
+        visible: Bool[np.ndarray, "J"],
+    ) -> None:
+        names = annotations.skeleton.names
+        known = visible & np.isfinite(joints).all(axis=1)
+        self._joint = {n: p for n, p, k in zip(names, joints, known, strict=True) if k}
+
+    def points(self) -> Iterator[tuple[str, float, float]]:
+        """Name of the part and a point on it, px."""
+        yield from self._between("head", "neck", "head_top", (HEAD_CENTRE,))
+        for side in ("right", "left"):
+            yield from self._between(
+                "foot", f"{side}_knee", f"{side}_ankle", (1 + SHOE_BEYOND_ANKLE,)
+            )
+            for part, start, stop, shares in LIMB_PARTS:
+                yield from self._between(part, f"{side}_{start}", f"{side}_{stop}", shares)
+        if {"right_hip", "left_hip", "neck"} <= self._joint.keys():
+            hips = (self._joint["right_hip"] + self._joint["left_hip"]) / 2
+            for share in ALONG_TRUNK:
+                x, y = self._joint["neck"] * (1 - share) + hips * share
+                yield "trunk", float(x), float(y)
+
+    def _between(
+        self, part: str, start: str, stop: str, shares: tuple[float, ...]
+    ) -> Iterator[tuple[str, float, float]]:
+        if start in self._joint and stop in self._joint:
+            for share in shares:
+                x, y = self._joint[start] * (1 - share) + self._joint[stop] * share
+                yield part, float(x), float(y)

@@ -1,0 +1,63 @@
+"""Marks of a person as fixed points of the track.
+
+A marked head or pair of feet is the best evidence there is: in its frame it takes the place of all
+candidates, at a cost that no path passes by. The same marks are examples for the filters, and tell
+where a track that was made without them is wrong.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.numerics.geometry import warp_points
+from keyrecon.records import CameraPath, Track, TrackAnchors
+
+ANCHOR_COST = -60.0
+"""Cost of a marked place, nats: beyond what two jumps and the skips around it could save."""
+ANCHOR_FOOT_COST = -3.0
+"""Cost of a marked foot by itself when paths are smoothed: twenty times the weight of a foot whose
+response is certain."""
+CONTRADICTION = 0.12
+"""A head or foot that lies farther from its mark is wrong, player heights: the ankle of the other
+leg is farther away in an open stance, and marks of ankles and tracks of shoes differ by .04."""
+
+
+def anchored_states(
+    states: Sequence[Float[np.ndarray, "_ p 2"]],
+    costs: Sequence[Float[np.ndarray, "_"]],
+    marked: Float[np.ndarray, "n p 2"],
+) -> tuple[list[Float[np.ndarray, "_ p 2"]], list[Float[np.ndarray, "_"]]]:
+    """States and their costs, with the marked place alone where all of it is marked (not NaN)."""
+    known = np.isfinite(marked).all(axis=(1, 2))
+    rows = list(zip(states, costs, marked, known, strict=True))
+    places = [mark[None] if fixed else state for state, _, mark, fixed in rows]
+    return places, [np.array([ANCHOR_COST]) if fixed else cost for _, cost, _, fixed in rows]
+
+
+def marked_places(
+    anchors: TrackAnchors, numbers: Int[np.ndarray, "n"], camera: CameraPath
+) -> tuple[Float[np.ndarray, "n 1 2"], Float[np.ndarray, "n 2 2"]]:
+    """Marked heads and feet of some frames in the reference frame; NaN where not marked."""
+    head, feet = np.full((len(numbers), 1, 2), np.nan), np.full((len(numbers), 2, 2), np.nan)
+    at = np.searchsorted(anchors.frames, numbers)
+    for row, place in enumerate(at.tolist()):
+        if place < len(anchors.frames) and anchors.frames[place] == numbers[row]:
+            path = camera.to_reference[numbers[row]]
+            head[row, 0] = warp_points(path, anchors.head[place])
+            feet[row] = warp_points(path, anchors.feet[place])
+    return head, feet
+
+
+def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:
+    """Frames in which the head or a foot of a track is not where a person marked it."""
+    if not len(anchors.frames):
+        return anchors.frames
+    limit = CONTRADICTION * track.height[anchors.frames]
+    head = np.linalg.norm(track.head[anchors.frames] - anchors.head, axis=-1)
+    own = track.feet[anchors.frames]
+    straight, crossed = (
+        np.linalg.norm(feet - anchors.feet, axis=-1).max(axis=1) for feet in (own, own[:, ::-1])
+    )
+    # comparisons with NaN are false: what is not marked contradicts nothing
+    return anchors.frames[(head > limit) | (np.minimum(straight, crossed) > limit)]
