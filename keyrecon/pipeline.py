@@ -45,6 +45,7 @@ from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_
 from keyrecon.tracking.anchors import contradicted_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
+from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
 from keyrecon.tracking.tracker import TrackOptions, track_player
 
 Inputs = ParamSpec("Inputs")
@@ -89,6 +90,7 @@ class Options:
     colors: ColorOptions = field(default_factory=ColorOptions)
     find: FindOptions = field(default_factory=FindOptions)
     track: TrackOptions = field(default_factory=TrackOptions)
+    flow: FlowOptions = field(default_factory=FlowOptions)
     background: BackgroundOptions = field(default_factory=BackgroundOptions)
     edges: EdgeOptions = field(default_factory=EdgeOptions)
     compare: CompareOptions = field(default_factory=CompareOptions)
@@ -133,7 +135,10 @@ def prepare(
     clicks, anchors = tuple(picks), TrackAnchors.none()
     if marks is not None:
         clicks += picks_from_bodies(marks, (video.width, video.height))
-        anchors = anchors_from_bodies(marks)
+        flow = keep(
+            "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
+        )
+        anchors = anchors_from_bodies(marks, flow)
     camera = keep(
         "camera", estimate_camera_motion, video, options=options.camera, progress=progress
     )
@@ -215,11 +220,17 @@ def reconstruct(
     """
     preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
     video, height = preparation.video, preparation.track.height
+    flow = None
+    if options.propagate.method == "fused":
+        flow = keep(
+            "flow", track_marked_joints, video, annotations, options=options.flow, progress=progress
+        )
     tracks = keep(
         "propagate",
         propagate_joints,
         preparation,
         annotations,
+        flow,
         options=options.propagate,
         progress=progress,
     )

@@ -69,11 +69,18 @@ class TrackAnchors:
     """Centre of the head, px; NaN where not marked."""
     feet: Float[np.ndarray, "A 2 2"]
     """Both shoes, px; NaN where not both are marked."""
+    marked: Bool[np.ndarray, "A"]
+    """False where flow between marks has found them, not a person."""
 
     @classmethod
     def none(cls) -> "TrackAnchors":
         """Nothing was marked."""
-        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+        return cls(
+            np.zeros(0, dtype=np.int64),
+            np.zeros((0, 2)),
+            np.zeros((0, 2, 2)),
+            np.zeros(0, dtype=bool),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +248,16 @@ class JointTracks:
     """0-1; 0 where missing."""
     keyframe: Int[np.ndarray, "T J"]
     """Frame number of the keyframe that each joint comes from."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlowTracks:
+    """Marked joints followed by optical flow between marks near in time."""
+
+    joints: Float[np.ndarray, "T J 2"]
+    """px; NaN where nothing was followed."""
+    confidence: Float[np.ndarray, "T J"]
+    """0-1: how well the ways from both marks agree, and the place with what was marked."""
 
 
 SOURCES = ("annotated", "propagated", "interpolated", "refined")

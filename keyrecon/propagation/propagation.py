@@ -42,13 +42,28 @@ from keyrecon.propagation.trajectory_smoothing import (
     ChosenHypotheses,
     smooth_trajectories,
 )
-from keyrecon.records import Annotations, HalfName, JointTracks, PoseDistances, Preparation
+from keyrecon.records import (
+    Annotations,
+    FlowTracks,
+    HalfName,
+    JointTracks,
+    PoseDistances,
+    Preparation,
+)
 
 LEAST_MARKED = 0.5
 """Share of a half's joints that must be marked for a frame to serve as a template."""
 LIMB_HYPOTHESES = 3
 """Limbs of other annotated frames that are fitted on each side of a frame: as many as there may be
 places for one."""
+
+
+FLOW_TOLERANCE = 0.05
+"""Flow and edges that put a joint nearer together than this agree, player heights: edges are the
+more exact; two eyes mark a joint .042 apart in the worst tenth."""
+MIN_FLOW_CONFIDENCE = 0.6
+"""Flow that is surer than this overrules edges: both ways meet within a deviation, on a patch like
+the mark's."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +106,13 @@ class PropagatedHalf:
 def propagate_joints(
     preparation: Preparation,
     annotations: Annotations,
+    flow: FlowTracks | None = None,
     options: PropagateOptions = PropagateOptions(),
     progress: Progress = silent,
 ) -> JointTracks:
     """Joints in px, confidence and source keyframe of every joint in every frame.
 
-    Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when a
+    Where `flow` between marks is sure of a joint, it has the last word. Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when a
     joint is marked nowhere.
     """
     marked = np.isfinite(annotations.joints).all(axis=2)
@@ -105,7 +121,21 @@ def propagate_joints(
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
     tracks = _propagate_fused(preparation, annotations, options, progress)
+    if flow is not None:
+        tracks = with_flow(tracks, flow, preparation.track.height)
     return _with_marks(annotations, marked, tracks)
+
+
+def with_flow(tracks: JointTracks, flow: FlowTracks, height: Float[np.ndarray, "T"]) -> JointTracks:
+    """Tracks with joints that flow is sure of where edges have put them elsewhere."""
+    apart = np.linalg.norm(tracks.joints - flow.joints, axis=2) / height[:, None]
+    elsewhere = ~(apart < FLOW_TOLERANCE) & np.isfinite(flow.joints).all(axis=2)
+    replaced = elsewhere & (flow.confidence > MIN_FLOW_CONFIDENCE)
+    return JointTracks(
+        np.where(replaced[..., None], flow.joints, tracks.joints),
+        np.where(replaced, flow.confidence, tracks.confidence),
+        tracks.keyframe,
+    )
 
 
 def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:

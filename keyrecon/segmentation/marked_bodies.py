@@ -7,11 +7,12 @@ limbs. Hidden joints and their limbs tell nothing of colours.
 """
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
-from keyrecon.records import Annotations, Pick, TrackAnchors
+from keyrecon.records import Annotations, FlowTracks, Pick, TrackAnchors
 
 SHOE_BEYOND_ANKLE = 0.18
 """The middle of a shoe lies beyond the ankle along the shank by this share of the shank: the ankle
@@ -19,6 +20,8 @@ is .039 of the stature above the floor, the shank .246 long (Drillis and Contini
 HEAD_CENTRE = 0.55
 """The middle of the head on the way from the base of the neck to the top of the skull."""
 LEG_JOINTS = ("right_knee", "left_knee", "right_ankle", "left_ankle")
+SURE_FLOW = 0.7
+"""Confidence from which joints followed by flow count as fixed points of the track."""
 ALONG_TRUNK = 0.2, 0.45, 0.7
 """From neck to hips: the shirt, and not its collar or the belt."""
 LIMB_PARTS = (
@@ -31,7 +34,7 @@ LIMB_PARTS = (
 
 
 def picks_from_bodies(annotations: Annotations, size: tuple[int, int]) -> tuple[Pick, ...]:
-    """Clicks that a person would make along the limbs of every marked body, on pictures of a size."""
+    """Clicks that a person would make along the limbs of marked bodies, on pictures of a size."""
     picks: list[Pick] = []
     for row, frame in enumerate(annotations.frames.tolist()):
         body = _Body(annotations, annotations.joints[row], annotations.visible[row])
@@ -43,11 +46,35 @@ def picks_from_bodies(annotations: Annotations, size: tuple[int, int]) -> tuple[
     return tuple(picks)
 
 
-def anchors_from_bodies(annotations: Annotations) -> TrackAnchors:
-    """Heads and shoes of every frame on which they are marked, hidden ones too."""
-    names, joints = annotations.skeleton.names, annotations.joints
+def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None) -> TrackAnchors:
+    """Heads and shoes of every frame on which they are marked, hidden ones too.
+
+    With `flow` also of the frames between in which it is sure of them.
+    """
+    names = annotations.skeleton.names
     if not {"neck", "head_top", *LEG_JOINTS} <= set(names):
         return TrackAnchors.none()
+    own = _anchors(names, annotations.frames, annotations.joints, marked=True)
+    if flow is None:
+        return own
+    sure = np.where(flow.confidence[..., None] > SURE_FLOW, flow.joints, np.nan)
+    between = _anchors(names, np.arange(len(sure)), sure, marked=False)
+    new = ~np.isin(between.frames, own.frames)
+    order = np.argsort(np.concatenate([own.frames, between.frames[new]]), kind="stable")
+    return TrackAnchors(
+        *(
+            np.concatenate([getattr(own, f.name), getattr(between, f.name)[new]])[order]
+            for f in fields(TrackAnchors)
+        )
+    )
+
+
+def _anchors(
+    names: tuple[str, ...],
+    frames: Int[np.ndarray, "n"],
+    joints: Float[np.ndarray, "n J 2"],
+    marked: bool,
+) -> TrackAnchors:
     place = {name: joints[:, names.index(name)] for name in ("neck", "head_top", *LEG_JOINTS)}
     head = place["neck"] * (1 - HEAD_CENTRE) + place["head_top"] * HEAD_CENTRE
     shoes = [
@@ -58,7 +85,7 @@ def anchors_from_bodies(annotations: Annotations) -> TrackAnchors:
     feet = np.stack(shoes, axis=1)
     feet[~np.isfinite(feet).all(axis=(1, 2))] = np.nan
     useful = np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
-    return TrackAnchors(annotations.frames[useful], head[useful], feet[useful])
+    return TrackAnchors(frames[useful], head[useful], feet[useful], np.full(useful.sum(), marked))
 
 
 class _Body:

@@ -51,8 +51,8 @@ def marked_places(
 
 def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:
     """Frames in which the head or a foot of a track is not where a person marked it."""
-    if not len(anchors.frames):
-        return anchors.frames
+    if not anchors.marked.all():
+        raise ValueError("only a person's marks contradict a track")
     limit = CONTRADICTION * track.height[anchors.frames]
     head = np.linalg.norm(track.head[anchors.frames] - anchors.head, axis=-1)
     own = track.feet[anchors.frames]

@@ -94,7 +94,7 @@ def find_player(
     parts = posterior_tables(colors)
     every = max(1, round(video.fps / options.pace))
     paced = np.append(np.arange(0, len(video), every), len(video) - 1)
-    numbers = np.unique(np.concatenate([paced, anchors.frames]))
+    numbers = np.unique(np.concatenate([paced, anchors.frames[anchors.marked]]))
     pictures = _read_pictures(video, width, numbers, progress)
     scene = model_scene_by_colour(pictures, numbers, camera, shrink, parts.max(axis=0))
     tall = colors.height * shrink

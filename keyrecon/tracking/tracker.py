@@ -183,6 +183,7 @@ def _marked_examples(
 ) -> Examples | None:
     """Examples of the frames on which head and feet are marked, each several times over."""
     whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
+    whole &= anchors.marked
     if not whole.any():
         return None
     parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[whole]
