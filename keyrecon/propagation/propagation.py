@@ -112,8 +112,8 @@ def propagate_joints(
 ) -> JointTracks:
     """Joints in px, confidence and source keyframe of every joint in every frame.
 
-    Where `flow` between marks is sure of a joint, it has the last word. Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when a
-    joint is marked nowhere.
+    Where `flow` between marks is sure of a joint, it has the last word. Annotated joints come back
+    as they were marked, with confidence 1. Raises KeyreconError when a joint is marked nowhere.
     """
     marked = np.isfinite(annotations.joints).all(axis=2)
     _require_marks(annotations.skeleton, marked)

@@ -1,17 +1,20 @@
 """Marked joints followed by optical flow, from the mark before and from the mark after.
 
-Between two marks near in time, each joint is followed forwards from the first and backwards from the
-second by pyramidal Lucas-Kanade (Bouguet, Intel 2001). The two ways know nothing of one another: where
-they meet, and the place looks like one of the marks, the joint is there, whatever colours and edges
-say. Where they part, limbs have turned or hidden one another, and flow says nothing.
+Between two marks near in time, each joint is followed forwards from the first and backwards from
+the second by pyramidal Lucas-Kanade (Bouguet, Intel 2001). The two ways know nothing of one
+another: where they meet, and the place looks like one of the marks, the joint is there, whatever
+colours and edges say. Where they part, limbs have turned or hidden one another, and flow says
+nothing. Before the first mark, after the last, and where marks are far apart there is one way only:
+then every step must lead back to where it came from (Kalal, Mikolajczyk and Matas, ICPR 2010), and
+the place must look like the mark all the more.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
@@ -31,8 +34,14 @@ class FlowOptions:
     gap: float = 0.03
     """Distance of the two ways at which they begin to disagree, player heights: two eyes mark the
     same joint .016 apart in the median, .042 in the worst tenth."""
-    likeness: float = 0.6
+    likeness: float = 0.5
     """Correlation with the better of both marks' patches at which a place is half believed."""
+    lone_likeness: float = 0.7
+    """The same with the only mark's, where there is one way only."""
+
+    def side(self, height: float) -> int:
+        """Side of the window for a player of some px, odd."""
+        return max(7, 2 * round(self.window * height / 2) + 1)
 
 
 def track_marked_joints(
@@ -50,25 +59,51 @@ def track_marked_joints(
     row_of = {int(frame): row for row, frame in enumerate(marks.frames)}
     last = np.full(shape[1], -1)
     pictures: dict[int, UInt8[np.ndarray, "h w"]] = {}
-    frames = progress(video.frames(width=width), "Following marks", count)
-    for t, picture in enumerate(frames):
+
+    def note(frames: range, group: Int[np.ndarray, "g"], way: _Way) -> None:
+        better = way.confidence[1:] > confidence[frames[1:]][:, group]
+        at = np.ix_(frames[1:], group)
+        joints[at] = np.where(better[..., None], way.places[1:] / shrink, joints[at])
+        confidence[at] = np.where(better, way.confidence[1:], confidence[at])
+
+    def follow_on(first: int, frames: range, group: Int[np.ndarray, "g"]) -> None:
+        start = shrink * marks.joints[row_of[first], group]
+        cut = [pictures[u] for u in frames]
+        note(frames, group, _follow_one_way(cut, start, height * shrink, options))
+
+    for t, picture in enumerate(progress(video.frames(width=width), "Following marks", count)):
         pictures[t] = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
         pictures.pop(t - longest - 1, None)
-        if t not in row_of:
-            continue
-        marked = np.isfinite(marks.joints[row_of[t], :, 0])
-        for first in np.unique(last[marked & (last >= 0)]).tolist():
-            group = np.flatnonzero(marked & (last == first))
-            if t - first > longest or t - first < 2:
-                continue
-            ends = [shrink * marks.joints[row_of[f], group] for f in (first, t)]
-            between = [pictures[u] for u in range(first, t + 1)]
-            places, sure = _join(between, ends[0], ends[1], height * shrink, options)
-            inside = slice(first + 1, t)
-            joints[inside, group] = places[1:-1] / shrink
-            confidence[inside, group] = sure[1:-1]
-        last[marked] = t
+        if t in row_of:
+            marked = np.isfinite(marks.joints[row_of[t], :, 0])
+            for first in np.unique(last[marked]).tolist():
+                group = np.flatnonzero(marked & (last == first))
+                if first < 0 or t - first > longest:
+                    earliest = max(0, t - longest, first + longest + 1 if first >= 0 else 0)
+                    follow_on(t, range(t, earliest - 1, -1), group)
+                elif t - first > 1:
+                    ends = [shrink * marks.joints[row_of[f], group] for f in (first, t)]
+                    between = [pictures[u] for u in range(first, t + 1)]
+                    way = _join_ways(between, ends[0], ends[1], height * shrink, options)
+                    note(range(first, t), group, way.without_last())
+            last[marked] = t
+        stop = t == count - 1
+        ending = (last >= 0) & (last < t) & ((t - last == longest) | (stop & (t - last < longest)))
+        for first in np.unique(last[ending]).tolist():
+            follow_on(first, range(first, t + 1), np.flatnonzero(ending & (last == first)))
     return FlowTracks(joints, confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """Points in a row of pictures, the first of which is marked."""
+
+    places: Float[np.ndarray, "n g 2"]
+    confidence: Float[np.ndarray, "n g"]
+
+    def without_last(self) -> "_Way":
+        """Without the last picture, which is marked too."""
+        return _Way(self.places[:-1], self.confidence[:-1])
 
 
 def _marked_height(marks: Annotations) -> float:
@@ -77,48 +112,83 @@ def _marked_height(marks: Annotations) -> float:
     return float(np.percentile(extent, 80))
 
 
-def _join(
+def _join_ways(
     pictures: list[UInt8[np.ndarray, "h w"]],
     first: Float[np.ndarray, "g 2"],
     last: Float[np.ndarray, "g 2"],
     height: float,
     options: FlowOptions,
-) -> tuple[Float[np.ndarray, "n g 2"], Float[np.ndarray, "n g"]]:
-    """Places in all pictures from the first to the last, and how sure they are."""
-    side = max(7, 2 * round(options.window * height / 2) + 1)
-    ahead = np.stack(list(_follow(pictures, first, side)))
-    back = np.stack(list(_follow(pictures[::-1], last, side)))[::-1]
+) -> _Way:
+    """Places from marks in the first and in the last picture; sure where both ways meet."""
+    side = options.side(height)
+    ahead, _ = _follow(pictures, first, side)
+    back = _follow(pictures[::-1], last, side)[0][::-1]
     share = np.linspace(0, 1, len(pictures))[:, None]
     apart = np.linalg.norm(ahead - back, axis=-1) / height
     places = (1 - share)[..., None] * ahead + share[..., None] * back
-    patches = [
-        [_patch(picture, place, side) for place in spots]
-        for picture, spots in ((pictures[0], first), (pictures[-1], last))
-    ]
-    alike = np.array(
-        [
-            [
-                max(_correlation(_patch(picture, place, side), end[g]) for end in patches)
-                for g, place in enumerate(spots)
-            ]
-            for picture, spots in zip(pictures, places, strict=True)
-        ]
-    )
-    believed = np.clip((alike - options.likeness) / (1 - options.likeness) * 2 + 0.5, 0, 1)
-    return places, np.exp(-0.5 * (apart / options.gap) ** 2) * believed
+    ends = [_patches(pictures[0], first, side), _patches(pictures[-1], last, side)]
+    alike = np.max([_likeness(pictures, places, end, side) for end in ends], axis=0)
+    believed = _ramp(alike, options.likeness)
+    return _Way(places, np.exp(-0.5 * (apart / options.gap) ** 2) * believed)
+
+
+def _follow_one_way(
+    pictures: list[UInt8[np.ndarray, "h w"]],
+    start: Float[np.ndarray, "g 2"],
+    height: float,
+    options: FlowOptions,
+) -> _Way:
+    """Places from marks in the first picture alone; sure while every step leads back."""
+    side = options.side(height)
+    places, returned = _follow(pictures, start, side)
+    apart = np.cumsum(returned, axis=0) / height
+    alike = _likeness(pictures, places, _patches(pictures[0], start, side), side)
+    believed = np.minimum.accumulate(_ramp(alike, options.lone_likeness), axis=0)
+    return _Way(places, np.exp(-0.5 * (apart / options.gap) ** 2) * believed)
 
 
 def _follow(
     pictures: list[UInt8[np.ndarray, "h w"]], start: Float[np.ndarray, "g 2"], side: int
-) -> Iterator[Float[np.ndarray, "g 2"]]:
-    """Points followed from picture to picture."""
-    places = start.astype(np.float32)[:, None]
-    yield start
-    for before, after in zip(pictures, pictures[1:], strict=False):
-        places, _, _ = cv2.calcOpticalFlowPyrLK(
-            before, after, places, None, winSize=(side, side), maxLevel=3
-        )
-        yield places[:, 0].astype(np.float64)
+) -> tuple[Float[np.ndarray, "n g 2"], Float[np.ndarray, "n g"]]:
+    """Points followed from picture to picture, and how far each step back ends from its start."""
+    places, returned = [start], [np.zeros(len(start))]
+    flow = {"winSize": (side, side), "maxLevel": 3}
+    for before, after in pairwise(pictures):
+        here = places[-1].astype(np.float32)[:, None]
+        there, _, _ = cv2.calcOpticalFlowPyrLK(before, after, here, None, **flow)
+        again, _, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, **flow)
+        places.append(there[:, 0].astype(np.float64))
+        returned.append(np.linalg.norm(again[:, 0] - here[:, 0], axis=-1).astype(np.float64))
+    return np.stack(places), np.stack(returned)
+
+
+def _ramp(value: Float[np.ndarray, "*n"], half: float) -> Float[np.ndarray, "*n"]:
+    """0-1, a half at `half`, 1 halfway from there to 1."""
+    return np.clip(0.5 + (value - half) / (1 - half), 0, 1)
+
+
+def _likeness(
+    pictures: list[UInt8[np.ndarray, "h w"]],
+    places: Float[np.ndarray, "n g 2"],
+    patches: list[Float[np.ndarray, "s s"]],
+    side: int,
+) -> Float[np.ndarray, "n g"]:
+    """Correlation of the pictures around the places with one patch for each point."""
+    return np.array(
+        [
+            [
+                _correlation(own, patch)
+                for own, patch in zip(_patches(picture, spots, side), patches, strict=True)
+            ]
+            for picture, spots in zip(pictures, places, strict=True)
+        ]
+    )
+
+
+def _patches(
+    picture: UInt8[np.ndarray, "h w"], places: Float[np.ndarray, "g 2"], side: int
+) -> list[Float[np.ndarray, "s s"]]:
+    return [_patch(picture, place, side) for place in places]
 
 
 def _patch(
