@@ -3,7 +3,8 @@
     python benchmarks/real.py [--half develop|report|all] [--only NAME ...] [--cost 0.06]
         [--work DIR] [--sheets]
 
-For every clip: whole bodies are marked in two or three clear frames (no colour is clicked), the
+For every clip: a whole body is marked in one clear frame and in three more where the program is
+least sure (no colour is clicked), the
 program asks for keyframes, each is marked where the nearest frame with marks by eye is, joints are
 propagated and lifted, and every other frame marked by eye is held against the result:
 
@@ -41,6 +42,7 @@ from keyrecon.library import reconstruct
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.records import Annotations, Keyframes, Motion
 from keyrecon.report.drawing import draw_pose
+from keyrecon.tracking.anchors import least_sure_frames
 
 ROOT = Path(__file__).parent.parent
 VIDEOS = ROOT.parent / "shared" / "data" / "video"
@@ -58,6 +60,8 @@ DEVELOP = (
 )
 LEGS = ("right_knee", "right_ankle"), ("left_knee", "left_ankle")
 ARMS = ("right_elbow", "right_wrist"), ("left_elbow", "left_wrist")
+MORE_BODIES = 3
+"""Whole bodies that the program asks for where it is least sure, before the keyframes."""
 STRAIGHT = 165.0
 """Degrees in the picture above which a knee counts as straight."""
 
@@ -156,15 +160,17 @@ def solve(clip: Clip, cost: float, work: Path) -> Result:
     """Mark bodies, choose keyframes, mark them, reconstruct."""
     store = StageStore(work / clip.name / "cache")
     began = time.perf_counter()
-    first = choose_bodies(clip, 2)
     options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
-    bodies = take(clip, first, first)
-    preparation = prepare(clip.video, (), options, store.keep, show, bodies)
+    first = choose_bodies(clip, 1)
+    preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
+    unsure = least_sure_frames(
+        preparation.track, clip.truth.frames[first], clip.video.fps, MORE_BODIES
+    )
+    first = np.union1d(first, nearest_rows(clip, unsure))
+    preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
     marks = mark_keyframes(clip, preparation.keyframes, first)
     if len(frames_off_marks(preparation, marks)):
-        asked = preparation.keyframes
         preparation = prepare(clip.video, (), options, store.keep, show, marks)
-        preparation = replace(preparation, keyframes=asked)
     motion = reconstruct(preparation, marks, options, store.keep, show)
     return Result(clip, preparation.keyframes, marks, motion, time.perf_counter() - began)
 

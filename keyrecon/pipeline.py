@@ -24,6 +24,7 @@ from keyrecon.keyframes.selection import (
     adopt_keyframes,
     choose_keyframes,
     count_labels,
+    keep_marked,
 )
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
@@ -194,7 +195,21 @@ def prepare(
         options=options.keyframes,
         progress=progress,
     )
+    if marks is not None:
+        keyframes = keep_marked(
+            distances, keyframes, marked_frames(marks), options.keyframes, progress
+        )
     return Preparation(video, camera, colors, track, background, contours, distances, keyframes)
+
+
+def marked_frames(marks: Annotations) -> tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]]:
+    """Frames that have most joints of the upper body marked, and of the lower."""
+    lower = marks.skeleton.is_lower
+    marked = np.isfinite(marks.joints).all(axis=2)
+    upper_frames, lower_frames = (
+        marks.frames[marked[:, half].mean(axis=1) >= LEAST_MARKED] for half in (~lower, lower)
+    )
+    return upper_frames, lower_frames
 
 
 def frames_off_marks(preparation: Preparation, marks: Annotations) -> Int[np.ndarray, "n"]:
@@ -266,11 +281,8 @@ def _with_annotated_keyframes(
     preparation: Preparation, annotations: Annotations, options: Options, progress: Progress
 ) -> Preparation:
     """The keyframes that were annotated, where these are not just the ones asked for."""
-    asked, lower = preparation.keyframes, annotations.skeleton.is_lower
-    marked = np.isfinite(annotations.joints).all(axis=2)
-    of_upper, of_lower = (
-        annotations.frames[marked[:, half].mean(axis=1) >= LEAST_MARKED] for half in (~lower, lower)
-    )
+    asked = preparation.keyframes
+    of_upper, of_lower = marked_frames(annotations)
     for name, frames in (("upper", of_upper), ("lower", of_lower)):
         if not len(frames):
             raise KeyreconError(f"No frame has most joints of the {name} body annotated.")

@@ -314,3 +314,32 @@ def adopt_keyframes(
         halves.append(restore_frames(adopted, kept, everyone))
     upper, lower = halves
     return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)
+
+
+def keep_marked(
+    comparison: PoseDistances,
+    asked: Keyframes,
+    marked: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """The keyframes with frames that are marked already, upper and lower body, among them.
+
+    A marked frame takes the place of the keyframe most like it, if that represents it; else it
+    comes on top, which costs the person nothing.
+    """
+    halves = []
+    for half, name, frames in zip(
+        (asked.upper, asked.lower), ("upper", "lower"), marked, strict=True
+    ):
+        distances = getattr(comparison, name)
+        chosen = half.frames.tolist()
+        for frame in frames.tolist():
+            row = distances[comparison.row[frame], comparison.row[chosen]]
+            nearest = int(row.argmin())
+            if chosen[nearest] not in frames and row[nearest] < half.beta:
+                chosen.pop(nearest)
+            if frame not in chosen:
+                chosen.append(frame)
+        halves.append(np.array(sorted(chosen), dtype=np.int64))
+    return adopt_keyframes(comparison, asked, (halves[0], halves[1]), options, progress)

@@ -98,7 +98,9 @@ class _Body:
         visible: Bool[np.ndarray, "J"],
     ) -> None:
         names = annotations.skeleton.names
-        known = visible & np.isfinite(joints).all(axis=1)
+        placed = np.isfinite(joints).all(axis=1)
+        # a neck behind a chin or a cap still tells where the head is
+        known = placed & (visible | np.isin(names, ("neck", "head_top")))
         self._joint = {n: p for n, p, k in zip(names, joints, known, strict=True) if k}
 
     def points(self) -> Iterator[tuple[str, float, float]]:

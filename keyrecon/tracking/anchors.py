@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.ndimage import uniform_filter1d
 
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import CameraPath, Track, TrackAnchors
@@ -18,6 +19,12 @@ ANCHOR_COST = -60.0
 ANCHOR_FOOT_COST = -3.0
 """Cost of a marked foot by itself when paths are smoothed: twenty times the weight of a foot whose
 response is certain."""
+DOUBT_SECONDS = 0.3
+"""Doubt is averaged over this time: one frame of blur needs no mark."""
+LEAST_DOUBT = 0.15
+"""A track that is sure of itself may be wrong all the same."""
+FAR_SECONDS = 2.0
+"""Marks farther away in time than this teach nothing of a frame."""
 CONTRADICTION = 0.12
 """A head or foot that lies farther from its mark is wrong, player heights: the ankle of the other
 leg is farther away in an open stance, and marks of ankles and tracks of shoes differ by .04."""
@@ -61,3 +68,22 @@ def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, 
     )
     # comparisons with NaN are false: what is not marked contradicts nothing
     return anchors.frames[(head > limit) | (np.minimum(straight, crossed) > limit)]
+
+
+def least_sure_frames(
+    track: Track, marked: Int[np.ndarray, "n"], fps: float, count: int
+) -> Int[np.ndarray, "m"]:
+    """Frames in which a whole body, marked next, would teach most: the track is least sure there.
+
+    A frame counts by the doubt around it and by the time to the nearest marked frame, which it
+    counts as itself once it is chosen: marks teach what lies near them in time.
+    """
+    doubt = 1 - uniform_filter1d(track.confidence, max(1, round(DOUBT_SECONDS * fps)))
+    frames, chosen = np.arange(len(doubt)), list(marked.tolist())
+    for _ in range(count):
+        nearest = np.abs(frames[:, None] - np.array(chosen or [-fps * FAR_SECONDS])).min(axis=1)
+        value = (LEAST_DOUBT + doubt) * np.minimum(nearest / fps, FAR_SECONDS)
+        if value.max() <= 0:
+            break
+        chosen.append(int(value.argmax()))
+    return np.array(sorted(chosen[len(marked) :]), dtype=np.int64)

@@ -51,47 +51,94 @@ def track_marked_joints(
     progress: Progress = silent,
 ) -> FlowTracks:
     """Joints between marks, and how sure they are; NaN and 0 where flow says nothing."""
-    count, height = len(video), _marked_height(marks)
-    shape = count, len(marks.skeleton.names)
-    joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
-    width = min(video.width, max(64, round(video.width * options.player / height)))
-    shrink, longest = width / video.width, round(options.longest * video.fps)
-    row_of = {int(frame): row for row, frame in enumerate(marks.frames)}
-    last = np.full(shape[1], -1)
-    pictures: dict[int, UInt8[np.ndarray, "h w"]] = {}
-
-    def note(frames: range, group: Int[np.ndarray, "g"], way: _Way) -> None:
-        better = way.confidence[1:] > confidence[frames[1:]][:, group]
-        at = np.ix_(frames[1:], group)
-        joints[at] = np.where(better[..., None], way.places[1:] / shrink, joints[at])
-        confidence[at] = np.where(better, way.confidence[1:], confidence[at])
-
-    def follow_on(first: int, frames: range, group: Int[np.ndarray, "g"]) -> None:
-        start = shrink * marks.joints[row_of[first], group]
-        cut = [pictures[u] for u in frames]
-        note(frames, group, _follow_one_way(cut, start, height * shrink, options))
-
-    for t, picture in enumerate(progress(video.frames(width=width), "Following marks", count)):
-        pictures[t] = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        pictures.pop(t - longest - 1, None)
-        if t in row_of:
-            marked = np.isfinite(marks.joints[row_of[t], :, 0])
+    follower = _Follower.start(video, marks, options)
+    last = np.full(len(marks.skeleton.names), -1)
+    pictures = progress(video.frames(width=follower.width), "Following marks", len(video))
+    for t, picture in enumerate(pictures):
+        follower.remember(t, picture)
+        if t in follower.row_of:
+            marked = np.isfinite(marks.joints[follower.row_of[t], :, 0])
             for first in np.unique(last[marked]).tolist():
-                group = np.flatnonzero(marked & (last == first))
-                if first < 0 or t - first > longest:
-                    earliest = max(0, t - longest, first + longest + 1 if first >= 0 else 0)
-                    follow_on(t, range(t, earliest - 1, -1), group)
-                elif t - first > 1:
-                    ends = [shrink * marks.joints[row_of[f], group] for f in (first, t)]
-                    between = [pictures[u] for u in range(first, t + 1)]
-                    way = _join_ways(between, ends[0], ends[1], height * shrink, options)
-                    note(range(first, t), group, way.without_last())
+                follower.close(first, t, np.flatnonzero(marked & (last == first)))
             last[marked] = t
-        stop = t == count - 1
-        ending = (last >= 0) & (last < t) & ((t - last == longest) | (stop & (t - last < longest)))
+        age = np.where(last >= 0, t - last, 0)
+        ending = (age == follower.longest) | ((t == len(video) - 1) & (age > 0))
+        ending &= age <= follower.longest
         for first in np.unique(last[ending]).tolist():
-            follow_on(first, range(first, t + 1), np.flatnonzero(ending & (last == first)))
-    return FlowTracks(joints, confidence)
+            group = np.flatnonzero(ending & (last == first))
+            follower.follow_on(first, range(first, t + 1), group)
+    return FlowTracks(follower.joints, follower.confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class _Follower:
+    """The last pictures, the marks in their pixels, and what was followed so far."""
+
+    marks: Annotations
+    options: FlowOptions
+    width: int
+    """Of the pictures, px."""
+    shrink: float
+    """Their pixels per pixel of the video."""
+    height: float
+    """Of the player in them, px."""
+    longest: int
+    """Frames that flow is followed over."""
+    row_of: dict[int, int]
+    """Row of each marked frame."""
+    joints: Float[np.ndarray, "T J 2"]
+    confidence: Float[np.ndarray, "T J"]
+    pictures: dict[int, UInt8[np.ndarray, "h w"]]
+
+    @classmethod
+    def start(cls, video: Video, marks: Annotations, options: FlowOptions) -> "_Follower":
+        height, shape = _marked_height(marks), (len(video), len(marks.skeleton.names))
+        width = min(video.width, max(64, round(video.width * options.player / height)))
+        shrink = width / video.width
+        return cls(
+            marks=marks,
+            options=options,
+            width=width,
+            shrink=shrink,
+            height=height * shrink,
+            longest=round(options.longest * video.fps),
+            row_of={int(frame): row for row, frame in enumerate(marks.frames)},
+            joints=np.full((*shape, 2), np.nan),
+            confidence=np.zeros(shape),
+            pictures={},
+        )
+
+    def remember(self, t: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
+        """Keep a picture for as long as marks are followed."""
+        self.pictures[t] = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        self.pictures.pop(t - self.longest - 1, None)
+
+    def close(self, first: int, t: int, group: Int[np.ndarray, "g"]) -> None:
+        """Joints marked in frame t, and before in frame `first` (-1: never)."""
+        if first < 0 or t - first > self.longest:
+            earliest = max(0, t - self.longest, first + self.longest + 1 if first >= 0 else 0)
+            self.follow_on(t, range(t, earliest - 1, -1), group)
+        elif t - first > 1:
+            start, stop = (self._marks(frame, group) for frame in (first, t))
+            between = [self.pictures[u] for u in range(first, t + 1)]
+            way = _join_ways(between, start, stop, self.height, self.options)
+            self._note(range(first, t), group, way.without_last())
+
+    def follow_on(self, first: int, frames: range, group: Int[np.ndarray, "g"]) -> None:
+        """One way from the marks of frame `first`, the first of `frames`."""
+        cut = [self.pictures[u] for u in frames]
+        way = _follow_one_way(cut, self._marks(first, group), self.height, self.options)
+        self._note(frames, group, way)
+
+    def _marks(self, frame: int, group: Int[np.ndarray, "g"]) -> Float[np.ndarray, "g 2"]:
+        return self.shrink * self.marks.joints[self.row_of[frame], group]
+
+    def _note(self, frames: range, group: Int[np.ndarray, "g"], way: "_Way") -> None:
+        """Take over what is surer than what was known; the first frame is marked."""
+        at = np.ix_(np.array(frames[1:], dtype=np.int64), group)
+        better = way.confidence[1:] > self.confidence[at]
+        self.joints[at] = np.where(better[..., None], way.places[1:] / self.shrink, self.joints[at])
+        self.confidence[at] = np.where(better, way.confidence[1:], self.confidence[at])
 
 
 @dataclass(frozen=True, eq=False)
