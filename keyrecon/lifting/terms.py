@@ -111,3 +111,33 @@ def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Ter
         return LinearizedTerm((weight * off).reshape(frames, -1), by_direction, None, cost)
 
     return term
+
+
+def unseen_bend(
+    bones: tuple[int, int],
+    start: Float[np.ndarray, "T B 3"],
+    noise: float,
+    weight: float,
+) -> Term:
+    """The part of a bend that the picture does not show is of the size of the part that it shows.
+
+    The difference w of two bones' unit directions tells their bend. Seen from anywhere alike, the
+    depth w_z given the picture's part a = |w_xy| has the density a / (a^2 + w_z^2) times that of
+    the bend's size: a Cauchy density of scale a. A limb that looks straight is straight, but for
+    `noise`: each bone by itself would be given the depth that its foreshortening may hide, and two
+    such depths of opposite signs bend the limb. a is taken from the directions of `start`.
+    """
+    first, second = bones
+    pictured = np.linalg.norm((start[:, second] - start[:, first])[:, :2], axis=-1)
+    scale = np.hypot(pictured, noise)[:, None]
+
+    def term(state: MotionState) -> LinearizedTerm:
+        depth = (state.directions[:, second, 2] - state.directions[:, first, 2])[:, None]
+        residual = depth / scale
+        root = np.sqrt(2 * weight / (1 + residual**2))
+        slope = np.zeros((len(depth), 1, state.directions.shape[1], 3))
+        slope[:, 0, second, 2], slope[:, 0, first, 2] = (root / scale)[:, 0], -(root / scale)[:, 0]
+        cost = weight * float(np.log1p(residual**2).sum())
+        return LinearizedTerm(root * residual, slope, None, cost)
+
+    return term
