@@ -21,6 +21,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.progress import silent
+from keyrecon.records import HalfKeyframes, Keyframes
 from keyrecon.synthetic.cameras import CameraPlanOptions
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
@@ -221,3 +222,40 @@ def test_a_skeleton_of_ones_own_goes_through(clip, tmp_path):
     motion = read_motion(made / "motion.npz")
     assert motion.skeleton.names[-2:] == ("right_toe", "left_toe")
     assert np.median(np.abs(motion.points2d - points2d)[:, -2:]) < 0.03 * 150
+
+
+def whole_body(truth, *frames):
+    """Every joint of some frames, marked."""
+    both = HalfKeyframes(
+        frames=np.array(frames),
+        nearest=np.zeros(FRAMES, dtype=np.int64),
+        represented=np.zeros(FRAMES, dtype=bool),
+        coverage=0.0,
+        beta=1.0,
+        distance=np.zeros(FRAMES),
+        printed_count=1,
+    )
+    asked = Keyframes(both, both, 10, 0.95)
+    return mark_from_truth(
+        asked, truth["points2d"], truth["points3d"], None, MarkOptions(noise=1.0, signs=False)
+    )
+
+
+def test_one_marked_body_serves_in_place_of_clicks(clip, tmp_path, capsys):
+    made, truth = tmp_path / "marked", read_truth(clip / "truth.npz")
+    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
+    assert keyrecon("keyframes", made) == 1
+    assert "no picks and no marked body yet" in capsys.readouterr().err
+    write_coco(tmp_path / "body.json", whole_body(truth, 30, 90), SIZE)
+    assert keyrecon("import", made, tmp_path / "body.json") == 0
+    assert keyrecon("keyframes", made, "--budget", "0.06") == 0
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    assert {30, 90} <= set(asked.upper.frames.tolist()) & set(asked.lower.frames.tolist())
+    marks = mark_from_truth(
+        asked, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(noise=1.0)
+    )
+    write_coco(tmp_path / "marks.json", marks, SIZE)
+    assert keyrecon("import", made, tmp_path / "marks.json", "--replace") == 0
+    assert keyrecon("run", made, "--height", f"{float(truth['height_m']):.2f}") == 0
+    scores = evaluate_motion(read_motion(made / "motion.npz"), truth)
+    assert scores.pck > 0.9

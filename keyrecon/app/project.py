@@ -19,17 +19,24 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
-from keyrecon.io.formats.coco import read_coco, write_coco
+from keyrecon.io.formats.coco import coco_text, read_coco, write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
-from keyrecon.keyframes.selection import KeyframeOptions
+from keyrecon.keyframes.selection import KeyframeOptions, keep_marked
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, as_printed, prepare, with_height
+from keyrecon.pipeline import (
+    Options,
+    as_printed,
+    frames_off_marks,
+    marked_frames,
+    prepare,
+    with_height,
+)
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
@@ -138,13 +145,55 @@ def find_keyframes(
     """
     options = workspace.options(options, Options())
     options = replace(options, keyframes=chosen.over(options.keyframes))
-    keep = workspace.stages.keep
     forms = as_printed(options) if printed else options
-    preparation = prepare(workspace.video(), workspace.picks(), forms, keep, progress)
+    video = workspace.video()
+    marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
+    preparation = prepare_with_marks(workspace, video, marks, forms, progress)
+    if marks is not None and not printed:
+        kept = keep_marked(
+            preparation.pose_distances,
+            preparation.keyframes,
+            marked_frames(marks),
+            options.keyframes,
+            progress,
+        )
+        preparation = replace(preparation, keyframes=kept)
     workspace.remember(options, Options())
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
     return describe_keyframes(workspace, preparation)
+
+
+def prepare_with_marks(
+    workspace: Workspace,
+    video: Video,
+    marks: Annotations | None,
+    options: Options,
+    progress: Progress,
+) -> Preparation:
+    """The automatic part; made with the marks where there are no picks, or where it was off.
+
+    What was made before is found again while no mark contradicts its track. The printed forms know
+    picks alone, where there are any.
+    """
+    used, file = None, workspace.prepared_marks_file
+    if options.track.method == "paper" and workspace.picks_file.is_file():
+        keep = workspace.stages.keep
+        return prepare(video, workspace.picks(), options, keep, progress)
+    if file.is_file() and not workspace.stages.force:
+        used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+    if used is None and marks is not None and not workspace.picks_file.is_file():
+        used = marks
+    picks = workspace.picks() if used is None or workspace.picks_file.is_file() else ()
+    keep = workspace.stages.keep
+    preparation = prepare(video, picks, options, keep, progress, used)
+    if marks is not None and len(frames_off_marks(preparation, marks)):
+        used = marks
+        preparation = prepare(video, picks, options, keep, progress, used)
+    if used is not None:
+        size = (video.width, video.height)
+        write_durably(file, coco_text(used, size).encode())
+    return preparation
 
 
 def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
@@ -161,6 +210,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
         [
             f"Player found in {seen:.1%} of {frames} frames.",
             *_describe_absence(preparation),
+            *_describe_doubt(preparation),
             *halves,
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
@@ -188,6 +238,25 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
     more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
     return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
+
+
+MIN_CONFIDENCE = 0.3
+"""Confidence under which a track is a guess: two responses of a fifth of the usual strength."""
+
+
+def _describe_doubt(preparation: Preparation) -> list[str]:
+    """Where the track is least sure of itself, and the frame whose mark would teach most."""
+    doubtful = preparation.track.confidence < MIN_CONFIDENCE
+    stretches = [s for s in list_stretches(doubtful) if s[1] - s[0] >= preparation.keyframes.reach]
+    if not stretches:
+        return []
+    longest = sorted(stretches, key=lambda s: s[0] - s[1])[:3]
+    listed = ", ".join(f"{first}-{last}" for first, last in sorted(longest))
+    middle = sum(longest[0]) // 2
+    return [
+        f"The track is least sure in frames {listed}; marking the whole body in frame {middle} "
+        "would help most."
+    ]
 
 
 def _counted(number: int, what: str) -> str:
@@ -270,7 +339,7 @@ def run(
     """
     started = time.perf_counter()
     annotations = annotated(workspace, partial)
-    preparation = prepared(workspace, options, progress)
+    preparation = prepared(workspace, options, progress, annotations)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     write_motion(workspace.motion_file, motion)
     material = ReportMaterial(
@@ -305,11 +374,15 @@ def _other_choice(workspace: Workspace, options: Options, asked: Keyframes) -> l
     ]
 
 
-def prepared(workspace: Workspace, options: Options, progress: Progress) -> Preparation:
+def prepared(
+    workspace: Workspace,
+    options: Options,
+    progress: Progress,
+    marks: Annotations | None = None,
+) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
-    video, asked = workspace.video(), asked_for(workspace)
-    keep = workspace.stages.keep
-    preparation = prepare(video, workspace.picks(), options, keep, progress)
+    asked = asked_for(workspace)
+    preparation = prepare_with_marks(workspace, workspace.video(), marks, options, progress)
     return replace(preparation, keyframes=asked)
 
 

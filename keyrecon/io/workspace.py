@@ -87,6 +87,11 @@ class Workspace:
         return self.folder / "annotations.json"
 
     @property
+    def prepared_marks_file(self) -> Path:
+        """Marks that the automatic part was last made with; none where picks were enough."""
+        return self.folder / "cache" / "prepared_marks.json"
+
+    @property
     def motion_file(self) -> Path:
         """motion.npz"""
         return self.folder / "motion.npz"
@@ -174,9 +179,11 @@ class Workspace:
         """
         if not self.picks_file.is_file():
             raise KeyreconError(
-                f"{self.folder} has no picks yet; click the player's head, feet and clothes on the "
-                f"page of keyrecon annotate {quoted(self.folder)}, or with: keyrecon pick "
-                f"{quoted(self.folder)} --frame N --head X,Y --foot X,Y --region shirt:X,Y"
+                f"{self.folder} has no picks and no marked body yet; click the player's head, feet "
+                f"and clothes on the page of keyrecon annotate {quoted(self.folder)}, or with: "
+                f"keyrecon pick {quoted(self.folder)} --frame N --head X,Y --foot X,Y --region "
+                "shirt:X,Y; or mark the joints of one whole body and import them: "
+                f"keyrecon import {quoted(self.folder)} FILE"
             )
         picks = read_picks(self.picks_file)
         return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))

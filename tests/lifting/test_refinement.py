@@ -10,6 +10,7 @@ from keyrecon.lifting.foreshortening import depth_share, log_density
 from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
 from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
+from keyrecon.lifting.terms import unseen_bend
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.records import HalfKeyframes
@@ -245,3 +246,28 @@ def test_a_step_of_a_foot_that_rests_is_no_outlier():
     residual[90:96, 0, 1] -= 0.03 * np.sin(np.linspace(0, np.pi, 6))
     residual[150, 0] += 0.3
     assert np.flatnonzero(reject_spikes(residual, 9, 4.0, 0.0125)[:, 0]).tolist() == [150]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+def test_a_limb_that_looks_straight_is_straightened_and_a_bend_in_the_picture_stays(angle):
+    thigh, shank = np.array([0.0, 0.95, 0.31]), np.array([np.sin(angle), 0.9, -0.3])
+    directions = np.tile([thigh, shank], (6, 1, 1))
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    term = unseen_bend((0, 1), directions, noise=0.12, weight=1.0)
+    state = MotionState(np.zeros((6, 2)), directions)
+    pull = np.abs(term(state).residual).max()
+    assert pull > 1 if angle == 0 else pull < 1.3
+
+
+def test_the_slope_of_an_unseen_bend_is_that_of_its_cost():
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(1, 3, 3))
+    term = unseen_bend((0, 2), directions, noise=0.2, weight=0.7)
+    at = MotionState(np.zeros((1, 2)), directions)
+    line = term(at)
+    gradient = np.einsum("tm,tmbi->tbi", line.residual, line.by_direction)
+    for bone, axis in ((0, 2), (2, 2), (1, 2), (0, 0)):
+        moved = directions.copy()
+        moved[0, bone, axis] += 1e-6
+        slope = (term(MotionState(np.zeros((1, 2)), moved)).cost - line.cost) / 1e-6
+        assert slope == pytest.approx(gradient[0, bone, axis], abs=1e-4)

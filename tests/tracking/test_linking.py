@@ -33,7 +33,8 @@ def link(covered):
         detections.append(Detections(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
     standing, motion = track(), FootMotionModel(0.04 * TALL, 50, 1.0, 1.0)
-    return link_feet(detections, camera, cropping, standing.head, standing.height, motion)
+    unmarked = np.full((len(detections), 2, 2), np.nan)
+    return link_feet(detections, camera, cropping, standing.head, standing.height, unmarked, motion)
 
 
 def test_a_foot_behind_the_other_leg_stays_where_it_stood():

@@ -5,7 +5,7 @@ from drawn_player import HEIGHT, corners, film, heads, lifts, picks
 from keyrecon.errors import KeyreconError
 from keyrecon.io.frame_reader import read_small
 from keyrecon.numerics.geometry import warp_points
-from keyrecon.records import CameraPath
+from keyrecon.records import CameraPath, TrackAnchors
 from keyrecon.segmentation.background_model import ForegroundModel, build_background
 from keyrecon.segmentation.color_model import learn_colors, to_lab
 from keyrecon.segmentation.contours import find_edges
@@ -15,6 +15,7 @@ from keyrecon.tracking.scale import standing_height, zoom
 from keyrecon.tracking.tracker import TrackOptions, track_player
 
 COUNT = 40
+NO_MARKS = TrackAnchors.none()
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["static", "panning"])
@@ -23,9 +24,9 @@ def found(request, tmp_path_factory):
     video = film(tmp_path_factory.mktemp("film") / "player.mp4", COUNT, request.param)
     camera = estimate_camera_motion(video)
     colors = learn_colors(video, picks(COUNT, request.param))
-    rough = find_player(video, colors, camera)
+    rough = find_player(video, colors, camera, NO_MARKS)
     background = build_background(video, camera, rough)
-    track = track_player(video, rough, camera, background, colors)
+    track = track_player(video, rough, camera, background, colors, NO_MARKS)
     return request.param, video, camera, colors, track
 
 
@@ -52,8 +53,10 @@ def test_neither_a_racket_like_a_shoe_nor_a_lifted_foot_misleads(tmp_path):
     video = film(tmp_path / "playing.mp4", COUNT, playing=True)
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
     colors = learn_colors(video, picks(COUNT))
-    rough = find_player(video, colors, camera)
-    track = track_player(video, rough, camera, build_background(video, camera, rough), colors)
+    rough = find_player(video, colors, camera, NO_MARKS)
+    track = track_player(
+        video, rough, camera, build_background(video, camera, rough), colors, NO_MARKS
+    )
     head = heads(COUNT) - corners(COUNT, False)
     left = head + np.array([-12, HEIGHT])
     right = head + np.stack([np.full(COUNT, 12), HEIGHT - lifts(COUNT)], axis=1)
@@ -66,14 +69,14 @@ def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
     _, video, camera, colors, track = found
     options = TrackOptions(method="paper")
     background = build_background(video, camera, track)
-    assert track_player(video, track, camera, background, colors, options) is track
+    assert track_player(video, track, camera, background, colors, NO_MARKS, options) is track
 
 
 def test_a_video_too_long_for_its_pictures_to_be_kept_is_read_again(found, monkeypatch):
     _, video, camera, colors, _ = found
-    kept = find_player(video, colors, camera)
+    kept = find_player(video, colors, camera, NO_MARKS)
     monkeypatch.setattr("keyrecon.tracking.detection.MAX_CACHE_BYTES", 0)
-    again = find_player(video, colors, camera)
+    again = find_player(video, colors, camera, NO_MARKS)
     assert (again.head == kept.head).all()
     assert (again.feet == kept.feet).all()
 
@@ -138,4 +141,4 @@ def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_
     panning, _, camera, colors, _ = found
     empty = film(tmp_path / "empty.mp4", COUNT, panning, empty=True)
     with pytest.raises(KeyreconError, match=r"0 of 21 frames; pick .* again"):
-        find_player(empty, colors, camera)
+        find_player(empty, colors, camera, NO_MARKS)

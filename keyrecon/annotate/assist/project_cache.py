@@ -23,6 +23,7 @@ from keyrecon.annotate.assist.checks import Neighbours, find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, choose_sources, suggest_joints
 from keyrecon.annotate.assist.preview import Strip, cut_strip
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.coco import read_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
@@ -80,7 +81,8 @@ class ProjectCache:
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
-        files = self._workspace.keyframes_file, self._workspace.picks_file
+        known = self._workspace.picks_file, self._workspace.prepared_marks_file
+        files = (self._workspace.keyframes_file, *(file for file in known if file.exists()))
         return self._load("preparation", files, self._prepared)
 
     def motion(self) -> Motion | None:
@@ -182,7 +184,11 @@ class ProjectCache:
         workspace = Workspace(self._workspace.folder)
         options = workspace.options(Options(), Options())
         recall = workspace.stages.recall
-        preparation = prepare(workspace.video(), workspace.picks(), options, recall)
+        video, marks, file = workspace.video(), None, workspace.prepared_marks_file
+        if file.is_file():
+            marks = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+        picks = workspace.picks() if marks is None or workspace.picks_file.is_file() else ()
+        preparation = prepare(video, picks, options, recall, marks=marks)
         keyframes = keyframes_from_json(workspace.keyframes_file.read_text())
         if len(keyframes.upper.nearest) != len(preparation.video):
             raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")

@@ -1,0 +1,54 @@
+"""Marks of a person as fixed points of the track."""
+
+import numpy as np
+
+from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
+from keyrecon.records import Track, TrackAnchors
+from keyrecon.tracking.anchors import anchored_states, contradicted_frames, least_sure_frames
+
+
+def standing(count, confidence=1.0):
+    """A player of 100 px who stands still at x = 50."""
+    head, feet = np.tile([50.0, 20.0], (count, 1)), np.tile([[44.0, 120], [56, 120]], (count, 1, 1))
+    sure = np.broadcast_to(confidence, count).astype(float)
+    return Track(head, feet, np.full(count, 100.0), np.zeros((count, 4)), sure)
+
+
+def marks(track, frames, shift=(0.0, 0.0)):
+    """Anchors where the track is, moved by a shift."""
+    frames = np.array(frames)
+    head, feet = track.head[frames] + shift, track.feet[frames] + shift
+    return TrackAnchors(frames, head, feet, np.ones(len(frames), dtype=bool))
+
+
+def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
+    states = [np.zeros((1, 1, 2))] * 9
+    marked = np.full((9, 1, 2), np.nan)
+    marked[4] = 500.0
+    places, costs = anchored_states(states, [np.zeros(1)] * 9, marked)
+    taken = find_cheapest_track(costs, places, TransitionModel(1.0))
+    assert taken[4] == 0
+    assert (places[4] == 500).all()
+
+
+def test_marks_where_the_track_is_contradict_nothing_and_others_are_named():
+    track = standing(30)
+    assert len(contradicted_frames(track, marks(track, [3, 9]))) == 0
+    assert contradicted_frames(track, marks(track, [3, 9], (20.0, 0.0))).tolist() == [3, 9]
+
+
+def test_feet_contradict_in_no_particular_order_and_what_is_not_marked_contradicts_nothing():
+    track = standing(30)
+    crossed = marks(track, [5])
+    crossed = TrackAnchors(
+        crossed.frames, crossed.head * np.nan, crossed.feet[:, ::-1], crossed.marked
+    )
+    assert len(contradicted_frames(track, crossed)) == 0
+
+
+def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is_near():
+    confidence = np.ones(200)
+    confidence[120:150] = 0.0
+    first, second = least_sure_frames(standing(200, confidence), np.array([0]), 50.0, 2)
+    assert 115 < first < 155 or 115 < second < 155
+    assert abs(first - second) > 10
