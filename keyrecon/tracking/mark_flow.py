@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.video import Video
+from keyrecon.numerics.picture_points import track_there_and_back
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, FlowTracks
 
@@ -199,13 +200,11 @@ def _follow(
 ) -> tuple[Float[np.ndarray, "n g 2"], Float[np.ndarray, "n g"]]:
     """Points followed from picture to picture, and how far each step back ends from its start."""
     places, returned = [start], [np.zeros(len(start))]
-    flow = {"winSize": (side, side), "maxLevel": 3}
     for before, after in pairwise(pictures):
         here = places[-1].astype(np.float32)[:, None]
-        there, _, _ = cv2.calcOpticalFlowPyrLK(before, after, here, None, **flow)
-        again, _, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, **flow)
+        there, off, _ = track_there_and_back(before, after, here, side)
         places.append(there[:, 0].astype(np.float64))
-        returned.append(np.linalg.norm(again[:, 0] - here[:, 0], axis=-1).astype(np.float64))
+        returned.append(off.astype(np.float64))
     return np.stack(places), np.stack(returned)
 
 

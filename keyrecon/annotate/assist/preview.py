@@ -15,7 +15,7 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.errors import KeyreconError
 from keyrecon.io.frame_reader import reduce_picture
 from keyrecon.io.video import Video
-from keyrecon.records import CameraPath, Colors, Track
+from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import sample_frames
 from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
 from keyrecon.tracking import detection as find
@@ -89,7 +89,7 @@ def find_player(
     strip: Strip, colors: Colors, camera: CameraPath, frames: tuple[int, ...]
 ) -> PreviewedParts:
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
-    track: Track = find.find_player(strip, colors, camera)
+    track: Track = find.find_player(strip, colors, camera, TrackAnchors.none())
     rows = np.searchsorted(strip.numbers, np.unique(frames))
     found = track.confidence > 0
     missing = ~found[rows]
