@@ -7,11 +7,13 @@ from keyrecon.records import Annotations, FlowTracks
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
 
 STANDING = {
-    "head_top": (100, 10), "neck": (100, 40), "right_shoulder": (80, 45), "left_shoulder": (120, 45),
-    "right_elbow": (75, 80), "left_elbow": (125, 80), "right_wrist": (75, 110),
-    "left_wrist": (125, 110), "right_hip": (90, 110), "left_hip": (110, 110),
-    "right_knee": (90, 160), "left_knee": (110, 160), "right_ankle": (90, 210),
-    "left_ankle": (110, 210),
+    "head_top": (100, 10), "neck": (100, 40),
+    "right_shoulder": (80, 45), "left_shoulder": (120, 45),
+    "right_elbow": (75, 80), "left_elbow": (125, 80),
+    "right_wrist": (75, 110), "left_wrist": (125, 110),
+    "right_hip": (90, 110), "left_hip": (110, 110),
+    "right_knee": (90, 160), "left_knee": (110, 160),
+    "right_ankle": (90, 210), "left_ankle": (110, 210),
 }  # fmt: skip
 
 
