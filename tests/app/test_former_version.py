@@ -107,7 +107,8 @@ def test_it_can_be_run_again(folder):
     assert motion.units == former.units
     assert motion.keyframes.tolist() == former.keyframes.tolist()
     off = np.linalg.norm(motion.points2d - former.points2d, axis=-1)
-    assert np.median(off) < 2.0
+    tall = np.median(np.ptp(former.points2d[..., 1], axis=1))
+    assert np.median(off) < 0.03 * tall  # results change with versions, about as two eyes do
 
 
 def test_the_journal_on_the_disk_is_of_the_former_version():
