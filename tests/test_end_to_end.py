@@ -245,7 +245,7 @@ def test_one_marked_body_serves_in_place_of_clicks(clip, tmp_path, capsys):
     made, truth = tmp_path / "marked", read_truth(clip / "truth.npz")
     assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
     assert keyrecon("keyframes", made) == 1
-    assert "no picks and no marked body yet" in capsys.readouterr().err
+    assert "no picks yet, and no marked body" in capsys.readouterr().err
     write_coco(tmp_path / "body.json", whole_body(truth, 30, 90), SIZE)
     assert keyrecon("import", made, tmp_path / "body.json") == 0
     assert keyrecon("keyframes", made, "--budget", "0.06") == 0
