@@ -179,8 +179,8 @@ class Workspace:
         """
         if not self.picks_file.is_file():
             raise KeyreconError(
-                f"{self.folder} has no picks yet, and no marked body; click the player's head, feet "
-                f"and clothes on the page of keyrecon annotate {quoted(self.folder)}, or with: "
+                f"{self.folder} has no picks yet, and no marked body; click the player's head, "
+                f"feet and clothes on the page of keyrecon annotate {quoted(self.folder)}, or with: "
                 f"keyrecon pick {quoted(self.folder)} --frame N --head X,Y --foot X,Y --region "
                 "shirt:X,Y; or mark the joints of one whole body and import them: "
                 f"keyrecon import {quoted(self.folder)} FILE"
