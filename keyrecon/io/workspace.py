@@ -178,12 +178,13 @@ class Workspace:
         Raises KeyreconError when there is nothing yet.
         """
         if not self.picks_file.is_file():
+            folder = quoted(self.folder)
             raise KeyreconError(
                 f"{self.folder} has no picks yet, and no marked body; click the player's head, "
-                f"feet and clothes on the page of keyrecon annotate {quoted(self.folder)}, or with: "
-                f"keyrecon pick {quoted(self.folder)} --frame N --head X,Y --foot X,Y --region "
-                "shirt:X,Y; or mark the joints of one whole body and import them: "
-                f"keyrecon import {quoted(self.folder)} FILE"
+                f"feet and clothes on the page of keyrecon annotate {folder}, or with: "
+                f"keyrecon pick {folder} --frame N --head X,Y --foot X,Y --region shirt:X,Y; or "
+                "mark the joints of one whole body and import them: "
+                f"keyrecon import {folder} FILE"
             )
         picks = read_picks(self.picks_file)
         return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))

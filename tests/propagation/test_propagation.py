@@ -6,7 +6,8 @@ from capsule_player import hide, marks, scene, standing, turned
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
+from keyrecon.propagation.propagation import PropagateOptions, propagate_joints, with_flow
+from keyrecon.records import FlowTracks, JointTracks
 
 PAPER = PropagateOptions(method="paper")
 RIGHT_ARM = ("right_wrist",)
@@ -19,7 +20,7 @@ def bending(angles=BEND):
 
 
 def carry(preparation, annotations, options=PropagateOptions()):
-    return propagate_joints(preparation, annotations, options)
+    return propagate_joints(preparation, annotations, options=options)
 
 
 def test_annotated_frames_keep_their_marks_exactly():
@@ -113,3 +114,15 @@ def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
     found = carry(preparation, annotations)
     away = np.linalg.norm(found.joints - truth, axis=-1) / preparation.track.height[:, None]
     assert away.max() < 0.03
+
+
+def test_flow_that_is_sure_overrules_edges_and_flow_that_is_not_does_not():
+    joints = np.zeros((3, 2, 2))
+    tracks = JointTracks(joints, np.full((3, 2), 0.5), np.zeros((3, 2), dtype=np.int64))
+    flow = FlowTracks(joints + 40.0, np.array([[0.9, 0.3], [0.0, 0.0], [0.9, 0.9]]))
+    flow.joints[2] = joints[2] + 1.0
+    fused = with_flow(tracks, flow, np.full(3, 100.0))
+    assert (fused.joints[0, 0] == 40).all()
+    assert fused.confidence[0, 0] == 0.9
+    assert (fused.joints[[0, 1, 1], [1, 0, 1]] == 0).all()
+    assert (fused.joints[2] == 0).all()  # near one another they agree, and edges are more exact
