@@ -133,6 +133,9 @@ def prepare(
     found in most frames, or the annotation budget cannot be met.
     """
     count_labels(options.keyframes, len(video))  # a person waits minutes for the choice itself
+    camera = keep(
+        "camera", estimate_camera_motion, video, options=options.camera, progress=progress
+    )
     clicks, anchors = tuple(picks), TrackAnchors.none()
     if marks is not None:
         clicks += picks_from_bodies(marks, (video.width, video.height))
@@ -140,9 +143,6 @@ def prepare(
             "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
         )
         anchors = anchors_from_bodies(marks, flow)
-    camera = keep(
-        "camera", estimate_camera_motion, video, options=options.camera, progress=progress
-    )
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
     detected = keep(
         "find", find_player, video, colors, camera, anchors, options=options.find, progress=progress
