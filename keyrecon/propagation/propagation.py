@@ -66,6 +66,12 @@ MIN_FLOW_CONFIDENCE = 0.6
 the mark's."""
 
 
+MAX_DOUBTED_CONFIDENCE = 0.2
+"""Edges that are surer than this are not overruled. Tried on rendered sequences: overruling all of
+them cost .6 points of PCK and 2 mm of PA-MPJPE, these alone nothing; on real clips either is within
+.3 points of the other."""
+
+
 @dataclass(frozen=True)
 class PropagateOptions:
     """How joints are propagated to the frames that nobody annotated."""
@@ -112,8 +118,9 @@ def propagate_joints(
 ) -> JointTracks:
     """Joints in px, confidence and source keyframe of every joint in every frame.
 
-    Where `flow` between marks is sure of a joint, it has the last word. Annotated joints come back
-    as they were marked, with confidence 1. Raises KeyreconError when a joint is marked nowhere.
+    Where edges leave a joint in doubt and `flow` between marks is sure of it, flow has it.
+    Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when
+    a joint is marked nowhere.
     """
     marked = np.isfinite(annotations.joints).all(axis=2)
     _require_marks(annotations.skeleton, marked)
@@ -127,10 +134,11 @@ def propagate_joints(
 
 
 def with_flow(tracks: JointTracks, flow: FlowTracks, height: Float[np.ndarray, "T"]) -> JointTracks:
-    """Tracks with joints that flow is sure of where edges have put them elsewhere."""
+    """Tracks with joints that flow is sure of where edges are not, and have put them elsewhere."""
     apart = np.linalg.norm(tracks.joints - flow.joints, axis=2) / height[:, None]
     elsewhere = ~(apart < FLOW_TOLERANCE) & np.isfinite(flow.joints).all(axis=2)
     replaced = elsewhere & (flow.confidence > MIN_FLOW_CONFIDENCE)
+    replaced &= ~(tracks.confidence > MAX_DOUBTED_CONFIDENCE)
     return JointTracks(
         np.where(replaced[..., None], flow.joints, tracks.joints),
         np.where(replaced, flow.confidence, tracks.confidence),

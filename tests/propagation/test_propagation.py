@@ -116,11 +116,12 @@ def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
     assert away.max() < 0.03
 
 
-def test_flow_that_is_sure_overrules_edges_and_flow_that_is_not_does_not():
+def test_sure_flow_overrules_edges_in_doubt_and_no_others():
     joints = np.zeros((3, 2, 2))
-    tracks = JointTracks(joints, np.full((3, 2), 0.5), np.zeros((3, 2), dtype=np.int64))
+    doubt = np.array([[0.1, 0.1], [0.1, 0.1], [0.1, 0.9]])
+    tracks = JointTracks(joints, doubt, np.zeros((3, 2), dtype=np.int64))
     flow = FlowTracks(joints + 40.0, np.array([[0.9, 0.3], [0.0, 0.0], [0.9, 0.9]]))
-    flow.joints[2] = joints[2] + 1.0
+    flow.joints[2, 0] = joints[2, 0] + 1.0
     fused = with_flow(tracks, flow, np.full(3, 100.0))
     assert (fused.joints[0, 0] == 40).all()
     assert fused.confidence[0, 0] == 0.9
