@@ -177,6 +177,8 @@ def prepare_with_marks(
     picks alone, where there are any.
     """
     used, file = None, workspace.prepared_marks_file
+    if marks is not None and not np.isfinite(marks.joints).any():
+        marks = None  # a file without a mark tells nothing
     if options.track.method == "paper" and workspace.picks_file.is_file():
         keep = workspace.stages.keep
         return prepare(video, workspace.picks(), options, keep, progress)

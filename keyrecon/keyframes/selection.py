@@ -335,10 +335,11 @@ def keep_marked(
         distances = getattr(comparison, name)
         chosen = half.frames.tolist()
         for frame in frames.tolist():
-            row = distances[comparison.row[frame], comparison.row[chosen]]
-            nearest = int(row.argmin())
-            if chosen[nearest] not in frames and row[nearest] < half.beta:
-                chosen.pop(nearest)
+            if chosen:
+                row = distances[comparison.row[frame], comparison.row[chosen]]
+                nearest = int(row.argmin())
+                if chosen[nearest] not in frames and row[nearest] < half.beta:
+                    chosen.pop(nearest)
             if frame not in chosen:
                 chosen.append(frame)
         halves.append(np.array(sorted(chosen), dtype=np.int64))

@@ -4,7 +4,12 @@ import numpy as np
 
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import Track, TrackAnchors
-from keyrecon.tracking.anchors import anchored_states, contradicted_frames, least_sure_frames
+from keyrecon.tracking.anchors import (
+    DOUBT_SECONDS,
+    anchored_states,
+    contradicted_frames,
+    least_sure_frames,
+)
 
 
 def standing(count, confidence=1.0):
@@ -51,4 +56,4 @@ def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is
     confidence[120:150] = 0.0
     first, second = least_sure_frames(standing(200, confidence), np.array([0]), 50.0, 2)
     assert 115 < first < 155 or 115 < second < 155
-    assert abs(first - second) > 10
+    assert abs(first - second) > DOUBT_SECONDS * 50
