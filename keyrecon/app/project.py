@@ -360,6 +360,7 @@ def run(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
+            *_describe_doubt(preparation),
             *_other_choice(workspace, options, preparation.keyframes),
             f"Took {time.perf_counter() - started:.0f} s.",
         ]
