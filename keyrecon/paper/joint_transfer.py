@@ -255,18 +255,19 @@ def _gather_models(
     models: dict[tuple[HalfName, int], TransferModel] = {}
     video = preparation.video
     width = PatchSource.width_for(video, preparation.track.height)
-    for row, frame in enumerate(annotations.frames.tolist()):
-        height = float(preparation.track.height[frame])
-        picture = crop_patches(video.frame(frame, width), video.width, height)
-        visible = np.where(annotations.visible[row][:, None], annotations.joints[row], np.nan)
-        for name in HALVES:
-            half: HalfKeyframes = getattr(preparation.keyframes, name)
-            if frame not in half.frames:
+    seen = np.where(annotations.visible[..., None], annotations.joints, np.nan)
+    rows = dict(zip(annotations.frames.tolist(), range(len(seen)), strict=True))
+    for name in HALVES:
+        half: HalfKeyframes = getattr(preparation.keyframes, name)
+        members = annotations.skeleton.is_lower == (name == "lower")
+        for frame in half.frames.tolist():
+            if frame not in rows:
                 continue
+            height = float(preparation.track.height[frame])
+            picture = crop_patches(video.frame(frame, width), video.width, height)
             origin = _anchor(preparation, frame, name)
             edges = align_edges(preparation.contours.edges[frame], preparation.track, frame, name)
-            members = annotations.skeleton.is_lower == (name == "lower")
-            joints = np.where(members[:, None], (visible - origin) / height, np.nan)
+            joints = np.where(members[:, None], (seen[rows[frame]] - origin) / height, np.nan)
             models[name, frame] = TransferModel(edges, joints, picture.around(origin))
     return models
 

@@ -1,4 +1,4 @@
-"""Which edge element of a frame corresponds to which element of a posed template.
+"""Which edge element of a frame corresponds to which of a posed template, and how well they fit.
 
 The nearest one of the same colour in place and direction together: the chord between two unit
 tangents, times `TANGENT_SCALE`, counts like a distance. Elements that differ by 45 degrees are so
@@ -10,6 +10,11 @@ descriptors,
     |a - b|^2 = |a|^2 + (-2 a, 1) . (b, |b|^2),
 
 come from one small matrix product in single precision, and no tree is as quick.
+
+Scores tell how well a posed template and a frame's edges explain one another. From the template's
+side: do a bone's elements find counterparts? From the frame's: which of its elements does each part
+of the template account for? The second question tells two poses apart that both lie on edges, one
+of which leaves a bare arm unexplained.
 """
 
 from dataclasses import dataclass
@@ -33,6 +38,14 @@ PADDING_DISTANCE = 1e3
 """Squared distance of what only fills up an array."""
 CACHED_DISTANCES = 1 << 18
 """Distances in work at a time: they stay in the processor's cache."""
+SCORE_RADIUS = 0.06
+"""Distance at which an element counts as wrong, player heights. Chosen on
+rendered sequences; see benchmarks/sensitivity.py."""
+HYPOTHESIS_SPREAD = 0.06
+"""Distance at which a chosen hypothesis loses most of its pull, player heights. Chosen on rendered
+sequences; see benchmarks/sensitivity.py."""
+BODY_PARTS = 3
+"""Trunk, one side, the other side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +150,24 @@ def bone_axes(half: BodyHalf, joints: Complex[np.ndarray, "P J"]) -> Complex[np.
     return bone / np.maximum(np.abs(bone), 1e-6)
 
 
+@dataclass(frozen=True, eq=False)
+class TemplateFits:
+    """P fits: which template takes which pose in which frame."""
+
+    frames: Int[np.ndarray, "P"]
+    template: Int[np.ndarray, "P"]
+    """Rows of the templates."""
+    joints: Complex[np.ndarray, "P J"]
+
+    def take(self, part: slice) -> "TemplateFits":
+        """Some of them."""
+        return TemplateFits(self.frames[part], self.template[part], self.joints[part])
+
+    def moved(self, joints: Complex[np.ndarray, "P J"]) -> "TemplateFits":
+        """The same in other poses."""
+        return TemplateFits(self.frames, self.template, joints)
+
+
 @runtime_checkable
 class PlacedElements(Protocol):
     """Elements of P posed templates: position, direction and colour."""
@@ -178,6 +209,38 @@ def match_frame_elements(
     return nearest[:, 0], matched[:, 0]
 
 
+@dataclass(frozen=True, eq=False)
+class MatchedElements:
+    """Pairs of an element of a posed template and one of its frame, for P fits."""
+
+    row: Int[np.ndarray, "P R"]
+    """Of the frame's elements in the index."""
+    joint_weights: Float[np.ndarray, "P R J"]
+    offset: Complex[np.ndarray, "P R"]
+    points: Complex[np.ndarray, "P R"]
+    """Where the template's elements lie."""
+    weight: Float[np.ndarray, "P R"]
+    """0 where nothing corresponds."""
+
+
+def match_both_ways(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits, radius: float, stride: int
+) -> tuple[MatchedElements, MatchedElements]:
+    """(what each n-th element of the templates corresponds to, what each n-th of the frame's)."""
+    posed = pose_templates(templates, fits.template, fits.joints, stride)
+    row, matched = match_elements(index, fits.frames, posed, radius)
+    weight = matched * posed.weight
+    forward = MatchedElements(row, posed.joint_weights, posed.offset, posed.points, weight)
+    listed = templates.frame_elements[fits.frames, ::stride]
+    nearest, matched = match_frame_elements(index, listed, posed, radius)
+    points, offset, weight = (
+        np.take_along_axis(values, nearest, axis=1)
+        for values in (posed.points, posed.offset, posed.weight)
+    )
+    joint_weights = np.take_along_axis(posed.joint_weights, nearest[..., None], axis=1)
+    return forward, MatchedElements(listed, joint_weights, offset, points, matched * weight)
+
+
 def match_frame_to_parts(
     index: ElementIndex,
     frame_elements: Int[np.ndarray, "P F"],
@@ -200,3 +263,107 @@ def match_frame_to_parts(
         nearest[:, number], matched[:, number] = _find_nearest(queries, of_part, radius)
     matched &= (frame_elements >= 0)[:, None]
     return np.where(matched, nearest, 0), matched
+
+
+@dataclass(frozen=True, eq=False)
+class FitScores:
+    """How well P fits and their frames' edges explain one another."""
+
+    residual: Float[np.ndarray, "P B"]
+    """Of every bone, 0-1: mean distance of its elements to their matches over `SCORE_RADIUS`; 1
+    where nothing matches."""
+    unexplained: Float32[np.ndarray, "P 3 F"]
+    """How far each of the frame's elements is from each part of the template, 0-1 likewise; 0 for
+    padding."""
+
+
+def score_fits(templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits) -> FitScores:
+    """From both sides."""
+    posed = pose_templates(templates, fits.template, fits.joints)
+    return FitScores(
+        _residuals(templates, index, fits, posed), _unexplained(templates, index, fits, posed)
+    )
+
+
+def score_bones(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits
+) -> Float[np.ndarray, "P B"]:
+    """The residuals alone."""
+    posed = pose_templates(templates, fits.template, fits.joints)
+    return _residuals(templates, index, fits, posed)
+
+
+def _residuals(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits, posed: PosedTemplates
+) -> Float[np.ndarray, "P B"]:
+    row, matched = match_elements(index, fits.frames, posed, SCORE_RADIUS)
+    distance = _relative_distance(index.points[row] - posed.points, matched)
+    count = len(templates.half.bones)
+    slot = np.arange(len(row))[:, None] * count + templates.elements.bone[fits.template]
+    total = np.bincount(slot.ravel(), (posed.weight * distance).ravel(), len(row) * count)
+    weight = np.bincount(slot.ravel(), posed.weight.ravel(), len(row) * count)
+    mean = np.where(weight > 0, total / np.maximum(weight, 1e-9), 1.0)
+    return mean.reshape(len(row), count)
+
+
+def _relative_distance(
+    gap: Complex[np.ndarray, "*n"], matched: Bool[np.ndarray, "*n"]
+) -> Float[np.ndarray, "*n"]:
+    """Length of gaps in `SCORE_RADIUS`, 1 at most and where there is no match."""
+    return np.where(matched, np.minimum(np.abs(gap) / SCORE_RADIUS, 1), 1)
+
+
+def _unexplained(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits, posed: PosedTemplates
+) -> Float32[np.ndarray, "P 3 F"]:
+    part = templates.half.limb[templates.elements.bone[fits.template]]
+    listed = templates.frame_elements[fits.frames]
+    nearest, matched = match_frame_to_parts(index, listed, posed, part, BODY_PARTS, SCORE_RADIUS)
+    points = posed.points[np.arange(len(listed))[:, None, None], nearest]
+    distance = _relative_distance(index.points[listed][:, None] - points, matched)
+    return (distance * (listed >= 0)[:, None]).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class _LimbOutline:
+    """The elements of one limb in many poses."""
+
+    points: Complex[np.ndarray, "P E"]
+    tangent: Complex[np.ndarray, "P E"]
+    color: Int[np.ndarray, "P E"]
+
+
+def score_limb(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits, bones: Int[np.ndarray, "b"]
+) -> Float[np.ndarray, "P"]:
+    """Residual of the average outline of a few bones."""
+    average = templates.elements.take(np.s_[templates.average])
+    on_limb = np.flatnonzero(np.isin(average.bone, bones) & (average.color >= 0))
+    if not len(on_limb):
+        return np.ones(len(fits.frames))
+    limb = average.take(on_limb)
+    axis = bone_axes(templates.half, fits.joints)[:, limb.bone]
+    weights = templates.joint_weights[templates.average, on_limb]
+    points = fits.joints @ weights.T + limb.offset * axis
+    color = np.broadcast_to(limb.color, points.shape)
+    outline = _LimbOutline(points, limb.bone_tangent * axis, color)
+    row, matched = match_elements(index, fits.frames, outline, SCORE_RADIUS)
+    distance = _relative_distance(index.points[row] - points, matched)
+    return distance @ limb.weight / limb.weight.sum()
+
+
+def joint_confidence(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    chosen: Complex[np.ndarray, "T J"],
+    joints: Complex[np.ndarray, "T J"],
+) -> Float[np.ndarray, "T J"]:
+    """Confidence 0-1: share of the outline matched around a joint, less where the `chosen`
+    hypothesis lay elsewhere."""
+    frames = np.arange(len(joints))
+    fits = TemplateFits(frames, np.full(len(frames), templates.average), joints)
+    score = 1 - score_bones(templates, index, fits)
+    ends = np.zeros((len(templates.half.bones), joints.shape[1]))
+    ends[np.arange(len(ends))[:, None], templates.half.bones] = 1
+    around = score @ ends / np.maximum(ends.sum(axis=0), 1)
+    return around * np.exp(-0.5 * (np.abs(joints - chosen) / HYPOTHESIS_SPREAD) ** 2)

@@ -17,16 +17,19 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.blocks import in_blocks
-from keyrecon.propagation.correspondence import ElementIndex
+from keyrecon.propagation.correspondence import (
+    ElementIndex,
+    TemplateFits,
+    score_fits,
+    score_limb,
+)
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.registration import (
     COARSE_TO_FINE,
     RegistrationStep,
-    TemplateFits,
     register_templates,
     shape_equations,
 )
-from keyrecon.propagation.scoring import find_unexplained_edges, score_limb, score_templates
 
 TRACKING_SCHEDULE = (RegistrationStep(0.05, 0.006, 0.02), RegistrationStep(0.03, 0.006, 0.02))
 """Corrections of a pose that was predicted from the neighbouring frame."""
@@ -60,7 +63,7 @@ class PoseHypotheses:
 
     joints: Complex[np.ndarray, "T S J"]
     residual: Float[np.ndarray, "T S B"]
-    """Of every bone, 0-1 (`score_templates`)."""
+    """Of every bone, 0-1 (`FitScores`)."""
     unexplained: Float[np.ndarray, "T S 3 F"]
     """How far each of the frame's elements is from each part of the body."""
     template: Int[np.ndarray, "T S"]
@@ -103,8 +106,8 @@ def fit_hypotheses(
 
     def fit(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         fits = register_templates(templates, index, start.take(part), schedule)
-        residual = score_templates(templates, index, fits)
-        return fits.joints, residual, find_unexplained_edges(templates, index, fits)
+        scores = score_fits(templates, index, fits)
+        return fits.joints, scores.residual, scores.unexplained
 
     joints, residual, unexplained = in_blocks(fit, len(start.frames))
     shape = (start.frames[-1] + 1, -1)

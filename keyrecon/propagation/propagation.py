@@ -24,9 +24,13 @@ from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
-from keyrecon.propagation.correspondence import ElementIndex, index_elements
-from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates, make_edge_templates
-from keyrecon.propagation.foot_evidence import learn_foot_offsets
+from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
+from keyrecon.propagation.edge_template import (
+    AnnotatedPoses,
+    EdgeTemplates,
+    learn_foot_offsets,
+    make_edge_templates,
+)
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.hypotheses import (
     fit_similar,
@@ -34,14 +38,9 @@ from keyrecon.propagation.hypotheses import (
     propose_limbs,
     track_from_keyframes,
 )
-from keyrecon.propagation.registration import TemplateFits
-from keyrecon.propagation.scoring import score_templates
+from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
-from keyrecon.propagation.trajectory_smoothing import (
-    HYPOTHESIS_SPREAD,
-    ChosenHypotheses,
-    smooth_trajectories,
-)
+from keyrecon.propagation.trajectory_smoothing import smooth_trajectories
 from keyrecon.records import (
     Annotations,
     FlowTracks,
@@ -210,25 +209,8 @@ def propagate_half(
     limbs_chosen.joints[:, templates.half.fixed] = start.fixed
     chosen = ChosenHypotheses(limbs_chosen.joints, nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
-    confidence = joint_confidence(templates, index, chosen, joints)
+    confidence = joint_confidence(templates, index, chosen.joints, joints)
     return PropagatedHalf(joints, confidence, limbs_chosen.template)
-
-
-def joint_confidence(
-    templates: EdgeTemplates,
-    index: ElementIndex,
-    chosen: ChosenHypotheses,
-    joints: Complex[np.ndarray, "T J"],
-) -> Float[np.ndarray, "T J"]:
-    """Confidence 0-1: share of the outline matched around a joint, less where the chosen
-    hypothesis lay elsewhere."""
-    frames = np.arange(len(joints))
-    fits = TemplateFits(frames, np.full(len(frames), templates.average), joints)
-    score = 1 - score_templates(templates, index, fits)
-    ends = np.zeros((len(templates.half.bones), joints.shape[1]))
-    ends[np.arange(len(ends))[:, None], templates.half.bones] = 1
-    around = score @ ends / np.maximum(ends.sum(axis=0), 1)
-    return around * np.exp(-0.5 * (np.abs(joints - chosen.joints) / HYPOTHESIS_SPREAD) ** 2)
 
 
 def gather_poses(

@@ -19,15 +19,20 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from keyrecon.numerics.blocks import in_blocks
 from keyrecon.propagation.correspondence import (
+    HYPOTHESIS_SPREAD,
     ElementIndex,
-    bone_axes,
-    match_elements,
-    match_frame_elements,
-    pose_templates,
+    MatchedElements,
+    TemplateFits,
+    match_both_ways,
 )
-from keyrecon.propagation.edge_template import EdgeTemplates
-from keyrecon.propagation.foot_evidence import FOOT_MATCH_DISTANCE, FootEvidence, order_feet
+from keyrecon.propagation.edge_template import (
+    FOOT_MATCH_DISTANCE,
+    EdgeTemplates,
+    FootEvidence,
+    order_feet,
+)
 
 TANGENTIAL_WEIGHT = 0.15
 """Weight of sliding along a contour against leaving it. Chosen on rendered sequences; see
@@ -37,6 +42,8 @@ CONTOUR_SPREAD = 0.03
 together, which is why it is more than a contour's own noise of about .01."""
 DAMPING = 1e-9
 """Keeps a joint that nothing observes from making the equations singular."""
+FIXED_WEIGHT, MARKED_WEIGHT = 1e5, 1e6
+"""Weights of joints that are known: by the other half of the body, and by a person."""
 
 
 @dataclass(frozen=True)
@@ -64,21 +71,12 @@ rendered sequences; see benchmarks/sensitivity.py."""
 
 
 @dataclass(frozen=True, eq=False)
-class TemplateFits:
-    """P fits: which template takes which pose in which frame."""
+class ChosenHypotheses:
+    """Where the joints of every frame are before smoothing."""
 
-    frames: Int[np.ndarray, "P"]
-    template: Int[np.ndarray, "P"]
-    """Rows of the templates."""
-    joints: Complex[np.ndarray, "P J"]
-
-    def take(self, part: slice) -> "TemplateFits":
-        """Some of them."""
-        return TemplateFits(self.frames[part], self.template[part], self.joints[part])
-
-    def moved(self, joints: Complex[np.ndarray, "P J"]) -> "TemplateFits":
-        """The same in other poses."""
-        return TemplateFits(self.frames, self.template, joints)
+    joints: Complex[np.ndarray, "T J"]
+    template: Int[np.ndarray, "T"]
+    """Row of the template most similar to each frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,29 +164,9 @@ def edge_equations(
 
     Only each n-th element is used.
     """
-    posed = pose_templates(templates, fits.template, fits.joints, stride)
-    row, matched = match_elements(index, fits.frames, posed, radius)
-    weight = _robust_weight(index, row, posed.points, matched * posed.weight, radius)
-    forward = point_equations(
-        posed.joint_weights,
-        index.points[row] - posed.offset,
-        1j * index.tangent[row],
-        weight,
-        TANGENTIAL_WEIGHT * weight,
-    )
-    listed = templates.frame_elements[fits.frames, ::stride]
-    nearest, matched = match_frame_elements(index, listed, posed, radius)
-    points, offset, weight = (
-        np.take_along_axis(values, nearest, axis=1)
-        for values in (posed.points, posed.offset, posed.weight)
-    )
-    weight = _robust_weight(index, listed, points, matched * weight, radius)
-    backward = point_equations(
-        np.take_along_axis(posed.joint_weights, nearest[..., None], axis=1),
-        index.points[listed] - offset,
-        1j * index.tangent[listed],
-        weight,
-        TANGENTIAL_WEIGHT * weight,
+    forward, backward = (
+        _element_equations(index, matched, radius)
+        for matched in match_both_ways(templates, index, fits, radius, stride)
     )
     both = forward + backward
     both = NormalEquations(stride * both.matrix, stride * both.right)
@@ -197,17 +175,32 @@ def edge_equations(
     return both + foot_equations(templates.feet, fits.frames, fits.joints)
 
 
-def _robust_weight(
-    index: ElementIndex,
-    row: Int[np.ndarray, "P R"],
-    points: Complex[np.ndarray, "P R"],
-    weight: Float[np.ndarray, "P R"],
-    radius: float,
-) -> Float[np.ndarray, "P R"]:
-    """Weight along a contour's normal; far matches count less (Geman and McClure's weights)."""
-    normal = 1j * index.tangent[row]
-    distance = np.abs(((index.points[row] - points) * np.conj(normal)).real)
-    return weight / (1 + (2 * distance / radius) ** 2) ** 2 / CONTOUR_SPREAD**2
+def _element_equations(
+    index: ElementIndex, matched: MatchedElements, radius: float
+) -> NormalEquations:
+    """Elements lie on their counterparts' contours; far matches count less (Geman and McClure)."""
+    normal = 1j * index.tangent[matched.row]
+    distance = np.abs(((index.points[matched.row] - matched.points) * np.conj(normal)).real)
+    weight = matched.weight / (1 + (2 * distance / radius) ** 2) ** 2 / CONTOUR_SPREAD**2
+    return point_equations(
+        matched.joint_weights,
+        index.points[matched.row] - matched.offset,
+        normal,
+        weight,
+        TANGENTIAL_WEIGHT * weight,
+    )
+
+
+def edge_equations_of_all(
+    templates: EdgeTemplates, index: ElementIndex, fits: TemplateFits, radius: float
+) -> NormalEquations:
+    """Observations of many fits, a block at a time."""
+
+    def observe(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        equations = edge_equations(templates, index, fits.take(part), radius)
+        return equations.matrix, equations.right
+
+    return NormalEquations(*in_blocks(observe, len(fits.frames)))
 
 
 def foot_equations(
@@ -233,11 +226,25 @@ def shape_equations(
     rows = np.arange(len(bones))
     difference[:, rows, bones[:, 1]] = 1
     difference[:, rows, bones[:, 0]] -= 1
-    axis = bone_axes(templates.half, joints)
-    bone = model[:, bones[:, 1]] - model[:, bones[:, 0]]
+    present, bone = (p[:, bones[:, 1]] - p[:, bones[:, 0]] for p in (joints, model))
+    axis = present / np.maximum(np.abs(present), 1e-6)
     # along the present direction the length is set right, across it the direction
     target = axis * (np.abs(bone) + 1j * (bone * np.conj(axis)).imag)
     ones = np.ones(axis.shape)
     return point_equations(
         difference, target, axis, ones / step.length_spread**2, ones / step.transverse_spread**2
     )
+
+
+def hypothesis_equations(
+    templates: EdgeTemplates, chosen: ChosenHypotheses, joints: Complex[np.ndarray, "T J"]
+) -> NormalEquations:
+    """Attract joints to the chosen hypotheses, and fix what is known."""
+    poses = templates.poses
+    distance = (np.abs(joints - chosen.joints) / HYPOTHESIS_SPREAD) ** 2
+    weight = 1 / (HYPOTHESIS_SPREAD * (1 + distance)) ** 2
+    weight[:, templates.half.fixed] = FIXED_WEIGHT
+    target = chosen.joints.copy()
+    target[poses.frames] = np.where(poses.known, poses.joints, target[poses.frames])
+    weight[poses.frames] = np.where(poses.known, MARKED_WEIGHT, weight[poses.frames])
+    return joint_equations(target, weight)

@@ -16,8 +16,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.viterbi import find_cheapest_path
-from keyrecon.propagation.edge_template import EdgeTemplates
-from keyrecon.propagation.foot_evidence import foot_costs
+from keyrecon.propagation.edge_template import EdgeTemplates, foot_costs
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import PoseHypotheses
 

@@ -5,18 +5,27 @@ from capsule_player import scene, standing, turned
 
 from keyrecon.body import LSP14
 from keyrecon.propagation.body_frame import stabilise_player
-from keyrecon.propagation.correspondence import index_elements, match_elements, pose_templates
-from keyrecon.propagation.edge_template import AnnotatedPoses, assign_to_bones, make_edge_templates
-from keyrecon.propagation.foot_evidence import learn_foot_offsets
+from keyrecon.propagation.correspondence import (
+    TemplateFits,
+    index_elements,
+    match_elements,
+    pose_templates,
+    score_bones,
+    score_fits,
+)
+from keyrecon.propagation.edge_template import (
+    AnnotatedPoses,
+    assign_to_bones,
+    learn_foot_offsets,
+    make_edge_templates,
+)
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.registration import (
-    TemplateFits,
     foot_equations,
     joint_equations,
     point_equations,
     register_templates,
 )
-from keyrecon.propagation.scoring import find_unexplained_edges, score_templates
 from keyrecon.propagation.selection import LimbStates, choose_two
 from keyrecon.propagation.trajectory_smoothing import solve_smooth
 
@@ -68,7 +77,7 @@ def test_a_template_in_its_own_pose_lies_on_its_own_elements():
     own = posed.color >= 0
     assert found[own].mean() > 0.9
     assert np.abs(index.points[row] - posed.points)[found].max() < 0.02
-    assert score_templates(templates, index, fits).max() < 0.35
+    assert score_bones(templates, index, fits).max() < 0.35
 
 
 def test_matches_have_the_same_colour_and_direction():
@@ -99,9 +108,9 @@ def test_an_arm_elsewhere_leaves_edges_unexplained():
     preparation, truth = scene([standing(), bent], (0,))
     templates, index, _ = templates_of(preparation, truth, (0, 1), UPPER)
     first = np.zeros(2, int)
-    far = find_unexplained_edges(
+    far = score_fits(
         templates, index, TemplateFits(first, first, templates.poses.joints)
-    )
+    ).unexplained
     left = far.min(axis=1).sum(axis=1)
     assert left[0] < 0.5 * left[1]
 

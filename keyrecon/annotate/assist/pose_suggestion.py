@@ -13,14 +13,20 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
-from keyrecon.propagation.correspondence import ElementIndex, index_elements
+from keyrecon.propagation.correspondence import (
+    HYPOTHESIS_SPREAD,
+    ElementIndex,
+    TemplateFits,
+    index_elements,
+    joint_confidence,
+)
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
     EdgeTemplates,
+    learn_foot_offsets,
     list_half_elements,
     make_edge_templates,
 )
-from keyrecon.propagation.foot_evidence import learn_foot_offsets
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.hypotheses import (
     PoseHypotheses,
@@ -34,22 +40,15 @@ from keyrecon.propagation.propagation import (
     PropagateOptions,
     distances_to,
     gather_poses,
-    joint_confidence,
 )
 from keyrecon.propagation.registration import (
+    FIXED_WEIGHT,
     RegistrationStep,
-    TemplateFits,
     joint_equations,
     register_templates,
 )
 from keyrecon.propagation.selection import ChosenLimbs, choose_limbs
-from keyrecon.propagation.trajectory_smoothing import (
-    FIXED_WEIGHT,
-    HYPOTHESIS_SPREAD,
-    SEARCH_RADII,
-    SHAPE_PRIOR,
-    ChosenHypotheses,
-)
+from keyrecon.propagation.trajectory_smoothing import SEARCH_RADII, SHAPE_PRIOR
 from keyrecon.records import Annotations, Preparation
 
 OPTIONS = PropagateOptions()
@@ -263,7 +262,7 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     final = register_templates(
         templates, index, start, FINAL_REGISTRATION, joint_equations(chosen, weight)
     ).joints
-    confidence = joint_confidence(templates, index, ChosenHypotheses(chosen, similar), final)
+    confidence = joint_confidence(templates, index, chosen, final)
     free = templates.half.free
     source = fitting.sources[limbs.template[:, free]]
     return _HalfSuggestion(final[:, free], confidence[:, free], source)
