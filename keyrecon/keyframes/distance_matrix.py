@@ -147,7 +147,7 @@ def measure_matrix(
     cells = group_elements(elements, options.cell, options.directions, options.reach)
     total = np.empty((len(edges), len(edges)), dtype=np.float32)
     matched = np.empty_like(total) if options.largest == "observed" else None
-    _accumulate(elements, cells, options.reach, (total, matched), progress)
+    _accumulate(elements, cells, options.reach, total, matched, progress)
     count = np.bincount(elements.frame, minlength=len(edges)).astype(np.float32)[:, None]
     empty = count[:, 0] == 0
     np.divide(total, count, out=total, where=count > 0)
@@ -163,11 +163,11 @@ def _accumulate(
     elements: BinnedElements,
     cells: DescriptorBins,
     reach: float,
-    out: tuple[Float32[np.ndarray, "T T"], Float32[np.ndarray, "T T"] | None],
+    total: Float32[np.ndarray, "T T"],
+    matched: Float32[np.ndarray, "T T"] | None,
     progress: Progress,
 ) -> None:
     """Fill in the summed distances and, where asked for, the numbers of matches."""
-    total, matched = out
     members = csr_matrix(
         (np.ones(len(elements.frame), np.float32), (elements.frame, cells.of_element)),
         shape=(elements.n_frames, len(cells.center)),

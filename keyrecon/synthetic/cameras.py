@@ -120,7 +120,7 @@ def plan_camera(
     focal = options.player_px * float(np.linalg.norm(center - middle)) / stature
     size = (options.width, options.height)
     if options.pan:
-        return _follow(points, fps, center, focal, (size, rng))
+        return _follow(points, fps, center, focal, size, rng)
     rotation = look_at(center, middle, UP)[None]
     still = CameraMove(center, rotation, np.array([focal]), size)
     reach = np.abs(still.project(points.reshape(1, -1, 3))[0] - still.principal).max(axis=0)
@@ -135,10 +135,10 @@ def _follow(
     fps: float,
     center: Float[np.ndarray, "3"],
     focal: float,
-    frame: tuple[tuple[int, int], np.random.Generator],
+    size: tuple[int, int],
+    rng: np.random.Generator,
 ) -> CameraMove:
     """Turn after the player with half a second of lag, and breathe a little with the zoom."""
-    size, rng = frame
     root = points.mean(axis=1) * [1, 0.35, 1]
     root[:, 1] += 0.6 * points[:, :, 1].mean()
     pole = np.exp(-1 / (0.3 * fps))
@@ -148,7 +148,7 @@ def _follow(
         target = np.stack(
             [lfilter([1 - pole], [1, -pole], c, zi=start * c[0])[0] for c in target.T], axis=1
         )
-    unrest = _wander(rng, len(points), fps, (1.2, 4))
+    unrest = _wander(rng, len(points), fps, seconds=1.2, count=4)
     target = target + unrest[:, :3] * [0.05, 0.03, 0.05]
     rotation = np.stack([look_at(center, t, UP) for t in target])
     zoom = 1 + 0.012 * unrest[:, 3]
@@ -156,10 +156,9 @@ def _follow(
 
 
 def _wander(
-    rng: np.random.Generator, frames: int, fps: float, shape: tuple[float, int]
+    rng: np.random.Generator, frames: int, fps: float, seconds: float, count: int
 ) -> Float[np.ndarray, "T N"]:
-    """Slow random curves of unit spread; `shape` is seconds of correlation and how many."""
-    seconds, count = shape
+    """`count` slow random curves of unit spread, correlated over so many `seconds`."""
     noise = rng.standard_normal((frames + int(8 * seconds * fps), count))
     curves = gaussian_filter1d(noise, seconds * fps, axis=0, mode="wrap")[:frames]
     return curves * np.sqrt(2 * np.sqrt(np.pi) * seconds * fps)

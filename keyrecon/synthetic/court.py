@@ -68,9 +68,9 @@ def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> C
     picture = np.clip(painted, 0, 255).astype(np.uint8)
     view = PropView(move.center, rotation, focal, -lo, beyond)
     behind = move.center[2] < NET_Z  # the camera looks through the net from the far side
-    add_props(picture, view, (look, seed), lambda z: (z > NET_Z) == behind)
+    add_props(picture, view, look, seed, lambda z: (z > NET_Z) == behind)
     _add_net(picture, rays, surface_t, look.court)
-    add_props(picture, view, (look, seed), lambda z: (z > NET_Z) != behind)
+    add_props(picture, view, look, seed, lambda z: (z > NET_Z) != behind)
     return CourtPicture(picture, rotation, focal, lo)
 
 

@@ -96,8 +96,10 @@ def _draw_racket(stage: Stage, frame: int, span: tuple[float, float], scale: flo
     way = np.linalg.norm(tips[1] - tips[0]) * focal / tips[0, 2]
     count = int(np.clip(np.ceil(way / RACKET_STEP), 1, RACKET_MOST))
     poses = at(time + length * ((np.arange(count) + 0.5) / count - 0.5))
-    view = (focal, stage.move.principal, stage.move.size, scale)
-    return draw_implement(stage.held, poses, view, np.array(stage.look.racket, np.float32))
+    color = np.array(stage.look.racket, np.float32)
+    return draw_implement(
+        stage.held, poses, focal, stage.move.principal, stage.move.size, scale, color
+    )
 
 
 def _hide(racket: Layer | None, surface: Surface) -> Layer | None:

@@ -61,7 +61,7 @@ def _place_joints(
     up = _lean(mean_turn, pitch, roll)
     across = unit(_square(_right(pelvis_turn), up))
     half_hips = 0.0955 * options.stature * across
-    height = _pelvis_height(ground, half_hips, ankles, (pose[:, 4] * s, rate, options.stature))
+    height = _pelvis_height(ground, half_hips, ankles, pose[:, 4] * s, rate, options.stature)
     pelvis = np.stack([ground[:, 0], height, -ground[:, 1]], axis=1)
     trunk = np.sqrt(_LENGTH["right_hip"] ** 2 - 0.0955**2) * options.stature
     points = np.empty((len(times), 14, 3))
@@ -73,7 +73,7 @@ def _place_joints(
     for index, (side, sign) in enumerate((("right", 1), ("left", -1))):
         hip = pelvis + sign * half_hips
         knee_way = unit(_ahead(headings[:, index]) + 0.6 * _ahead(pelvis_turn))
-        _reach(points, (f"{side}_hip", hip), ankles[:, index], knee_way, options.stature)
+        _reach(points, f"{side}_hip", hip, ankles[:, index], knee_way, options.stature)
     _place_arms(points, (neck, up, _right(shoulder_turn)), pose[:, 7:], options.stature)
     return points
 
@@ -148,10 +148,11 @@ def _pelvis_height(
     ground: Float[np.ndarray, "T 2"],
     half_hips: Float[np.ndarray, "T 3"],
     ankles: Float[np.ndarray, "T 2 3"],
-    wish: tuple[np.ndarray, float, float],
+    drop: Float[np.ndarray, "T"],
+    rate: float,
+    stature: float,
 ) -> Float[np.ndarray, "T"]:
     """As high as the pose wants, never higher than both legs reach."""
-    drop, rate, stature = wish
     leg = 0.985 * (_LENGTH["right_knee"] + _LENGTH["right_ankle"]) * stature
     middle = np.stack([ground[:, 0], 0 * drop, -ground[:, 1]], axis=1)
     limits = [leg + ANKLE_HEIGHT * stature / STATURE - drop]
@@ -179,7 +180,7 @@ def _place_arms(
         wrist, elbow = np.split(wrists[:, 6 * index : 6 * index + 6], 2, axis=1)
         goal = middle + np.einsum("tc,tcx->tx", wrist * stature / STATURE, axes)
         shoulder = middle + sign * 0.129 * stature * right
-        _reach(points, (f"{side}_shoulder", shoulder), goal,
+        _reach(points, f"{side}_shoulder", shoulder, goal,
                unit(np.einsum("tc,tcx->tx", elbow, axes)), stature)  # fmt: skip
 
 
@@ -188,13 +189,13 @@ _NEXT = {"hip": ("knee", "ankle"), "shoulder": ("elbow", "wrist")}
 
 def _reach(
     points: np.ndarray,
-    start: tuple[str, np.ndarray],
+    name: str,
+    root: Float[np.ndarray, "T 3"],
     goal: Float[np.ndarray, "T 3"],
     bend: Float[np.ndarray, "T 3"],
     stature: float,
 ) -> None:
     """Enter a limb of two bones that reaches for a goal and bends towards a direction."""
-    name, root = start
     side, joint = name.split("_")
     upper, lower = (f"{side}_{n}" for n in _NEXT[joint])
     a, b = _LENGTH[upper] * stature, _LENGTH[lower] * stature

@@ -65,11 +65,11 @@ class Person:
 def add_props(
     picture: UInt8[np.ndarray, "h w 3"],
     view: PropView,
-    scene: tuple[Look, int],
+    look: Look,
+    seed: int,
     wanted: Callable[[float], bool],
 ) -> None:
     """Draw a seed's furniture, people and balls whose z is wanted, farthest first."""
-    look, seed = scene
     rng = np.random.default_rng([seed, 31])
     things: list[tuple[float, Box | Person]] = []
     for box in _choose_boxes(rng, look):
@@ -84,7 +84,7 @@ def add_props(
         if isinstance(thing, Box):
             _draw_box(picture, view, thing, look)
         else:
-            _draw_person(picture, view, thing, (look, tiles))
+            _draw_person(picture, view, thing, look, tiles)
     _draw_balls(picture, view, rng, wanted)
 
 
@@ -188,10 +188,9 @@ def _stand(person: Person) -> Float[np.ndarray, "14 3"]:
 
 
 def _draw_person(
-    picture: np.ndarray, view: PropView, person: Person, scene: tuple[Look, Tiles]
+    picture: np.ndarray, view: PropView, person: Person, look: Look, tiles: Tiles
 ) -> None:
     """A clothed bystander; one in three wears the player's shirt."""
-    look, tiles = scene
     points = np.repeat(_stand(person)[None], 3, axis=0)
     if min(view.depth(p) for p in points[0]) < 1:
         return

@@ -94,14 +94,16 @@ def racket_frames(
 def draw_implement(
     implement: Implement,
     poses: Float[np.ndarray, "n 3 3"],
-    view: tuple[float, Float[np.ndarray, "2"], tuple[int, int], float],
+    focal: float,
+    principal: Float[np.ndarray, "2"],
+    size: tuple[int, int],
+    depth_scale: float,
     color: Float[np.ndarray, "3"],
 ) -> Layer | None:
     """Average of an implement at several poses in camera axes.
 
-    `view` is focal length, principal point, picture size, and px per metre of the depth.
+    Focal length, principal point and picture size are px; `depth_scale` is px per metre of depth.
     """
-    focal, principal, size, depth_scale = view
     flat = np.concatenate([stroke.points for stroke in implement.strokes])
     outline = poses[:, :1] + flat[:, :1] * poses[:, 1:2] + flat[:, 1:] * poses[:, 2:]
     pixels = outline[..., :2] / outline[..., 2:] * focal + principal

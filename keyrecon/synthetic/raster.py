@@ -82,17 +82,17 @@ def make_forms(solids: Solids, focal: float, principal: Float[np.ndarray, "2"]) 
     stretch = np.concatenate([1 / solids.squeeze, np.ones((len(length), 1))], axis=1)
     to_local = stretch[:, :, None] * basis
     boxes = _boxes(pixels, radii, np.linalg.inv(to_local))
-    return _derive(pixels[:, 0], to_local, (length, radii), boxes)
+    return _derive(pixels[:, 0], to_local, length, radii, boxes)
 
 
 def _derive(
     start: Float[np.ndarray, "P 3"],
     to_local: Float[np.ndarray, "P 3 3"],
-    shape: tuple[Float[np.ndarray, "P"], Float[np.ndarray, "P 2"]],
+    length: Float[np.ndarray, "P"],
+    radii: Float[np.ndarray, "P 2"],
     boxes: Float[np.ndarray, "P 4"],
 ) -> Forms:
     """The forms of Quilez's derivation, for all pixels at once."""
-    length, radii = shape
     per_px = np.linalg.norm(to_local[:, :, 2], axis=1)
     ray = to_local[:, :, 2] / per_px[:, None]
     plane = np.concatenate([to_local[:, :, :2], np.zeros((len(length), 3, 1))], axis=2)

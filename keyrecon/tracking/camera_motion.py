@@ -190,28 +190,33 @@ def _register_all(
             tracker.overlay.add(grey)
         waiting.append(grey)
         if len(waiting) == FRAMES_AT_REST or len(path) < FRAMES_AT_REST:
-            path += _register(tracker, waiting, path)
+            path += _register(tracker, waiting, [pose for pose, _ in path[-2:]])
             waiting = []
-    path += _register(tracker, waiting, path)
+    path += _register(tracker, waiting, [pose for pose, _ in path[-2:]])
     return np.array([pose for pose, _ in path]), np.array([confidence for _, confidence in path])
 
 
 def _register(
-    tracker: _FeatureTracker, waiting: list[Grey], before: list[tuple[Matrix, float]]
+    tracker: _FeatureTracker, waiting: list[Grey], before: list[Matrix]
 ) -> list[tuple[Matrix, float]]:
-    """Poses of frames in a row; while the camera rests, the last one tells those before it."""
-    poses = list(before[-2:])
-    if len(poses) == 2 and waiting:
-        last, there = poses[0][0], poses[1][0]
+    """Poses of frames in a row; while the camera rests, the last one tells those before it.
+
+    `before` are the poses of up to two frames before them.
+    """
+    if len(before) == 2 and waiting:
+        last, there = before
         step = _displacement(np.linalg.inv(last) @ there, waiting[0].shape)
         if step * waiting[0].shape[1] < MAX_REST_MOTION and (
             rest := tracker.register_at_rest(waiting[-1], there)
         ):
             along = np.linspace(0, 1, len(waiting) + 1)[1:]
             return [(there + share * (rest[0] - there), rest[1]) for share in along]
+    registered: list[tuple[Matrix, float]] = []
+    guess = before[-1] if before else np.eye(3)
     for grey in waiting:
-        poses.append(tracker.register(grey, poses[-1][0] if poses else np.eye(3)))
-    return poses[len(before[-2:]) :]
+        registered.append(tracker.register(grey, guess))
+        guess = registered[-1][0]
+    return registered
 
 
 def _corners(grey: Grey, overlaid: Bool[np.ndarray, "h w"] | None) -> Float[np.ndarray, "n 2"]:

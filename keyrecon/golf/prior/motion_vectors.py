@@ -48,11 +48,11 @@ def find_centre(turns: Float[np.ndarray, "M N P 3 3"]) -> Float[np.ndarray, "P 3
 
 
 def motion_vector(
-    sampled: tuple[Float[np.ndarray, "N P 3 3"], Float[np.ndarray, "N 3"]],
+    turns: Float[np.ndarray, "N P 3 3"],
+    place: Float[np.ndarray, "N 3"],
     centre: Float[np.ndarray, "P 3 3"],
 ) -> Float[np.ndarray, "N D"]:
     """Rotation vectors of all segments and the place of the pelvis, as one row per sample."""
-    turns, place = sampled
     local = np.swapaxes(centre, 1, 2) @ turns
     vectors = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_rotvec()
     return np.concatenate([vectors.reshape(len(turns), -1), place], axis=1)

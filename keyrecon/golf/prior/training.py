@@ -77,7 +77,7 @@ def collect_swings(
     captured = [retarget_swing(swing, body) for swing in swings]
     sampled = [sample_swing(swing, keys) for swing in captured]
     centre = find_centre(np.stack([turns for turns, _ in sampled]))
-    vectors = [motion_vector(one, centre) for one in sampled]
+    vectors = [motion_vector(turns, place, centre) for turns, place in sampled]
     for swing, vector in zip(swings, vectors, strict=True):
         _check_turns(swing.name, vector)
     rng = np.random.default_rng(options.variation.seed)
@@ -106,7 +106,7 @@ def _vary(
     """A variation; one that turns a limb inside out is drawn again."""
     body = size_body(REFERENCE)
     while True:
-        vector = motion_vector(sample_swing(vary_swing(swing, body, options, rng), keys), centre)
+        vector = motion_vector(*sample_swing(vary_swing(swing, body, options, rng), keys), centre)
         if farthest_turn(vector)[1] < FARTHEST_TURN:
             return vector
 

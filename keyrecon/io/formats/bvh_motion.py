@@ -19,6 +19,7 @@ position channels besides, so that reading the file gives every joint back.
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -44,8 +45,17 @@ STUB = 0.03
 SKULL_BASE = 0.4
 """Where the head's joint lies between neck and crown: neck .07 of .17 statures (Winter)."""
 
-SIDES = (("Right", "right", -1.0), ("Left", "left", 1.0))
-"""Name in the file, name in the skeleton, and side of the T-pose, which faces +Z."""
+
+class _Side(NamedTuple):
+    name: str
+    """In the file."""
+    word: str
+    """In the skeleton."""
+    out: float
+    """Along x in the T-pose, which faces +Z."""
+
+
+SIDES = (_Side("Right", "right", -1.0), _Side("Left", "left", 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +119,7 @@ def _build_nodes(joints: dict[str, Points], stub: float) -> list[_Node]:
     return nodes
 
 
-def _leg(
-    joints: dict[str, Points], pelvis: Turns, side: tuple[str, str, float], stub: float
-) -> list[_Node]:
+def _leg(joints: dict[str, Points], pelvis: Turns, side: _Side, stub: float) -> list[_Node]:
     name, word, out = side
     hip, knee, ankle = (joints[f"{word}_{j}"] for j in ("hip", "knee", "ankle"))
     hinge = _hinge(knee - hip, ankle - knee, pelvis, rest=np.array([1.0, 0.0, 0.0]))
@@ -125,9 +133,7 @@ def _leg(
     ]
 
 
-def _arm(
-    joints: dict[str, Points], chest: Turns, side: tuple[str, str, float], stub: float
-) -> list[_Node]:
+def _arm(joints: dict[str, Points], chest: Turns, side: _Side, stub: float) -> list[_Node]:
     name, word, out = side
     neck = joints["neck"]
     shoulder, elbow, wrist = (joints[f"{word}_{j}"] for j in ("shoulder", "elbow", "wrist"))

@@ -137,10 +137,10 @@ def test_samples_of_a_swing_pass_its_key_postures(swings):
     swing = swings[0]
     keys = np.array([0.0, 0.4, 0.7, 1.0])
     turns, place = sample_swing(swing, keys, samples=101)
-    vectors = motion_vector((turns, place), np.tile(np.eye(3), (turns.shape[1], 1, 1)))
+    vectors = motion_vector(turns, place, np.tile(np.eye(3), (turns.shape[1], 1, 1)))
     whole = replace(swing, keys=np.array([0, swing.keys[1], swing.keys[2], swing.keys[3]]))
     exact = motion_vector(
-        sample_swing(whole, keys, samples=101), np.tile(np.eye(3), (turns.shape[1], 1, 1))
+        *sample_swing(whole, keys, samples=101), np.tile(np.eye(3), (turns.shape[1], 1, 1))
     )
     np.testing.assert_allclose(vectors, exact, atol=1e-9)
     np.testing.assert_allclose(place[40], sample_swing(swing, keys, samples=11)[1][4], atol=1e-9)
