@@ -28,6 +28,7 @@ class Sequence:
     player: int = 350
     """Standing height in the picture, px."""
     seconds: float = 36.0
+    fps: float = 50.0
 
 
 FH, BH, SERVE = "jarua_Derecha_18seg", "jarua_Reves", "jarua_Servicio"
@@ -43,6 +44,25 @@ TENNIS = (
     Sequence("volley-above-static", (VOLLEY, FH2), "above", False, 7, player=250),
     Sequence("all-oblique-small", (BH, VOLLEY, SERVE2), "oblique", False, 8, 640, 170),
 )
+
+SECOND = (
+    Sequence("jdescobar-back-30", ("jdescobar_Derecha", "jdescobar_Reves"), "back", False, 21, fps=30.0),
+    Sequence("jduribe-side-pan-25", ("jduribe_Derecha", "jduribe_VReves"), "side", True, 22, fps=25.0),
+    Sequence("jjmarin-serve-oblique-30", ("jjmarin_Servicio", "jjmarin_Reves"), "oblique", False, 23,
+             player=300, fps=30.0),
+    Sequence("jpmoreno-front-pan-50", ("jpmoreno_Derecha", "jpmoreno_Servicio"), "front", True, 24,
+             player=400),
+    Sequence("jsgiraldo-back-pan-25", ("jsgiraldo_Reves", "jsgiraldo_Servicio"), "back", True, 25,
+             player=260, fps=25.0),
+    Sequence("jsguevara-side-50", ("jsguevara_Derecha_17seg", "jsguevara_Servicio"), "side", False, 26,
+             player=320),
+    Sequence("secheverri-above-30", ("secheverri_Derecha", "secheverri_Reves"), "above", False, 27,
+             player=280, fps=30.0),
+    Sequence("mixed-oblique-pan-30", ("jpmoreno_VDerecha", "jdescobar_Servicio", "jsgiraldo_Derecha"),
+             "oblique", True, 28, 960, 200, fps=30.0),
+)  # fmt: skip
+"""Seven players that the first table does not have, other looks and cameras, at the rates of
+broadcast and phones. Nobody looks at these while a constant is set."""
 
 OTHER = (
     Sequence("dance", ("cmu_05_12_daz",), "oblique", False, 11, seconds=10.0),
@@ -70,7 +90,7 @@ def render(sequence: Sequence, work: Path, mocap: Path) -> Path:
             View(sequence.camera), sequence.pan, *size, float(sequence.player)
         )
         options = SynthOptions(
-            SceneOptions(sequence.seed, camera), JoinOptions(seconds=sequence.seconds)
+            SceneOptions(sequence.seed, camera), JoinOptions(sequence.seconds, sequence.fps)
         )
         synthesize(folder, mocap_files(sequence, mocap), options, show)
     return folder
