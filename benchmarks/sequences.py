@@ -28,7 +28,7 @@ class Sequence:
     player: int = 350
     """Standing height in the picture, px."""
     seconds: float = 36.0
-    fps: float = 50.0
+    fps: float = 50
 
 
 FH, BH, SERVE = "jarua_Derecha_18seg", "jarua_Reves", "jarua_Servicio"
@@ -46,21 +46,32 @@ TENNIS = (
 )
 
 SECOND = (
-    Sequence("jdescobar-back-30", ("jdescobar_Derecha", "jdescobar_Reves"), "back", False, 21, fps=30.0),
-    Sequence("jduribe-side-pan-25", ("jduribe_Derecha", "jduribe_VReves"), "side", True, 22, fps=25.0),
-    Sequence("jjmarin-serve-oblique-30", ("jjmarin_Servicio", "jjmarin_Reves"), "oblique", False, 23,
-             player=300, fps=30.0),
-    Sequence("jpmoreno-front-pan-50", ("jpmoreno_Derecha", "jpmoreno_Servicio"), "front", True, 24,
-             player=400),
-    Sequence("jsgiraldo-back-pan-25", ("jsgiraldo_Reves", "jsgiraldo_Servicio"), "back", True, 25,
-             player=260, fps=25.0),
-    Sequence("jsguevara-side-50", ("jsguevara_Derecha_17seg", "jsguevara_Servicio"), "side", False, 26,
-             player=320),
-    Sequence("secheverri-above-30", ("secheverri_Derecha", "secheverri_Reves"), "above", False, 27,
-             player=280, fps=30.0),
-    Sequence("mixed-oblique-pan-30", ("jpmoreno_VDerecha", "jdescobar_Servicio", "jsgiraldo_Derecha"),
-             "oblique", True, 28, 960, 200, fps=30.0),
-)  # fmt: skip
+    Sequence("jdescobar-back", ("jdescobar_Derecha", "jdescobar_Reves"), "back", False, 21, fps=30),
+    Sequence("jduribe-side-pan", ("jduribe_Derecha", "jduribe_VReves"), "side", True, 22, fps=25),
+    Sequence(
+        "jjmarin-oblique", ("jjmarin_Servicio", "jjmarin_Reves"), "oblique", False, 23, fps=30
+    ),
+    Sequence("jpmoreno-front-pan", ("jpmoreno_Derecha", "jpmoreno_Servicio"), "front", True, 24),
+    Sequence(
+        "jsgiraldo-back-pan", ("jsgiraldo_Reves", "jsgiraldo_Servicio"), "back", True, 25, fps=25
+    ),
+    Sequence(
+        "jsguevara-side", ("jsguevara_Derecha_17seg", "jsguevara_Servicio"), "side", False, 26
+    ),
+    Sequence(
+        "secheverri-above", ("secheverri_Derecha", "secheverri_Reves"), "above", False, 27, fps=30
+    ),
+    Sequence(
+        "mixed-oblique-pan",
+        ("jpmoreno_VDerecha", "jdescobar_Servicio", "jsgiraldo_Derecha"),
+        "oblique",
+        True,
+        28,
+        960,
+        200,
+        fps=30,
+    ),
+)
 """Seven players that the first table does not have, other looks and cameras, at the rates of
 broadcast and phones. Nobody looks at these while a constant is set."""
 
