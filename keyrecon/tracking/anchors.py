@@ -19,6 +19,9 @@ ANCHOR_COST = -60.0
 ANCHOR_FOOT_COST = -3.0
 """Cost of a marked foot by itself when paths are smoothed: twenty times the weight of a foot whose
 response is certain."""
+MAX_BRIDGE_COST = 8.0
+"""Largest cost of a place far from the way between two marks: that of a jump; a frame without any
+place costs half as much."""
 DOUBT_SECONDS = 0.3
 """Doubt is averaged over this time: one frame of blur needs no mark."""
 LEAST_DOUBT = 0.15
@@ -40,6 +43,45 @@ def anchored_states(
     rows = list(zip(states, costs, marked, known, strict=True))
     places = [mark[None] if fixed else state for state, _, mark, fixed in rows]
     return places, [np.array([ANCHOR_COST]) if fixed else cost for _, cost, _, fixed in rows]
+
+
+def with_bridge_costs(
+    states: Sequence[Float[np.ndarray, "_ p 2"]],
+    costs: Sequence[Float[np.ndarray, "_"]],
+    marked: Float[np.ndarray, "n p 2"],
+    step: float,
+) -> list[Float[np.ndarray, "_"]]:
+    """Costs of states, more for those far from the straight way between the marks around them.
+
+    A path of independent steps that is known at two times is a Brownian bridge: n frames after the
+    one and m before the other its deviation is `step` sqrt(nm / (n + m)). Transitions alone forgive
+    a jump once and for all; a head that is taken for a shoe between two marks pays in each frame.
+    """
+    known = np.flatnonzero(np.isfinite(marked).all(axis=(1, 2)))
+    if not len(known):
+        return list(costs)
+    middle, spread = _bridges(marked.mean(axis=1), known, step)
+    pairs = zip(states, costs, middle, spread, strict=True)
+    return [
+        cost
+        + np.minimum(
+            np.square(state.mean(axis=1) - place).sum(axis=1) / (2 * deviation**2), MAX_BRIDGE_COST
+        )
+        for state, cost, place, deviation in pairs
+    ]
+
+
+def _bridges(
+    marked: Float[np.ndarray, "n 2"], known: Int[np.ndarray, "m"], step: float
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n"]]:
+    """Expected place in every frame, and how far from it the path may be."""
+    frames = np.arange(len(marked))
+    place = np.stack([np.interp(frames, known, marked[known, axis]) for axis in (0, 1)], axis=1)
+    after = np.searchsorted(known, frames)
+    since = np.where(after > 0, frames - known[after - 1], np.inf)
+    until = np.where(after < len(known), known[np.minimum(after, len(known) - 1)] - frames, np.inf)
+    frames_apart = 1 / (1 / np.maximum(since, 1) + 1 / np.maximum(until, 1))
+    return place, step * np.sqrt(np.maximum(frames_apart, 1))
 
 
 def marked_places(

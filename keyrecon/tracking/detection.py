@@ -27,7 +27,7 @@ from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
 from keyrecon.segmentation.part_evidence import Reader, evaluate_evidence, model_scene_by_colour
-from keyrecon.tracking.anchors import anchored_states, marked_places
+from keyrecon.tracking.anchors import anchored_states, marked_places, with_bridge_costs
 from keyrecon.tracking.candidates import PartCandidates, search_frame
 from keyrecon.tracking.foot_pairs import (
     COLOR_PRIOR,
@@ -148,6 +148,7 @@ def _link(
     marked_head, marked_feet = marked_places(anchors, numbers, camera)
     head_cost = _costs([c.head_score for c in candidates])
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
+    head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
     stable, head_cost = anchored_states(stable, head_cost, marked_head)
     chosen = find_cheapest_track(head_cost, stable, TransitionModel(options.head_speed * step))
     if (chosen >= 0).mean() < MIN_DETECTED_SHARE:
@@ -156,6 +157,7 @@ def _link(
     pairs, costs = _pair(candidates, head[numbers], height)
     stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
+    costs = with_bridge_costs(stable, costs, marked_feet, options.foot_speed * step)
     stable, costs = anchored_states(stable, costs, marked_feet)
     model = TransitionModel(
         options.foot_speed * step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST

@@ -16,7 +16,7 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
-from keyrecon.tracking.anchors import ANCHOR_FOOT_COST, anchored_states
+from keyrecon.tracking.anchors import ANCHOR_FOOT_COST, anchored_states, with_bridge_costs
 from keyrecon.tracking.candidates import MIN_FOOT_SEPARATION
 from keyrecon.tracking.foot_pairs import (
     FILTER_PRIOR,
@@ -107,6 +107,7 @@ def link_head(
     places = [cropping.to_picture(detected.heads, t) for t, detected in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(detected.head_strength) for detected in detections]
+    costs = with_bridge_costs(stable, costs, marked, sigma)
     stable, costs = anchored_states(stable, costs, marked)
     chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
     from_reference = np.linalg.inv(camera.to_reference)
@@ -139,7 +140,9 @@ def link_feet(
         in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
         both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
-    places, costs = anchored_states([p.places for p in pairs], [p.cost for p in pairs], marked)
+    costs = [p.cost for p in pairs]
+    costs = with_bridge_costs([p.places for p in pairs], costs, marked, motion.step)
+    places, costs = anchored_states([p.places for p in pairs], costs, marked)
     fixed = np.isfinite(marked).all(axis=(1, 2))
     sure = np.full((1, 2), ANCHOR_FOOT_COST)
     alone = [sure if f else p.each for p, f in zip(pairs, fixed, strict=True)]
