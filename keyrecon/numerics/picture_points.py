@@ -27,14 +27,18 @@ def track_there_and_back(
 ) -> tuple[Float[np.ndarray, "n *one 2"], Float[np.ndarray, "n"], Bool[np.ndarray, "n"]]:
     """Where points are in the next picture, how far from its start each is when tracked back, px,
     and which were tracked both ways; `window` is the side of the patch compared (Lucas-Kanade)."""
-    there, tracked = _track(before, after, points, window)
-    back, again = _track(after, before, there, window)
+    there, tracked = track_points(before, after, points, window)
+    back, again = track_points(after, before, there, window)
     return there, np.linalg.norm(back - points, axis=-1).ravel(), tracked & again
 
 
-def _track(
-    before: np.ndarray, after: np.ndarray, points: np.ndarray, window: int
-) -> tuple[np.ndarray, Bool[np.ndarray, "n"]]:
+def track_points(
+    before: UInt8[np.ndarray, "h w"],
+    after: UInt8[np.ndarray, "h w"],
+    points: Float[np.ndarray, "n *one 2"],
+    window: int,
+) -> tuple[Float[np.ndarray, "n *one 2"], Bool[np.ndarray, "n"]]:
+    """Where points are in the next picture, and which were tracked."""
     there, tracked, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]  # stubs want a guess
         before, after, points, None, winSize=(window, window), maxLevel=PYRAMID_LEVELS
     )

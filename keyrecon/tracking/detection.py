@@ -157,7 +157,6 @@ def _link(
     pairs, costs = _pair(candidates, head[numbers], height)
     stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
-    costs = with_bridge_costs(stable, costs, marked_feet, options.foot_speed * step)
     stable, costs = anchored_states(stable, costs, marked_feet)
     model = TransitionModel(
         options.foot_speed * step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST

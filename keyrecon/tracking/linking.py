@@ -140,9 +140,7 @@ def link_feet(
         in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
         both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
-    costs = [p.cost for p in pairs]
-    costs = with_bridge_costs([p.places for p in pairs], costs, marked, motion.step)
-    places, costs = anchored_states([p.places for p in pairs], costs, marked)
+    places, costs = anchored_states([p.places for p in pairs], [p.cost for p in pairs], marked)
     fixed = np.isfinite(marked).all(axis=(1, 2))
     sure = np.full((1, 2), ANCHOR_FOOT_COST)
     alone = [sure if f else p.each for p, f in zip(pairs, fixed, strict=True)]

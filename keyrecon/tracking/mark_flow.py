@@ -7,29 +7,41 @@ colours and edges say. Where they part, limbs have turned or hidden one another,
 nothing. Before the first mark, after the last, and where marks are far apart there is one way only:
 then every step must lead back to where it came from (Kalal, Mikolajczyk and Matas, ICPR 2010), and
 the place must look like the mark all the more.
+
+All joints of a frame are followed by one call, forwards while the video is read, and back as soon
+as the later mark is reached, in the reduced grey pictures that are held until then.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
+from keyrecon.io.frame_reader import read_grey
 from keyrecon.io.video import Video
-from keyrecon.numerics.picture_points import track_there_and_back
+from keyrecon.numerics.picture_points import (
+    sample_picture,
+    track_points,
+    track_there_and_back,
+)
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, FlowTracks
+
+WHOLE_BODY = 0.8
+"""Share of the joints that are marked where a whole body is."""
 
 
 @dataclass(frozen=True)
 class FlowOptions:
     """How marked joints are followed."""
 
-    player: float = 240.0
-    """Height of the player in the pictures, px; larger follows thin limbs better and is slower."""
-    window: float = 0.1
-    """Side of the window that is matched, player heights: a forearm's length, two wrists."""
+    player: float = 160.0
+    """Height of the player in the pictures, px; smaller is faster. Tried on a rendered and three
+    real videos: 240 and 120 have as many joints right (within half a point)."""
+    window: float = 0.13
+    """Side of the window that is matched, player heights: a forearm's length, two wrists. Tried:
+    with .1, of the joints that flow is sure of, 1-4 of a hundred more are wrong."""
     longest: float = 3.0
     """Marks farther apart than this are not joined, seconds."""
     gap: float = 0.03
@@ -53,29 +65,54 @@ def track_marked_joints(
 ) -> FlowTracks:
     """Joints between marks, and how sure they are; NaN and 0 where flow says nothing."""
     follower = _Follower.start(video, marks, options)
-    last = np.full(len(marks.skeleton.names), -1)
-    pictures = progress(video.frames(width=follower.width), "Following marks", len(video))
+    pictures = progress(read_grey(video, follower.width), "Following marks", len(video))
     for t, picture in enumerate(pictures):
-        follower.remember(t, picture)
-        if t in follower.row_of:
-            marked = np.isfinite(marks.joints[follower.row_of[t], :, 0])
-            for first in np.unique(last[marked]).tolist():
-                follower.close(first, t, np.flatnonzero(marked & (last == first)))
-            last[marked] = t
-        age = np.where(last >= 0, t - last, 0)
-        ending = (age == follower.longest) | ((t == len(video) - 1) & (age > 0))
-        ending &= age <= follower.longest
-        for first in np.unique(last[ending]).tolist():
-            group = np.flatnonzero(ending & (last == first))
-            follower.follow_on(first, range(first, t + 1), group)
-    return FlowTracks(follower.joints, follower.confidence)
+        follower.advance(t, picture)
+    return follower.tracks()
+
+
+@dataclass(frozen=True, eq=False)
+class _Schedule:
+    """Which joint is marked when."""
+
+    marked: Bool[np.ndarray, "T J"]
+    last: Int[np.ndarray, "T J"]
+    """Latest marked frame before each one; -1 where there is none."""
+    next: Int[np.ndarray, "T J"]
+    """The first at it or after it; T where there is none."""
+    longest: int
+    """Frames that a joint is followed over."""
+
+    @classmethod
+    def of(cls, marks: Annotations, n_frames: int, longest: int) -> "_Schedule":
+        marked = np.zeros((n_frames, len(marks.skeleton.names)), dtype=bool)
+        marked[marks.frames] = np.isfinite(marks.joints).all(axis=2)
+        number = np.arange(n_frames)[:, None]
+        upto = np.maximum.accumulate(np.where(marked, number, -1))
+        last = np.concatenate([np.full((1, marked.shape[1]), -1), upto[:-1]])
+        coming = np.where(marked, number, n_frames)
+        return cls(marked, last, np.minimum.accumulate(coming[::-1])[::-1], longest)
+
+    def joined(self, t: int) -> Bool[np.ndarray, "J"]:
+        """Joints that are followed in frame t both ways."""
+        between = (self.last[t] >= 0) & (self.next[t] < len(self.last))
+        return between & (self.next[t] - self.last[t] <= self.longest)
+
+    def ahead(self, t: int) -> Bool[np.ndarray, "J"]:
+        """Joints that are followed into frame t from a mark before it."""
+        return (self.last[t] >= 0) & (t - self.last[t] <= self.longest) & ~self.marked[t]
+
+    def back(self, t: int) -> Bool[np.ndarray, "J"]:
+        """Joints that are followed into frame t from a mark after it."""
+        free = self.joined(t) | (self.last[t] < 0) | (t - self.last[t] > self.longest)
+        return free & (self.next[t] - t <= self.longest) & (self.next[t] < len(self.last))
 
 
 @dataclass(frozen=True, eq=False)
 class _Follower:
     """The last pictures, the marks in their pixels, and what was followed so far."""
 
-    marks: Annotations
+    schedule: _Schedule
     options: FlowOptions
     width: int
     """Of the pictures, px."""
@@ -83,129 +120,158 @@ class _Follower:
     """Their pixels per pixel of the video."""
     height: float
     """Of the player in them, px."""
-    longest: int
-    """Frames that flow is followed over."""
-    row_of: dict[int, int]
-    """Row of each marked frame."""
+    marks: Float[np.ndarray, "T J 2"]
+    ahead: Float[np.ndarray, "T J 2"]
+    """Places followed forwards, and the marks."""
     joints: Float[np.ndarray, "T J 2"]
     confidence: Float[np.ndarray, "T J"]
+    doubt: Float[np.ndarray, "J"]
+    """Forwards: by how much the steps since the mark have not led back, player heights."""
+    alike: Float[np.ndarray, "J"]
+    """Forwards: least belief in the likeness with the mark so far."""
+    patches: Float[np.ndarray, "J s s"]
+    """Around the last mark."""
     pictures: dict[int, UInt8[np.ndarray, "h w"]]
 
     @classmethod
     def start(cls, video: Video, marks: Annotations, options: FlowOptions) -> "_Follower":
-        height, shape = _marked_height(marks), (len(video), len(marks.skeleton.names))
-        width = min(video.width, max(64, round(video.width * options.player / height)))
+        tall = _marked_height(marks)
+        width = min(video.width, max(64, round(video.width * options.player / tall)))
         shrink = width / video.width
+        height, shape = tall * shrink, (len(video), len(marks.skeleton.names))
+        places = np.full((*shape, 2), np.nan)
+        places[marks.frames] = shrink * (marks.joints + 0.5) - 0.5
+        side = options.side(height)
         return cls(
-            marks=marks,
+            schedule=_Schedule.of(marks, len(video), round(options.longest * video.fps)),
             options=options,
             width=width,
             shrink=shrink,
-            height=height * shrink,
-            longest=round(options.longest * video.fps),
-            row_of={int(frame): row for row, frame in enumerate(marks.frames)},
+            height=height,
+            marks=places,
+            ahead=places.copy(),
             joints=np.full((*shape, 2), np.nan),
             confidence=np.zeros(shape),
+            doubt=np.zeros(shape[1]),
+            alike=np.ones(shape[1]),
+            patches=np.zeros((shape[1], side, side)),
             pictures={},
         )
 
-    def remember(self, t: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
-        """Keep a picture for as long as marks are followed."""
-        self.pictures[t] = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        self.pictures.pop(t - self.longest - 1, None)
+    def tracks(self) -> FlowTracks:
+        """What was followed, in pixels of the video."""
+        return FlowTracks((self.joints + 0.5) / self.shrink - 0.5, self.confidence)
 
-    def close(self, first: int, t: int, group: Int[np.ndarray, "g"]) -> None:
-        """Joints marked in frame t, and before in frame `first` (-1: never)."""
-        if first < 0 or t - first > self.longest:
-            earliest = max(0, t - self.longest, first + self.longest + 1 if first >= 0 else 0)
-            self.follow_on(t, range(t, earliest - 1, -1), group)
-        elif t - first > 1:
-            start, stop = (self._marks(frame, group) for frame in (first, t))
-            between = [self.pictures[u] for u in range(first, t + 1)]
-            way = _join_ways(between, start, stop, self.height, self.options)
-            self._note(range(first, t), group, way.without_last())
+    def advance(self, t: int, picture: UInt8[np.ndarray, "h w"]) -> None:
+        """Take the next picture: follow joints into it, and back from those marked in it."""
+        self.pictures[t] = picture
+        self.pictures.pop(t - self.schedule.longest - 1, None)
+        going = np.flatnonzero(self.schedule.ahead(t))
+        if len(going):
+            self._step_ahead(t, going)
+        marked = np.flatnonzero(self.schedule.marked[t])
+        if len(marked):
+            patches = self._patches(t, self.marks[t, marked])
+            self._follow_back(t, marked, patches)
+            self.doubt[marked], self.alike[marked], self.patches[marked] = 0, 1, patches
 
-    def follow_on(self, first: int, frames: range, group: Int[np.ndarray, "g"]) -> None:
-        """One way from the marks of frame `first`, the first of `frames`."""
-        cut = [self.pictures[u] for u in frames]
-        way = _follow_one_way(cut, self._marks(first, group), self.height, self.options)
-        self._note(frames, group, way)
+    def _step_ahead(self, t: int, going: Int[np.ndarray, "g"]) -> None:
+        """Joints from the frame before; those with no mark to come are done with."""
+        alone = ~self.schedule.joined(t)[going]
+        places, returned = self._step(t - 1, t, self.ahead[t - 1, going], alone)
+        self.ahead[t, going] = places
+        self.doubt[going] += returned
+        lone = going[alone]
+        if len(lone):
+            alike = _correlations(self._patches(t, places[alone]), self.patches[lone])
+            self.alike[lone] = np.minimum(
+                self.alike[lone], _ramp(alike, self.options.lone_likeness)
+            )
+            self._note(t, lone, places[alone], self._agreement(self.doubt[lone]) * self.alike[lone])
 
-    def _marks(self, frame: int, group: Int[np.ndarray, "g"]) -> Float[np.ndarray, "g 2"]:
-        return self.shrink * self.marks.joints[self.row_of[frame], group]
+    def _follow_back(
+        self, marked_at: int, group: Int[np.ndarray, "g"], ends: Float[np.ndarray, "g s s"]
+    ) -> None:
+        """From marks in one frame to those before them, or as far as flow is followed."""
+        places = self.marks[marked_at, group]
+        doubt, least = np.zeros(len(group)), np.ones(len(group))
+        for t in range(marked_at - 1, -1, -1):
+            # joints that are marked in t end there
+            kept = self.schedule.back(t)[group] & (self.schedule.next[t, group] == marked_at)
+            if not kept.any():
+                break
+            group, ends, doubt, least = group[kept], ends[kept], doubt[kept], least[kept]
+            joined = self.schedule.joined(t)[group]
+            places, returned = self._step(t + 1, t, places[kept], ~joined)
+            doubt = doubt + returned
+            last = self.schedule.last[t, group]
+            share = np.where(joined, (t - last) / (marked_at - last), 1.0)[:, None]
+            ahead = np.where(joined[:, None], self.ahead[t, group], places)
+            middle = (1 - share) * ahead + share * places
+            apart = np.where(joined, np.linalg.norm(ahead - places, axis=1) / self.height, doubt)
+            here = self._patches(t, middle)
+            alike = _correlations(here, ends)
+            either = np.maximum(alike, _correlations(here, self.patches[group]))
+            least = np.minimum(least, _ramp(alike, self.options.lone_likeness))
+            believed = np.where(joined, _ramp(either, self.options.likeness), least)
+            self._note(t, group, middle, self._agreement(apart) * believed)
 
-    def _note(self, frames: range, group: Int[np.ndarray, "g"], way: "_Way") -> None:
-        """Take over what is surer than what was known; the first frame is marked."""
-        at = np.ix_(np.array(frames[1:], dtype=np.int64), group)
-        better = way.confidence[1:] > self.confidence[at]
-        self.joints[at] = np.where(better[..., None], way.places[1:] / self.shrink, self.joints[at])
-        self.confidence[at] = np.where(better, way.confidence[1:], self.confidence[at])
+    def _step(
+        self, start: int, stop: int, places: Float[np.ndarray, "g 2"], alone: Bool[np.ndarray, "g"]
+    ) -> tuple[Float[np.ndarray, "g 2"], Float[np.ndarray, "g"]]:
+        """Points from one picture to its neighbour; how far from there the steps of those that are
+        followed one way only lead back, player heights."""
+        before, after = self.pictures[start], self.pictures[stop]
+        side, returned = self.patches.shape[1], np.zeros(len(places))
+        there = np.empty_like(places)
+        here = places.astype(np.float32)[:, None]
+        if alone.any():
+            found, off, _ = track_there_and_back(before, after, here[alone], side)
+            there[alone], returned[alone] = found[:, 0], off / self.height
+        if not alone.all():
+            there[~alone] = track_points(before, after, here[~alone], side)[0][:, 0]
+        return there, returned
 
+    def _agreement(self, apart: Float[np.ndarray, "g"]) -> Float[np.ndarray, "g"]:
+        """0-1, for two ways that end so many player heights apart."""
+        return np.exp(-0.5 * (apart / self.options.gap) ** 2)
 
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """Points in a row of pictures, the first of which is marked."""
+    def _note(
+        self,
+        t: int,
+        group: Int[np.ndarray, "g"],
+        places: Float[np.ndarray, "g 2"],
+        confidence: Float[np.ndarray, "g"],
+    ) -> None:
+        self.joints[t, group], self.confidence[t, group] = places, confidence
 
-    places: Float[np.ndarray, "n g 2"]
-    confidence: Float[np.ndarray, "n g"]
-
-    def without_last(self) -> "_Way":
-        """Without the last picture, which is marked too."""
-        return _Way(self.places[:-1], self.confidence[:-1])
+    def _patches(self, t: int, places: Float[np.ndarray, "g 2"]) -> Float[np.ndarray, "g s s"]:
+        """The picture around points, less its mean there, all by one call."""
+        side = self.patches.shape[1]
+        across = np.arange(side) - side // 2
+        grid = np.stack(np.meshgrid(across, across), axis=-1) + np.clip(
+            places[:, None, None], -1e4, 1e4
+        )
+        cut = sample_picture(self.pictures[t], grid.reshape(-1, side, 2), cv2.BORDER_REPLICATE)
+        cut = cut.reshape(-1, side, side).astype(np.float64)
+        return cut - cut.mean(axis=(1, 2), keepdims=True)
 
 
 def _marked_height(marks: Annotations) -> float:
-    """Size of the player, px: the upper fifth of the marked extents, as half bodies show half."""
-    marked = marks.joints[np.isfinite(marks.joints[..., 1]).any(axis=1), :, 1]
-    return float(np.percentile(np.nanmax(marked, axis=1) - np.nanmin(marked, axis=1), 80))
+    """Size of the player, px: the upper fifth of the marked extents of whole bodies, or of both
+    halves one above the other where no frame has a whole one."""
+    known = np.isfinite(marks.joints).all(axis=2)
+    whole = known.mean(axis=1) >= WHOLE_BODY
+    if whole.any():
+        return _extent(marks.joints[whole, :, 1])
+    lower = marks.skeleton.is_lower
+    return sum(_extent(marks.joints[:, half, 1]) for half in (lower, ~lower))
 
 
-def _join_ways(
-    pictures: list[UInt8[np.ndarray, "h w"]],
-    first: Float[np.ndarray, "g 2"],
-    last: Float[np.ndarray, "g 2"],
-    height: float,
-    options: FlowOptions,
-) -> _Way:
-    """Places from marks in the first and in the last picture; sure where both ways meet."""
-    side = options.side(height)
-    ahead, _ = _follow(pictures, first, side)
-    back = _follow(pictures[::-1], last, side)[0][::-1]
-    share = np.linspace(0, 1, len(pictures))[:, None]
-    apart = np.linalg.norm(ahead - back, axis=-1) / height
-    places = (1 - share)[..., None] * ahead + share[..., None] * back
-    ends = [_patches(pictures[0], first, side), _patches(pictures[-1], last, side)]
-    alike = np.max([_likeness(pictures, places, end, side) for end in ends], axis=0)
-    believed = _ramp(alike, options.likeness)
-    return _Way(places, np.exp(-0.5 * (apart / options.gap) ** 2) * believed)
-
-
-def _follow_one_way(
-    pictures: list[UInt8[np.ndarray, "h w"]],
-    start: Float[np.ndarray, "g 2"],
-    height: float,
-    options: FlowOptions,
-) -> _Way:
-    """Places from marks in the first picture alone; sure while every step leads back."""
-    side = options.side(height)
-    places, returned = _follow(pictures, start, side)
-    apart = np.cumsum(returned, axis=0) / height
-    alike = _likeness(pictures, places, _patches(pictures[0], start, side), side)
-    believed = np.minimum.accumulate(_ramp(alike, options.lone_likeness), axis=0)
-    return _Way(places, np.exp(-0.5 * (apart / options.gap) ** 2) * believed)
-
-
-def _follow(
-    pictures: list[UInt8[np.ndarray, "h w"]], start: Float[np.ndarray, "g 2"], side: int
-) -> tuple[Float[np.ndarray, "n g 2"], Float[np.ndarray, "n g"]]:
-    """Points followed from picture to picture, and how far each step back ends from its start."""
-    places, returned = [start], [np.zeros(len(start))]
-    for before, after in pairwise(pictures):
-        here = places[-1].astype(np.float32)[:, None]
-        there, off, _ = track_there_and_back(before, after, here, side)
-        places.append(there[:, 0].astype(np.float64))
-        returned.append(off.astype(np.float64))
-    return np.stack(places), np.stack(returned)
+def _extent(y: Float[np.ndarray, "n j"]) -> float:
+    """Upper fifth of the extents of some frames, 0 where nothing is marked."""
+    y = y[np.isfinite(y).any(axis=1)]
+    return float(np.percentile(np.nanmax(y, axis=1) - np.nanmin(y, axis=1), 80)) if len(y) else 0.0
 
 
 def _ramp(value: Float[np.ndarray, "*n"], half: float) -> Float[np.ndarray, "*n"]:
@@ -213,39 +279,9 @@ def _ramp(value: Float[np.ndarray, "*n"], half: float) -> Float[np.ndarray, "*n"
     return np.clip(0.5 + (value - half) / (1 - half), 0, 1)
 
 
-def _likeness(
-    pictures: list[UInt8[np.ndarray, "h w"]],
-    places: Float[np.ndarray, "n g 2"],
-    patches: list[Float[np.ndarray, "s s"]],
-    side: int,
-) -> Float[np.ndarray, "n g"]:
-    """Correlation of the pictures around the places with one patch for each point."""
-    return np.array(
-        [
-            [
-                _correlation(own, patch)
-                for own, patch in zip(_patches(picture, spots, side), patches, strict=True)
-            ]
-            for picture, spots in zip(pictures, places, strict=True)
-        ]
-    )
-
-
-def _patches(
-    picture: UInt8[np.ndarray, "h w"], places: Float[np.ndarray, "g 2"], side: int
-) -> list[Float[np.ndarray, "s s"]]:
-    return [_patch(picture, place, side) for place in places]
-
-
-def _patch(
-    picture: UInt8[np.ndarray, "h w"], place: Float[np.ndarray, "2"], side: int
-) -> Float[np.ndarray, "s s"]:
-    x, y = (float(np.clip(v, -1e4, 1e4)) for v in place)
-    cut = cv2.getRectSubPix(picture, (side, side), (x, y)).astype(np.float32)
-    return cut - cut.mean()
-
-
-def _correlation(one: Float[np.ndarray, "s s"], other: Float[np.ndarray, "s s"]) -> float:
-    """Normalised correlation of two patches without their means."""
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float((one * other).sum()) / size if size > 0 else 0.0
+def _correlations(
+    some: Float[np.ndarray, "g s s"], others: Float[np.ndarray, "g s s"]
+) -> Float[np.ndarray, "g"]:
+    """Normalised correlations of patches without their means, pair by pair; 0 for even ones."""
+    size = np.linalg.norm(some, axis=(1, 2)) * np.linalg.norm(others, axis=(1, 2))
+    return (some * others).sum(axis=(1, 2)) / np.where(size > 0, size, np.inf)
