@@ -9,6 +9,7 @@ from keyrecon.tracking.anchors import (
     anchored_states,
     contradicted_frames,
     least_sure_frames,
+    with_bridge_costs,
 )
 
 
@@ -34,6 +35,29 @@ def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
     taken = find_cheapest_track(costs, places, TransitionModel(1.0))
     assert taken[4] == 0
     assert (places[4] == 500).all()
+
+
+def test_between_two_marks_a_head_is_not_taken_for_what_looks_more_like_one_far_away():
+    marked = np.full((60, 1, 2), np.nan)
+    marked[[0, 59]] = 0.0
+    states, costs = [np.array([[[3.0, 0.0]], [[300.0, 0.0]]])] * 60, [np.array([1.5, 0.0])] * 60
+    places, anchored = anchored_states(states, costs, marked)
+    strayed = find_cheapest_track(anchored, places, TransitionModel(2.0))
+    assert (strayed[1:-1] == 1).all()
+    costs = with_bridge_costs(states, costs, marked, 2.0)
+    places, anchored = anchored_states(states, costs, marked)
+    assert (find_cheapest_track(anchored, places, TransitionModel(2.0)) == 0).all()
+
+
+def test_a_bridge_forgives_more_the_farther_a_mark_is_and_most_between_marks():
+    marked = np.full((101, 1, 2), np.nan)
+    marked[[0, 40]] = 0.0
+    costs = with_bridge_costs([np.full((1, 1, 2), 4.0)] * 101, [np.zeros(1)] * 101, marked, 2.0)
+    cost = np.concatenate(costs)
+    assert (np.diff(cost[1:21]) < 0).all()
+    assert (np.diff(cost[21:40]) > 0).all()
+    assert (np.diff(cost[41:]) < 0).all()
+    assert with_bridge_costs([np.ones((1, 1, 2))], [np.ones(1)], marked[1:2], 2.0) == [np.ones(1)]
 
 
 def test_marks_where_the_track_is_contradict_nothing_and_others_are_named():
