@@ -24,6 +24,9 @@ class Assistant:
 
     keyframes: Callable[[dict[int, str]], Json] | None = None
     """Added keyframes -> {"frames": {frame: {"stands_for", "why"}}, "height_px"}."""
+    bodies: Callable[[], list[Json] | None] | None = None
+    """Frames in which a whole body, marked before there are keyframes, would teach most, as
+    {"frame", "box"}; None before the player was followed."""
     suggestion: Callable[[Annotations, int], Json] | None = None
     """Where the joints of a frame probably are, from the frames annotated so far."""
     pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import uvicorn
 
 from keyrecon.annotate.assist.answers import make_assistant
@@ -24,8 +25,10 @@ from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import project
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, marked_frames
 from keyrecon.progress import Progress
 
 GRACE_SECONDS = 2
@@ -97,7 +100,32 @@ class _Server(uvicorn.Server):
 
 def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress], str]]:
     """What the page can have done, by name."""
-    return {"keyframes": partial(_find_keyframes, folder), "run": partial(_run, folder)}
+    return {
+        "follow": partial(_follow_player, folder),
+        "keyframes": partial(_find_keyframes, folder),
+        "run": partial(_run, folder),
+    }
+
+
+def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+    """The automatic part with the bodies marked so far, before keyframes are chosen."""
+    workspace = Workspace(folder)
+    video = workspace.video()
+    _prepare_with_bodies(workspace, video)
+    marks = project.load_annotations(workspace, video)
+    options = workspace.options(Options(), Options())
+    preparation = project.prepare_with_marks(workspace, video, marks, options, progress)
+    seen = float((preparation.track.confidence > 0).mean())
+    return f"Player found in {seen:.1%} of {len(video)} frames."
+
+
+def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
+    """Before there are keyframes, every mark there is teaches the automatic part."""
+    if workspace.keyframes_file.exists() or not workspace.annotations_file.exists():
+        return
+    marks = project.load_annotations(workspace, video)
+    if len(np.intersect1d(*marked_frames(marks))):
+        write_coco(workspace.prepared_marks_file, marks, (video.width, video.height))
 
 
 def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -> str:
@@ -105,7 +133,9 @@ def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -
     chosen = project.KeyframeSettings(
         options.get("budget"), options.get("coverage"), None if reach is None else round(reach)
     )
-    return project.find_keyframes(Workspace(folder), Options(), chosen, progress)
+    workspace = Workspace(folder)
+    _prepare_with_bodies(workspace, workspace.video())
+    return project.find_keyframes(workspace, Options(), chosen, progress)
 
 
 def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:

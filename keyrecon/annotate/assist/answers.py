@@ -26,6 +26,7 @@ from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Annotations, Pick
+from keyrecon.tracking.anchors import least_sure_frames
 
 MIN_CERTAINTY = 0.8
 """Of the depth signs that come with a suggestion: nine in ten are right."""
@@ -36,6 +37,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
     cache = ProjectCache(workspace)
     return Assistant(
         keyframes=partial(describe_keyframes, cache),
+        bodies=partial(describe_bodies, cache),
         suggestion=partial(describe_suggestion, cache),
         pose=partial(describe_pose, cache),
         checks=partial(describe_checks, cache),
@@ -61,6 +63,24 @@ def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:
         for frame, reason in reasons.items()
     }
     return {"frames": frames, "height_px": float(np.median(preparation.track.height))}
+
+
+MORE_BODIES = 3
+"""Whole bodies asked for where the program is least sure, before the keyframes; as measured by
+benchmarks/real.py."""
+
+
+def describe_bodies(cache: ProjectCache) -> list[Json] | None:
+    """Where a whole body, marked next, would teach the track most, and where the player is there.
+
+    None before the player was followed with a marked body.
+    """
+    preparation, marked = cache.preparation(), cache.prepared_bodies()
+    if preparation is None or not len(marked):
+        return None
+    track = preparation.track
+    frames = least_sure_frames(track, marked, preparation.video.fps, MORE_BODIES)
+    return [{"frame": int(t), "box": _rounded(track.box[t], 1)} for t in frames]
 
 
 def describe_suggestion(cache: ProjectCache, annotations: Annotations, frame: int) -> Json:

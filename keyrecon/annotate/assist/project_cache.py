@@ -16,7 +16,7 @@ from threading import Lock, RLock, Thread
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate, estimate_body
 from keyrecon.annotate.assist.checks import Neighbours, find_neighbours
@@ -28,7 +28,7 @@ from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options, prepare
+from keyrecon.pipeline import Options, marked_frames, prepare
 from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick, Preparation
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking.camera_motion import estimate_camera_motion
@@ -81,9 +81,19 @@ class ProjectCache:
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
-        known = self._workspace.picks_file, self._workspace.prepared_marks_file
-        files = (self._workspace.keyframes_file, *(file for file in known if file.exists()))
+        workspace = self._workspace
+        known = workspace.keyframes_file, workspace.prepared_marks_file, workspace.picks_file
+        files = tuple(file for file in known if file.exists())
+        if not {workspace.keyframes_file, workspace.prepared_marks_file} & {*files}:
+            return None
         return self._load("preparation", files, self._prepared)
+
+    def prepared_bodies(self) -> Int[np.ndarray, "n"]:
+        """Frames with the whole bodies that the player was followed with."""
+        marks = self._prepared_marks()
+        if marks is None:
+            return np.zeros(0, dtype=np.int64)
+        return np.intersect1d(*marked_frames(marks))
 
     def motion(self) -> Motion | None:
         """The result of the last run, if there was one."""
@@ -184,15 +194,21 @@ class ProjectCache:
         workspace = Workspace(self._workspace.folder)
         options = workspace.options(Options(), Options())
         recall = workspace.stages.recall
-        video, marks, file = workspace.video(), None, workspace.prepared_marks_file
-        if file.is_file():
-            marks = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+        video, marks = workspace.video(), self._prepared_marks()
         picks = workspace.picks() if marks is None or workspace.picks_file.is_file() else ()
         preparation = prepare(video, picks, options, recall, marks=marks)
+        if not workspace.keyframes_file.is_file():
+            return preparation
         keyframes = keyframes_from_json(workspace.keyframes_file.read_text())
         if len(keyframes.upper.nearest) != len(preparation.video):
             raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")
         return replace(preparation, keyframes=keyframes)
+
+    def _prepared_marks(self) -> Annotations | None:
+        """The marks that the automatic part was made with."""
+        workspace, video = self._workspace, self.video
+        file, size = workspace.prepared_marks_file, (video.width, video.height)
+        return read_coco(file, workspace.skeleton, len(video), size) if file.is_file() else None
 
     def _load(self, name: str, files: tuple[Path, ...], read: Callable[[], Any]) -> Any:
         """What `read` gives, read again when a file changes; the last there was if it cannot be.

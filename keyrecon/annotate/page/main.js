@@ -5,6 +5,7 @@ import { createViewer } from "./draw/viewer.js";
 import { createActions } from "./state/actions.js";
 import { createFrameCache } from "./state/caches.js";
 import { createModel } from "./state/model.js";
+import { createBodies } from "./views/bodies.js";
 import { createDepth } from "./views/depth.js";
 import { byId } from "./views/dom.js";
 import { createFiles } from "./views/files.js";
@@ -17,7 +18,7 @@ import { createPick } from "./views/pick.js";
 import { createPrompt, createScrub } from "./views/prompt.js";
 import { createShell } from "./views/shell.js";
 
-const VIEWS = ["pick", "keyframes", "motion"];
+const VIEWS = ["bodies", "keyframes", "motion"];
 
 const model = await createModel();
 const { ui } = model;
@@ -42,6 +43,7 @@ const panels = [
   lists,
   createJoints(model, actions),
 ];
+const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
 createFiles(model);
@@ -51,7 +53,7 @@ let opening = null; // {frame, at}: a keyframe that is not drawn yet, to measure
 function opened(frame) {
   opening = { frame, at: performance.now() };
   const places = Object.values(model.marks(frame)).filter(([, , v]) => v);
-  viewer.frameBox(enclosing(model.keyframe()?.box, places));
+  viewer.frameBox(enclosing(model.keyframe()?.box ?? bodies.box(frame), places));
   history.replaceState(null, "", `#frame=${frame}`);
   model.poses.requestSuggestion(frame);
   prefetchAround();
@@ -94,6 +96,7 @@ model.onDraw(() => {
   if (ui.view === null) return;
   shell.draw();
   if (ui.view === "keyframes") drawKeyframes();
+  if (ui.view === "bodies") bodies.draw();
   if (ui.view === "pick") pick.draw();
   if (ui.view === "motion") motion.draw();
 });
@@ -112,6 +115,7 @@ const commands = {
     page: ({ index }) => go(VIEWS[index]),
   },
   keyframes: keyframeCommands(model, { actions, viewer, lists }),
+  bodies: bodies.commands,
   pick: pick.commands,
   motion: motion.commands,
 };
@@ -146,6 +150,8 @@ function onPress(selector, command) {
 }
 onPress("[data-swap]", (button) => commands.keyframes[button.dataset.swap]());
 onPress("#alternatives button", (_, n) => actions.confirmAlternative(n));
+onPress("#bodies-colours", () => go("pick"));
+onPress("#pick-bodies", () => go("bodies"));
 onPress("#undo", actions.undo);
 onPress("#redo", actions.redo);
 addEventListener("hashchange", () => addressed() !== null && actions.open(addressed()));
@@ -155,4 +161,4 @@ await model.readState();
 model.listen();
 shell.refreshJobs();
 lists.refresh();
-go(model.keyframes().length ? "keyframes" : "pick");
+go(bodies.isWaiting() ? "bodies" : "keyframes");

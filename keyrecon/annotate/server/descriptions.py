@@ -80,14 +80,24 @@ def halves_marked(cells: Cells, skeleton: Skeleton) -> dict[int, str]:
     return halves
 
 
+WHY_A_BODY = "Here the program is least sure where the player is: a whole body teaches most."
+
+
 def describe_keyframes(
-    keyframes: Keyframes | None, cells: Cells, skeleton: Skeleton, details: dict[int, Json]
+    keyframes: Keyframes | None,
+    cells: Cells,
+    skeleton: Skeleton,
+    details: dict[int, Json],
+    bodies: Iterable[Json] = (),
 ) -> list[Json]:
     """All frames to annotate: those chosen, those a person added, and others that bear marks.
 
-    `details` by frame replace what is said here.
+    `bodies` are asked for before keyframes are chosen. `details` replace what is said here.
     """
     chosen, marked = halves_by_frame(keyframes), halves_marked(cells, skeleton)
+    for body in bodies:
+        chosen[body["frame"]] = "both"
+        details = {**details, body["frame"]: {"why": WHY_A_BODY, "box": body["box"]}}
     added = {int(key[1]): half for key, half in of_kind(cells, "own").items()}
     listed = marked | chosen
     counts = _represented(keyframes)

@@ -75,13 +75,17 @@ def describe_project(session: Session) -> Json:
     added = {int(frame): half for frame, half in by_frame(cells, "own").items()}
     explain, skeleton = session.assistant.keyframes, session.limits.skeleton
     explained = explain(added) if explain and keyframes else {}
+    bodies = session.assistant.bodies() if session.assistant.bodies and not keyframes else None
     name = session.workspace.folder.resolve().name
     return {
         **describe_video(session.frames.video, name),
         **describe_skeleton(skeleton),
         "id": f"{name}-{session.frames.identity}",
         "version": session.frames.identity,
-        "keyframes": describe_keyframes(keyframes, cells, skeleton, explained.get("frames", {})),
+        "keyframes": describe_keyframes(
+            keyframes, cells, skeleton, explained.get("frames", {}), bodies or ()
+        ),
+        "bodies": None if bodies is None else [body["frame"] for body in bodies],
         "height_px": explained.get("height_px"),
         "settings": describe_settings(Workspace(session.workspace.folder)),
         "has": {

@@ -12,6 +12,7 @@ from page_project import (
     STATURE,
     block,
     count_slowly,
+    follow_at_once,
     make_project,
     read_number,
     true_signs,
@@ -23,6 +24,7 @@ from keyrecon.annotate.assist.answers import describe_pose
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.project_cache import ProjectCache
 from keyrecon.annotate.assistant import Assistant
+from keyrecon.app.project import start
 from keyrecon.body import LSP14
 from keyrecon.io.formats.coco import read_coco
 
@@ -266,8 +268,10 @@ def test_a_list_of_five_hundred_keyframes_makes_few_rows(person):
 
 def test_no_key_of_any_page_fails(person):
     pages = person.call("views/keyboard", "m.KEYS")
-    for number, page in enumerate(("pick", "keyframes", "motion"), start=1):
+    for number, page in ((1, "bodies"), (1, "pick"), (2, "keyframes"), (3, "motion")):
         person.press(f"Alt+{number}")
+        if page == "pick":
+            person.page.click("#bodies-colours")
         for keys, _, action in pages[page]:
             if action not in ("primary", "add"):
                 person.press(keys[-1].replace(" ", "Space"))
@@ -275,8 +279,58 @@ def test_no_key_of_any_page_fails(person):
     assert "swap left and right" in person.text("#keys-panel")
 
 
+def asking_assistant(folder, frame):
+    """Asks for one more body once the player was followed."""
+
+    def bodies():
+        box = [*POINTS2D[frame].min(axis=0).tolist(), *POINTS2D[frame].max(axis=0).tolist()]
+        return [{"frame": frame, "box": box}] if (folder / "followed").exists() else None
+
+    return Assistant(bodies=bodies)
+
+
+def test_a_new_project_begins_with_whole_bodies_and_no_colour(context, tmp_path, video_file):
+    folder = tmp_path / "new"
+    start(video_file, folder)
+    commands = {"follow": partial(follow_at_once, folder)}
+    with serving(folder, asking_assistant(folder, 55), commands) as server:
+        person = Person(context, server.credentials.address)
+        person.await_text("#bodies-text", "whole player clearly")
+        person.page.wait_for_selector("#bodies-picture[data-frame]")
+        person.press("Enter")
+        first = person.frame()
+        assert "top of the skull" in person.text("#prompt-more").lower()
+        person.mark_joints(partial(place_of, first))
+        person.await_text("#prompt-text", "The body is marked")
+        person.press("Enter")
+        person.await_text("#bodies-text", "The body is marked")
+        person.press("Enter")
+        person.await_text("#bodies-text", "One body is to be marked")
+        person.press("Enter")
+        person.page.wait_for_selector("#picture[data-frame='55']")
+        assert "least sure" in person.text("#explanation")
+        person.mark_joints(partial(place_of, 55))
+        person.press("Enter")
+        person.await_text("#bodies-primary", "Choose the keyframes")
+        person.await_saved()
+        context.close()
+    assert marks_on_file(folder).frames.tolist() == [first, 55]
+    assert (person.clicks, person.keys) == (28, 5)
+    assert person.complaints == []
+
+
+def test_the_guide_shows_the_joint_that_is_asked_for(person):
+    person.open(10)
+    assert "stored results are missing" in person.text("#pose-empty")
+    person.press("Alt+1")
+    person.page.wait_for_selector("#bodies:not([hidden])")
+    person.page.hover("#guide [data-joint=left_hip]")
+    assert "left hip: the centre of the joint" in person.text("#guide-words")
+
+
 def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
     person.press("Alt+1")
+    person.page.click("#bodies-colours")
     person.page.wait_for_selector("#pick-picture[data-frame]")
     box = person.page.locator("#pick-picture").bounding_box()
     for dx in (0, 20, 40, 60):

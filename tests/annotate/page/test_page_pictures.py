@@ -44,6 +44,7 @@ def test_small_pictures_of_an_upright_video_keep_their_shape(tmp_path, video, vi
     with serving(folder) as server:
         person = visit(server)
         person.press("Alt+1")
+        person.page.click("#bodies-colours")
         person.page.wait_for_function(UPRIGHT)
 
 

@@ -50,12 +50,20 @@ def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, s
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
     person = Person(context, server.credentials.address)
     found = {}
-    for key, page in (("Alt+1", "pick"), ("Alt+2", "keyframes"), ("Alt+3", "motion")):
-        person.press(key)
+    for key, page in (
+        ("Alt+1", "bodies"),
+        (None, "pick"),
+        ("Alt+2", "keyframes"),
+        ("Alt+3", "motion"),
+    ):
+        if key is None:
+            person.page.click("#bodies-colours")
+        else:
+            person.press(key)
         person.page.wait_for_selector(f"#{page}:not([hidden])")
         person.await_drawn()
         found[page] = person.page.evaluate(OVERLAPS, PARTS)
         wide = person.page.evaluate("document.documentElement.scrollWidth")
         assert wide <= size[0], page
     context.close()
-    assert found == {"pick": [], "keyframes": [], "motion": []}
+    assert found == {"bodies": [], "pick": [], "keyframes": [], "motion": []}

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as workflow from "../../../keyrecon/annotate/page/state/workflow.js";
+import { FIGURE, jointWords } from "../../../keyrecon/annotate/page/state/joint_words.js";
 import { KEYS, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
 
 const PROJECT = {
@@ -92,4 +93,26 @@ test("a key means one thing on a page, and is written as it stands on the keyboa
   assert.equal(key({ key: "d" }).index, 1);
   assert.equal(key({ key: "F9" }), null);
   assert.equal(keyText("Ctrl+Shift+z"), "Ctrl Shift Z");
+});
+
+test("before there are keyframes: a frame, its body, following, more bodies, the choice", () => {
+  const begin = (keyframes, { bodies = null, keyframed = false, done = [] } = {}) =>
+    workflow.nextBeginning({ has: { keyframes: keyframed }, bodies }, keyframes, ({ frame }) =>
+      done.includes(frame),
+    );
+  const body = (frame) => ({ frame, half: "both" });
+  assert.deepEqual(begin([]), { do: "frame" });
+  assert.deepEqual(begin([{ frame: 3, half: "upper" }], { done: [3] }), { do: "frame" });
+  assert.deepEqual(begin([body(3)]), { do: "mark", frame: 3, left: 1 });
+  assert.deepEqual(begin([body(3)], { done: [3] }), { do: "follow" });
+  const asked = [body(3), body(20), body(40)];
+  assert.deepEqual(begin(asked, { done: [3], bodies: [20, 40] }), { do: "mark", frame: 20, left: 2 });
+  assert.deepEqual(begin(asked, { done: [3, 20, 40], bodies: [20, 40] }), { do: "choose" });
+  assert.deepEqual(begin([body(3)], { keyframed: true }), { do: "choose" });
+});
+
+test("every joint of the figure has words", () => {
+  for (const joint of Object.keys(FIGURE)) assert.ok(jointWords(joint), joint);
+  assert.equal(Object.keys(FIGURE).length, 14);
+  assert.equal(jointWords("tail"), "");
 });

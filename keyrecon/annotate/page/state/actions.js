@@ -260,7 +260,7 @@ function createNavigation(model, placing, opened) {
 
   function nextKeyframe() {
     const frame = nextOpen(model.keyframes(), ui.frame, model.isDone);
-    if (frame === null) model.update({ view: "motion" });
+    if (frame === null) model.update({ view: model.project.has.keyframes ? "motion" : "bodies" });
     else open(frame);
   }
 

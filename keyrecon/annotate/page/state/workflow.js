@@ -58,6 +58,17 @@ export function nextOpen(keyframes, frame, done) {
   return [...after, ...before].find((keyframe) => !done(keyframe))?.frame ?? null;
 }
 
+// What is to be done before there are keyframes: a whole body in a clear frame, more of them where the
+// program is least sure, then the choice. {do: "frame" | "mark" | "follow" | "choose", frame, left}
+export function nextBeginning(project, keyframes, done) {
+  if (project.has.keyframes) return { do: "choose" };
+  const bodies = keyframes.filter(({ half }) => half === "both"),
+    open = bodies.filter((body) => !done(body));
+  if (open.length) return { do: "mark", frame: open[0].frame, left: open.length };
+  if (!bodies.length) return { do: "frame" };
+  return { do: project.bodies ? "choose" : "follow" };
+}
+
 // Keyframes that were chosen and those that a person added, by frame.
 export function allKeyframes(project, state) {
   const byFrame = new Map(project.keyframes.map((keyframe) => [keyframe.frame, keyframe]));
@@ -133,6 +144,10 @@ export function missingParts(parts) {
 // Share of the frames to mark that is usual for a video: some 25 keyframes, which is 1.5 % of half a
 // minute, and less where little repeats because there is little.
 export const defaultBudget = (count) => Math.max(0.015, Math.min(0.05, 25 / count));
+
+// The share that a project was set to, or the usual one, in per cent.
+export const budgetText = ({ settings, n_frames: count }) =>
+  String(Math.round(10000 * (settings.budget ?? defaultBudget(count))) / 100);
 
 // Frames spread over the video, to see how well the picks do elsewhere.
 export function spreadFrames(count, n) {

@@ -4,6 +4,7 @@ import { createFigure3d } from "../../../report/figure3d.js";
 import { cssColor } from "../draw/canvas.js";
 import { label, whyNoAssistant } from "../state/workflow.js";
 import { byId, make, setText, toggle } from "./dom.js";
+import { createGuide } from "./guide.js";
 
 const EMPTY = "The body in space appears here as joints are placed.";
 const STYLE = {
@@ -63,7 +64,9 @@ export function createPoseFigure(canvas, model) {
 }
 
 export function createDepth(model) {
-  const figure = createPoseFigure(byId("pose-canvas"), model);
+  const figure = createPoseFigure(byId("pose-canvas"), model),
+    guide = createGuide(byId("pose-guide"), model);
+  const turning = byId("pose-canvas").parentElement.querySelectorAll("[data-yaw]");
   let hovered = null;
 
   function request() {
@@ -110,8 +113,14 @@ export function createDepth(model) {
     const pose = model.poses.current(),
       other = pose?.alternatives?.[hovered]?.points3d;
     figure.show(other ?? pose?.points3d, other ? pose?.points3d : null);
-    byId("pose-empty").hidden = Object.keys(pose?.points3d ?? {}).length > 1;
-    setText(byId("pose-empty"), pose?.trouble ?? whyNoAssistant(model.project) ?? EMPTY);
+    const empty = Object.keys(pose?.points3d ?? {}).length < 2,
+      trouble = pose?.trouble ?? whyNoAssistant(model.project);
+    const guided = empty && trouble === null && guide.exists;
+    byId("pose-guide").hidden = !guided;
+    byId("pose-empty").hidden = !empty || guided;
+    setText(byId("pose-empty"), trouble ?? EMPTY);
+    for (const button of turning) button.hidden = guided;
+    guide.show(model.ui.hovered?.joint ?? model.ui.joint);
     drawAlternatives(pose);
   }
 

@@ -7,7 +7,7 @@ export const KEYS = {
   any: [
     [["Ctrl+z"], "undo", "undo"],
     [["Ctrl+Shift+z", "Ctrl+y"], "redo", "redo"],
-    [["1", "2", "3"].map((n) => `Alt+${n}`), "colours, keyframes, motion", "page"],
+    [["1", "2", "3"].map((n) => `Alt+${n}`), "body, keyframes, motion", "page"],
     [["?"], "show or hide the keys", "help"],
   ],
   keyframes: [
@@ -38,6 +38,13 @@ export const KEYS = {
     [["g"], "go to the most suspicious place, then to the next", "check"],
     [["y"], "add the frame that would help most", "suggestion"],
     [["l"], "lock or unlock the keyframe", "lock"],
+  ],
+  bodies: [
+    [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
+    [["z"], "the whole picture", "zoom"],
+    [["+", "-"], "zoom in, out", "zoomBy"],
+    [["Enter"], "do what the bar over the picture offers", "primary"],
+    [["k"], "mark the whole body in this frame", "add"],
   ],
   pick: [
     [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],

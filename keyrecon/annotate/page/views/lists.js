@@ -116,6 +116,7 @@ export function createLists(model, actions) {
     (fault) => model.notify(fault.message),
   );
   model.onIdle(refresh);
+  model.onProject(refresh); // after a run there is more to say
 
   document.querySelectorAll("[data-tab]").forEach((button) =>
     button.addEventListener("click", () => {

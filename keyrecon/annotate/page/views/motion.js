@@ -87,7 +87,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     if (open < keyframes.length) return ["Make the motion", left];
     return [
       "No marks yet",
-      keyframes.length ? "Mark some keyframes first." : "The colours come first.",
+      keyframes.length ? "Mark some keyframes first." : "One marked body comes first.",
     ];
   }
 

@@ -4,8 +4,8 @@ import { drawCross, drawLabel } from "../draw/canvas.js";
 import { nearestPlace } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import { addPick, newId, removePick } from "../state/edits.js";
-import { REQUIRED_PARTS, defaultBudget, missingParts, partsOf } from "../state/workflow.js";
-import { byId, make, numberIn, setText } from "./dom.js";
+import { REQUIRED_PARTS, budgetText, missingParts, partsOf } from "../state/workflow.js";
+import { byId, make, setText } from "./dom.js";
 import { arrowStep } from "./keyboard.js";
 import { createStrip } from "./strip.js";
 
@@ -106,16 +106,12 @@ export function createPick(model, { frames, shell }) {
   byId("pick-primary").addEventListener("click", primary);
   byId("show-map").addEventListener("change", loadMap);
 
-  const budget = project.settings.budget ?? defaultBudget(project.n_frames);
-  byId("budget").value = String(Math.round(10000 * budget) / 100);
+  byId("budget").value = budgetText(project);
 
   function primary() {
-    const [next] = missingParts(parts()),
-      wanted = (numberIn(byId("budget")) ?? NaN) / 100;
+    const [next] = missingParts(parts());
     if (next) choose(next.part);
-    else if (!(wanted > 0))
-      model.notify("The share of frames to mark is a number of per cent, such as 1.5.");
-    else if (!shell.runningJob()) shell.startJob("keyframes", { budget: wanted });
+    else shell.chooseKeyframes(byId("budget"));
   }
 
   function drawPicture() {

@@ -1,7 +1,8 @@
 // The bar over the picture: the next step in words, and the button that Enter presses; and the slider
 // below it.
 import { byId, setText } from "./dom.js";
-import { label, requiredJoints, unmarked } from "../state/workflow.js";
+import { jointWords } from "../state/joint_words.js";
+import { label, nextBeginning, requiredJoints, unmarked } from "../state/workflow.js";
 
 const UNCERTAIN = 0.75; // certainty below which a limb is named
 const SIDES = { left: "the player's left", right: "the player's right", middle: "the" };
@@ -13,6 +14,24 @@ function named(model, joint) {
 
 function counted(n, word) {
   return `${n} ${word}${n === 1 ? "" : "s"}`;
+}
+
+const sentence = (words) => (words ? `${words[0].toUpperCase()}${words.slice(1)}. ` : "");
+
+// Before there are keyframes: what a marked body is for.
+function afterBody(model) {
+  const { left } = nextBeginning(model.project, model.keyframes(), model.isDone);
+  if (left)
+    return {
+      text: "This body is done",
+      more: `${counted(left, "more body").replace("bodys", "bodies")}, where the program is least sure.`,
+      button: "Next body",
+    };
+  return {
+    text: model.project.bodies ? "All bodies are marked" : "The body is marked",
+    more: "The program learns from it where the player is and what the player looks like.",
+    button: "Go on",
+  };
 }
 
 function leastCertain(model, limbs) {
@@ -36,7 +55,7 @@ const PROMPTS = {
   },
   place: (model, { joint, left }) => ({
     text: `Click ${named(model, joint)}`,
-    more: `${counted(left, "joint")} to go. Shift-click if it is hidden, V if it cannot be placed.`,
+    more: `${sentence(jointWords(joint))}${counted(left, "joint")} to go. Shift-click if it is hidden, V if it cannot be placed.`,
   }),
   depth: (model, { limbs }) => ({
     text: "Which ends are nearer the camera?",
@@ -44,6 +63,7 @@ const PROMPTS = {
     button: "Right as shown",
   }),
   next(model) {
+    if (!model.project.has.keyframes) return afterBody(model);
     const open = model.keyframes().filter((keyframe) => !model.isDone(keyframe)).length;
     return open
       ? {
@@ -76,7 +96,7 @@ export function createPrompt(model, actions) {
     if (!model.keyframe())
       return {
         text: "No keyframes yet",
-        more: "Pick the colours first; the program then chooses the keyframes.",
+        more: "Mark one whole body first (1 Body); the program then chooses the keyframes.",
       };
     if (model.ui.offset)
       return {

@@ -1,7 +1,7 @@
 // What surrounds every page: the steps, whether all is saved, notices, long work on the server, and
 // the table of keys.
 import * as api from "../state/api.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, make, numberIn, setText } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
 
 const SAVING = {
@@ -9,7 +9,7 @@ const SAVING = {
   saving: () => "Saving …",
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
-const TITLES = { any: "Everywhere", keyframes: "Keyframes", pick: "Colours", motion: "Motion" };
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion" };
 
 function keyElements(keys) {
   const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
@@ -104,15 +104,29 @@ export function createShell(model, go) {
     setText(byId("notice-offer"), offer?.text ?? "");
   }
 
+  // How far each step is; bodies that are marked before there are keyframes belong to the first.
+  function drawCounts() {
+    const { has } = model.project,
+      keyframes = model.keyframes(),
+      done = keyframes.filter(model.isDone).length,
+      counts = keyframes.length ? `${done} of ${keyframes.length}` : "",
+      picked = model.state.picks.length;
+    setText(byId("pick-count"), picked ? `${picked} picks` : "");
+    setText(byId("body-count"), has.keyframes ? "" : counts);
+    setText(byId("done-count"), has.keyframes ? counts : "");
+    setText(byId("motion-state"), has.motion ? "made" : "");
+  }
+
   function draw() {
     const { status, waiting, why } = model.saving,
-      { undo, redo } = model.state,
-      keyframes = model.keyframes();
+      { undo, redo } = model.state;
     const { view } = model.ui;
     document.body.dataset.view = view;
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
     document.querySelectorAll("[data-go]").forEach((button) => {
-      button.setAttribute("aria-current", button.dataset.go === view ? "step" : "false");
+      const beginning = view === "pick" || (view === "keyframes" && !model.project.has.keyframes),
+        own = button.dataset.go === (beginning ? "bodies" : view);
+      button.setAttribute("aria-current", own ? "step" : "false");
     });
     setText(byId("project-name"), model.project.name);
     setText(byId("saving"), SAVING[status](waiting));
@@ -123,15 +137,7 @@ export function createShell(model, go) {
         : "";
     byId("undo").disabled = !undo && !waiting;
     byId("redo").disabled = !redo;
-    setText(
-      byId("pick-count"),
-      model.state.picks.length ? `${model.state.picks.length} picks` : "",
-    );
-    setText(
-      byId("done-count"),
-      keyframes.length ? `${keyframes.filter(model.isDone).length} of ${keyframes.length}` : "",
-    );
-    setText(byId("motion-state"), model.project.has?.motion ? "made" : "");
+    drawCounts();
     drawNotice();
     jobs.noteEnds();
     drawJob();
@@ -168,6 +174,7 @@ function createJobs(model) {
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
     model.readProject().then(() => {
+      if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });
       if (job.kind === "run") model.update({ view: "motion" });
     });
@@ -183,5 +190,13 @@ function createJobs(model) {
 
   const runningJob = () => [...model.jobs.values()].find(({ state }) => state === "running");
 
-  return { startJob, refreshJobs, noteEnds, runningJob };
+  // Has the keyframes chosen, as many as a field for the share of the frames says.
+  function chooseKeyframes(field) {
+    const wanted = (numberIn(field) ?? NaN) / 100;
+    if (!(wanted > 0))
+      model.notify("The share of frames to mark is a number of per cent, such as 1.5.");
+    else if (!runningJob()) startJob("keyframes", { budget: wanted });
+  }
+
+  return { startJob, refreshJobs, noteEnds, runningJob, chooseKeyframes };
 }
