@@ -295,7 +295,7 @@ def test_a_new_project_begins_with_whole_bodies_and_no_colour(context, tmp_path,
     commands = {"follow": partial(follow_at_once, folder)}
     with serving(folder, asking_assistant(folder, 55), commands) as server:
         person = Person(context, server.credentials.address)
-        person.await_text("#bodies-text", "whole player clearly")
+        person.await_text("#bodies-text", "shows the player clearly")
         person.page.wait_for_selector("#bodies-picture[data-frame]")
         person.press("Enter")
         first = person.frame()

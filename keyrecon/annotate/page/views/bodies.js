@@ -69,32 +69,32 @@ export function createBodies(model, { frames, shell, actions, colors }) {
 
   const WORDS = {
     frame: () => ({
-      text: "Find a frame that shows the whole player clearly",
-      more: "Arms and legs apart, nothing before them, no blur. The wheel zooms; then its 14 joints are marked.",
+      text: "Find a frame that shows the player clearly",
+      more: "Arms and legs apart, nothing before them, no blur. The wheel zooms.",
       button: "Mark the body in this frame",
     }),
     mark: ({ frame: open, left }) => ({
       text: left > 1 ? `${left} bodies are to be marked` : "One body is to be marked",
       more: model.project.bodies
-        ? "In these frames the program is least sure where the player is; what it suggests there only needs correcting."
+        ? "In these frames the program is least sure where the player is."
         : "All joints of the player in one frame.",
       button: `Mark frame ${open}`,
     }),
     follow: () => ({
       text: "The body is marked",
-      more: "The program now follows the player with it, and says where it is least sure.",
+      more: "The program now follows the player, and asks where it is unsure.",
       button: "Follow the player",
     }),
     choose: () =>
       model.project.has.keyframes
         ? {
             text: "The keyframes are chosen",
-            more: "Marks are kept when they are chosen again. K marks one more whole body in the frame shown.",
+            more: "K marks one more body here.",
             button: "Choose the keyframes again",
           }
         : {
             text: "The player is known",
-            more: "The program now chooses the frames that stand for all others.",
+            more: "It now chooses the frames to mark.",
             button: "Choose the keyframes",
           },
   };
