@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 from tuned_numbers import TunedNumber
 
-NOTHING = 0.05
-"""Points of PCK and mm of PA-MPJPE that are no change."""
 MUCH_PCK, MUCH_PA = 2.0, 3.0
 """Points and mm from which on a number matters much."""
+NOTHING = 0.05
+"""Points and mm that are no change."""
+QUARTERS, WIDE = ("x0.75", "x1.25"), ("x0.5", "x2")
 
 
 @dataclass(frozen=True)
@@ -23,16 +24,19 @@ class Row:
     """Version of the package's code (`code_digest`)."""
     clip: str
     frames: int
-    """Used of the clip; 0 for all."""
+    """Used of a rendered clip; 0 for all."""
     number: str
-    """file:name of a number, 'clicks:...' or 'base'."""
+    """file:name of a number, or 'clicks:...'."""
     line: int
     old: str
-    new: str
     change: str
     """'x0.75', 'x1.25', '+0.15', ..."""
-    first: str
-    """First stage that was run."""
+    stages: str
+    """Stages that the change reaches by itself."""
+    others: int
+    """Numbers that were changed along with it."""
+    same: int
+    """1 where no bit of any stage's result changed."""
     pck: float
     """0-1"""
     pa: float
@@ -46,12 +50,17 @@ class Row:
     d_pa_unsigned: float
     seconds: float
     fault: str
-    """Last line of what was said when it failed."""
+    """What was said when it failed."""
 
     @property
     def key(self) -> tuple[str, ...]:
         """Tells it from all other measurements."""
         return self.code, self.clip, str(self.frames), self.number, self.change
+
+    @property
+    def changes(self) -> tuple[float, float, float]:
+        """Against the base: points of PCK, mm of PA-MPJPE, mm without signs."""
+        return self.d_pck, self.d_pa, self.d_pa_unsigned
 
 
 def read_rows(file: Path) -> Iterator[Row]:
@@ -71,97 +80,107 @@ def shorten(values: Iterable[float]) -> str:
 
 @dataclass(frozen=True)
 class Effect:
-    """What one number does, over both directions and all clips: changes for the worse, >= 0."""
+    """Largest changes over some rows, either way."""
 
-    number: str
-    line: int
-    old: str
-    cost: tuple[float, float, float]
-    """Largest loss on the mean over the clips, of either direction: points of PCK, mm of PA-MPJPE,
-    mm without signs."""
-    cost_one: tuple[float, float, float]
-    """The same on the worst clip."""
-    gain: tuple[float, float, float]
-    """Largest gain on the mean."""
-    largest: float
-    """Largest absolute change in any row, points or mm."""
+    pck: float
+    """Points."""
+    pa: float
+    """mm, with signs or without."""
+    clips: int
+    alone: bool
+    """Whether nothing else was changed with it."""
+    same: bool
+    """Whether no bit changed."""
     faults: tuple[str, ...]
-    complete: bool
-    """Whether both directions were measured."""
+
+    @classmethod
+    def of(cls, rows: list[Row]) -> "Effect":
+        """The effect of one number, or of clicks, that these rows vary; the latest rows count."""
+        latest = {row.key: row for row in rows}.values()
+        good = [row for row in latest if not row.fault]
+        values = np.abs([row.changes for row in good]).reshape(-1, 3)
+        values = np.where(np.isfinite(values), values, 0.0)  # in 3D nothing is known of real clips
+        return cls(
+            float(values[:, 0].max(initial=0)),
+            float(values[:, 1:].max(initial=0)),
+            len({row.clip for row in good}),
+            not any(row.others and not row.same for row in good),
+            bool(good) and all(row.same for row in good),
+            tuple(sorted({f"{row.change}: {row.fault}" for row in latest if row.fault})),
+        )
+
+    @property
+    def is_much(self) -> bool:
+        """Whether it is more than `MUCH_PCK` points or `MUCH_PA` mm."""
+        return self.pck > MUCH_PCK or self.pa > MUCH_PA
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether nothing changes that could be told from rounding."""
+        return bool(self.clips) and max(self.pck, self.pa) < NOTHING and not self.faults
+
+    def __str__(self) -> str:
+        """Points and mm."""
+        if not self.clips:
+            return "; ".join(self.faults) or "-"
+        told = "same bits" if self.same else f"{self.pck:.1f} points, {self.pa:.1f} mm"
+        return told + ("" if self.alone else " (with others)")
 
 
-def summarise(rows: Iterable[Row]) -> list[Effect]:
-    """The effect of every number in the rows."""
-    of: dict[str, list[Row]] = defaultdict(list)
+def by_number(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """The rows of each number."""
+    found: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
-        of[row.number].append(row)
-    return [effect_of(number, group) for number, group in of.items()]
+        found[row.number].append(row)
+    return found
 
 
-def effect_of(number: str, rows: list[Row]) -> Effect:
-    """The effect of the number that these rows vary."""
-    good = [row for row in rows if not row.fault]
-    losses = np.array([(-r.d_pck, r.d_pa, r.d_pa_unsigned) for r in good]).reshape(-1, 3)
-    losses = np.ma.masked_invalid(losses)  # of a real clip, nothing is known in 3D
-    changes = np.array([row.change for row in good])
-    means = [losses[changes == change].mean(axis=0).filled(0) for change in sorted(set(changes))]
-    losses, none = losses.filled(0), np.zeros(3)
-    means = np.array(means).reshape(-1, 3)
-    cost, cost_one, gain = (
-        tuple(float(x) for x in np.max([none, *values], axis=0))
-        for values in (means, losses, -means)
+def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None:
+    """The table as markdown: clicks, then every number by folder."""
+    print(head)
+    of = by_number(rows)
+    print("\n## Clicks\n\nLargest change of any clip, either way.\n")
+    print("| what | change | PCK, points | PA-MPJPE, mm | clips |\n|---|---|---|---|---|")
+    for name, group in of.items():
+        if name.startswith("clicks:"):
+            for change in dict.fromkeys(row.change for row in group):
+                effect = Effect.of([row for row in group if row.change == change])
+                told = name.removeprefix("clicks:")
+                print(
+                    f"| {told} | {change} | {effect.pck:.1f} | {effect.pa:.1f} | {effect.clips} |"
+                )
+    effects = {
+        name: tuple(Effect.of([r for r in group if r.change in of]) for of in (QUARTERS, WIDE))
+        for name, group in of.items()
+        if not name.startswith("clicks:")
+    }
+    much = [name for name, (quarter, _) in effects.items() if quarter.is_much]
+    print_table(
+        f"A quarter changes more than {MUCH_PCK:g} points or {MUCH_PA:g} mm", much, effects, of
     )
-    faults = tuple(sorted({f"{r.change}: {r.fault}" for r in rows if r.fault}))
-    largest = float(np.abs(losses).max(initial=0))
-    complete = len({row.change for row in rows}) > 1
-    return Effect(
-        number, rows[-1].line, rows[-1].old, cost, cost_one, gain, largest, faults, complete
-    )
-
-
-def is_much(loss: tuple[float, float, float], share: float = 1.0) -> bool:
-    """Whether points or millimetres are more than a share of what counts as much."""
-    pck, *errors = loss
-    return pck > share * MUCH_PCK or max(errors) > share * MUCH_PA
-
-
-def print_summary(rows: list[Row], unused: list[TunedNumber]) -> None:
-    """What matters, what does nothing, what cannot be varied."""
-    effects = summarise(rows)
-    clicks = [e for e in effects if e.number.startswith("clicks:")]
-    numbers = [e for e in effects if not e.number.startswith("clicks:")]
-    much = [e for e in numbers if is_much(e.cost)]
-    single = [e for e in numbers if not is_much(e.cost) and is_much(e.cost_one)]
-    better = [e for e in numbers if is_much(e.gain, 0.5)]
-    nothing = [e for e in numbers if e.largest < NOTHING and not e.faults and e.complete]
-    limits = f"{MUCH_PCK:g} points or {MUCH_PA:g} mm"
-    print_table(f"a quarter more or less costs more than {limits} on the mean", much)
-    print_table("the same on one clip, not on the mean", single)
-    print_table("a quarter more or less gains half of that on the mean", better)
-    print_table("clicks", clicks)
-    print(f"\nchange nothing (all under {NOTHING:g} points and mm): {len(nothing)}")
-    for e in nothing:
-        print(f"  {where(e)} = {e.old}")
-    print(f"\nin no code that these clips run: {len(unused)}")
+    nothing = [n for n, (q, w) in effects.items() if w.is_nothing and not q.is_much]
+    rest = [name for name in effects if name not in much and name not in nothing]
+    print_table("Less than that", rest, effects, of)
+    print(f"\n## Halved or doubled they change nothing ({len(nothing)})\n")
+    for name in nothing:
+        quiet = "no bit" if effects[name][1].same else f"less than {NOTHING:g} points and mm"
+        print(f"- `{name}` = {of[name][0].old}: {quiet}, {effects[name][1].clips} clips")
+    print(f"\n## In no code that these clips run ({len(unused)})\n")
     for number in unused:
-        print(f"  {number.module}:{number.line}:{number.name} = {shorten(number.values)}")
-    print("\ncannot be varied so:")
-    for e in numbers:
-        for fault in e.faults:
-            print(f"  {where(e)} {fault}")
+        print(f"- `{number.key}` = {shorten(number.values)}")
 
 
-def print_table(title: str, effects: list[Effect]) -> None:
-    """Costs and gains, the largest cost in space first."""
-    print(f"\n{title}: {len(effects)}")
-    head = "".join(f"{name:>8}" for name in ("PCK", "PA", "auto"))
-    print(f"{'':<62}{'value':>10} |{head} |{head} |{head}")
-    print(f"{'':<62}{'':>10} |{'mean loss':>24} |{'worst clip':>24} |{'mean gain':>24}")
-    for e in sorted(effects, key=lambda e: -max(e.cost[1:])):
-        groups = ("".join(f"{x:8.2f}" for x in part) for part in (e.cost, e.cost_one, e.gain))
-        print(f"{where(e):<62}{e.old:>10.10} |{' |'.join(groups)}")
-
-
-def where(effect: Effect) -> str:
-    """file:line:name."""
-    return effect.number.replace(":", f":{effect.line}:", 1) if effect.line else effect.number
+def print_table(
+    title: str,
+    names: list[str],
+    effects: dict[str, tuple[Effect, Effect]],
+    rows: dict[str, list[Row]],
+) -> None:
+    """Numbers with what they change, the largest change first."""
+    print(f"\n## {title} ({len(names)})\n")
+    print("| number | value | a quarter more or less | halved or doubled | clips |")
+    print("|---|---|---|---|---|")
+    for name in sorted(names, key=lambda n: -max(e.pa for e in effects[n])):
+        quarter, wide = effects[name]
+        clips = len({row.clip for row in rows[name]})
+        print(f"| `{name}` | {rows[name][0].old} | {quarter} | {wide} | {clips} |")

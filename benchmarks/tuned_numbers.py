@@ -15,6 +15,7 @@ import operator
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
@@ -30,6 +31,14 @@ ARITHMETIC = {
     ast.Pow: operator.pow,
     ast.LShift: operator.lshift,
 }
+FORMS = (
+    "lifting/priors/depth_model.py:DEPTH_MODEL_VERSION",
+    "lifting/priors/depth_model.py:TERMS",
+    "lifting/priors/depth_model.py:_INPUTS",
+    "numerics/banded_least_squares.py:STENCIL",
+    "numerics/blocks.py:WORKERS",
+)
+"""Formulas and what a file says of itself: there is nothing to tune."""
 SHAPES = ("dtype", "axis", "shape")
 """Arguments that are no numbers to be tuned."""
 Place = tuple[int, int, int, int]
@@ -70,7 +79,8 @@ def find_numbers(trees: dict[str, ast.Module]) -> list[TunedNumber]:
     for module, tree in trees.items():
         if module.split("/")[0] in FOLDERS:
             for name, value in _constants(tree):
-                found += _of_constant(module, name, value, fields)
+                if f"{module}:{name}" not in FORMS:
+                    found += _of_constant(module, name, value, fields)
             for record in _classes(tree):
                 if record.name in records:
                     found += _of_record(module, record)
@@ -113,21 +123,30 @@ def find_stages(trees: dict[str, ast.Module]) -> dict[str, str]:
     return {call.args[0].value: source[call.args[1].id] for call in calls}
 
 
-def first_stage(module: str, trees: dict[str, ast.Module], stages: dict[str, str]) -> str | None:
-    """The first stage that a module can affect: the first that imports it, however indirectly."""
-    return next((s for s, file in stages.items() if module in _reached(file, trees)), None)
+def stages_using(
+    number: TunedNumber,
+    trees: dict[str, ast.Module],
+    stages: dict[str, str],
+    called: dict[str, dict[str, set[str]]],
+) -> tuple[str, ...]:
+    """Stages in which code that ran mentions the number, in order; '' last for code between them.
 
-
-def is_used(number: TunedNumber, trees: dict[str, ast.Module], called: dict[str, set[str]]) -> bool:
-    """Whether code that ran mentions the number; `called`: names in the functions run, by module.
-
-    Code at the top level of a module and defaults of arguments have always run.
+    `called`: names in the functions run, by stage and module. Code at the top level of a module
+    and defaults of arguments count for all stages that import it, however indirectly.
     """
-    if not CONSTANT.match(number.symbol):
-        return any(number.symbol in names for names in called.values())
     homes = {number.module} | {m for m, t in trees.items() if _imports(t, number)}
-    at_import = any(number.symbol in _read_on_import(trees[m]) for m in homes)
-    return at_import or any(number.symbol in called.get(m, ()) for m in homes)
+    if CONSTANT.match(number.symbol):
+        at_import = {m for m in homes if number.symbol in _read_on_import(trees[m])}
+    else:
+        homes, at_import = set(trees), set()  # a field is mentioned wherever its record goes
+    found = []
+    for stage, modules in called.items():
+        used = any(number.symbol in modules.get(module, ()) for module in homes)
+        reached = _reached(stages[stage], trees) if stage else {number.module}
+        if (used and number.module in reached) or (stage and at_import & reached):
+            found.append(stage)
+    order = [*stages, ""]
+    return tuple(sorted(found, key=order.index))
 
 
 def code_digest(trees: dict[str, ast.Module]) -> str:
@@ -276,20 +295,23 @@ def _reached(file: str, trees: dict[str, ast.Module]) -> set[str]:
     return found
 
 
-def _imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
+@cache
+def _imported(tree: ast.Module) -> frozenset[tuple[str, str]]:
     """File and name of everything that is imported from the package."""
+    found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "keyrecon":
             for alias in node.names:
-                yield _file_of(node.module), alias.name
-                yield _file_of(f"{node.module}.{alias.name}"), ""
+                found.add((_file_of(node.module), alias.name))
+                found.add((_file_of(f"{node.module}.{alias.name}"), ""))
+    return frozenset(found)
 
 
 def _imports(tree: ast.Module, number: TunedNumber) -> bool:
-    return any(found in ((number.module, number.symbol), (number.module, "")) for found in
-               _imported(tree))  # fmt: skip
+    return bool({(number.module, number.symbol), (number.module, "")} & _imported(tree))
 
 
+@cache
 def _read_on_import(tree: ast.Module) -> set[str]:
     """Names that a module reads when it is imported: outside functions, and arguments' defaults."""
     found: set[str] = set()

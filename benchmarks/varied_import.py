@@ -2,7 +2,7 @@
 
 import ast
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.abc import MetaPathFinder, SourceLoader
 from importlib.machinery import ModuleSpec
 from importlib.util import spec_from_file_location
@@ -12,27 +12,30 @@ from tuned_numbers import PACKAGE, Place, rewrite
 
 
 class VariedImport(MetaPathFinder):
-    """Finds one module of the package, with other numbers; all others are found as ever."""
+    """Finds some modules of the package, with other numbers; all others are found as ever."""
 
-    def __init__(self, module: str, new: dict[Place, float]) -> None:
-        """`module`: the file below the package."""
-        self.file = str(PACKAGE / module)
-        self.name = "keyrecon." + module.removesuffix(".py").replace("/", ".")
-        self.new = new
+    def __init__(self, new: Mapping[str, Mapping[Place, float]]) -> None:
+        """`new`: numbers by the module's file below the package."""
+        self.new = {
+            "keyrecon." + module.removesuffix(".py").replace("/", "."): (module, numbers)
+            for module, numbers in new.items()
+        }
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """How to import the module."""
-        if name != self.name:
+        """How to import one of the modules."""
+        if name not in self.new:
             return None
-        return spec_from_file_location(name, self.file, loader=_Loader(self.file, self.new))
+        module, numbers = self.new[name]
+        file = str(PACKAGE / module)
+        return spec_from_file_location(name, file, loader=_Loader(file, numbers))
 
 
 class _Loader(SourceLoader):
     """Compiles the rewritten source; no compiled file is read or kept."""
 
-    def __init__(self, file: str, new: dict[Place, float]) -> None:
+    def __init__(self, file: str, new: Mapping[Place, float]) -> None:
         self.file = file
         self.new = new
 
@@ -50,9 +53,9 @@ class _Loader(SourceLoader):
         return compile(rewrite(ast.parse(self.get_data(self.file)), self.new), self.file, "exec")
 
 
-def vary_imports(module: str, new: dict[Place, float]) -> None:
-    """From now on the module is imported with other numbers at these places of its source."""
-    varied = VariedImport(module, new)
-    if varied.name in sys.modules:
-        raise RuntimeError(f"{varied.name} has been imported already.")
+def vary_imports(new: Mapping[str, Mapping[Place, float]]) -> None:
+    """From now on modules are imported with other numbers at these places of their source."""
+    varied = VariedImport(new)
+    if imported := varied.new.keys() & sys.modules.keys():
+        raise RuntimeError(f"{', '.join(sorted(imported))} imported already.")
     sys.meta_path.insert(0, varied)

@@ -114,12 +114,12 @@ class TransitionModel:
 
     sigma: float
     """Usual movement from one frame to the next."""
+    max_gap: int
+    """Longest gap that is bridged, frames."""
     max_cost: float = 8.0
     """Greatest cost of a movement: beyond it a jump is a jump."""
     skip_cost: float = 4.0
     """Cost of a frame without a state."""
-    max_gap: int = 25
-    """Longest gap that is bridged, frames."""
 
 
 def find_cheapest_track(

@@ -32,11 +32,11 @@ from keyrecon.tracking.candidates import PartCandidates, search_frame
 from keyrecon.tracking.foot_pairs import (
     COLOR_PRIOR,
     FOOT_SKIP_COST,
-    MAX_FOOT_GAP,
     MAX_PAIRS,
     foot_pairs,
     foot_pose_cost,
 )
+from keyrecon.tracking.linking import MAX_GAP_SECONDS
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.smoothing import (
     fill_gaps,
@@ -144,13 +144,16 @@ def _link(
     """The path of the head, then that of the feet."""
     from_reference = np.linalg.inv(camera.to_reference)
     searched = camera.to_reference[numbers]
-    step = height / video.fps * float(np.median(np.diff(numbers))) if len(numbers) > 1 else height
+    apart = float(np.median(np.diff(numbers))) if len(numbers) > 1 else video.fps
+    step, max_gap = height / video.fps * apart, round(MAX_GAP_SECONDS * video.fps / apart)
     marked_head, marked_feet = marked_places(anchors, numbers, camera)
     head_cost = _costs([c.head_score for c in candidates])
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
     stable, head_cost = anchored_states(stable, head_cost, marked_head)
-    chosen = find_cheapest_track(head_cost, stable, TransitionModel(options.head_speed * step))
+    chosen = find_cheapest_track(
+        head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
+    )
     if (chosen >= 0).mean() < MIN_DETECTED_SHARE:
         raise _missed_head(chosen, numbers)
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
@@ -158,9 +161,7 @@ def _link(
     stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
     stable, costs = anchored_states(stable, costs, marked_feet)
-    model = TransitionModel(
-        options.foot_speed * step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST
-    )
+    model = TransitionModel(options.foot_speed * step, max_gap, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)

@@ -11,9 +11,8 @@ from jaxtyping import Float, Int
 
 from keyrecon.segmentation.part_evidence import SHOE_RADIUS
 
-MAX_FOOT_GAP, FOOT_SKIP_COST = 12, 7.0
-"""Longest gap that a pair of feet is bridged over, linked frames, and the cost of each of them: a
-pair with one bad foot costs less, a wrong pair more."""
+FOOT_SKIP_COST = 7.0
+"""Cost of a frame without a pair of feet: one bad foot costs less, a wrong pair more."""
 MAX_PAIRS = 30
 """Pairs kept of each frame, the cheapest."""
 

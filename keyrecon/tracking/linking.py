@@ -21,7 +21,6 @@ from keyrecon.tracking.candidates import MIN_FOOT_SEPARATION
 from keyrecon.tracking.foot_pairs import (
     FILTER_PRIOR,
     FOOT_SKIP_COST,
-    MAX_FOOT_GAP,
     MAX_PAIRS,
     foot_pairs,
     foot_pose_cost,
@@ -46,6 +45,8 @@ HIDDEN_FOOT_RISE = 0.07
 higher up in the picture, and it is the shin that covers the foot."""
 MEMORY_SAMPLES = 6
 """Frames before and after that feet are propagated from, ever farther apart."""
+MAX_GAP_SECONDS = 2.0
+"""Longest time without head or feet that a path bridges: who is away for longer, came anew."""
 MAX_PROPAGATED = 8
 """Propagated feet of a frame, at most."""
 
@@ -69,6 +70,8 @@ class FootMotionModel:
 
     step: float
     """Usual movement from one frame to the next, px."""
+    max_gap: int
+    """Longest gap that is bridged, frames."""
     memory: int
     """Frames before and after that feet are propagated from."""
     occlusion_cost: float
@@ -98,18 +101,18 @@ def link_head(
     camera: CameraPath,
     cropping: Cropping,
     marked: Float[np.ndarray, "T 1 2"],
-    sigma: float,
+    model: TransitionModel,
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
-    """The head in the picture of every frame, and its confidence; `sigma` is its usual step, px.
+    """The head in the picture of every frame, and its confidence; `model`: how it moves, px.
 
     `marked` heads, in the reference frame, are passed through; NaN where there is none.
     """
     places = [cropping.to_picture(detected.heads, t) for t, detected in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(detected.head_strength) for detected in detections]
-    costs = with_bridge_costs(stable, costs, marked, sigma)
+    costs = with_bridge_costs(stable, costs, marked, model.sigma)
     stable, costs = anchored_states(stable, costs, marked)
-    chosen = find_cheapest_track(costs, stable, TransitionModel(sigma))
+    chosen = find_cheapest_track(costs, stable, model)
     from_reference = np.linalg.inv(camera.to_reference)
     head = fill_gaps(taken_states(stable, chosen), np.arange(len(detections)), from_reference)
     return head[:, 0], state_confidence(costs, chosen)
@@ -144,7 +147,7 @@ def link_feet(
     fixed = np.isfinite(marked).all(axis=(1, 2))
     sure = np.full((1, 2), ANCHOR_FOOT_COST)
     alone = [sure if f else p.each for p, f in zip(pairs, fixed, strict=True)]
-    model = TransitionModel(motion.step, max_gap=MAX_FOOT_GAP, skip_cost=FOOT_SKIP_COST)
+    model = TransitionModel(motion.step, motion.max_gap, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, places, model)
     each = taken_states(alone, taken)
     smooth = smooth_pairs(taken_states(places, taken), each, motion.stiffness)

@@ -20,6 +20,7 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.viterbi import TransitionModel
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import ForegroundModel
@@ -35,7 +36,13 @@ from keyrecon.tracking.correlation_filters import (
     spectrum,
     train_filters,
 )
-from keyrecon.tracking.linking import Detections, FootMotionModel, link_feet, link_head
+from keyrecon.tracking.linking import (
+    MAX_GAP_SECONDS,
+    Detections,
+    FootMotionModel,
+    link_feet,
+    link_head,
+)
 from keyrecon.tracking.radial_symmetry import find_peaks
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.visibility import is_visible
@@ -228,14 +235,14 @@ def _link(
     """The track through the detections; a foot behind the other one costs `occlusion_cost`."""
     camera, cropping, fps = frames.camera, frames.cropping, frames.fps
     step = float(np.median(frames.rough.height)) / fps
-    head, head_confidence = link_head(
-        detections, camera, cropping, frames.marked_head, options.head_speed * step
-    )
+    max_gap = round(MAX_GAP_SECONDS * fps)
+    motion = TransitionModel(options.head_speed * step, max_gap)
+    head, head_confidence = link_head(detections, camera, cropping, frames.marked_head, motion)
     stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
     memory = round(MEMORY_SECONDS * fps)
-    motion = FootMotionModel(options.foot_speed * step, memory, occlusion_cost, stiffness)
+    gait = FootMotionModel(options.foot_speed * step, max_gap, memory, occlusion_cost, stiffness)
     feet, feet_confidence = link_feet(
-        detections, camera, cropping, head, frames.rough.height, frames.marked_feet, motion
+        detections, camera, cropping, head, frames.rough.height, frames.marked_feet, gait
     )
     window = round(options.envelope * fps)
     height = standing_height(head, feet.mean(axis=1), frames.magnification, window)

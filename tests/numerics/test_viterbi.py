@@ -77,18 +77,19 @@ def test_a_lost_player_is_remembered_where_last_observed():
     both = np.concatenate([far, near])
     points = [near, near, empty, empty, both, both]
     unary = [np.zeros(len(p)) for p in points]
-    path = find_cheapest_track(unary, points, TransitionModel(sigma=1.0))
+    path = find_cheapest_track(unary, points, TransitionModel(sigma=1.0, max_gap=25))
     assert path.tolist() == [0, 0, -1, -1, 1, 1]
 
 
 def test_feet_that_swap_their_order_have_not_moved():
     pair = np.array([[[0.0, 0.0], [5.0, 0.0]]])
     points = [pair, pair[:, ::-1], pair]
-    model = TransitionModel(sigma=0.1, skip_cost=2.0)
+    model = TransitionModel(sigma=0.1, max_gap=25, skip_cost=2.0)
     assert find_cheapest_track([np.array([1.0])] * 3, points, model).tolist() == [0, 0, 0]
 
 
 def test_without_candidates_there_is_no_path():
     empty = np.zeros((0, 1, 2))
-    path = find_cheapest_track([np.zeros(0)] * 4, [empty] * 4, TransitionModel(sigma=1.0))
+    model = TransitionModel(sigma=1.0, max_gap=25)
+    path = find_cheapest_track([np.zeros(0)] * 4, [empty] * 4, model)
     assert path.tolist() == [-1] * 4

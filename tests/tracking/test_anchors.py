@@ -32,7 +32,7 @@ def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
     marked = np.full((9, 1, 2), np.nan)
     marked[4] = 500.0
     places, costs = anchored_states(states, [np.zeros(1)] * 9, marked)
-    taken = find_cheapest_track(costs, places, TransitionModel(1.0))
+    taken = find_cheapest_track(costs, places, TransitionModel(1.0, 25))
     assert taken[4] == 0
     assert (places[4] == 500).all()
 
@@ -42,11 +42,11 @@ def test_between_two_marks_a_head_is_not_taken_for_what_looks_more_like_one_far_
     marked[[0, 59]] = 0.0
     states, costs = [np.array([[[3.0, 0.0]], [[300.0, 0.0]]])] * 60, [np.array([1.5, 0.0])] * 60
     places, anchored = anchored_states(states, costs, marked)
-    strayed = find_cheapest_track(anchored, places, TransitionModel(2.0))
+    strayed = find_cheapest_track(anchored, places, TransitionModel(2.0, 25))
     assert (strayed[1:-1] == 1).all()
     costs = with_bridge_costs(states, costs, marked, 2.0)
     places, anchored = anchored_states(states, costs, marked)
-    assert (find_cheapest_track(anchored, places, TransitionModel(2.0)) == 0).all()
+    assert (find_cheapest_track(anchored, places, TransitionModel(2.0, 25)) == 0).all()
 
 
 def test_a_bridge_forgives_more_the_farther_a_mark_is_and_most_between_marks():

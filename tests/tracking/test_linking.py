@@ -32,7 +32,7 @@ def link(covered):
         mask = np.full([n // 2 for n in cropping.size], covered)
         detections.append(Detections(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
-    standing, motion = track(), FootMotionModel(0.04 * TALL, 50, 1.0, 1.0)
+    standing, motion = track(), FootMotionModel(0.04 * TALL, 25, 50, 1.0, 1.0)
     unmarked = np.full((len(detections), 2, 2), np.nan)
     return link_feet(detections, camera, cropping, standing.head, standing.height, unmarked, motion)
 
