@@ -19,14 +19,30 @@ GapCost = Callable[[Gaps, Gaps], Gaps]
 """Cost of the gaps between represented frames `left` and `right`, -1 and T at the ends."""
 
 
-def uncovered_cost(n_frames: int, reach: int) -> GapCost:
-    """Frames that are neither represented nor in a gap of at most `reach` (Eq. 1)."""
+def uncovered_cost(
+    n_frames: int, reach: int, elapsed: Int[np.ndarray, "ends"] | None = None
+) -> GapCost:
+    """Frames that are neither represented nor in a gap of at most `reach` (Eq. 1).
 
-    def cost(left: Gaps, right: Gaps) -> Gaps:
+    With `elapsed`, the time before each frame and at the end in hundredths of a frame, frames count
+    for the time that they take, and a gap is bridged that is no longer than `reach` in that time
+    either.
+    """
+
+    def count(left: Gaps, right: Gaps) -> Gaps:
         bridged = (left >= 0) & (right < n_frames) & (right - left <= reach)
         return (right - left - 1) * ~bridged
 
-    return cost
+    def measure(left: Gaps, right: Gaps) -> Gaps:
+        assert elapsed is not None
+        inside = elapsed[right] - elapsed[left + 1]
+        short = (right - left <= reach) & (inside <= (reach - 1) * TIME_UNIT)
+        return inside * ~((left >= 0) & (right < n_frames) & short)
+
+    return count if elapsed is None else measure
+
+TIME_UNIT = 100
+"""Of measured time, per frame: costs stay whole numbers, of which equal ones are found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +122,14 @@ def choose_greedily(
     uncovered: int,
     max_keyframes: int,
     tie: Float[np.ndarray, "M"],
+    elapsed: Int[np.ndarray, "ends"] | None = None,
 ) -> list[int]:
     """Candidates that each bridge or represent the most further frames, at most `max_keyframes`.
 
-    Stops when at most `uncovered` frames are left. Among equals the one that represents most
-    wins, then the one with the largest `tie` (0-1).
+    Stops when at most `uncovered` frames (with `elapsed`: hundredths of measured time) are left.
+    Among equals the one that represents most wins, then the one with the largest `tie` (0-1).
     """
-    cost = uncovered_cost(hoods.n_frames, reach)
+    cost = uncovered_cost(hoods.n_frames, reach, elapsed)
     everyone = np.arange(len(tie))
     chosen: list[int] = []
     represented = np.zeros(hoods.n_frames, dtype=bool)

@@ -21,7 +21,8 @@ from jaxtyping import Float, Int
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
-from keyrecon.keyframes.coverage import choose_greedily
+from keyrecon.keyframes.coverage import TIME_UNIT, choose_greedily
+from keyrecon.keyframes.pose_time import elapsed_time
 from keyrecon.keyframes.smoothing import smooth_distances
 from keyrecon.keyframes.swaps import (
     CoverageGoal,
@@ -65,6 +66,10 @@ class KeyframeOptions:
     smoothing: float = 0.6
     """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
     smooths. method='paper' smooths with the beta of the choice instead."""
+    pose_time: float = 0.35
+    """Share of time that is measured in pose change, 0-1: a frame counts as 1 less this, and as
+    much on average as its pose changes faster than on average. So strokes are covered as well as
+    waiting; 0 counts frames alone, as method='paper' does."""
     form: Literal["both", "mean"] = "both"
     """Smoothed distances: rows then columns averaged, or the mean of both averages."""
     method: Literal["coverage", "paper"] = "coverage"
@@ -84,6 +89,8 @@ class HalfDistances:
     exemplar_distance: Float[np.ndarray, "T"]
     reach: int
     uncovered: int
+    elapsed: Int[np.ndarray, "ends"]
+    """Measured time before each frame and at the end, hundredths of a frame."""
     options: KeyframeOptions
 
     def distances(self, beta: float) -> Float[np.ndarray, "M M"]:
@@ -98,7 +105,8 @@ class HalfDistances:
             self.distances(beta), self.pose_distances, self.exemplar_distance, beta
         )
         visibility_score = self.pose_distances.visibility_score[self.pose_distances.frames]
-        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score)
+        elapsed = None if self.options.method == "paper" else self.elapsed
+        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score, elapsed)
 
 
 def count_labels(options: KeyframeOptions, n_frames: int) -> int:
@@ -170,6 +178,7 @@ def _half(
         exemplar_distance=comparison.exemplar_distance[index],
         reach=reach,
         uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
+        elapsed=elapsed_time(comparison, index, reach, options.pose_time),
         options=options,
     )
 
@@ -200,9 +209,10 @@ def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list
     chosen = choose_greedily(
         goal.hoods,
         goal.reach,
-        goal.uncovered,
+        goal.allowed,
         max_keyframes + max_keyframes // 5 + 1,
         goal.visibility_score,
+        goal.elapsed,
     )
     return drop_redundant(goal, chosen)[:max_keyframes]
 
@@ -234,7 +244,12 @@ def _lower_beta(
     while beta * BETA_FACTOR > MIN_BETA:
         goal = half.goal(beta * BETA_FACTOR)
         start = choose_greedily(
-            goal.hoods, goal.reach, goal.uncovered, max_keyframes, goal.visibility_score
+            goal.hoods,
+            goal.reach,
+            goal.allowed,
+            max_keyframes,
+            goal.visibility_score,
+            goal.elapsed,
         )
         swapped = swap_for_coverage(goal, start)
         if not goal.reached(swapped):
@@ -257,7 +272,8 @@ def _move_to_medoids(
     which is worth half a percent of the distance.
     """
     unclear = 2 - goal.visibility_score - 0.005 * np.isin(half.pose_distances.frames, also)
-    members = np.bincount(half.pose_distances.row, minlength=len(goal.visibility_score))
+    row, time = half.pose_distances.row, np.diff(half.elapsed) / TIME_UNIT
+    members = np.bincount(row, time, minlength=len(goal.visibility_score))
     distance = half.smoothed * unclear[:, None].astype(half.smoothed.dtype)
     weight = members.astype(distance.dtype)
     chosen = add_medoids(chosen, max_keyframes, distance, weight)

@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.keyframes.coverage import (
+    TIME_UNIT,
+    GapCost,
     Neighborhoods,
     largest_gain,
     measure_gains,
@@ -36,19 +38,52 @@ class CoverageGoal:
     """Frames that may be left uncovered: (1 - alpha) of all."""
     visibility_score: Float[np.ndarray, "M"]
     """0-1: how well each candidate could be annotated."""
+    elapsed: Int[np.ndarray, "ends"] | None = None
+    """Time before each frame and at the end, hundredths of a frame, where it is measured in pose
+    change (`pose_time`): of it, too, no more than (1 - alpha) may be left uncovered."""
+
+    @property
+    def allowed(self) -> int:
+        """What may be left uncovered, of the measure that keyframes are chosen by."""
+        return self.uncovered * (1 if self.elapsed is None else TIME_UNIT)
 
     def left_over(self, represented: Bool[np.ndarray, "T"]) -> int:
         """Frames not covered."""
         return total_cost(represented, uncovered_cost(self.hoods.n_frames, self.reach))
 
+    def time_left(self, represented: Bool[np.ndarray, "T"]) -> int:
+        """What is not covered, in the measure that keyframes are chosen by."""
+        return total_cost(represented, self._cost())
+
     def reached(self, chosen: list[int]) -> bool:
-        """Whether Eq. 1 holds."""
-        return self.left_over(self.hoods.union(chosen)) <= self.uncovered
+        """Whether Eq. 1 holds, for frames and for measured time."""
+        represented = self.hoods.union(chosen)
+        enough = self.time_left(represented) <= self.allowed
+        return enough and self.left_over(represented) <= self.uncovered
+
+    def _cost(self) -> GapCost:
+        return uncovered_cost(self.hoods.n_frames, self.reach, self.elapsed)
 
     def replacements(self, others: list[int]) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
-        """Frames left uncovered with each candidate beside `others`, and how many it adds."""
+        """What is left uncovered with each candidate beside `others`, and how many frames it adds.
+
+        In the measure that keyframes are chosen by.
+        """
+        return self._replacements(others, self._cost())
+
+    def sufficient(self, others: list[int]) -> Bool[np.ndarray, "M"]:
+        """Candidates beside `others` with which the goal is reached."""
+        left, _ = self.replacements(others)
+        enough = left <= self.allowed
+        if self.elapsed is not None:
+            frames = uncovered_cost(self.hoods.n_frames, self.reach)
+            enough &= self._replacements(others, frames)[0] <= self.uncovered
+        return enough
+
+    def _replacements(
+        self, others: list[int], cost: GapCost
+    ) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
         represented = self.hoods.union(others)
-        cost = uncovered_cost(self.hoods.n_frames, self.reach)
         gain, added = measure_gains(
             self.hoods.without(represented),
             np.arange(len(self.visibility_score)),
@@ -70,11 +105,11 @@ def drop_redundant(goal: CoverageGoal, chosen: list[int]) -> list[int]:
 def swap_for_coverage(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     """As many keyframes that leave fewer frames uncovered; stops when the goal is reached."""
     chosen = list(chosen)
-    left = goal.left_over(goal.hoods.union(chosen))
+    left = goal.time_left(goal.hoods.union(chosen))
     for _ in range(MAX_ROUNDS):
         before = left
         for place in range(len(chosen)):
-            if left <= goal.uncovered:
+            if left <= goal.allowed:
                 return chosen
             left_with, added = goal.replacements(chosen[:place] + chosen[place + 1 :])
             best = largest_gain(-left_with, added, goal.visibility_score)
@@ -89,7 +124,7 @@ def shrink_by_swaps(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     """Fewer keyframes by dropping one and swapping the others, as long as that succeeds."""
     while len(chosen) > 1:
         others = [chosen[:place] + chosen[place + 1 :] for place in range(len(chosen))]
-        least = min(others, key=lambda kept: goal.left_over(goal.hoods.union(kept)))
+        least = min(others, key=lambda kept: goal.time_left(goal.hoods.union(kept)))
         fewer = swap_for_coverage(goal, least)
         if not goal.reached(fewer):
             break
@@ -122,16 +157,16 @@ def swap_medoids(
     """Keyframes nearer to the frames they stand for; the goal stays reached.
 
     distance(k, i) is what it costs that candidate k stands for row i, `weight` how many frames
-    row i stands for.
+    row i stands for, or how much time.
     """
     chosen = list(chosen)
     for _ in range(MAX_ROUNDS):
         changed = False
         for place, present in enumerate(chosen):
             others = chosen[:place] + chosen[place + 1 :]
-            left_with, _ = goal.replacements(others)
-            left_with[others] = goal.uncovered + 1
-            allowed = np.flatnonzero(left_with <= goal.uncovered)
+            sufficient = goal.sufficient(others)
+            sufficient[others] = False
+            allowed = np.flatnonzero(sufficient)
             nearest = distance[others].min(axis=0, initial=np.inf)
             total = np.full(len(weight), np.inf, distance.dtype)
             total[allowed] = np.minimum(distance[allowed], nearest) @ weight

@@ -1,0 +1,47 @@
+"""Time measured in pose change: a stroke takes as long as its poses differ, waiting hardly any.
+
+A serve lasts half a second of the ten that a player prepares for it, so that a choice which counts
+frames may leave it out and still cover 95 in a hundred. Measured in pose change a stroke is long.
+How fast the pose changes is the pose distance of the frames just before and just after: over a
+tenth of a second its rank correlation with the true speed of the joints is .80-.93 for the upper
+body on four rendered sequences, over one frame .61-.83, as contours differ by their noise too.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.keyframes.coverage import TIME_UNIT
+from keyrecon.records import PoseDistances
+
+STILL_SHARE = 0.1
+"""Share of the frames in which the pose does not change: what distance they have is noise."""
+
+
+def elapsed_time(
+    comparison: PoseDistances, half: int, reach: int, share: float
+) -> Int[np.ndarray, "ends"]:
+    """Time before each frame and at the end, hundredths of a frame; `half` 0 is the upper body.
+
+    A frame takes 1 - `share`, and `share` times how many times faster than on average its pose
+    changes, so that all frames together take as long as they are many. `reach` is what frames a
+    gap may have that is bridged; change is measured over half of it.
+    """
+    change = pose_change(comparison, half, max(1, reach // 4))
+    mean = change.mean() if len(change) else 0.0
+    weight = 1 - share + share * change / mean if mean > 0 else np.ones(len(change))
+    return np.rint(TIME_UNIT * np.concatenate([[0.0], np.cumsum(weight)])).astype(np.int64)
+
+
+def pose_change(comparison: PoseDistances, half: int, lag: int) -> Float[np.ndarray, "T"]:
+    """Pose distance between `lag` frames before and after each frame, less the noise of a still
+    pose; player heights."""
+    table = comparison.upper if half == 0 else comparison.lower
+    frames = np.arange(len(comparison.row))
+    before, after = np.maximum(frames - lag, 0), np.minimum(frames + lag, len(frames) - 1)
+    row, apart = comparison.row, comparison.exemplar_distance[half]
+    same = row[before] == row[after]
+    distance = table[row[before], row[after]]
+    distance = np.where(same, np.maximum(apart[before], apart[after]), distance).astype(float)
+    # at the ends the two are nearer in time
+    distance *= 2 * lag / np.maximum(after - before, 1)
+    return np.maximum(distance - np.quantile(distance, STILL_SHARE), 0.0)
