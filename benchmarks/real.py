@@ -39,10 +39,15 @@ from keyrecon.io.formats.coco import read_coco
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, open_video
 from keyrecon.library import reconstruct
-from keyrecon.pipeline import Options, frames_off_marks, prepare
+from keyrecon.pipeline import (
+    Options,
+    frames_off_marks,
+    frames_to_mark,
+    prepare,
+    with_marked_keyframes,
+)
 from keyrecon.records import Annotations, Keyframes, Motion
 from keyrecon.report.drawing import draw_pose
-from keyrecon.tracking.anchors import least_sure_frames
 
 ROOT = Path(__file__).parent.parent
 VIDEOS = ROOT.parent / "shared" / "data" / "video"
@@ -163,11 +168,11 @@ def solve(clip: Clip, cost: float, work: Path) -> Result:
     options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
     first = choose_bodies(clip, 1)
     preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
-    unsure = least_sure_frames(
-        preparation.track, clip.truth.frames[first], clip.video.fps, MORE_BODIES
-    )
+    unsure = frames_to_mark(preparation, clip.truth.frames[first], MORE_BODIES, options)
     first = np.union1d(first, nearest_rows(clip, unsure))
-    preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
+    bodies = take(clip, first, first)
+    preparation = prepare(clip.video, (), options, store.keep, show, bodies)
+    preparation = with_marked_keyframes(preparation, bodies, options)
     marks = mark_keyframes(clip, preparation.keyframes, first)
     if len(frames_off_marks(preparation, marks)):
         preparation = prepare(clip.video, (), options, store.keep, show, marks)

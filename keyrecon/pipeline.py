@@ -19,6 +19,7 @@ from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.video import Video
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
+from keyrecon.keyframes.pose_time import pose_seconds
 from keyrecon.keyframes.selection import (
     KeyframeOptions,
     adopt_keyframes,
@@ -43,7 +44,7 @@ from keyrecon.segmentation.background_model import BackgroundOptions, build_back
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
 from keyrecon.segmentation.contours import EdgeOptions, find_edges
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
-from keyrecon.tracking.anchors import contradicted_frames
+from keyrecon.tracking.anchors import contradicted_frames, least_sure_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
@@ -195,11 +196,24 @@ def prepare(
         options=options.keyframes,
         progress=progress,
     )
-    if marks is not None:
-        keyframes = keep_marked(
-            distances, keyframes, marked_frames(marks), options.keyframes, progress
-        )
     return Preparation(video, camera, colors, track, background, contours, distances, keyframes)
+
+
+def with_marked_keyframes(
+    preparation: Preparation,
+    marks: Annotations,
+    options: Options = Options(),
+    progress: Progress = silent,
+) -> Preparation:
+    """The same with the frames that are marked already among the keyframes."""
+    keyframes = keep_marked(
+        preparation.pose_distances,
+        preparation.keyframes,
+        marked_frames(marks),
+        options.keyframes,
+        progress,
+    )
+    return replace(preparation, keyframes=keyframes)
 
 
 def marked_frames(marks: Annotations) -> tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]]:
@@ -218,6 +232,21 @@ def frames_off_marks(preparation: Preparation, marks: Annotations) -> Int[np.nda
     Where there are any, `prepare` with these marks follows the player anew.
     """
     return contradicted_frames(preparation.track, anchors_from_bodies(marks))
+
+
+def frames_to_mark(
+    preparation: Preparation,
+    marked: Int[np.ndarray, "n"],
+    count: int,
+    options: Options = Options(),
+) -> Int[np.ndarray, "m"]:
+    """Frames in which a whole body would teach most, in addition to those marked.
+
+    Where the track is least sure, and where the pose has changed most since the nearest mark.
+    """
+    fps, share = preparation.video.fps, options.keyframes.pose_time
+    time = pose_seconds(preparation.pose_distances, fps, share)
+    return least_sure_frames(preparation.track, marked, fps, count, time)
 
 
 def reconstruct(

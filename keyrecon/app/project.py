@@ -26,16 +26,16 @@ from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
-from keyrecon.keyframes.selection import KeyframeOptions, keep_marked
+from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import (
     Options,
     as_printed,
     frames_off_marks,
-    marked_frames,
     prepare,
     with_height,
+    with_marked_keyframes,
 )
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick, Preparation
@@ -150,14 +150,7 @@ def find_keyframes(
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
     preparation = prepare_with_marks(workspace, video, marks, forms, progress)
     if marks is not None and not printed:
-        kept = keep_marked(
-            preparation.pose_distances,
-            preparation.keyframes,
-            marked_frames(marks),
-            options.keyframes,
-            progress,
-        )
-        preparation = replace(preparation, keyframes=kept)
+        preparation = with_marked_keyframes(preparation, marks, options, progress)
     workspace.remember(options, Options())
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)

@@ -41,6 +41,7 @@ def uncovered_cost(
 
     return count if elapsed is None else measure
 
+
 TIME_UNIT = 100
 """Of measured time, per frame: costs stay whole numbers, of which equal ones are found."""
 

@@ -15,6 +15,8 @@ from keyrecon.records import PoseDistances
 
 STILL_SHARE = 0.1
 """Share of the frames in which the pose does not change: what distance they have is noise."""
+REACH_SECONDS = 0.2
+"""T of Eq. 1 (`KeyframeOptions.reach`)."""
 
 
 def elapsed_time(
@@ -30,6 +32,13 @@ def elapsed_time(
     mean = change.mean() if len(change) else 0.0
     weight = 1 - share + share * change / mean if mean > 0 else np.ones(len(change))
     return np.rint(TIME_UNIT * np.concatenate([[0.0], np.cumsum(weight)])).astype(np.int64)
+
+
+def pose_seconds(comparison: PoseDistances, fps: float, share: float) -> Float[np.ndarray, "T"]:
+    """Seconds up to each frame measured so, the mean of both halves of the body."""
+    reach = max(1, round(REACH_SECONDS * fps))
+    elapsed = np.mean([elapsed_time(comparison, half, reach, share) for half in (0, 1)], axis=0)
+    return elapsed[:-1] / (TIME_UNIT * fps)
 
 
 def pose_change(comparison: PoseDistances, half: int, lag: int) -> Float[np.ndarray, "T"]:

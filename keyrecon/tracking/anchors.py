@@ -113,18 +113,24 @@ def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, 
 
 
 def least_sure_frames(
-    track: Track, marked: Int[np.ndarray, "n"], fps: float, count: int
+    track: Track,
+    marked: Int[np.ndarray, "n"],
+    fps: float,
+    count: int,
+    time: Float[np.ndarray, "T"] | None = None,
 ) -> Int[np.ndarray, "m"]:
     """Frames in which a whole body, marked next, would teach most: the track is least sure there.
 
     A frame counts by the doubt around it and by the time to the nearest marked frame, which it
-    counts as itself once it is chosen: marks teach what lies near them in time.
+    counts as itself once it is chosen: marks teach what lies near them in time. `time` of each
+    frame, seconds, may be another than the video's (`pose_seconds`).
     """
     doubt = 1 - uniform_filter1d(track.confidence, max(1, round(DOUBT_SECONDS * fps)))
-    frames, chosen = np.arange(len(doubt)), list(marked.tolist())
+    chosen = list(marked.tolist())
+    time = np.arange(len(doubt)) / fps if time is None else time
     for _ in range(count):
-        nearest = np.abs(frames[:, None] - np.array(chosen or [-fps * FAR_SECONDS])).min(axis=1)
-        value = (LEAST_DOUBT + doubt) * np.minimum(nearest / fps, FAR_SECONDS)
+        apart = np.abs(time[:, None] - time[chosen]).min(axis=1, initial=FAR_SECONDS)
+        value = (LEAST_DOUBT + doubt) * apart
         if value.max() <= 0:
             break
         chosen.append(int(value.argmax()))

@@ -58,7 +58,8 @@ def test_frames_that_are_all_the_same_need_no_particular_keyframe():
 
 def test_choosing_for_coverage_beats_the_choice_as_printed_at_equal_beta(comparison):
     for beta in (0.01, 0.02):
-        options = KeyframeOptions(beta_upper=beta, beta_lower=beta)
+        # both count frames: to cover strokes in pose change too takes more keyframes
+        options = KeyframeOptions(beta_upper=beta, beta_lower=beta, pose_time=0.0)
         chosen = choose_keyframes(comparison, 50.0, options)
         assert len(chosen.upper.frames) < chosen.upper.printed_count
         assert len(chosen.lower.frames) <= chosen.lower.printed_count

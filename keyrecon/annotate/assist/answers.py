@@ -25,8 +25,8 @@ from keyrecon.annotate.assist.project_cache import ProjectCache
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import frames_to_mark
 from keyrecon.records import Annotations, Pick
-from keyrecon.tracking.anchors import least_sure_frames
 
 MIN_CERTAINTY = 0.8
 """Of the depth signs that come with a suggestion: nine in ten are right."""
@@ -79,7 +79,7 @@ def describe_bodies(cache: ProjectCache) -> list[Json] | None:
     if preparation is None or not len(marked):
         return None
     track = preparation.track
-    frames = least_sure_frames(track, marked, preparation.video.fps, MORE_BODIES)
+    frames = frames_to_mark(preparation, marked, MORE_BODIES)
     return [{"frame": int(t), "box": _rounded(track.box[t], 1)} for t in frames]
 
 
