@@ -173,11 +173,12 @@ def solve(clip: Clip, cost: float, work: Path) -> Result:
     bodies = take(clip, first, first)
     preparation = prepare(clip.video, (), options, store.keep, show, bodies)
     preparation = with_marked_keyframes(preparation, bodies, options)
-    marks = mark_keyframes(clip, preparation.keyframes, first)
+    asked = preparation.keyframes
+    marks = mark_keyframes(clip, asked, first)
     if len(frames_off_marks(preparation, marks)):
         preparation = prepare(clip.video, (), options, store.keep, show, marks)
     motion = reconstruct(preparation, marks, options, store.keep, show)
-    return Result(clip, preparation.keyframes, marks, motion, time.perf_counter() - began)
+    return Result(clip, asked, marks, motion, time.perf_counter() - began)
 
 
 def interpolate_lines(marks: Annotations, count: int) -> np.ndarray:
