@@ -189,13 +189,12 @@ def _prior_costs(
     limit_weight: float,
     expected_depth_weight: float,
 ) -> tuple[Float[np.ndarray, "T S"], list[Float[np.ndarray, "T S _"]]]:
-    """Cost of every trunk state, and of every limb state given it.
-
-    The depth model is not asked about the trunk: its lean cannot be told from a camera that looks
-    down, so what a model expects there tells of cameras.
-    """
+    """Cost of every trunk state, and of every limb state given it."""
     trunk, limbs = _limit_costs(bones, breadths, anatomy)
-    return limit_weight * trunk, [
+    trunk = limit_weight * trunk
+    if anatomy.trunk:
+        trunk += expected_depth_weight * _expected_depth_cost(anatomy.trunk, bones)
+    return trunk, [
         limit_weight * cost
         + expected_depth_weight * _expected_depth_cost(limb.bones, bones)[:, None]
         for limb, cost in zip(anatomy.limbs, limbs, strict=True)

@@ -120,7 +120,15 @@ def _fit_window(
         )
         signs = track_depth_signs(bones, exemplars, size.breadths, skeleton, sign_options)
         start = MotionState(joints[:, skeleton.root], lift_foreshortened(bones, signs.sign))
-        state = refine_motion(start, observed, initial.directions, size, fps, refine_options)
+        state = refine_motion(
+            start,
+            observed,
+            initial.directions,
+            size,
+            fps,
+            refine_options,
+            bones.expected_depth / lengths,
+        )
         joints, noise = state.points(lengths, skeleton)[..., :2], _FITTED_NOISE
         directions = _fitted_key_directions(keys, state)
     return state

@@ -16,6 +16,8 @@ from jaxtyping import Float
 from keyrecon.body import Skeleton
 from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.numerics.banded_least_squares import (
+    STENCIL,
+    add_second_differences,
     apply_bands,
     band_from_blocks,
     second_difference_bands,
@@ -58,10 +60,19 @@ Term = Callable[[MotionState], LinearizedTerm]
 
 @dataclass(frozen=True, eq=False)
 class Smoothness:
-    """Penalty on second differences in time: weights of the root and of each bone's direction."""
+    """Penalty on second differences in time that leave the expected ones; S is T - 2."""
 
     root: float
-    bones: Float[np.ndarray, "B"]
+    bones: Float[np.ndarray, "S B 3"]
+    """Weights of each bone's direction."""
+    expected: Float[np.ndarray, "S B 3"]
+    """Second differences of bone directions that cost nothing."""
+
+    @classmethod
+    def even(cls, frames: int, root: float, bones: Float[np.ndarray, "B"]) -> "Smoothness":
+        """The same at all times, and nothing but constant velocity is free."""
+        weights = np.broadcast_to(bones[:, None], (max(frames - 2, 0), len(bones), 3))
+        return cls(root, weights, np.zeros_like(weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +129,11 @@ def _cost(
         0.5 * float((term.residual**2).sum()) if term.cost is None else term.cost
         for term in linearized
     )
-    bend = (np.diff(state.directions, 2, axis=0) ** 2).sum(axis=(0, 2)) @ smoothness.bones
-    return total + 0.5 * float(bend + smoothness.root * (np.diff(state.root, 2, axis=0) ** 2).sum())
+    bend = np.diff(state.directions, 2, axis=0) - smoothness.expected
+    leap = np.diff(state.root, 2, axis=0)
+    return total + 0.5 * float(
+        (smoothness.bones * bend**2).sum() + smoothness.root * (leap**2).sum()
+    )
 
 
 def _step(
@@ -128,17 +142,21 @@ def _step(
     basis = tangents(state.directions)
     hessian, gradient = _gather(linearized, basis)
     frames, size = gradient.shape
-    weights = np.concatenate([[smoothness.root] * 2, np.repeat(smoothness.bones, 2)])
     bands = second_difference_bands(frames)
-    flat = np.concatenate([state.root, state.directions.reshape(frames, -1)], axis=1)
-    pull = apply_bands(bands, flat)
-    gradient[:, :2] += smoothness.root * pull[:, :2]
-    bend = np.einsum("tbik,tbi->tbk", basis, pull[:, 2:].reshape(state.directions.shape))
-    gradient[:, 2:] += (smoothness.bones[:, None] * bend).reshape(frames, -1)
+    gradient[:, :2] += smoothness.root * apply_bands(bands, state.root)
+    stiffness = np.zeros((3, *state.directions.shape))
+    add_second_differences(list(stiffness), smoothness.bones)
+    expected = np.zeros_like(state.directions)
+    for place, factor in enumerate(STENCIL):
+        part = expected[place : place + len(smoothness.bones)]
+        part += factor * smoothness.bones * smoothness.expected
+    pull = apply_bands(stiffness, state.directions) - expected
+    gradient[:, 2:] += (basis * pull[..., None]).sum(axis=2).reshape(frames, -1)
     diagonal = np.arange(size)
     hessian[:, diagonal, diagonal] *= 1 + damping
-    hessian[:, diagonal, diagonal] += bands[0][:, None] * weights + 1e-9
-    banded = _banded(hessian, basis, bands, smoothness)
+    hessian[:, diagonal, diagonal] += 1e-9
+    hessian[:, diagonal[:2], diagonal[:2]] += smoothness.root * bands[0][:, None]
+    banded = _banded(hessian, basis, smoothness.root * bands, stiffness)
     return -solve_banded(banded, gradient.ravel()).reshape(frames, size)
 
 
@@ -165,20 +183,25 @@ def _gather(
 def _banded(
     hessian: Float[np.ndarray, "T D D"],
     basis: Float[np.ndarray, "T B 3 2"],
-    bands: Float[np.ndarray, "3 T"],
-    smoothness: Smoothness,
+    root: Float[np.ndarray, "3 T"],
+    bones: Float[np.ndarray, "3 T B 3"],
 ) -> Float[np.ndarray, "w n"]:
-    """The normal matrix in scipy's lower banded form; unknowns ordered frame by frame."""
+    """The normal matrix in scipy's lower banded form; unknowns ordered frame by frame.
+
+    `root` and `bones`: diagonals of the smoothness.
+    """
     frames, size, _ = hessian.shape
     # a bone is coupled with itself alone: nothing lies farther off than two frames and one
     banded = band_from_blocks([hessian.swapaxes(1, 2)], 2 * size + 2).reshape(-1, frames, size)
-    for offset in (1, 2):
-        band = bands[offset][:-offset]
-        banded[offset * size, :-offset, :2] += smoothness.root * band[:, None]
-        product = np.einsum("tbik,tbil->tbkl", basis[:-offset], basis[offset:])  # (T-k, B, 2, 2)
-        product *= band[:, None, None, None] * smoothness.bones[:, None, None]
+    for offset in (0, 1, 2):
+        until = frames - offset
+        if offset:
+            banded[offset * size, :until, :2] += root[offset, :until, None]
+        weighted = bones[offset, :until, ..., None] * basis[:until]
         for here in range(2):
             for there in range(2):
                 row = offset * size + there - here
-                banded[row, :-offset, 2 + here :: 2] += product[:, :, here, there]
+                if row >= 0:
+                    product = (weighted[..., here] * basis[offset:, ..., there]).sum(axis=-1)
+                    banded[row, :until, 2 + here :: 2] += product
     return banded.reshape(2 * size + 2, frames * size)

@@ -113,6 +113,27 @@ def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Ter
     return term
 
 
+def depth_prior(
+    shares: Float[np.ndarray, "T B"], spread: Float[np.ndarray, "B"], weight: float
+) -> Term:
+    """Depths of bones, as shares of their lengths, are those expected; NaN expects nothing.
+
+    Quadratic within `spread`, linear beyond (pseudo-Huber): some poses are not what was learnt.
+    """
+    known, bones = np.isfinite(shares), np.arange(len(spread))
+    wanted = np.nan_to_num(shares)
+
+    def term(state: MotionState) -> LinearizedTerm:
+        off = np.where(known, (state.directions[..., 2] - wanted) / spread, 0.0)
+        size = np.sqrt(1 + off**2)
+        root = np.sqrt(weight / size)
+        slope = np.zeros((len(off), len(bones), len(bones), 3))
+        slope[:, bones, bones, 2] = np.where(known, root / spread, 0.0)
+        return LinearizedTerm(root * off, slope, None, weight * float((size - 1).sum()))
+
+    return term
+
+
 def unseen_bend(
     bones: tuple[int, int],
     start: Float[np.ndarray, "T B 3"],

@@ -17,10 +17,11 @@ STENCIL = (1, -2, 1)
 
 
 def add_second_differences(
-    diagonals: Sequence[Float[np.ndarray, "T *n"]], weight: float | Float[np.ndarray, "*n"] = 1.0
+    diagonals: Sequence[Float[np.ndarray, "T *n"]], weight: float | Float[np.ndarray, "..."] = 1.0
 ) -> None:
-    """Add `weight` times D'D to the main, first and second diagonal, in place.
+    """Add D' `weight` D to the main, first and second diagonal, in place.
 
+    `weight`: one, one for each column (*n), or one for each second difference too (T - 2, *n).
     Entry t of diagonal k couples frames t and t + k; the last k entries are not used. Fewer than
     three frames have no second difference.
     """
@@ -39,12 +40,16 @@ def second_difference_bands(count: int) -> Float[np.ndarray, "3 T"]:
 
 
 def apply_bands(
-    bands: Float[np.ndarray, "3 T"], values: Float[np.ndarray, "T n"]
-) -> Float[np.ndarray, "T n"]:
-    """The symmetric matrix of these diagonals times `values`."""
-    result = bands[0][:, None] * values
+    bands: Float[np.ndarray, "3 T *m"], values: Float[np.ndarray, "T *n"]
+) -> Float[np.ndarray, "T *n"]:
+    """The symmetric matrix of these diagonals times `values`.
+
+    The diagonals are the same for all columns of `values`, or each column has its own.
+    """
+    bands = bands.reshape(*bands.shape, *[1] * (values.ndim + 1 - bands.ndim))
+    result = bands[0] * values
     for offset in (1, 2):
-        band = bands[offset][:-offset, None]
+        band = bands[offset][:-offset]
         result[:-offset] += band * values[offset:]
         result[offset:] += band * values[:-offset]
     return result

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import LSP14
 from keyrecon.lifting import terms
 from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.foreshortening import depth_share, log_density
 from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
+from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
+from keyrecon.lifting.refinement import refine_motion, tilted_as
 from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
 from keyrecon.lifting.terms import unseen_bend
 from keyrecon.numerics.geometry import unit_vectors
@@ -170,7 +173,7 @@ def test_the_solver_returns_to_the_truth_from_a_disturbed_start():
         truth.root + 0.02, unit_vectors(truth.directions + [0.05, -0.05, 0] + deep * [0, 0, 1])
     )
     term = terms.reprojection(known(observed, 0.005), LENGTHS, LSP14)
-    smoothness = Smoothness(1e2, 1e2 * LENGTHS**2)
+    smoothness = Smoothness.even(80, 1e2, 1e2 * LENGTHS**2)
     found = solve(start, [term], smoothness, 40, 1e-8)
     error = np.linalg.norm(positions(found) - positions(truth), axis=-1)
     assert np.median(error) < 0.005
@@ -181,7 +184,7 @@ def test_a_solver_step_never_raises_the_cost():
     rng = np.random.default_rng(5)
     observed = positions(truth)[..., :2] + rng.normal(0, 0.05, (40, 14, 2))
     term = terms.reprojection(known(observed, 0.01), LENGTHS, LSP14)
-    smoothness = Smoothness(1e3, 1e3 * LENGTHS**2)
+    smoothness = Smoothness.even(40, 1e3, 1e3 * LENGTHS**2)
     costs = [term(solve(truth, [term], smoothness, rounds, 0.0)).cost for rounds in (0, 1, 3, 8)]
     assert costs[-1] < costs[0]
 
@@ -197,7 +200,7 @@ def test_what_a_person_marked_holds_against_outlying_neighbours():
         observed = known(displaced, 0.02)
         observed.spread[marked], observed.huber_delta[marked] = 0.007, delta
         term = terms.reprojection(observed, LENGTHS, LSP14)
-        found = solve(truth, [term], Smoothness(1e4, 1e4 * LENGTHS**2), 20, 1e-6)
+        found = solve(truth, [term], Smoothness.even(60, 1e4, 1e4 * LENGTHS**2), 20, 1e-6)
         off[delta] = np.linalg.norm(positions(found)[marked, wrist, :2] - joints[marked, wrist])
     assert off[np.inf] < 0.5 * off[HUBER_DELTA]
 
@@ -236,7 +239,7 @@ def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
     term = terms.balance(share, 0.1, 0.05)
     assert np.abs(term(MotionState(np.zeros((5, 2)), upright)).residual).max() < 1e-9
     solved = solve(
-        MotionState(np.zeros((5, 2)), leaning), [term], Smoothness(1.0, LENGTHS), 20, 1e-9
+        MotionState(np.zeros((5, 2)), leaning), [term], Smoothness.even(5, 1.0, LENGTHS), 20, 1e-9
     )
     assert np.abs(term(solved).residual).max() < 0.01
 
@@ -271,3 +274,54 @@ def test_the_slope_of_an_unseen_bend_is_that_of_its_cost():
         moved[0, bone, axis] += 1e-6
         slope = (term(MotionState(np.zeros((1, 2)), moved)).cost - line.cost) / 1e-6
         assert slope == pytest.approx(gradient[0, bone, axis], abs=1e-4)
+
+
+def swinging_arm(frames=120, fps=50.0):
+    """A body that rests, but for one arm that swings by 170 degrees within 0.3 s."""
+    state = MotionState(np.zeros((frames, 2)), np.tile(unit_vectors(np.ones(3)), (frames, 13, 1)))
+    bones = [b for b, (_, end) in enumerate(LSP14.bones) if LSP14.names[end].startswith("right_")]
+    arm = [b for b in bones if LSP14.names[LSP14.bones[b, 1]][6:] in ("elbow", "wrist")]
+    angle = np.radians(170) / (1 + np.exp(-(np.arange(frames) - frames / 2) / (0.05 * fps)))
+    swing = np.stack([np.cos(angle), np.sin(angle) * 0.8, np.sin(angle) * 0.6], axis=-1)
+    state.directions[:, arm] = swing[:, None]
+    return state
+
+
+def test_a_stroke_keeps_its_speed_and_rest_stays_still():
+    truth, wrist = swinging_arm(), LSP14.index("right_wrist")
+    rng = np.random.default_rng(2)
+    drift = gaussian_filter1d(rng.normal(0, 0.03, (120, 14, 2)), 4, axis=0)
+    observed = known(positions(truth)[..., :2] + drift, 0.03)
+    size = BodySize(LSP14, LENGTHS, np.array([0.145, 0.258]), np.full(120, 400.0))
+    flat = np.linspace(truth.directions[0], truth.directions[-1], 120)
+    found = refine_motion(truth, observed, unit_vectors(flat + 1e-6), size, 50.0)
+    speed, wanted = (
+        np.linalg.norm(np.diff(positions(state)[:, wrist], axis=0), axis=-1).max()
+        for state in (found, truth)
+    )
+    assert 0.9 < speed / wanted < 1.1
+    rest = np.diff(positions(found)[:40, LSP14.index("left_knee")], 2, axis=0)
+    assert np.abs(rest).max() < 0.002
+
+
+def test_a_depth_prior_turns_a_bone_to_where_it_is_expected_and_nothing_else():
+    state = smooth_state(5)
+    shares = np.full((5, 13), np.nan)
+    shares[:, 4] = 0.8 * state.directions[:, 4, 2]
+    term = terms.depth_prior(shares, np.full(13, 0.1), 1.0)
+    found = solve(state, [term], Smoothness.even(5, 1.0, 0 * LENGTHS), 30, 1e-12)
+    np.testing.assert_allclose(found.directions[:, 4, 2], shares[:, 4], atol=1e-3)
+    others = np.arange(13) != 4
+    np.testing.assert_allclose(found.directions[:, others], state.directions[:, others], atol=1e-6)
+
+
+def test_expected_depths_aretilted_as_the_motion_is():
+    rng = np.random.default_rng(3)
+    expected = unit_vectors(rng.normal(size=(50, 13, 3)))
+    angle = np.radians(15)
+    turn = np.array(
+        [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]]
+    )
+    found = tilted_as(expected[..., 2], expected @ turn.T)
+    before = np.abs(expected[..., 2] - (expected @ turn.T)[..., 2]).mean()
+    assert np.abs(found - (expected @ turn.T)[..., 2]).mean() < 0.4 * before

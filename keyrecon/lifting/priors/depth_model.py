@@ -4,9 +4,10 @@ A flat picture of a whole body says more about depth than joint limits can put i
 way an arm reaches depends on how hips, shoulders and the other limbs are placed. The rule is a
 polynomial of second degree in the picture of the 13 bones, in shares of their lengths: both
 in-plane parts, and how much is left for depth (Taylor's sqrt(1 - q^2)). Its coefficients give the
-depths of captured people, filmed from all around, with the least squared error. Only the sign of
-what it gives is of interest here, since lengths tell the rest better; a value near zero says that
-the picture fits both signs, and then it does not count.
+depths of captured people, filmed from all around, with the least squared error. It helps to choose
+signs, and its expectation is a prior on depth itself (`depth_spread`): near the picture's plane,
+where legs and trunks mostly are, foreshortening tells less. A value near zero may also say that
+the picture fits both signs.
 
 The training poses are captured ones, varied and filmed from all around: mirrored or not, each
 limb turned a little as other people would hold it, filmed by a camera from any side and from a
@@ -91,6 +92,28 @@ def expected_depth(
     flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
     expected[:, places] = model.depth_shares(flat) * lengths[places]
     return expected
+
+
+def depth_spread(skeleton: Skeleton) -> Float[np.ndarray, "B"]:
+    """Error of a depth model for each bone, in lengths of the bone; infinite for unknown bones.
+
+    Root mean square over captures of two players in turn, filmed from all around, with models
+    learnt from nine players less the one (`DepthTrainingOptions` without turned limbs).
+    """
+    ends = [skeleton.names[child].split("_")[-1] for _, child in skeleton.bones]
+    return np.array([_SPREAD.get(end, np.inf) for end in ends])
+
+
+_SPREAD = {
+    "hip": 0.13,
+    "shoulder": 0.21,
+    "top": 0.18,
+    "knee": 0.18,
+    "ankle": 0.18,
+    "elbow": 0.25,
+    "wrist": 0.25,
+}
+"""By the far end of the bone: for instance 0.18 for a thigh, whose end is the knee."""
 
 
 def _places(skeleton: Skeleton) -> list[int] | None:
