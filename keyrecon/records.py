@@ -289,3 +289,5 @@ class Motion:
     """'m' where a height was given, else 'body heights'."""
     keyframes: Int[np.ndarray, "K"]
     """Annotated frames."""
+    expected_error: Float[np.ndarray, "T J"] | None = None
+    """Expected distance of `points2d` from the joints, px; None where it is not known."""

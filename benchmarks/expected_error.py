@@ -1,0 +1,183 @@
+"""The tables of keyrecon/uncertainty.py, from real clips whose joints were marked by eye.
+
+    python benchmarks/expected_error.py [--work DIR] [--only NAME ...] [--half develop|report]
+
+Takes every clip as benchmarks/real.py does (with the same `--work` what it stored is found again) and
+holds the refined joints against the marks by eye that nobody made for the program. Prints
+
+    reliability    joints by the error that was expected of them, in eight groups of like size: what
+                   was expected and what it was, in player heights. Each clip is predicted by
+                   tables that were fitted to the other clips
+    clips          the same for each clip, as actual over expected
+    others         what speed (heights per frame) and the time to the nearest mark would add:
+                   mean of log p + error / p, smaller is better, and the rank correlation
+    stretches      arms, legs and heads of frames that would be reported (mean expected error above
+                   UNCERTAIN): how many of them have a joint that is off by more than .08 and
+                   .05 heights, and how many of those that have are reported
+    tables         to be put into keyrecon/uncertainty.py
+
+With `--half report` nothing is fitted: the tables that are there are measured on those clips.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import real
+from scipy.optimize import isotonic_regression
+from scipy.stats import spearmanr
+
+from keyrecon.body import LSP14
+from keyrecon.uncertainty import (
+    MAX_ERROR,
+    UNCERTAIN,
+    body_parts,
+    find_bins,
+    measure_correction,
+    player_height,
+    predict_error,
+)
+
+EDGES = {
+    "confidence": (0.0, 0.001, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8),
+    "correction": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05),
+    "speed": (0.0, 0.001, 0.005, 0.01, 0.02, 0.04, 0.08),
+    "time": (0.0, 0.1, 0.2, 0.4),
+}
+"""Lower ends of the bins: about equal numbers of joints, more of them where errors are large."""
+RISES = {"confidence": False, "correction": True, "speed": True, "time": True}
+PRIOR = 20
+"""Joints of the mean error that every bin is begun with, so that a rare one follows its neighbours."""
+GROUPS = 8
+OFF = 0.08, 0.05
+"""Errors that count as off, player heights: 0.2 of the torso is about .06."""
+
+Sample = dict[str, np.ndarray]
+
+
+def collect(name: str, work: Path) -> Sample:
+    """Errors and what may tell of them, for all joints of a clip that can be seen and were not
+    marked for the program."""
+    clip = real.load_clip(name)
+    result = real.solve(clip, 0.06, work)
+    motion, frames = result.motion, clip.truth.frames
+    height = player_height(motion)[:, None]
+    used = real.held_out(result) & clip.seen
+    rows, joints = np.nonzero(used)
+    at = frames[rows], joints
+    error = np.linalg.norm(motion.points2d[frames] - clip.truth.joints, axis=2) / height[frames]
+    speed = np.linalg.norm(np.gradient(motion.points2d, axis=0), axis=2) / height
+    marked = np.isfinite(result.marks.joints[..., 0])
+    away = [np.abs(result.marks.frames[marked[:, j]] - t).min() for t, j in zip(*at, strict=True)]
+    return {
+        "clip": np.full(len(rows), name),
+        "frame": at[0],
+        "joint": at[1],
+        "error": np.minimum(error[rows, joints], MAX_ERROR),
+        "confidence": motion.confidence[at],
+        "correction": measure_correction(motion)[at],
+        "speed": speed[at],
+        "time": np.array(away) / clip.video.fps,
+    }
+
+
+def fit(sample: Sample, used: tuple[str, ...]) -> tuple[float, dict[str, np.ndarray]]:
+    """Mean error and a monotone table of factors for each predictor; clips weigh the same."""
+    error = sample["error"]
+    _, clip, count = np.unique(sample["clip"], return_inverse=True, return_counts=True)
+    weight = 1 / count[clip]
+    weight /= weight.mean()
+    mean = float((weight * error).mean())
+    bins = {name: find_bins(sample[name], EDGES[name]) for name in used}
+    tables = {name: np.ones(len(EDGES[name])) for name in used}
+    for _ in range(30):
+        for name in used:
+            others = mean * np.prod([tables[n][bins[n]] for n in used if n != name], axis=0)
+            size = len(tables[name])
+            actual = np.bincount(bins[name], weight * error, size) + PRIOR * mean
+            expected = np.bincount(bins[name], weight * others, size) + PRIOR * mean
+            tables[name] = isotonic_regression(
+                actual / expected, weights=expected, increasing=RISES[name]
+            ).x
+        product = np.prod([tables[n][bins[n]] for n in used], axis=0)
+        mean = float((weight * error).sum() / (weight * product).sum())
+    return mean, tables
+
+
+def predict(sample: Sample, model: tuple[float, dict[str, np.ndarray]]) -> np.ndarray:
+    """Expected errors, player heights."""
+    mean, tables = model
+    factors = [table[find_bins(sample[name], EDGES[name])] for name, table in tables.items()]
+    return np.minimum(mean * np.prod(factors, axis=0), MAX_ERROR)
+
+
+def leave_one_out(sample: Sample, used: tuple[str, ...]) -> np.ndarray:
+    """Expected errors, those of each clip by tables from the others."""
+    expected = np.zeros(len(sample["error"]))
+    for name in np.unique(sample["clip"]):
+        own = sample["clip"] == name
+        others = {key: values[~own] for key, values in sample.items()}
+        expected[own] = predict({k: v[own] for k, v in sample.items()}, fit(others, used))
+    return expected
+
+
+def print_reliability(sample: Sample, expected: np.ndarray) -> None:
+    """Expected and actual errors in groups, by clip, and of the parts that are reported."""
+    error = sample["error"]
+    order = np.array_split(np.argsort(expected, kind="stable"), GROUPS)
+    print("reliability (heights)" + "".join(f"{n + 1:>8}" for n in range(GROUPS)))
+    print("  expected           " + "".join(f"{expected[rows].mean():8.3f}" for rows in order))
+    print("  actual             " + "".join(f"{error[rows].mean():8.3f}" for rows in order))
+    for name in np.unique(sample["clip"]):
+        own = sample["clip"] == name
+        ratio = error[own].mean() / expected[own].mean()
+        print(f"  {name:<26}{own.sum():>6} joints, actual {error[own].mean():.3f}, {ratio:.2f} of expected")
+    part = np.zeros(len(LSP14.names), int)
+    for number, members in enumerate(body_parts(LSP14).values()):
+        part[members] = number
+    keys = np.stack(
+        [np.unique(sample["clip"], return_inverse=True)[1], sample["frame"], part[sample["joint"]]]
+    )
+    groups, group = np.unique(keys, axis=1, return_inverse=True)
+    count = np.bincount(group.ravel())
+    told = np.bincount(group.ravel(), expected) / count > UNCERTAIN
+    worst = np.zeros(groups.shape[1])
+    np.maximum.at(worst, group.ravel(), error)
+    for off in OFF:
+        wrong = worst > off
+        print(
+            f"stretches: {told.sum()} of {len(told)} parts reported, {wrong[told].mean():.0%} of them "
+            f"with a joint off by more than {off}; {told[wrong].mean():.0%} of such parts reported"
+        )
+
+
+def main() -> None:
+    """Print everything."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--work", type=Path, default=Path("benchmarks/work/real"))
+    parser.add_argument("--only", nargs="*", help="names of clips")
+    parser.add_argument("--half", choices=("develop", "report"), default="develop")
+    words = parser.parse_args()
+    names = [file.stem for file in sorted(real.TRUTH.glob("*.json"))]
+    chosen = [n for n in names if (n in real.DEVELOP) == (words.half == "develop")]
+    samples = [collect(n, words.work) for n in chosen if not words.only or n in words.only]
+    sample = {key: np.concatenate([one[key] for one in samples]) for key in samples[0]}
+    if words.half == "report":
+        print_reliability(sample, predict_error(sample["confidence"], sample["correction"]))
+        return
+    used = ("confidence", "correction")
+    print_reliability(sample, leave_one_out(sample, used))
+    for more in (("confidence",), ("correction",), used, (*used, "speed"), (*used, "time")):
+        expected = leave_one_out(sample, more)
+        score = float((np.log(expected) + sample["error"] / expected).mean())
+        rank = spearmanr(expected, sample["error"])[0]
+        print(f"{' '.join(more):<32} score {score:7.3f}   rank correlation {rank:.3f}")
+    mean, tables = fit(sample, used)
+    print(f"MEAN_ERROR = {mean:.4f}")
+    for name in used:
+        factors = ", ".join(f"{value:.2f}" for value in tables[name])
+        print(f"{name.upper()}_EDGES = {EDGES[name]}\n{name.upper()}_FACTORS = ({factors})")
+
+
+if __name__ == "__main__":
+    main()
