@@ -2,16 +2,16 @@
 
     python benchmarks/expected_error.py [--work DIR] [--only NAME ...] [--half develop|report]
 
-Takes every clip as benchmarks/real.py does (with the same `--work` what it stored is found again) and
-holds the refined joints against the marks by eye that nobody made for the program. Prints
+Takes every clip as benchmarks/real.py does (with the same `--work` what it stored is found again)
+and holds the refined joints against the marks by eye that nobody made for the program. Prints
 
     reliability    joints by the error that was expected of them, in eight groups of like size: what
                    was expected and what it was, in player heights. Each clip is predicted by
                    tables that were fitted to the other clips
-    clips          the same for each clip, as actual over expected
+    clips          the same for each clip
     others         what speed (heights per frame) and the time to the nearest mark would add:
                    mean of log p + error / p, smaller is better, and the rank correlation
-    stretches      arms, legs and heads of frames that would be reported (mean expected error above
+    reported       arms, legs and heads of frames that would be reported (mean expected error above
                    UNCERTAIN): how many of them have a joint that is off by more than .08 and
                    .05 heights, and how many of those that have are reported
     tables         to be put into keyrecon/uncertainty.py
@@ -47,7 +47,7 @@ EDGES = {
 """Lower ends of the bins: about equal numbers of joints, more of them where errors are large."""
 RISES = {"confidence": False, "correction": True, "speed": True, "time": True}
 PRIOR = 20
-"""Joints of the mean error that every bin is begun with, so that a rare one follows its neighbours."""
+"""Joints of the mean error that every bin is begun with, so that a rare one is not overrated."""
 GROUPS = 8
 OFF = 0.08, 0.05
 """Errors that count as off, player heights: 0.2 of the torso is about .06."""
@@ -122,7 +122,7 @@ def leave_one_out(sample: Sample, used: tuple[str, ...]) -> np.ndarray:
 
 
 def print_reliability(sample: Sample, expected: np.ndarray) -> None:
-    """Expected and actual errors in groups, by clip, and of the parts that are reported."""
+    """Expected and actual errors in groups and by clip."""
     error = sample["error"]
     order = np.array_split(np.argsort(expected, kind="stable"), GROUPS)
     print("reliability (heights)" + "".join(f"{n + 1:>8}" for n in range(GROUPS)))
@@ -130,24 +130,27 @@ def print_reliability(sample: Sample, expected: np.ndarray) -> None:
     print("  actual             " + "".join(f"{error[rows].mean():8.3f}" for rows in order))
     for name in np.unique(sample["clip"]):
         own = sample["clip"] == name
-        ratio = error[own].mean() / expected[own].mean()
-        print(f"  {name:<26}{own.sum():>6} joints, actual {error[own].mean():.3f}, {ratio:.2f} of expected")
+        actual, mean = error[own].mean(), expected[own].mean()
+        print(f"  {name:<26}{own.sum():>6} joints: actual {actual:.3f}, expected {mean:.3f}")
+
+
+def print_reported(sample: Sample, expected: np.ndarray) -> None:
+    """Of arms, legs and heads that are reported, how many are off, and the other way about."""
     part = np.zeros(len(LSP14.names), int)
     for number, members in enumerate(body_parts(LSP14).values()):
         part[members] = number
-    keys = np.stack(
-        [np.unique(sample["clip"], return_inverse=True)[1], sample["frame"], part[sample["joint"]]]
-    )
+    clip = np.unique(sample["clip"], return_inverse=True)[1]
+    keys = np.stack([clip, sample["frame"], part[sample["joint"]]])
     groups, group = np.unique(keys, axis=1, return_inverse=True)
-    count = np.bincount(group.ravel())
-    told = np.bincount(group.ravel(), expected) / count > UNCERTAIN
+    group = group.ravel()
+    told = np.bincount(group, expected) / np.bincount(group) > UNCERTAIN
     worst = np.zeros(groups.shape[1])
-    np.maximum.at(worst, group.ravel(), error)
+    np.maximum.at(worst, group, sample["error"])
     for off in OFF:
         wrong = worst > off
         print(
-            f"stretches: {told.sum()} of {len(told)} parts reported, {wrong[told].mean():.0%} of them "
-            f"with a joint off by more than {off}; {told[wrong].mean():.0%} of such parts reported"
+            f"{told.sum()} of {len(told)} parts reported: {wrong[told].mean():.0%} have a joint "
+            f"off by more than {off}; of all that have one {told[wrong].mean():.0%} are reported"
         )
 
 
@@ -163,10 +166,14 @@ def main() -> None:
     samples = [collect(n, words.work) for n in chosen if not words.only or n in words.only]
     sample = {key: np.concatenate([one[key] for one in samples]) for key in samples[0]}
     if words.half == "report":
-        print_reliability(sample, predict_error(sample["confidence"], sample["correction"]))
+        expected = predict_error(sample["confidence"], sample["correction"])
+        print_reliability(sample, expected)
+        print_reported(sample, expected)
         return
     used = ("confidence", "correction")
-    print_reliability(sample, leave_one_out(sample, used))
+    left_out = leave_one_out(sample, used)
+    print_reliability(sample, left_out)
+    print_reported(sample, left_out)
     for more in (("confidence",), ("correction",), used, (*used, "speed"), (*used, "time")):
         expected = leave_one_out(sample, more)
         score = float((np.log(expected) + sample["error"] / expected).mean())

@@ -49,6 +49,7 @@ from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
 from keyrecon.tracking.tracker import TrackOptions, track_player
+from keyrecon.uncertainty import expected_error
 
 Inputs = ParamSpec("Inputs")
 Result = TypeVar("Result")
@@ -340,7 +341,7 @@ def assemble_motion(
     source[annotations.frames] = np.where(
         marked, SOURCES.index("annotated"), source[annotations.frames]
     )
-    return Motion(
+    motion = Motion(
         skeleton=annotations.skeleton,
         points3d=lifted.points3d,
         points2d=lifted.points2d,
@@ -353,6 +354,7 @@ def assemble_motion(
         units="body heights" if height is None else "m",
         keyframes=annotations.frames,
     )
+    return replace(motion, expected_error=expected_error(motion))
 
 
 def as_printed(options: Options = Options()) -> Options:

@@ -35,6 +35,9 @@ class Assistant:
     """Marks that look wrong, most suspicious first."""
     next_frames: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
     """Frames where one more annotation would help most, none of those taken already."""
+    stretches: Callable[[Annotations], list[Json]] | None = None
+    """Where the motion, or before there is one the track, is least sure of itself, as {"first",
+    "last", "text", "frame", "half"}: the frame to mark and which half of the body there."""
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
     """Head and feet found on a few frames with these picks."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None

@@ -42,6 +42,7 @@ from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.report.summary import annotation_cost
+from keyrecon.uncertainty import uncertain_stretches, unsure_track
 
 
 def start(
@@ -205,7 +206,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
         [
             f"Player found in {seen:.1%} of {frames} frames.",
             *_describe_absence(preparation),
-            *_describe_doubt(preparation),
+            *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
             *halves,
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
@@ -233,25 +234,6 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
     more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
     return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
-
-
-MIN_CONFIDENCE = 0.3
-"""Confidence under which a track is a guess: two responses of a fifth of the usual strength."""
-
-
-def _describe_doubt(preparation: Preparation) -> list[str]:
-    """Where the track is least sure of itself, and the frame whose mark would teach most."""
-    doubtful = preparation.track.confidence < MIN_CONFIDENCE
-    stretches = [s for s in list_stretches(doubtful) if s[1] - s[0] >= preparation.keyframes.reach]
-    if not stretches:
-        return []
-    longest = sorted(stretches, key=lambda s: s[0] - s[1])[:3]
-    listed = ", ".join(f"{first}-{last}" for first, last in sorted(longest))
-    middle = sum(longest[0]) // 2
-    return [
-        f"The track is least sure in frames {listed}; marking the whole body in frame {middle} "
-        "would help most."
-    ]
 
 
 def _counted(number: int, what: str) -> str:
@@ -353,7 +335,7 @@ def run(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
-            *_describe_doubt(preparation),
+            *(stretch.text for stretch in uncertain_stretches(motion)),
             *_other_choice(workspace, options, preparation.keyframes),
             f"Took {time.perf_counter() - started:.0f} s.",
         ]

@@ -108,6 +108,11 @@ function enlarge(card) {
 for (const card of document.querySelectorAll(".still"))
   card.addEventListener("click", () => enlarge(card));
 large.addEventListener("click", () => large.close());
+for (const line of document.querySelectorAll(".goes"))
+  line.addEventListener("click", () => {
+    show(Number(line.dataset.frame));
+    byId("figure").scrollIntoView({ block: "center" });
+  });
 for (const image of document.querySelectorAll("[data-copy]"))
   image.src = byId(image.dataset.copy).src;
 

@@ -43,6 +43,7 @@ def write_report(path: Path, material: ReportMaterial, progress: Progress = sile
 def build_page(material: ReportMaterial, pictures: Pictures) -> str:
     """The whole page as text."""
     title = text(material.video.path.name)
+    navigation = _navigation(material.motion.expected_error is not None)
     style = (files("keyrecon.report") / "report.css").read_text("utf-8")
     scripts = (get_plotlyjs(), bundle_scripts(*SCRIPTS))
     return (
@@ -50,7 +51,7 @@ def build_page(material: ReportMaterial, pictures: Pictures) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{title}: keyrecon report</title><style>{style}</style></head><body>"
-        f"{_navigation()}<main>{_body(material, pictures)}</main>{_transport()}"
+        f"{navigation}<main>{_body(material, pictures)}</main>{_transport()}"
         f"{data_block('motion-data', to_json(_numbers(material)))}"
         f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>"
     )
@@ -63,6 +64,7 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
         (
             headline(material),
             _confidence_over_time(material),
+            sections.doubts(material),
             sections.story(pictures, material.motion.time),
             sections.keyframe_pictures(material, pictures),
             _occurrence(material),
@@ -185,8 +187,9 @@ def _angles(material: ReportMaterial) -> str:
     )
 
 
-def _navigation() -> str:
+def _navigation(has_doubts: bool) -> str:
     links = (
+        *([("doubts", "Doubts")] if has_doubts else []),
         ("video", "Video"),
         ("keyframes", "Keyframes"),
         ("occurrence", "Occurrence"),

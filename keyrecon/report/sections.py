@@ -6,10 +6,11 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.body import Skeleton
 from keyrecon.records import HalfKeyframes
-from keyrecon.report.markup import ReportMaterial, note, section, text, to_json
+from keyrecon.report.markup import ReportMaterial, note, section, table, text, to_json
 from keyrecon.report.pictures import Pictures, png_uri
 from keyrecon.report.summary import center_on_root, scale_truth, stature
 from keyrecon.report.views import VIEWS, pose_drawing
+from keyrecon.uncertainty import uncertain_stretches, worst_frames
 
 MATRIX_SIDE = 600
 """Largest side of a distance matrix in the page, px."""
@@ -29,6 +30,34 @@ def story(pictures: Pictures, time: Float[np.ndarray, "T"]) -> str:
         "the picture, rings filled in. Choose a picture to enlarge it and to go to its frame."
     )
     return section("video", "The video", note(key), f'<div class="strip">{stills}</div>')
+
+
+def doubts(material: ReportMaterial) -> str:
+    """Where the motion is least sure of itself, in the words of the command line, and the frames
+    with the largest expected errors; empty where none are known."""
+    motion = material.motion
+    if motion.expected_error is None:
+        return ""
+    lines = "".join(
+        f'<li><button type="button" class="goes" data-frame="{stretch.frame}">'
+        f"{text(stretch.text)}</button></li>"
+        for stretch in uncertain_stretches(motion)
+    )
+    rows = [
+        (
+            f"{frame}",
+            ", ".join(f"{name.replace('_', ' ')} {error:.0f} px" for name, error in joints),
+        )
+        for frame, joints in worst_frames(motion)
+    ]
+    about = note(
+        "How far each joint of the drawn pose probably is from where a person would mark it, as "
+        "learnt from real videos that were marked by eye; of what is reported here seven in ten "
+        f"were wrong there. Mean over this motion: {np.mean(motion.expected_error):.1f} px."
+    )
+    listed = f'<ul class="doubts">{lines}</ul>' if lines else note("No stretch stands out.")
+    worst = table(("frame", "least sure joints, expected error"), rows, "Worst frames", "texts")
+    return section("doubts", "Where it is least sure", about, listed, worst)
 
 
 def keyframe_pictures(material: ReportMaterial, pictures: Pictures) -> str:

@@ -19,6 +19,7 @@ from keyrecon.report.page import build_page, write_report
 from keyrecon.report.pictures import Windows, cut_pictures
 from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
 from keyrecon.report.views import VIEWS, pose_drawing
+from keyrecon.uncertainty import player_height, uncertain_stretches
 
 OWN = Path(__file__).parents[2] / "keyrecon" / "report"
 
@@ -292,3 +293,17 @@ def test_a_browser_opens_the_page_without_faults(page, tmp_path):
     assert '"faults":[]' in title.replace("&quot;", '"')
     assert "frame 7" in title and '"drawn":5' in title.replace("&quot;", '"')
     assert int(re.search(r'wide":(-?\d+)', title.replace("&quot;", '"')).group(1)) <= 0
+
+
+def test_the_report_tells_where_it_is_least_sure_and_each_line_goes_there(material, pictures):
+    motion = material.motion
+    errors = np.full(motion.confidence.shape, 1.0)
+    errors[12:25, :6] = 0.3 * player_height(motion)[:1]
+    doubtful = replace(material, motion=replace(motion, expected_error=errors))
+    (stretch,) = uncertain_stretches(doubtful.motion)
+    written = build_page(doubtful, pictures)
+    assert f'class="goes" data-frame="{stretch.frame}">{stretch.text}<' in written
+    assert 'href="#doubts"' in written
+    former = build_page(replace(material, motion=replace(motion, expected_error=None)), pictures)
+    assert 'id="doubts"' not in former
+    assert 'href="#doubts"' not in former

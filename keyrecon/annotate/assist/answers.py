@@ -25,8 +25,9 @@ from keyrecon.annotate.assist.project_cache import ProjectCache
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import frames_to_mark
+from keyrecon.pipeline import frames_to_mark, marked_frames
 from keyrecon.records import Annotations, Pick
+from keyrecon.uncertainty import uncertain_stretches, unsure_track
 
 MIN_CERTAINTY = 0.8
 """Of the depth signs that come with a suggestion: nine in ten are right."""
@@ -42,6 +43,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
         pose=partial(describe_pose, cache),
         checks=partial(describe_checks, cache),
         next_frames=partial(describe_next_frames, cache),
+        stretches=partial(describe_stretches, cache),
         preview=partial(describe_preview, cache),
         backprojection=partial(show_part, cache),
     )
@@ -242,6 +244,28 @@ def describe_next_frames(
         return []
     suggestions = suggest_frames(preparation.pose_distances, motion, annotations, taken)
     return [{**asdict(one), "gain": round(one.gain, 4)} for one in suggestions]
+
+
+def describe_stretches(cache: ProjectCache, annotations: Annotations) -> list[Json]:
+    """The worst stretches, as the command line tells them; those that were marked since are out."""
+    preparation, motion = cache.preparation(), cache.motion()
+    upper, lower = marked_frames(annotations)
+    if motion is not None:
+        stretches = uncertain_stretches(motion, np.union1d(upper, lower))
+    elif preparation is not None:
+        stretches = unsure_track(preparation.track, preparation.keyframes.reach)
+    else:
+        return []
+    return [
+        {
+            "first": stretch.first,
+            "last": stretch.last,
+            "text": stretch.text,
+            "frame": stretch.frame,
+            "half": stretch.half,
+        }
+        for stretch in stretches
+    ]
 
 
 def describe_preview(cache: ProjectCache, picks: tuple[Pick, ...], frames: tuple[int, ...]) -> Json:

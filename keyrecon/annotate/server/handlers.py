@@ -152,6 +152,12 @@ def next_frames(session: Session, request: ApiRequest) -> list[Json]:
     return suggest(session.store.annotations(), frozenset(taken)) if suggest else []
 
 
+def stretches(session: Session, request: ApiRequest) -> list[Json]:
+    """Where the result is least sure of itself."""
+    find = session.assistant.stretches
+    return find(session.store.annotations()) if find else []
+
+
 def preview(session: Session, request: ApiRequest) -> Json:
     """Head and feet found on some frames."""
     find_player, picks = session.assistant.preview, picks_from_cells(session.store.state.cells)
@@ -211,6 +217,9 @@ def _motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
         "points2d": np.round(motion.points2d[chosen], 1).tolist(),
         "points3d": np.round(motion.points3d[chosen], 4).tolist(),
         "confidence": np.round(motion.confidence[chosen], 2).tolist(),
+        "expected_error": None
+        if motion.expected_error is None
+        else np.round(motion.expected_error[chosen], 1).tolist(),
         "source": motion.source[chosen].tolist(),
         "source_names": list(SOURCES),
     }

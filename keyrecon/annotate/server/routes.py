@@ -57,6 +57,7 @@ ROUTES = (
     ApiRoute("POST", "/api/pose", handlers.pose, handlers.PoseRequest, alone=True),
     ApiRoute("GET", "/api/checks", handlers.checks, alone=True),
     ApiRoute("GET", "/api/next_frames", handlers.next_frames, alone=True),
+    ApiRoute("GET", "/api/stretches", handlers.stretches, alone=True),
     ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.PreviewRequest, alone=True),
     ApiRoute("GET", "/api/backprojection/{frame:int}", handlers.backprojection, alone=True),
     ApiRoute("GET", "/api/jobs", handlers.jobs),

@@ -23,6 +23,8 @@ ARRAYS = {
     "keyframes": "K",
 }
 """Arrays of a `Motion` and the letters of their axes."""
+OPTIONAL = {"expected_error": "TJ"}
+"""Arrays that files of former versions and of golf fits lack."""
 
 
 def write_motion(path: Path, motion: Motion) -> None:
@@ -31,7 +33,7 @@ def write_motion(path: Path, motion: Motion) -> None:
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
-        **{name: getattr(motion, name) for name in ARRAYS},
+        **{name: getattr(motion, name) for name in (*ARRAYS, *_known(motion))},
         source_names=np.array(SOURCES),
         joint_names=np.array(skeleton.names),
         parents=np.array(skeleton.parents),
@@ -45,6 +47,10 @@ def write_motion(path: Path, motion: Motion) -> None:
     write_durably(path, buffer.getvalue())
 
 
+def _known(motion: Motion) -> list[str]:
+    return [name for name in OPTIONAL if getattr(motion, name) is not None]
+
+
 def read_motion(path: Path) -> Motion:
     """Read what `write_motion` wrote; raises KeyreconError for any other file."""
     try:
@@ -54,6 +60,7 @@ def read_motion(path: Path) -> Motion:
         return Motion(
             skeleton=_skeleton(data),
             **{name: data[name] for name in ARRAYS},
+            **{name: data[name] for name in OPTIONAL if name in data},
             fps=float(data["fps"]),
             units=str(data["units"]),
         )
@@ -82,7 +89,7 @@ def _check_shapes(data: dict[str, np.ndarray]) -> None:
         "2": 2,
         "3": 3,
     }
-    for name, axes in ARRAYS.items():
+    for name, axes in {**ARRAYS, **{n: a for n, a in OPTIONAL.items() if n in data}}.items():
         expected = tuple(sizes[axis] for axis in axes)
         if data[name].shape != expected:
             raise ValueError(f"{name} has shape {data[name].shape} instead of {expected}")

@@ -397,6 +397,49 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
     assert person.complaints == []
 
 
+STRETCH = {
+    "first": 20,
+    "last": 31,
+    "text": "Frames 20-31: arms uncertain; marking frame 26 would help most.",
+    "frame": 26,
+    "half": "upper",
+}
+
+
+def test_what_is_uncertain_is_told_and_one_click_goes_to_mark_it(context, folder):
+    with serving(folder, Assistant(stretches=lambda annotations: [STRETCH])) as server:
+        person = Person(context, server.credentials.address)
+        person.page.click("[data-tab=next]")
+        person.await_text("#next-list", "Frames 20–31")
+        person.page.click("#next-list .row")
+        person.await_text("#position", "frame 26 of")
+        assert len(person.page.locator(".joint:not([hidden]) .name").all()) == 8
+        context.close()
+    assert person.complaints == []
+
+
+def test_what_is_uncertain_is_asked_for_anew_when_a_run_has_ended(context, folder):
+    told = []
+    assistant = Assistant(stretches=lambda annotations: [STRETCH] * len(told))
+    with serving(folder, assistant, {"run": partial(follow_at_once, folder)}) as server:
+        person = Person(context, server.credentials.address)
+        person.page.click("[data-tab=next]")
+        person.await_text("#explanation", "stored results are missing")
+        assert person.text("#next-list") == ""
+        person.open(40)
+        person.mark_joints(partial(place_of, 40))
+        person.await_saved()
+        person.page.wait_for_timeout(1500)  # what edits set off has come to rest
+        told.append(True)
+        person.press("Alt+3")
+        person.press("Enter")
+        person.page.wait_for_function(
+            "() => document.querySelector('#stretches').textContent.includes('frame 26')"
+        )
+        context.close()
+    assert person.complaints == []
+
+
 def test_a_page_that_can_tell_nothing_of_the_body_says_why(person):
     person.await_text("#pose-empty", "stored results are missing.* Make the motion")
 

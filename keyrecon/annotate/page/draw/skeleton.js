@@ -64,6 +64,22 @@ function wedge(pen, [ax, ay], [bx, by], sign) {
   pen.closePath();
 }
 
+// A faint disc about a joint, as wide as the joint may be off; none where it would not be seen.
+const LEAST_HALO = 7; // px on the screen
+export function drawHalo(pen, [x, y], radius, color) {
+  if (!(radius > LEAST_HALO)) return;
+  pen.save();
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  pen.fillStyle = pen.strokeStyle = color;
+  pen.globalAlpha = 0.16;
+  pen.fill();
+  pen.globalAlpha = 0.6;
+  pen.lineWidth = 1;
+  pen.stroke();
+  pen.restore();
+}
+
 // style: {color, sign, alpha, dashed, tooLong, hovered}; sign as in `wedge`.
 export function drawLimb(pen, from, to, style) {
   pen.save();

@@ -119,6 +119,12 @@ export function createMotionCache(project, arrived) {
       const named = row.map((point, joint) => [project.joints[joint], point]);
       return Object.fromEntries(named.filter(([, point]) => point && point[0] !== null));
     },
+    // {joint: px}: how far off each joint probably is; null while it is not known.
+    errors(frame) {
+      const number = Math.floor(frame / CHUNK),
+        row = chunks.get(number)?.expected_error?.[frame - number * CHUNK];
+      return row ? Object.fromEntries(row.map((px, joint) => [project.joints[joint], px])) : null;
+    },
     forget() {
       chunks = new Map();
     },

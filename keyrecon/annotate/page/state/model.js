@@ -28,6 +28,7 @@ export async function createModel() {
     saving: { status: "saved", waiting: 0 },
     notice: null,
     jobs: new Map(),
+    stretches: [], // where the program is least sure of itself: {first, last, text, frame, half}
   };
   const drawers = [],
     idleListeners = [],

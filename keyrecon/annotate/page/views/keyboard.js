@@ -36,7 +36,7 @@ export const KEYS = {
     [["+", "-"], "zoom in, out", "zoomBy"],
     [["h"], "hide the skeleton while held", "hide"],
     [["g"], "go to the most suspicious place, then to the next", "check"],
-    [["y"], "add the frame that would help most", "suggestion"],
+    [["y"], "mark the frame that would help most", "suggestion"],
     [["l"], "lock or unlock the keyframe", "lock"],
   ],
   bodies: [

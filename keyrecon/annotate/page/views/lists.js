@@ -74,6 +74,23 @@ function suggestionRow(element, suggestion) {
   ]);
 }
 
+function stretchRow(element, stretch) {
+  const place = stretch.first === stretch.last ? `${stretch.first}` : `${stretch.first}–${stretch.last}`,
+    text = stretch.text.replace(/^Frames? [^:]*: /, "");
+  fillRow(element, JSON.stringify(stretch), () => [
+    make("span", { className: "warns" }, "!"),
+    make(
+      "span",
+      { className: "text", title: stretch.text },
+      make("b", {}, `Frames ${place}`),
+      make("small", {}, text),
+    ),
+  ]);
+}
+
+const nextRow = (element, item) =>
+  item.text ? stretchRow(element, item) : suggestionRow(element, item);
+
 function suspicionMeter(share) {
   const bar = make("meter", { min: 0, max: 1, value: Math.max(0, Math.min(1, share)) });
   bar.title = `suspicion ${Math.round(100 * share)} %`;
@@ -90,7 +107,7 @@ export function createLists(model, actions) {
     choose: ({ frame }) => actions.open(frame),
   });
   const checkList = createVirtualList(byId("check-list"), { height: 58, fill: checkRow, choose: goTo });
-  const nextList = createVirtualList(byId("next-list"), { height: 58, fill: suggestionRow, choose: add });
+  const nextList = createVirtualList(byId("next-list"), { height: 58, fill: nextRow, choose: add });
 
   function goTo(check) {
     if (check) actions.open(check.frame, { joint: check.joint ?? check.limb ?? null });
@@ -109,8 +126,10 @@ export function createLists(model, actions) {
   // The server takes a while over these: one request at a time, or edits would wait for it.
   const refresh = api.latestOnly(
     async () => {
-      checks = await api.read("checks");
+      model.stretches = await api.read("stretches");
       suggestions = await api.read("next_frames");
+      model.redraw();
+      checks = await api.read("checks");
       model.redraw();
     },
     (fault) => model.notify(fault.message),
@@ -134,6 +153,8 @@ export function createLists(model, actions) {
         ? checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
         : "Nothing looks wrong.";
     if (tab === "next") {
+      if (model.stretches.length && !suggestions.length)
+        return "Where the program is least sure. Choose a line to mark its frame.";
       if (suggestions.length)
         return "Frames where one more keyframe would help most. Y adds the first.";
       return "After the motion was made, frames where one more keyframe would help are listed here.";
@@ -155,14 +176,14 @@ export function createLists(model, actions) {
         keyframes.findIndex(({ frame }) => frame === model.ui.frame),
       );
     if (tab === "checks") checkList.show(checks, openCheck());
-    if (tab === "next") nextList.show(suggestions, -1);
+    if (tab === "next") nextList.show([...model.stretches, ...suggestions], -1);
   }
 
   return {
     draw,
     refresh,
     nextCheck: () => goTo(checks[(openCheck() + 1) % checks.length]),
-    firstSuggestion: () => add(suggestions[0]),
+    firstSuggestion: () => add(model.stretches[0] ?? suggestions[0]),
   };
 }
 

@@ -1,9 +1,10 @@
 // The motion played over the picture, with the skeleton in space beside it.
-import { drawJoint, drawLimb } from "../draw/skeleton.js";
+import { drawHalo, drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
 import { createPoseFigure } from "./depth.js";
-import { byId, numberIn, setText } from "./dom.js";
+import { label } from "../state/workflow.js";
+import { byId, make, numberIn, setText } from "./dom.js";
 
 const PREFETCHED = 24; // frames fetched ahead while playing
 const WIDTH = 960; // of the pictures, px
@@ -66,6 +67,9 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const [pen] = viewer.overlay(),
       places = Object.entries(points("points2d") ?? {});
     const at = Object.fromEntries(places.map(([name, place]) => [name, viewer.toScreen(place)]));
+    const errors = exists() ? motion.errors(frame) : null;
+    for (const [name, place] of Object.entries(at))
+      if (errors) drawHalo(pen, place, errors[name] * viewer.scale(), colors[sides[name]]);
     for (const { name, parent } of project.limbs) {
       const style = { color: colors[sides[name]], sign: 0, alpha: 0.8 };
       if (at[name] && at[parent]) drawLimb(pen, at[parent], at[name], style);
@@ -73,6 +77,38 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     for (const [name, place] of Object.entries(at)) {
       drawJoint(pen, place, { side: sides[name], color: colors[sides[name]], size: 3.5 });
     }
+  }
+
+  // The joints that are probably farthest off in this frame.
+  function leastSure() {
+    const errors = exists() ? motion.errors(frame) : null;
+    if (!errors) return "";
+    const worst = Object.entries(errors).sort((a, b) => b[1] - a[1]),
+      mean = worst.reduce((sum, [, px]) => sum + px, 0) / worst.length;
+    const named = worst.slice(0, 3).map(([name, px]) => `${label(name)} ±${Math.round(px)}`);
+    return `Expected error here: ${mean.toFixed(0)} px; least sure: ${named.join(", ")}. Discs show it.`;
+  }
+
+  function drawStretches() {
+    const list = byId("stretches"),
+      content = JSON.stringify(model.stretches);
+    byId("stretches-title").hidden = !exists() || !model.stretches.length;
+    if (list.dataset.content === content) return;
+    list.dataset.content = content;
+    list.replaceChildren(...model.stretches.map(stretchButton));
+  }
+
+  // Goes to the frame and offers to mark it.
+  function stretchButton(stretch) {
+    const button = make("button", { className: "plain" }, stretch.text);
+    button.addEventListener("click", () => {
+      go(stretch.frame);
+      model.notify(`Frame ${stretch.frame} would help most here.`, {
+        text: `Mark frame ${stretch.frame}`,
+        act: () => actions.addKeyframe(stretch.frame, stretch.half),
+      });
+    });
+    return button;
   }
 
   function words() {
@@ -106,6 +142,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
         ? "Where the skeleton leaves the body, press K: that frame becomes a keyframe of yours."
         : "",
     );
+    setText(byId("motion-errors"), leastSure());
+    drawStretches();
     slider.value = frame;
     setText(byId("motion-where"), `frame ${frame} of ${project.n_frames}, ${seconds.toFixed(2)} s`);
     setText(byId("play"), player.playing() ? "❚❚" : "▶");

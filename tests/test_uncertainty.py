@@ -1,0 +1,129 @@
+"""What is expected to be wrong, and where."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from keyrecon import uncertainty
+from keyrecon.body import LSP14
+from keyrecon.records import Motion, Track
+from keyrecon.uncertainty import (
+    expected_error,
+    measure_correction,
+    player_height,
+    predict_error,
+    uncertain_stretches,
+    unsure_track,
+    worst_frames,
+)
+
+FRAMES, PIXELS, ARMS = 100, 200.0, slice(6, 12)
+
+
+def make_motion(confidence=None, moved=None):
+    """A body whose bones are the table's, `PIXELS` px tall; `moved` px by the refinement."""
+    skeleton, points = LSP14, np.zeros((FRAMES, 14, 3))
+    order = [skeleton.root]
+    while order:
+        joint = order.pop()
+        for child in [c for c, p in enumerate(skeleton.parents) if p == joint]:
+            points[:, child] = points[:, joint] + [0, skeleton.proportions[child], 0]
+            order.append(child)
+    points2d = points[..., :2] * PIXELS
+    shift = np.zeros((FRAMES, 14)) if moved is None else moved
+    motion = Motion(
+        skeleton=skeleton,
+        points3d=points,
+        points2d=points2d,
+        points2d_propagated=points2d + np.stack([shift, 0 * shift], axis=2),
+        confidence=np.full((FRAMES, 14), 0.9) if confidence is None else confidence,
+        source=np.ones((FRAMES, 14), int),
+        scale=np.full(FRAMES, PIXELS),
+        fps=25.0,
+        time=np.arange(FRAMES) / 25.0,
+        units="body heights",
+        keyframes=np.array([0]),
+    )
+    return replace(motion, expected_error=expected_error(motion))
+
+
+def with_lost_arms(first, last):
+    confidence, moved = np.full((FRAMES, 14), 0.9), np.zeros((FRAMES, 14))
+    confidence[first : last + 1, ARMS], moved[first : last + 1, ARMS] = 0.0, 0.2 * PIXELS
+    return make_motion(confidence, moved)
+
+
+def test_a_player_is_as_tall_as_the_bones_say():
+    assert player_height(make_motion()) == pytest.approx(PIXELS)
+    metres = make_motion()
+    metres = replace(metres, points3d=1.8 * metres.points3d, scale=metres.scale / 1.8, units="m")
+    assert player_height(metres) == pytest.approx(PIXELS)
+
+
+def test_less_confidence_and_more_correction_never_make_an_error_smaller():
+    confidence, correction = np.meshgrid(np.linspace(0, 1, 30), np.linspace(0, 0.2, 30))
+    errors = predict_error(confidence, correction)
+    assert (np.diff(errors, axis=1) <= 0).all()
+    assert (np.diff(errors, axis=0) >= 0).all()
+    assert (errors > 0).all()
+    assert errors.max() <= uncertainty.MAX_ERROR
+
+
+def test_a_joint_that_was_not_propagated_counts_as_moved_far():
+    motion = make_motion()
+    lost = motion.points2d_propagated.copy()
+    lost[3, 4] = np.nan
+    motion = replace(motion, points2d_propagated=lost)
+    assert measure_correction(motion)[3, 4] == np.inf
+    assert expected_error(motion)[3, 4] > 2 * expected_error(motion)[3, 5]
+
+
+def test_a_stretch_is_told_with_its_part_its_size_and_the_frame_to_mark():
+    (stretch,) = uncertain_stretches(with_lost_arms(41, 50))
+    assert (stretch.first, stretch.last, stretch.what, stretch.half) == (41, 50, "arms", "upper")
+    assert 43 <= stretch.frame <= 48
+    assert stretch.error > uncertainty.UNCERTAIN * PIXELS
+    assert stretch.text == (
+        f"Frames 41-50: arms uncertain, about {stretch.error:.0f} px; marking frame "
+        f"{stretch.frame} would help most."
+    )
+
+
+def test_a_sure_motion_and_one_of_a_former_version_tell_nothing():
+    assert uncertain_stretches(make_motion()) == []
+    former = replace(with_lost_arms(41, 50), expected_error=None)
+    assert uncertain_stretches(former) == []
+    assert worst_frames(former) == []
+
+
+def test_a_stretch_that_was_marked_since_is_no_longer_told():
+    motion = with_lost_arms(41, 50)
+    (stretch,) = uncertain_stretches(motion)
+    assert uncertain_stretches(motion, np.array([stretch.frame])) == []
+    assert uncertain_stretches(motion, np.array([stretch.frame + 30])) == [stretch]
+
+
+def test_worst_frames_lie_apart_and_name_the_joints_that_are_lost():
+    frames = worst_frames(with_lost_arms(41, 50), count=3)
+    assert 41 <= frames[0][0] <= 50
+    names = {name for name, _ in frames[0][1]}
+    assert names <= set(LSP14.names[ARMS])
+    assert min(np.diff(sorted(frame for frame, _ in frames))) > 10
+
+
+def test_a_track_that_is_a_guess_for_long_asks_for_the_body_in_its_middle():
+    nowhere = np.zeros((FRAMES, 2))
+    confidence = np.full(FRAMES, 0.8)
+    confidence[20:41] = 0.1
+    confidence[70:73] = 0.1
+    track = Track(
+        head=nowhere,
+        feet=np.zeros((FRAMES, 2, 2)),
+        confidence=confidence,
+        box=np.zeros((FRAMES, 4)),
+        height=np.full(FRAMES, PIXELS),
+    )
+    (stretch,) = unsure_track(track, reach=10)
+    assert (stretch.first, stretch.last, stretch.frame, stretch.half) == (20, 40, 30, "both")
+    assert "px" not in stretch.text
