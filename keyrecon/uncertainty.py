@@ -126,7 +126,7 @@ def uncertain_stretches(
         name: motion.expected_error[:, members].mean(axis=1) / height
         for name, members in parts.items()
     }
-    uncertain = np.array([values > UNCERTAIN for values in doubt.values()]).any(axis=0)
+    uncertain = np.max([*doubt.values()], axis=0) > UNCERTAIN
     found = []
     for first, last in _runs(uncertain, round(MERGED_SECONDS * fps)):
         if last - first + 1 < LEAST_SECONDS * fps:
@@ -164,7 +164,8 @@ def worst_frames(motion: Motion, count: int = 10) -> list[tuple[int, list[tuple[
     if motion.expected_error is None:
         return []
     left = motion.expected_error.mean(axis=1)
-    apart, found = round(TAUGHT_SECONDS * motion.fps), []
+    apart = round(TAUGHT_SECONDS * motion.fps)
+    found: list[tuple[int, list[tuple[str, float]]]] = []
     while len(found) < count and np.isfinite(left).any():
         frame = int(np.nanargmax(left))
         errors = motion.expected_error[frame]

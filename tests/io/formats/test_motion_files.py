@@ -36,6 +36,14 @@ def test_a_motion_comes_back_from_npz_unchanged(tmp_path, motion):
         )
 
 
+def test_expected_errors_come_back_and_a_file_without_them_is_read(tmp_path, motion):
+    errors = np.abs(motion.points2d[..., 0]) / 100
+    write_motion(tmp_path / "new.npz", replace(motion, expected_error=errors))
+    assert np.array_equal(read_motion(tmp_path / "new.npz").expected_error, errors)
+    write_motion(tmp_path / "former.npz", replace(motion, expected_error=None))
+    assert read_motion(tmp_path / "former.npz").expected_error is None
+
+
 def test_npz_holds_the_promised_arrays_without_pickles(tmp_path, motion):
     write_motion(tmp_path / "motion.npz", motion)
     with np.load(tmp_path / "motion.npz", allow_pickle=False) as stored:
