@@ -410,7 +410,7 @@ def test_what_is_uncertain_is_told_and_one_click_goes_to_mark_it(context, folder
     with serving(folder, Assistant(stretches=lambda annotations: [STRETCH])) as server:
         person = Person(context, server.credentials.address)
         person.page.click("[data-tab=next]")
-        person.await_text("#next-list", "Frames 20–31")
+        person.await_text("#next-list", "Frames 20-31")
         person.page.click("#next-list .row")
         person.await_text("#position", "frame 26 of")
         assert len(person.page.locator(".joint:not([hidden]) .name").all()) == 8

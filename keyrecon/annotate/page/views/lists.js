@@ -75,7 +75,7 @@ function suggestionRow(element, suggestion) {
 }
 
 function stretchRow(element, stretch) {
-  const place = stretch.first === stretch.last ? `${stretch.first}` : `${stretch.first}–${stretch.last}`,
+  const place = stretch.first === stretch.last ? `${stretch.first}` : `${stretch.first}-${stretch.last}`,
     text = stretch.text.replace(/^Frames? [^:]*: /, "");
   fillRow(element, JSON.stringify(stretch), () => [
     make("span", { className: "warns" }, "!"),
