@@ -21,7 +21,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.progress import silent
-from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.records import HalfKeyframes, Keyframes, Pick
 from keyrecon.synthetic.cameras import CameraPlanOptions
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
@@ -70,6 +70,20 @@ def solved(clip):
     assert keyrecon("import", made, clip / "marks.json") == 0
     assert keyrecon("run", made, "--height", f"{float(truth['height_m']):.2f}") == 0
     return read_motion(made / "motion.npz"), truth
+
+
+def test_a_head_clicked_on_the_scenery_is_named_and_left_aside(clip, tmp_path, capsys):
+    made = tmp_path / "project"
+    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
+    right = read_picks(clip / "picks.json")
+    Workspace(made).add_picks(right)
+    Workspace(made).add_picks([Pick(70, "head", 30.0, 30.0)])
+    assert keyrecon("keyframes", made, "--budget", "0.06") == 0
+    said = capsys.readouterr().out
+    assert said.count("clicked in frame") == 1
+    assert "The head clicked in frame 70 (30, 30) lies" in said
+    assert "was left aside" in said
+    assert len(Workspace(made).picks()) == len(right) + 1
 
 
 def test_keyframes_meet_the_budget_and_are_pictured(clip):

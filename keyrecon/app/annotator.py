@@ -25,6 +25,7 @@ from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import project
+from keyrecon.app.preparing import prepare_project
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -114,9 +115,11 @@ def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     _prepare_with_bodies(workspace, video)
     marks = project.load_annotations(workspace, video)
     options = workspace.options(Options(), Options())
-    preparation = project.prepare_with_marks(workspace, video, marks, options, progress)
-    seen = float((preparation.track.confidence > 0).mean())
-    return f"Player found in {seen:.1%} of {len(video)} frames."
+    found = prepare_project(workspace, video, marks, options, progress)
+    seen = float((found.preparation.track.confidence > 0).mean())
+    return "\n".join(
+        [f"Player found in {seen:.1%} of {len(video)} frames.", *found.contradictions()]
+    )
 
 
 def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:

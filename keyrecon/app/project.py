@@ -14,12 +14,13 @@ from keyrecon.annotate.store.cells import (
     cells_from_annotations,
 )
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
+from keyrecon.app.preparing import prepare_project
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
-from keyrecon.io.formats.coco import coco_text, read_coco, write_coco
+from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video, open_video
@@ -32,8 +33,6 @@ from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import (
     Options,
     as_printed,
-    frames_off_marks,
-    prepare,
     with_height,
     with_marked_keyframes,
 )
@@ -149,51 +148,20 @@ def find_keyframes(
     forms = as_printed(options) if printed else options
     video = workspace.video()
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
-    preparation = prepare_with_marks(workspace, video, marks, forms, progress)
+    found = prepare_project(workspace, video, marks, forms, progress)
+    preparation = found.preparation
     if marks is not None and not printed:
         preparation = with_marked_keyframes(preparation, marks, options, progress)
     workspace.remember(options, Options())
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
-    return describe_keyframes(workspace, preparation)
+    return describe_keyframes(workspace, preparation, found.contradictions())
 
 
-def prepare_with_marks(
-    workspace: Workspace,
-    video: Video,
-    marks: Annotations | None,
-    options: Options,
-    progress: Progress,
-) -> Preparation:
-    """The automatic part; made with the marks where there are no picks, or where it was off.
-
-    What was made before is found again while no mark contradicts its track. The printed forms know
-    picks alone, where there are any.
-    """
-    used, file = None, workspace.prepared_marks_file
-    if marks is not None and not np.isfinite(marks.joints).any():
-        marks = None  # a file without a mark tells nothing
-    if options.track.method == "paper" and workspace.picks_file.is_file():
-        keep = workspace.stages.keep
-        return prepare(video, workspace.picks(), options, keep, progress)
-    if file.is_file() and not workspace.stages.force:
-        used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
-    if used is None and marks is not None and not workspace.picks_file.is_file():
-        used = marks
-    picks = workspace.picks() if used is None or workspace.picks_file.is_file() else ()
-    keep = workspace.stages.keep
-    preparation = prepare(video, picks, options, keep, progress, used)
-    if marks is not None and len(frames_off_marks(preparation, marks)):
-        used = marks
-        preparation = prepare(video, picks, options, keep, progress, used)
-    if used is not None:
-        size = (video.width, video.height)
-        write_durably(file, coco_text(used, size).encode())
-    return preparation
-
-
-def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
-    """What was found, and what to do next."""
+def describe_keyframes(
+    workspace: Workspace, preparation: Preparation, contradictions: Sequence[str] = ()
+) -> str:
+    """What was found, what of the person's does not fit it, and what to do next."""
     found, frames = preparation.keyframes, len(preparation.video)
     folder = quoted(workspace.folder)
     seen = float((preparation.track.confidence > 0).mean())
@@ -205,6 +173,7 @@ def describe_keyframes(workspace: Workspace, preparation: Preparation) -> str:
     return "\n".join(
         [
             f"Player found in {seen:.1%} of {frames} frames.",
+            *contradictions,
             *_describe_absence(preparation),
             *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
             *halves,
@@ -316,7 +285,9 @@ def run(
     """
     started = time.perf_counter()
     annotations = annotated(workspace, partial)
-    preparation = prepared(workspace, options, progress, annotations)
+    asked = asked_for(workspace)
+    found = prepare_project(workspace, workspace.video(), annotations, options, progress)
+    preparation = replace(found.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     write_motion(workspace.motion_file, motion)
     material = ReportMaterial(
@@ -335,6 +306,7 @@ def run(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
+            *found.contradictions(),
             *(stretch.text for stretch in uncertain_stretches(motion)),
             *_other_choice(workspace, options, preparation.keyframes),
             f"Took {time.perf_counter() - started:.0f} s.",
@@ -360,8 +332,8 @@ def prepared(
 ) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
     asked = asked_for(workspace)
-    preparation = prepare_with_marks(workspace, workspace.video(), marks, options, progress)
-    return replace(preparation, keyframes=asked)
+    found = prepare_project(workspace, workspace.video(), marks, options, progress)
+    return replace(found.preparation, keyframes=asked)
 
 
 def asked_for(workspace: Workspace) -> Keyframes:

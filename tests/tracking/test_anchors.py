@@ -1,14 +1,19 @@
 """Marks of a person as fixed points of the track."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
-from keyrecon.records import Track, TrackAnchors
+from keyrecon.records import Pick, Track, TrackAnchors
 from keyrecon.tracking.anchors import (
     DOUBT_SECONDS,
     anchored_states,
     contradicted_frames,
+    distance_to_track,
     least_sure_frames,
+    misplaced_marks,
     with_bridge_costs,
 )
 
@@ -18,6 +23,19 @@ def standing(count, confidence=1.0):
     head, feet = np.tile([50.0, 20.0], (count, 1)), np.tile([[44.0, 120], [56, 120]], (count, 1, 1))
     sure = np.broadcast_to(confidence, count).astype(float)
     return Track(head, feet, np.full(count, 100.0), np.zeros((count, 4)), sure)
+
+
+def walking(count):
+    """The same player at 2 px per frame."""
+    still, way = standing(count), 2.0 * np.arange(count)[:, None] * [1, 0]
+    return replace(still, head=still.head + way, feet=still.feet + way[:, None])
+
+
+def replace_head(anchors, row, shift):
+    """Anchors with one head moved."""
+    head = anchors.head.copy()
+    head[row] += shift
+    return replace(anchors, head=head)
 
 
 def marks(track, frames, shift=(0.0, 0.0)):
@@ -81,3 +99,27 @@ def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is
     first, second = least_sure_frames(standing(200, confidence), np.array([0]), 50.0, 2)
     assert 115 < first < 155 or 115 < second < 155
     assert abs(first - second) > DOUBT_SECONDS * 50
+
+
+def test_a_mark_that_the_player_would_have_to_jump_to_is_named_and_others_are_not():
+    track = walking(60)
+    wrong = replace_head(marks(track, [10, 30, 50]), 1, (40.0, 0.0))
+    (found,) = misplaced_marks(track, wrong, 25.0)
+    assert (found.frame, found.part) == (30, "head")
+    assert found.distance == pytest.approx(0.4, abs=0.01)
+    assert misplaced_marks(track, marks(track, [0, 10, 30, 59]), 25.0) == []
+
+
+def test_feet_in_either_order_lie_on_their_way():
+    track = walking(60)
+    crossed = marks(track, [30])
+    crossed = replace(crossed, feet=crossed.feet[:, ::-1])
+    assert misplaced_marks(track, crossed, 25.0) == []
+    off = replace(crossed, feet=crossed.feet + np.array([0, 60.0]))
+    assert [mark.part for mark in misplaced_marks(track, off, 25.0)] == ["feet"]
+
+
+def test_a_click_lies_as_far_from_the_track_as_from_the_nearer_foot():
+    track = standing(3)
+    assert distance_to_track(track, Pick(1, "foot", 56.0, 120.0)) == 0
+    assert distance_to_track(track, Pick(1, "head", 50.0, 70.0)) == pytest.approx(0.5)
