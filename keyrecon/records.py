@@ -258,6 +258,8 @@ class FlowTracks:
     """px; NaN where nothing was followed."""
     confidence: Float[np.ndarray, "T J"]
     """0-1: how well the ways from both marks agree, and the place with what was marked."""
+    joined: Bool[np.ndarray, "T J"]
+    """Whether there is a way from a mark before and one from a mark after."""
 
 
 SOURCES = ("annotated", "propagated", "interpolated", "refined")

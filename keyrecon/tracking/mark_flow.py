@@ -93,8 +93,8 @@ class _Schedule:
         coming = np.where(marked, number, n_frames)
         return cls(marked, last, np.minimum.accumulate(coming[::-1])[::-1], longest)
 
-    def joined(self, t: int) -> Bool[np.ndarray, "J"]:
-        """Joints that are followed in frame t both ways."""
+    def joined(self, t: int | slice) -> Bool[np.ndarray, "*n J"]:
+        """Joints that are followed in some frames both ways."""
         between = (self.last[t] >= 0) & (self.next[t] < len(self.last))
         return between & (self.next[t] - self.last[t] <= self.longest)
 
@@ -160,7 +160,8 @@ class _Follower:
 
     def tracks(self) -> FlowTracks:
         """What was followed, in pixels of the video."""
-        return FlowTracks((self.joints + 0.5) / self.shrink - 0.5, self.confidence)
+        joints = (self.joints + 0.5) / self.shrink - 0.5
+        return FlowTracks(joints, self.confidence, self.schedule.joined(np.s_[:]))
 
     def advance(self, t: int, picture: UInt8[np.ndarray, "h w"]) -> None:
         """Take the next picture: follow joints into it, and back from those marked in it."""

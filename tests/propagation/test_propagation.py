@@ -116,14 +116,25 @@ def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
     assert away.max() < 0.03
 
 
-def test_sure_flow_overrules_edges_in_doubt_and_no_others():
-    joints = np.zeros((3, 2, 2))
-    doubt = np.array([[0.1, 0.1], [0.1, 0.1], [0.1, 0.9]])
-    tracks = JointTracks(joints, doubt, np.zeros((3, 2), dtype=np.int64))
-    flow = FlowTracks(joints + 40.0, np.array([[0.9, 0.3], [0.0, 0.0], [0.9, 0.9]]))
-    flow.joints[2, 0] = joints[2, 0] + 1.0
-    fused = with_flow(tracks, flow, np.full(3, 100.0))
-    assert (fused.joints[0, 0] == 40).all()
-    assert fused.confidence[0, 0] == 0.9
-    assert (fused.joints[[0, 1, 1], [1, 0, 1]] == 0).all()
-    assert (fused.joints[2] == 0).all()  # near one another they agree, and edges are more exact
+def fused(edges, followed, joined=True, shift=40.0):
+    """One joint at 0 by edges and elsewhere by flow, each with a confidence."""
+    joints = np.zeros((1, 1, 2))
+    tracks = JointTracks(joints, np.full((1, 1), edges), np.zeros((1, 1), dtype=np.int64))
+    flow = FlowTracks(joints + shift, np.full((1, 1), followed), np.full((1, 1), joined))
+    result = with_flow(tracks, flow, np.full(1, 100.0))
+    return float(result.joints[0, 0, 0]), float(result.confidence[0, 0])
+
+
+def test_flow_that_joins_two_marks_has_a_joint_where_it_is_surer_than_edges():
+    assert fused(edges=0.7, followed=0.95) == (40, 0.95)
+    assert fused(edges=0.02, followed=0.3) == (40, 0.3)
+    assert fused(edges=0.4, followed=0.6) == (0, 0.4)
+    assert fused(edges=0.02, followed=0.0) == (0, 0.02)
+
+
+def test_flow_from_one_mark_alone_overrules_nothing():
+    assert fused(edges=0.05, followed=0.99, joined=False) == (0, 0.05)
+
+
+def test_flow_and_edges_near_one_another_agree_and_edges_are_more_exact():
+    assert fused(edges=0.3, followed=0.99, shift=1.0) == (0, 0.3)

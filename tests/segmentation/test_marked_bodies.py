@@ -54,6 +54,6 @@ def test_sure_flow_gives_further_anchors_that_nobody_marked():
     joints = np.tile(body().joints, (12, 1, 1))
     confidence = np.zeros(joints.shape[:2])
     confidence[8] = 0.9
-    anchors = anchors_from_bodies(body(), FlowTracks(joints, confidence))
+    anchors = anchors_from_bodies(body(), FlowTracks(joints, confidence, confidence > 0))
     assert anchors.frames.tolist() == [7, 8]
     assert anchors.marked.tolist() == [True, False]
