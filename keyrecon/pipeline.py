@@ -265,20 +265,7 @@ def reconstruct(
     """
     preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
     video, height = preparation.video, preparation.track.height
-    flow = None
-    if options.propagate.method == "fused":
-        flow = keep(
-            "flow", track_marked_joints, video, annotations, options=options.flow, progress=progress
-        )
-    tracks = keep(
-        "propagate",
-        propagate_joints,
-        preparation,
-        annotations,
-        flow,
-        options=options.propagate,
-        progress=progress,
-    )
+    tracks = carry_joints(preparation, annotations, options, keep, progress)
     expected = None
     if options.prior == "golf" and models.swing is not None:
         expected = keep(
@@ -305,6 +292,30 @@ def reconstruct(
         progress=progress,
     )
     return assemble_motion(video, annotations, tracks, lifted, options.lift.height)
+
+
+def carry_joints(
+    preparation: Preparation,
+    annotations: Annotations,
+    options: Options = Options(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+) -> JointTracks:
+    """The annotated joints in every frame of the video."""
+    video, flow = preparation.video, None
+    if options.propagate.method == "fused":
+        flow = keep(
+            "flow", track_marked_joints, video, annotations, options=options.flow, progress=progress
+        )
+    return keep(
+        "propagate",
+        propagate_joints,
+        preparation,
+        annotations,
+        flow,
+        options=options.propagate,
+        progress=progress,
+    )
 
 
 def _with_annotated_keyframes(
