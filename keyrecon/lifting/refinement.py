@@ -23,7 +23,7 @@ from keyrecon.lifting import terms
 from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import MAD_TO_SIGMA, PreparedTracks
-from keyrecon.lifting.priors.anatomy import TILT, anatomy_of
+from keyrecon.lifting.priors.anatomy import TILT, anatomy_of, sideways_spread, trunk_axes
 from keyrecon.lifting.priors.depth_model import depth_spread
 from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.numerics.geometry import unit_vectors
@@ -149,15 +149,21 @@ def _trunk_terms(size: BodySize, options: RefineOptions) -> list[terms.Term]:
 def _bend_terms(
     start: MotionState, size: BodySize, fps: float, options: RefineOptions
 ) -> list[terms.Term]:
-    """Knees and elbows bend no more in depth than the picture gives reason for."""
+    """Knees and elbows bend in depth as the picture gives reason for, knees not sideways."""
     weight = 1 / max(options.bend_correlation * fps, 1.0)
-    return [
-        terms.unseen_bend(
-            (limb.bones[0], limb.bones[1]), start.directions, options.bend_noise, weight
-        )
-        for limb in anatomy_of(size.skeleton).limbs
-        if len(limb.bones) == 2
-    ]
+    anatomy, directions = anatomy_of(size.skeleton), start.directions
+    recipe = []
+    for limb in anatomy.limbs:
+        if len(limb.bones) != 2:
+            continue
+        bones = limb.bones[0], limb.bones[1]
+        recipe.append(terms.unseen_bend(bones, directions, options.bend_noise, weight))
+        if limb.kind == "leg":
+            corners = (size.lengths[:, None] * directions)[:, list(anatomy.trunk)]
+            hips, _, _ = trunk_axes(corners)
+            spread = sideways_spread(directions[:, bones[0]], directions[:, bones[1]], hips)
+            recipe.append(terms.hinge(bones, hips, spread, weight))
+    return recipe
 
 
 def tilted_as(

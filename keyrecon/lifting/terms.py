@@ -134,6 +134,25 @@ def depth_prior(
     return term
 
 
+def hinge(
+    bones: tuple[int, int],
+    axis: Float[np.ndarray, "T 3"],
+    spread: Float[np.ndarray, "T"],
+    weight: float,
+) -> Term:
+    """Two bones bend about an axis: along it their unit directions differ by `spread` at most."""
+    first, second = bones
+    inverse = (np.sqrt(weight) / spread)[:, None]
+
+    def term(state: MotionState) -> LinearizedTerm:
+        bend = state.directions[:, second] - state.directions[:, first]
+        slope = np.zeros((len(bend), 1, state.directions.shape[1], 3))
+        slope[:, 0, second], slope[:, 0, first] = inverse * axis, -inverse * axis
+        return LinearizedTerm(inverse * (bend * axis).sum(axis=-1, keepdims=True), slope)
+
+    return term
+
+
 def unseen_bend(
     bones: tuple[int, int],
     start: Float[np.ndarray, "T B 3"],

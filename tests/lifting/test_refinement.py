@@ -11,6 +11,7 @@ from keyrecon.lifting.foreshortening import depth_share, log_density
 from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
+from keyrecon.lifting.priors.anatomy import sideways_spread
 from keyrecon.lifting.refinement import refine_motion, tilted_as
 from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
 from keyrecon.lifting.terms import unseen_bend
@@ -19,6 +20,9 @@ from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.records import HalfKeyframes
 
 LENGTHS = LSP14.lengths
+LSP14_LEG = tuple(
+    [LSP14.names[end] for _, end in LSP14.bones].index(name) for name in ("left_knee", "left_ankle")
+)
 
 
 def smooth_state(frames=60, seed=0):
@@ -325,3 +329,18 @@ def test_expected_depths_aretilted_as_the_motion_is():
     found = tilted_as(expected[..., 2], expected @ turn.T)
     before = np.abs(expected[..., 2] - (expected @ turn.T)[..., 2]).mean()
     assert np.abs(found - (expected @ turn.T)[..., 2]).mean() < 0.4 * before
+
+
+def test_a_knee_seen_from_the_side_is_not_bent_in_depth():
+    state = smooth_state(3)
+    upright, hips = unit_vectors(np.array([0.1, 1.0, 0.0])), np.array([0.0, 0.0, 1.0])
+    thigh, shank = LSP14_LEG
+    state.directions[:, thigh] = unit_vectors(upright + 0.4 * hips)
+    state.directions[:, shank] = unit_vectors(upright - 0.4 * hips)
+    axis = np.tile(hips, (3, 1))
+    legs = state.directions[:, thigh], state.directions[:, shank]
+    spread = sideways_spread(*legs, axis)
+    assert spread.max() < 0.1
+    term = terms.hinge((thigh, shank), axis, spread, 1.0)
+    found = solve(state, [term], Smoothness.even(3, 1.0, 1e-6 + 0 * LENGTHS), 30, 1e-12).directions
+    np.testing.assert_allclose(found[:, thigh, 2], found[:, shank, 2], atol=1e-3)

@@ -176,10 +176,15 @@ def leg_cost(
     shank: Float[np.ndarray, "*#n 3"],
     side: int,
 ) -> Float[np.ndarray, "..."]:
-    """Knees bend backwards; the rest is habit. `side` is 1 for the right leg, -1 for the left."""
+    """Knees bend backwards and not sideways; the rest is habit.
+
+    `side` is 1 for the right leg, -1 for the left.
+    """
     bend = (np.cross(thigh, shank) * hips).sum(-1)
     axes = limb_axes(hips, up, side)
-    return hinge(bend + 0.05, 0.1) + posture_cost(thigh, shank, axes, "leg")
+    aside = ((shank - thigh) * hips).sum(-1) / sideways_spread(thigh, shank, hips)
+    limits = hinge(bend + 0.05, 0.1) + np.minimum(0.5 * aside**2, CAP)
+    return limits + posture_cost(thigh, shank, axes, "leg")
 
 
 def arm_cost(
@@ -191,6 +196,28 @@ def arm_cost(
 ) -> Float[np.ndarray, "..."]:
     """Habit alone: shoulder and elbow together leave an arm nearly free."""
     return posture_cost(upper, forearm, limb_axes(shoulders, up, side), "arm")
+
+
+_STRAIGHT_SIDEWAYS, _BENT_SIDEWAYS = 0.08, 0.25
+"""Sideways part of a knee's bend (`sideways_spread`): of straight legs, and in bends of the leg's
+own plane. Root mean square 0.06-0.11 of legs that are straight within 20 degrees, and 0.15-0.30 of
+the bend in others, in tennis, dancing, kicking, jumping and golf alike. Tried besides: 0.12 and
+0.35, which left knees 1-2 degrees more bent where they are straight."""
+
+
+def sideways_spread(
+    thigh: Float[np.ndarray, "*#n 3"],
+    shank: Float[np.ndarray, "*#n 3"],
+    hips: Float[np.ndarray, "*#n 3"],
+) -> Float[np.ndarray, "*n"]:
+    """How far a knee may bend along the line of the hips: a hinge bends across it.
+
+    A difference of unit directions. What the leg bends in its own plane is a hinge's right; seen
+    from the side, it is in the picture, and a bend in depth is none that a knee can make.
+    """
+    bend = shank - thigh
+    own = bend - (bend * hips).sum(-1, keepdims=True) * hips
+    return np.hypot(_STRAIGHT_SIDEWAYS, _BENT_SIDEWAYS * np.linalg.norm(own, axis=-1))
 
 
 def limb_axes(
