@@ -108,6 +108,23 @@ def _times(frames: int, cost: float) -> float:
     return frames * cost if frames else 0.0
 
 
+def state_probabilities(
+    unary: Sequence[Float[np.ndarray, "S"]], transition: Transition
+) -> Float[np.ndarray, "T S"]:
+    """Probability of each state of each frame, where costs are nats and all paths count.
+
+    The sum-product twin of `find_cheapest_path` (forward-backward: Baum et al., 1970) for a chain
+    in which every frame takes one of the same number of states.
+    """
+    frames = len(unary)
+    ahead, back = -np.array(unary), np.zeros((frames, len(unary[0])))
+    for t in range(1, frames):
+        ahead[t] += np.logaddexp.reduce(ahead[t - 1][:, None] - transition(t - 1, t), axis=0)
+        u = frames - 1 - t
+        back[u] = np.logaddexp.reduce(back[u + 1] - unary[u + 1] - transition(u, u + 1), axis=1)
+    return np.exp(ahead + back - np.logaddexp.reduce(ahead + back, axis=1, keepdims=True))
+
+
 @dataclass(frozen=True)
 class TransitionModel:
     """How points may move; all lengths in the unit of the positions."""

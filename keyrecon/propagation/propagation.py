@@ -8,7 +8,8 @@ For each half of the body, the lower first, it
 1. fits the edge templates of several annotated frames to every frame, limbs turning as they must,
    and tracks annotated poses through time from both sides (`hypotheses`);
 2. chooses among these hypotheses by the cheapest path through time (`selection`);
-3. smooths all trajectories in one least squares over edges, bone shape and acceleration, in which
+3. decides over the whole clip which limb is the left one (`limb_identity`);
+4. smooths all trajectories in one least squares over edges, bone shape and acceleration, in which
    the annotated frames are fixed (`trajectory_smoothing`).
 """
 
@@ -37,6 +38,12 @@ from keyrecon.propagation.hypotheses import (
     join_hypotheses,
     propose_limbs,
     track_from_keyframes,
+)
+from keyrecon.propagation.limb_identity import (
+    SideEvidence,
+    flow_evidence,
+    identify_limbs,
+    template_evidence,
 )
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
@@ -94,6 +101,8 @@ class HalfStart:
     """Pose distance of every frame to the annotated ones, player heights."""
     fixed: Complex[np.ndarray, "T G"]
     """Joints that the other half has estimated."""
+    flow: SideEvidence | None = None
+    """Marked joints followed by optical flow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +133,7 @@ def propagate_joints(
     if options.method == "paper":
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
-    tracks = _propagate_fused(preparation, annotations, options, progress)
+    tracks = _propagate_fused(preparation, annotations, flow, options, progress)
     if flow is not None:
         tracks = with_flow(tracks, flow, preparation.track.height)
     return _with_marks(annotations, marked, tracks)
@@ -160,6 +169,7 @@ def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
 def _propagate_fused(
     preparation: Preparation,
     annotations: Annotations,
+    flow: FlowTracks | None,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
@@ -183,7 +193,8 @@ def _propagate_fused(
         distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
-        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed)
+        followed = None if flow is None else flow_evidence(half, flow, body_frame, fps)
+        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed, followed)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -209,10 +220,16 @@ def propagate_half(
     hypotheses = join_hypotheses(fitted, limbs, tracked.result())
     limbs_chosen = choose_limbs(templates, hypotheses, fps)
     limbs_chosen.joints[:, templates.half.fixed] = start.fixed
-    chosen = ChosenHypotheses(limbs_chosen.joints, nearest)
+    half, marked = templates.half, templates.poses.frames
+    told = template_evidence(half, fitted.joints, fps)
+    if start.flow is not None:
+        told = told + start.flow
+    identity = identify_limbs(half, limbs_chosen.joints, told, marked, fps)
+    chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints)
-    return PropagatedHalf(joints, confidence, limbs_chosen.template)
+    confidence *= identity.confidence(half, joints)
+    return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
 
 
 def gather_poses(

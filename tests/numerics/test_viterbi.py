@@ -3,7 +3,12 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_path, find_cheapest_track
+from keyrecon.numerics.viterbi import (
+    TransitionModel,
+    find_cheapest_path,
+    find_cheapest_track,
+    state_probabilities,
+)
 
 
 def cost_of(path, unary, points, model):
@@ -93,3 +98,16 @@ def test_without_candidates_there_is_no_path():
     model = TransitionModel(sigma=1.0, max_gap=25)
     path = find_cheapest_track([np.zeros(0)] * 4, [empty] * 4, model)
     assert path.tolist() == [-1] * 4
+
+
+def test_probabilities_of_states_are_those_of_all_paths_together():
+    generator = np.random.default_rng(3)
+    unary = list(generator.uniform(0, 3, (5, 3)))
+    steps = generator.uniform(0, 3, (5, 3, 3))
+    expected = np.zeros((5, 3))
+    for path in product(range(3), repeat=5):
+        cost = sum(unary[t][s] for t, s in enumerate(path))
+        cost += sum(steps[t][path[t - 1], path[t]] for t in range(1, 5))
+        expected[np.arange(5), path] += np.exp(-cost)
+    expected /= expected.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(state_probabilities(unary, lambda _, t: steps[t]), expected)

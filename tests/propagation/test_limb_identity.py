@@ -1,0 +1,122 @@
+"""Left and right of two limbs over a whole clip."""
+
+import numpy as np
+import pytest
+
+from keyrecon.body import LSP14
+from keyrecon.propagation.half_body import split_body
+from keyrecon.propagation.limb_identity import (
+    SideEvidence,
+    exchange_price,
+    identify_limbs,
+    template_evidence,
+)
+
+LEGS = split_body(LSP14)[0]
+ONE, OTHER = map(list, LEGS.sides)
+FPS = 25.0
+LEG = np.array([0.0, 0.2j, 0.45j])
+"""Hip, knee and ankle of a leg that hangs straight down."""
+SWING = np.array([0.1, 0.6, 1.0])
+"""How far each joint takes part when a leg swings."""
+
+
+def legs(one, other):
+    """Joints of both legs in every frame, from how far aside they swing."""
+    joints = np.zeros((len(one), len(LEGS.joints)), complex)
+    joints[:, ONE] = LEG + np.outer(one, SWING)
+    joints[:, OTHER] = LEG + np.outer(other, SWING)
+    return joints
+
+
+def exchange(joints, frames):
+    """The same with left and right exchanged in some frames."""
+    result = joints.copy()
+    result[np.ix_(frames, ONE)], result[np.ix_(frames, OTHER)] = (
+        joints[np.ix_(frames, OTHER)],
+        joints[np.ix_(frames, ONE)],
+    )
+    return result
+
+
+def silence(joints):
+    return SideEvidence(joints[:, None], np.zeros((len(joints), 1, joints.shape[1])))
+
+
+def identify(joints, marked, evidence=None):
+    return identify_limbs(LEGS, joints, evidence or silence(joints), np.array(marked), FPS)
+
+
+TIME = np.linspace(-1, 1, 41)
+CROSSING = legs(0.25 * TIME, -0.25 * TIME)
+"""Two legs that pass one another in frame 20, each at its own constant speed."""
+PARTING = legs(0.02 + 0.25 * TIME**2, -0.02 - 0.25 * TIME**2)
+"""Two legs that come together until frame 20 and part again."""
+STANDING = legs(0.08 * np.sin(3 * TIME) ** 2, 0.25 * TIME)
+"""One leg goes past another that hardly moves."""
+
+
+@pytest.mark.parametrize("motion", [CROSSING, PARTING, STANDING], ids=["cross", "part", "pass"])
+@pytest.mark.parametrize("wrong", [range(21, 41), range(20), range(22, 33), range(0)])
+def test_limbs_keep_their_sides_where_they_meet(motion, wrong):
+    found = identify(exchange(motion, list(wrong)), [0] if 0 not in wrong else [40])
+    # where both legs are in one place, either is right
+    apart = np.abs(motion[:, ONE[-1]] - motion[:, OTHER[-1]]) > 0.05
+    np.testing.assert_array_equal(
+        found.exchanged[apart], np.isin(np.arange(41), list(wrong))[apart]
+    )
+
+
+def test_an_exchange_in_mid_air_is_moved_to_where_the_limbs_met():
+    # taken for one another when they met in frame 20, and set right by a jump in frame 32
+    found = identify(exchange(CROSSING, list(range(20, 32))), [0, 40])
+    assert found.exchanged[21:32].all()
+    assert not found.exchanged[:20].any()
+    assert not found.exchanged[32:].any()
+
+
+def test_limbs_far_apart_are_dearer_to_exchange_than_limbs_that_meet():
+    price = exchange_price(
+        np.stack([CROSSING[:, ONE], CROSSING[:, OTHER]], axis=1), np.array([0.016, 0.032, 0.064])
+    )
+    assert price[19] < 0.5 * price[4]
+    assert price[19] < 0.5 * price[34]
+    assert (price > 0).all()
+
+
+def test_the_next_mark_decides_a_meeting_that_motion_leaves_open():
+    apart = np.abs(TIME[:, None]) > 0.4
+    still = np.where(apart, CROSSING, legs(0 * TIME, 0 * TIME))
+    for wrong in (list(range(20, 41)), []):
+        found = identify(exchange(still, wrong), [0, 40])
+        assert not found.exchanged[:12].any()
+        assert not found.exchanged[29:].any()
+        assert found.probability[[2, 38]].min() > 0.95
+
+
+def test_sides_are_uncertain_where_nothing_decides():
+    together = legs(0 * TIME, 0 * TIME)
+    together[:10] = CROSSING[0]
+    together[30:] = CROSSING[0]
+    found = identify(together, [0])
+    assert found.probability[:9].min() > 0.95
+    assert found.probability[31:].max() < 0.7
+    away = found.confidence(LEGS, together)
+    assert away[35, ONE[-1]] < 0.8
+    assert away[20, ONE[-1]] == pytest.approx(1.0)
+
+
+def test_similar_poses_tell_sides_after_limbs_were_in_one_place():
+    together = legs(0 * TIME, 0 * TIME)
+    together[:10] = CROSSING[0]
+    together[30:] = CROSSING[0]
+    told = template_evidence(LEGS, np.repeat(CROSSING[:1, None], len(together), axis=0), FPS)
+    found = identify(exchange(together, list(range(30, 41))), [0], told)
+    assert found.exchanged[31:].all()
+    assert not found.exchanged[:10].any()
+
+
+def test_what_belongs_to_joints_follows_them_to_the_other_side():
+    wrong = list(range(22, 33))
+    found = identify(exchange(CROSSING, wrong), [0, 40])
+    np.testing.assert_allclose(found.apply(LEGS, exchange(CROSSING, wrong)), CROSSING)
