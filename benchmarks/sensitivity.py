@@ -62,8 +62,6 @@ SMALL_PCK, SMALL_PA = 1.0, 1.0
 """Points and mm up to which halving or doubling says enough: half of what other clicks on the same
 joints do."""
 BEFORE_KEYFRAMES = ("tracking", "segmentation")
-TOGETHER = 5
-"""Numbers varied at once: about one in ten changes much."""
 MOVE = 0.15
 """Of a head or a shin: how far picks are moved."""
 OTHER_SEEDS = (100, 200, 300)
@@ -114,8 +112,7 @@ class Bench:
     def __init__(self, words: argparse.Namespace, code: str) -> None:
         """Read the rows that are there."""
         self.words, self.code, self.frames = words, code, words.frames
-        rows = read_rows(words.out)
-        self.rows = [r for r in rows if r.code == code and r.frames in (words.frames, 0)]
+        self.rows = list(read_rows(words.out))
         self.known = {row.key: row for row in self.rows}
         self.began, self.done = time.perf_counter(), 0
         self.pool = ThreadPoolExecutor(words.workers)
@@ -315,12 +312,13 @@ class Study:
 
     def split(self, clip: str, factor: float, numbers: list[TunedNumber]) -> Iterator[TunedNumber]:
         """Numbers that change the clip, found by changing many at once."""
+        together = self.bench.words.together
         by_stages: dict[tuple[str, ...], list[TunedNumber]] = {}
         for number in numbers:
             by_stages.setdefault(self.using[clip][number.key][:1], []).append(number)
         for group in by_stages.values():
-            for start in range(0, len(group), TOGETHER):
-                yield from self._halve(clip, factor, group[start : start + TOGETHER])
+            for start in range(0, len(group), together):
+                yield from self._halve(clip, factor, group[start : start + together])
 
     def _halve(self, clip: str, factor: float, group: list[TunedNumber]) -> Iterator[TunedNumber]:
         rows = self.bench.measure(self.change(clip, factor, *group))
@@ -392,6 +390,7 @@ def main() -> None:
     parser.add_argument("--package", nargs="*", choices=FOLDERS)
     parser.add_argument("--constants", nargs="*", help="NAME, Record.field or file:name")
     parser.add_argument("--clicks", action="store_true", help="move clicks, and no number")
+    parser.add_argument("--together", type=int, default=5, help="numbers varied at once")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("benchmarks/work/sensitivity.csv"))
     parser.add_argument("--plan", action="store_true", help="print what would be measured")
@@ -412,8 +411,12 @@ def main() -> None:
             study.move_clicks()
         else:
             study.run()
-    asked = {n.key for n in study.numbers}
-    rows = [r for r in bench.rows if r.number in asked or r.number.startswith("clicks:")]
+    values = {n.key: shorten(n.values) for n in study.numbers}
+    rows = [
+        row
+        for row in bench.rows
+        if row.number.startswith("clicks:") or row.old == values.get(row.number)
+    ]
     print_summary(rows, [n for n in study.numbers if not study.users(n)], headline(bench, study))
 
 

@@ -139,16 +139,14 @@ def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None
     """The table as markdown: clicks, then every number by folder."""
     print(head)
     of = by_number(rows)
-    print("\n## Clicks\n\nLargest change of any clip, either way.\n")
-    print("| what | change | PCK, points | PA-MPJPE, mm | clips |\n|---|---|---|---|---|")
-    for name, group in of.items():
-        if name.startswith("clicks:"):
-            for change in dict.fromkeys(row.change for row in group):
-                effect = Effect.of([row for row in group if row.change == change])
-                told = name.removeprefix("clicks:")
-                print(
-                    f"| {told} | {change} | {effect.pck:.1f} | {effect.pa:.1f} | {effect.clips} |"
-                )
+    print("\n## Clicks\n")
+    print("| what | change | clip | PCK, points | PA-MPJPE, mm | without signs, mm |")
+    print("|---|---|---|---|---|---|")
+    for row in rows:
+        if row.number.startswith("clicks:"):
+            scores = " | ".join(f"{c:+.1f}" if np.isfinite(c) else "" for c in row.changes)
+            told = row.number.removeprefix("clicks:")
+            print(f"| {told} | {row.change} | {row.clip} | {row.fault or scores} |")
     effects = {
         name: tuple(Effect.of([r for r in group if r.change in of]) for of in (QUARTERS, WIDE))
         for name, group in of.items()
