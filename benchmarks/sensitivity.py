@@ -39,7 +39,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
-from sensitivity_rows import Row, print_summary, read_rows, shorten
+from sensitivity_rows import SMALL_PA, SMALL_PCK, Row, print_summary, read_rows, shorten
 from tuned_numbers import (
     FOLDERS,
     TunedNumber,
@@ -58,9 +58,6 @@ CLIPS = ("all-oblique-small", "ground-oblique-pan-body", "tennis_broadcast_purpl
 """Seen from above and small, from picks; a moving camera, from a marked body; a real one."""
 WIDE = (0.5, 2.0)
 FACTORS = (0.75, 1.25)
-SMALL_PCK, SMALL_PA = 1.0, 1.0
-"""Points and mm up to which halving or doubling says enough: half of what other clicks on the same
-joints do."""
 BEFORE_KEYFRAMES = ("tracking", "segmentation")
 MOVE = 0.15
 """Of a head or a shin: how far picks are moved."""
@@ -248,12 +245,6 @@ def describe(rows: list[Row]) -> str:
     return f"{row.clip:<24}{row.number}{others} {row.change}  {told}  ({row.seconds:.0f} s)"
 
 
-def is_small(row: Row) -> bool:
-    """Whether a change is worth no closer look."""
-    errors = [abs(e) for e in (row.d_pa, row.d_pa_unsigned) if np.isfinite(e)]
-    return not row.fault and abs(row.d_pck) <= SMALL_PCK and max(errors, default=0) <= SMALL_PA
-
-
 class Study:
     """The numbers asked for, and the stages of each clip that use them."""
 
@@ -322,7 +313,7 @@ class Study:
 
     def _halve(self, clip: str, factor: float, group: list[TunedNumber]) -> Iterator[TunedNumber]:
         rows = self.bench.measure(self.change(clip, factor, *group))
-        if not all(is_small(row) for row in rows):
+        if not all(row.is_small for row in rows):
             if len(group) == 1:
                 yield group[0]
             else:
@@ -407,10 +398,7 @@ def main() -> None:
             print(f"{number.key:<70}{shorten(number.values):<24}{len(using)} clips  {stages}")
         return
     if not words.summary:
-        if words.clicks:
-            study.move_clicks()
-        else:
-            study.run()
+        (study.move_clicks if words.clicks else study.run)()
     values = {n.key: shorten(n.values) for n in study.numbers}
     rows = [
         row

@@ -13,6 +13,9 @@ MUCH_PCK, MUCH_PA = 2.0, 3.0
 """Points and mm from which on a number matters much."""
 NOTHING = 0.05
 """Points and mm that are no change."""
+SMALL_PCK, SMALL_PA = 1.0, 1.0
+"""Points and mm up to which halving or doubling says enough: less than what other clicks on the
+same joints do."""
 QUARTERS, WIDE = ("x0.75", "x1.25"), ("x0.5", "x2")
 
 
@@ -62,6 +65,13 @@ class Row:
         """Against the base: points of PCK, mm of PA-MPJPE, mm without signs."""
         return self.d_pck, self.d_pa, self.d_pa_unsigned
 
+    @property
+    def is_small(self) -> bool:
+        """Whether the change is worth no closer look."""
+        errors = [abs(e) for e in self.changes[1:] if np.isfinite(e)]
+        small = abs(self.d_pck) <= SMALL_PCK and max(errors, default=0) <= SMALL_PA
+        return small and not self.fault
+
 
 def read_rows(file: Path) -> Iterator[Row]:
     """The rows of a CSV; none where there is no file."""
@@ -97,6 +107,7 @@ class Effect:
     def of(cls, rows: list[Row]) -> "Effect":
         """The effect of one number, or of clicks, that these rows vary; the latest rows count."""
         latest = {row.key: row for row in rows}.values()
+        latest = [row for row in latest if row.is_small or not row.others]  # else: by whom?
         good = [row for row in latest if not row.fault]
         values = np.abs([row.changes for row in good]).reshape(-1, 3)
         values = np.where(np.isfinite(values), values, 0.0)  # in 3D nothing is known of real clips

@@ -13,7 +13,7 @@ which is a look-up in a table of bins: 16 of lightness, 32 of each chroma.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -36,6 +36,14 @@ MAX_COLOR_DIFFERENCE = (22, 9, 9)
 """How far L, a and b may lie from the click's colour, of 255: shading within one material."""
 PATCH_RADIUS = {"head": 0.05, "foot": 0.06}
 """How far around a click a part goes, player heights: half a head, half a shoe."""
+ABOVE_SOLE = 0.02, 0.04, 0.06
+"""How far above a click on a foot its shoe is looked for, player heights: up to the ankle."""
+MIN_FLOOR, MIN_SHOE = 0.15, 0.1
+"""Shares of the patch's circle that a floor fills at least, and a shoe."""
+MIN_GAIN = 2.5
+"""Nats by which a shoe's colours are rarer in the scene and on the leg than those of the floor:
+on rendered players 3.6 to 6. Of 63 clicks on shoes of seven real clips and 52 on rendered ones none
+moves."""
 REGION_RADIUS = 0.08
 """The same for regions of clothing and skin, player heights."""
 HEAD_CORE = 0.45
@@ -79,13 +87,18 @@ def learn_colors(
     names = tuple(dict.fromkeys(("head", "foot", *sorted({p.part for p in picks}))))
     counts = np.zeros((len(names), *BINS))
     around = np.zeros((len(SURROUNDINGS_MARGINS), *BINS))
+    shoes: list[list[UInt16[np.ndarray, "_"]]] = []
     for frame in progress(sorted({p.frame for p in picks}), "Learning colours"):
         lab = to_lab(video.frame(frame))
         bins = color_bins(lab)
         here = [p for p in picks if p.frame == frame]
         for pick in here:
-            patch = grow_patch(lab, pick, height)
-            counts[names.index(pick.part)] += _count(bins[patch])
+            if pick.part == "foot":
+                shoes.append(
+                    [bins[grow_patch(lab, p, height)] for p in _at_and_above(pick, height)]
+                )
+            else:
+                counts[names.index(pick.part)] += _count(bins[grow_patch(lab, pick, height)])
         for row, margin in enumerate(SURROUNDINGS_MARGINS):
             around[row] += _count(bins[_outside(lab.shape[:2], here, margin * height)])
     enough = around.sum(axis=(1, 2, 3)) >= MIN_SURROUNDINGS * height**2
@@ -94,12 +107,42 @@ def learn_colors(
             "The player fills the picture in every picked frame, so nothing shows the "
             "surroundings; pick also in a frame where the player is farther from its edges."
         )
+    scene = _smooth(around[enough.argmax()])
+    rest = [_smooth(c) for name, c in zip(names, counts, strict=True) if name != "head"]
+    known = np.maximum(scene, np.max(rest, axis=0))
+    circle = np.pi * (PATCH_RADIUS["foot"] * height) ** 2
+    for patches in shoes:
+        counts[names.index("foot")] += _count(_shoe_patch(patches, known, circle))
     return Colors(
         names=names,
         histograms=np.stack([_smooth(c) for c in counts]).astype(np.float32),
-        surroundings=(_smooth(around[enough.argmax()]) * options.surroundings).astype(np.float32),
+        surroundings=(scene * options.surroundings).astype(np.float32),
         height=height,
     )
+
+
+def _at_and_above(pick: Pick, height: float) -> list[Pick]:
+    """A click, and places above it as far as a shoe is high."""
+    steps = (share * height for share in ABOVE_SOLE)
+    return [pick, *(replace(pick, y=max(0.0, pick.y - step)) for step in steps)]
+
+
+def _shoe_patch(
+    patches: list[UInt16[np.ndarray, "_"]], known: Float[np.ndarray, "bins"], circle: float
+) -> UInt16[np.ndarray, "n"]:
+    """The patch of a click, or of the place above it that has colours of its own.
+
+    A click beneath the sole has the colours of the floor, which are `known` like those of the leg.
+    """
+    if len(patches[0]) < MIN_FLOOR * circle:
+        return patches[0]
+    own = [-float(np.log(known[patch] + MIN_DENSITY).mean()) for patch in patches]
+    better = [
+        at
+        for at in range(1, len(patches))
+        if own[at] > own[0] + MIN_GAIN and len(patches[at]) >= MIN_SHOE * circle
+    ]
+    return patches[max(better, key=lambda at: own[at]) if better else 0]
 
 
 def picked_height(picks: Sequence[Pick]) -> float:

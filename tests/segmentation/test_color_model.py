@@ -1,6 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from drawn_player import film, picks
+from drawn_player import HEIGHT, SHOE, film, picks
 
 from keyrecon.errors import KeyreconError
 from keyrecon.records import Colors, Pick
@@ -44,6 +46,17 @@ def test_a_part_is_told_from_the_surroundings(video):
     shirt = tables[colors.names.index("shirt")]
     assert shirt[red] > 0.9
     assert shirt[green] < 0.05
+
+
+def test_a_click_beneath_the_sole_still_teaches_the_shoe(video):
+    below = [replace(p, y=p.y + 0.07 * HEIGHT) if p.part == "foot" else p for p in picks(4)]
+    tables = posterior_tables(learn_colors(video, below))
+    shoe, floor = (
+        color_bins(to_lab(np.array([[c]], np.uint8)))[0, 0] for c in (SHOE, (60, 120, 80))
+    )
+    foot = tables[1]
+    assert foot[shoe] > 0.9
+    assert foot[floor] < 0.1
 
 
 def test_histograms_are_shares(video):
