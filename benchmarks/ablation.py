@@ -5,9 +5,11 @@
 Rendered sequences as in accuracy.py; the mean over them is printed last. Perfect means taken from
 the truth: `2D` every joint in every frame; `signs` which end of a bone is nearer in every frame;
 `lengths` of bones and breadths; `scale` of every frame; `all of these` leaves the solver alone.
-Then what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of the
-carried joints thrown anywhere on the player. `signs` in the table: share of limb bones whose depth
-sign is right at the keyframes.
+Where it lies in the result as it is, tell the rows `bones`: the result with bones replaced by the
+true ones in one respect (true signs of depth, true size of depth, true depth, true place in the
+picture). Then what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of
+the carried joints thrown anywhere on the player. `signs` in the table: share of limb bones whose
+depth sign is right at the keyframes.
 """
 
 import argparse
@@ -34,6 +36,7 @@ from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
 from keyrecon.pipeline import Options
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import Annotations, JointTracks, Keyframes
+from keyrecon.tracking.mark_flow import track_marked_joints
 
 OUTLIERS = 0.03
 """Share of carried joints that are replaced."""
@@ -60,11 +63,20 @@ def carry(case: Case, model: DepthModel) -> Trial:
     """Joints of a sequence carried from its keyframes, as the pipeline does."""
     prepared, truth = case.preparation, case.truth
     marks = mark(case)
+    flow = case.store.keep(
+        "flow",
+        track_marked_joints,
+        prepared.video,
+        marks,
+        options=Options().flow,
+        progress=show,
+    )
     tracks = case.store.keep(
         "propagate",
         propagate_joints,
         prepared,
         marks,
+        flow,
         options=PropagateOptions(),
         progress=show,
     )
@@ -152,7 +164,6 @@ def _under(trial: Trial, *perfect: object) -> LiftResult:
 
 
 CONDITIONS: dict[str, Callable[[Trial], LiftResult]] = {
-    "as it is": lift_trial,
     "perfect 2D": lambda t: lift_trial(with_true_joints(t)),
     "perfect signs": lambda t: _under(t, perfect_signs(t)),
     "perfect lengths": lambda t: _under(t, perfect_size(t, scale=False)),
@@ -175,10 +186,29 @@ def judge(trial: Trial, found: LiftResult) -> list[float]:
     return [*scores, acceleration_error(points, truth, root), right[marked & limb].mean()]
 
 
+def replace_bones(trial: Trial, found: LiftResult) -> Iterator[tuple[str, LiftResult]]:
+    """The result with one respect of all bones from the truth."""
+    skeleton = trial.marks.skeleton
+    ours, true = (bone_vectors(p, skeleton) for p in (found.points3d, trial.truth["points3d"]))
+    depth, known = ours[..., 2], true[..., 2]
+    for name, flat, deep in (
+        ("true signs", ours, np.copysign(depth, known)),
+        ("true size of depth", ours, np.copysign(known, depth)),
+        ("true depth", ours, known),
+        ("true picture", true, depth),
+    ):
+        vectors = np.concatenate([flat[..., :2], deep[..., None]], axis=-1)
+        points = np.einsum("jb,tbi->tji", skeleton.ancestry, vectors)
+        yield f"bones: {name}", replace(found, points3d=points)
+
+
 def measure(folder: Path, case: Case, model: DepthModel) -> dict[str, list[float]]:
     """Scores of one sequence under every condition."""
     trial = carry(case, model)
-    rows = {name: judge(trial, run(trial)) for name, run in CONDITIONS.items()}
+    found = lift_trial(trial)
+    rows = {"as it is": judge(trial, found)}
+    rows |= {name: judge(trial, result) for name, result in replace_bones(trial, found)}
+    rows |= {name: judge(trial, run(trial)) for name, run in CONDITIONS.items()}
     blind = replace(trial, marks=replace(trial.marks, nearer=0 * trial.marks.nearer))
     rows["no signs from the person"] = judge(blind, lift_trial(blind))
     half = replace(Options(), keyframes=KeyframeOptions(budget=KeyframeOptions().budget / 2))

@@ -1,12 +1,14 @@
 """Accuracy on rendered tennis with known truth, sequence by sequence: paper's form beside ours.
 
-    python benchmarks/accuracy.py [--work DIR] [--mocap DIR] [--only NAME ...] [--other]
-        [--mediapipe PYTHON]
+    python benchmarks/accuracy.py [--work DIR] [--mocap DIR] [--only NAME ...] [--second]
+        [--other] [--mediapipe PYTHON]
 
 Renders what is missing in the work folder, annotates the chosen keyframes from the truth with
 click noise, reconstructs and prints a table. The depth model is learnt without the players of the
-sequence. Nothing is asserted. With an interpreter that has
-mediapipe 0.10.21 installed, MediaPipe Pose is measured on the same videos.
+sequence. Nothing is asserted. The last columns are those of `posture.py`: peak speed of the hands
+over the true one (median and tenth percentile), errors of knees, elbows and the angle between hips
+and shoulders, and by how much knees that are straight are bent, all in degrees. With an interpreter
+that has mediapipe 0.10.21 installed, MediaPipe Pose is measured on the same videos.
 """
 
 import argparse
@@ -15,8 +17,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import posture
 from peer import score_mediapipe
-from sequences import DATA, OTHER, TENNIS, Sequence, render
+from sequences import DATA, OTHER, SECOND, TENNIS, Sequence, render
 from unseen import unseen_model
 
 from keyrecon.app.console import show
@@ -114,6 +117,7 @@ FORMS = {
 COLUMNS = (
     f"{'sequence':<22}{'form':<23}{'cost':>6}{'cover':>7}{'track':>7}{'PCK':>7}{'wrist':>7}"
     f"{'median':>8}{'PA':>7}{'N':>7}{'accel':>7}{'limbs':>8}{'ms/fr':>7}"
+    f"{posture.COLUMNS}"
 )
 
 
@@ -137,7 +141,8 @@ def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> 
         print(
             f"{sequence.name:<22}{form:<23}{cost:6.2%}{cover:7.1%}{judge_track(case):7.1%}"
             f"{carried:7.1%}{wrist:7.1%}{median:8.2%}{scores.pa_mpjpe:7.1f}{scores.n_mpjpe:7.1f}"
-            f"{scores.acceleration:7.1f}{scores.limb_variation_max:8.4%}{spent:7.1f}",
+            f"{scores.acceleration:7.1f}{scores.limb_variation_max:8.4%}{spent:7.1f}"
+            f"{posture.row(posture.judge_posture(motion, case.truth))}",
             flush=True,
         )
 
@@ -159,11 +164,12 @@ def main() -> None:
     parser.add_argument("--mocap", type=Path, default=DATA / "mocap")
     parser.add_argument("--only", nargs="*", help="names of sequences")
     parser.add_argument("--form", nargs="*", default=list(FORMS), choices=list(FORMS))
+    parser.add_argument("--second", action="store_true", help="other players, the second table")
     parser.add_argument("--other", action="store_true", help="motion other than tennis")
     parser.add_argument("--mediapipe", type=Path, help="an interpreter with mediapipe")
     words = parser.parse_args()
     print(COLUMNS)
-    for sequence in OTHER if words.other else TENNIS:
+    for sequence in OTHER if words.other else SECOND if words.second else TENNIS:
         if not words.only or sequence.name in words.only:
             folder = render(sequence, words.work, words.mocap)
             depths, _ = unseen_model(sequence, words.work, words.mocap)
