@@ -29,19 +29,23 @@ from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.records import Edges
 
 MAX_OUTLINE_OFFSET = 0.16
-"""Farthest an outline lies from its bone, player heights: the side of a loose shirt."""
+"""Farthest an outline lies from its bone, player heights: the side of a loose shirt. Halved or
+doubled, others with it: at most 0.1 points, 0.1 mm on one clip."""
 ANGLE_WEIGHT = 0.05
-"""An element square to a bone counts as this much farther away, player heights. Chosen on
-rendered sequences; see benchmarks/sensitivity.py."""
+"""An element square to a bone counts as this much farther away, player heights. Halved or doubled,
+others with it: at most 0.1 points, 0.2 mm on one clip."""
 MIN_FACING_COSINE = 0.35
-"""Cosine between an element's left and the way to its bone, at least: they may
-differ by 70 degrees. Chosen on rendered sequences; see benchmarks/sensitivity.py."""
+"""Cosine between an element's left and the way to its bone, at least: they may differ by 70
+degrees. Halved or doubled, others with it: at most 0.1 points, 0.3 mm on one clip."""
 BONE_BINS = 8
-"""Bins along a bone in which its average outline has an element, on either side."""
+"""Bins along a bone in which its average outline has an element, on either side. Halved or doubled,
+others with it: at most 0.1 points, 0.3 mm on one clip."""
 END_BIN_LENGTH = 0.025
-"""Length of such bins past the end of a bone (hand, foot, crown), player heights."""
+"""Length of such bins past the end of a bone (hand, foot, crown), player heights. Halved or
+doubled, others with it: at most 0.1 points, 0.1 mm on one clip."""
 MIN_OUTLINE_SHARE = 0.25
-"""Share of the annotated frames that must have an element for the average outline to have it."""
+"""Share of the annotated frames that must have an element for the average outline to have it. A
+quarter more or less: at most 0.1 points, 0.1 mm on one clip."""
 FOOT_MATCH_DISTANCE = 0.08
 """A foot farther from where the ankle is estimated counts for little, player heights.
 Chosen on rendered sequences; see benchmarks/sensitivity.py."""
