@@ -114,13 +114,20 @@ def find_stages(trees: dict[str, ast.Module]) -> dict[str, str]:
         if isinstance(node, ast.ImportFrom) and node.module
         for alias in node.names
     }
-    calls = [
-        node
-        for node in ast.walk(pipeline)
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "keep"
-    ]
-    calls.sort(key=lambda call: call.lineno)
+    functions = {n.name: n for n in pipeline.body if isinstance(n, ast.FunctionDef)}
+    calls = [c for name in ("prepare", "reconstruct") for c in _keep_calls(name, functions)]
     return {call.args[0].value: source[call.args[1].id] for call in calls}
+
+
+def _keep_calls(name: str, functions: dict[str, ast.FunctionDef]) -> Iterator[ast.Call]:
+    """Calls of `keep` in the order in which a function of the recipe comes to them."""
+    calls = [node for node in ast.walk(functions[name]) if isinstance(node, ast.Call)]
+    for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset)):
+        called = getattr(call.func, "id", "")
+        if called == "keep":
+            yield call
+        elif called in functions and called != name:
+            yield from _keep_calls(called, functions)
 
 
 def stages_using(

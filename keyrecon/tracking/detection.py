@@ -56,8 +56,6 @@ BEST_SCORE_PERCENTILE = 95
 SCORE_SATURATION, SCORE_FLOOR = 0.15, 0.001
 """Shares of the best score: beyond the first, contrast says little; the second keeps costs finite.
 Chosen on rendered sequences; see benchmarks/sensitivity.py."""
-MIN_DETECTED_SHARE = 0.4
-"""Share of the searched frames in which a head must be detected for a track to be believed."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +72,9 @@ class FindOptions:
     """Usual speed of the feet, player heights per second."""
     envelope: float = 5.0
     """The standing height may change over this time, seconds."""
+    detected: float = 0.4
+    """Share of the searched frames in which a head must be detected for a track to be believed;
+    lower it for a player who is out of the picture most of the time."""
 
 
 def find_player(
@@ -154,7 +155,7 @@ def _link(
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
-    if (chosen >= 0).mean() < MIN_DETECTED_SHARE:
+    if (chosen >= 0).mean() < options.detected:
         raise _missed_head(chosen, numbers)
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
     pairs, costs = _pair(candidates, head[numbers], height)
@@ -195,7 +196,8 @@ def _missed_head(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) ->
     middle = int(gaps[len(gaps) // 2])
     return KeyreconError(
         f"The head was found in only {detected.sum()} of {len(detected)} frames; pick its colour "
-        f"again on a frame where it was missed, for instance frame {middle}."
+        f"again on a frame where it was missed, for instance frame {middle}. Where the player is "
+        "out of the picture most of the time, lower --find.detected."
     )
 
 
