@@ -9,6 +9,7 @@ so that an interrupted fit goes on where it stopped, and one that is repeated is
 """
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import numpy as np
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.golf.observation import observe_swing
+from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations
 from keyrecon.golf.swing_fit import (
     GolfOptions,
@@ -77,10 +79,13 @@ def fit_file(
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
     spent = time.perf_counter() - began
-    return (
-        f"{describe_tempo(fit.fitted, video.fps)}\n"
-        f"{folder}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
-        f"{spent:.0f} s ({spent / len(video):.2f} s per frame)."
+    return "\n".join(
+        [
+            describe_tempo(fit.fitted, video.fps),
+            *describe_doubts(find_doubts(fit.fitted, fit.observations)),
+            f"{folder}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
+            f"{spent:.0f} s ({spent / len(video):.2f} s per frame).",
+        ]
     )
 
 
@@ -238,3 +243,15 @@ def describe_tempo(fitted: FittedSwing, fps: float) -> str:
         f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}; "
         f"{up:.2f} s up, {down:.2f} s down, tempo {up / down:.1f} : 1."
     )
+
+
+def describe_doubts(doubts: Sequence[SwingDoubt]) -> list[str]:
+    """The warning of a fit that does not explain its video; no line where it does."""
+    if not doubts:
+        return []
+    reasons = "; ".join(f"{doubt.text} (frame {doubt.frame})" for doubt in doubts)
+    return [
+        f"WARNING: this fit is doubtful: {reasons}. Do not use its angles. Look at the overlay; "
+        "where the body is off, mark whole bodies on four frames or so (keyrecon new, annotate) "
+        "and use keyrecon run --prior golf."
+    ]

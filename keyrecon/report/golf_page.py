@@ -7,6 +7,7 @@ club and the hands went, how shoulders and hips turned, and how the swing differ
 those that the model was learnt from.
 """
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
+from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations
 from keyrecon.io.durable import write_durably
 from keyrecon.io.video import Video
@@ -100,8 +102,9 @@ def write_golf_report(
 ) -> None:
     """Write the report of a swing to one HTML file."""
     measures = measure_swing(fitted, observations)
+    doubts = find_doubts(fitted, observations)
     body = "".join((
-        _headline(fitted, measures, video),
+        _headline(fitted, measures, video, doubts),
         _key_postures(fitted, observations, video),
         _timing(fitted, observations, model),
         _strip(fitted, observations, video),
@@ -125,8 +128,10 @@ def _page(title: str, body: str) -> str:
     )
 
 
-def _headline(fitted: FittedSwing, measures: SwingMeasures, video: Video) -> str:
-    """The figures that matter, first."""
+def _headline(
+    fitted: FittedSwing, measures: SwingMeasures, video: Video, doubts: Sequence[SwingDoubt]
+) -> str:
+    """The figures that matter, first; of a doubtful fit only what speaks against it."""
     top = min(round(float(fitted.keys[1])), len(measures.hips) - 1)
     cards = [
         ("Tempo", f"{number(measures.tempo, '.1f')} : 1",
@@ -137,6 +142,8 @@ def _headline(fitted: FittedSwing, measures: SwingMeasures, video: Video) -> str
          f"at the top; most {measures.x_factor.max():.0f}°"),
         ("Club found", f"{measures.club_found:.0%}", "of the frames"),
     ]  # fmt: skip
+    if doubts:
+        cards = cards[-1:]
     tiles = "".join(
         f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
         for name, value, more in cards
@@ -144,7 +151,20 @@ def _headline(fitted: FittedSwing, measures: SwingMeasures, video: Video) -> str
     return (
         f'<header><p class="kicker">keyrecon swing report</p><h1>{text(video.path.name)}</h1>'
         f'<p class="lead">{video.width} &times; {video.height} px, {len(video)} frames, '
-        f'{video.fps:.4g} per second</p></header><dl class="cards">{tiles}</dl>'
+        f'{video.fps:.4g} per second</p></header>{_warning(doubts)}<dl class="cards">{tiles}</dl>'
+    )
+
+
+def _warning(doubts: Sequence[SwingDoubt]) -> str:
+    """What cannot be overlooked: the fit does not explain the video."""
+    if not doubts:
+        return ""
+    lines = "".join(f"<li>{text(d.text)} (frame {d.frame})</li>" for d in doubts)
+    return (
+        '<section class="warning" role="alert"><h2>This fit is doubtful</h2>'
+        f"<ul>{lines}</ul><p>Tempo and angles are not shown, and the curves below are not "
+        "measurements. Look at the fit through the swing; where the body is off, mark whole bodies "
+        "on a few frames and use <code>keyrecon run --prior golf</code>.</p></section>"
     )
 
 

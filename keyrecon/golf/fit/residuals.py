@@ -216,7 +216,7 @@ def silhouette_residuals(
     segment = np.tile(np.repeat(capsules.segment, len(AXIS_PLACES)), frames)
     points = points.reshape(-1, 3)
     pixels, slope = project(points, observations.camera)
-    values, gradient = _interpolate(
+    values, gradient = sample_distance(
         observations.silhouette_distance, pixels.reshape(frames, number, 2)
     )
     rows = np.flatnonzero(values > 0)
@@ -352,7 +352,7 @@ def _reject(vectors: Vectors, ways: Vectors) -> Vectors:
     return vectors - np.einsum("ni,ni->n", vectors, ways)[:, None] * ways
 
 
-def _interpolate(
+def sample_distance(
     stack: Float[np.ndarray, "T h w"], pixels: Float[np.ndarray, "T n 2"]
 ) -> tuple[Float[np.ndarray, "m"], Float[np.ndarray, "m 2"]]:
     """Values of each frame's distance picture between its pixels, and their slopes."""

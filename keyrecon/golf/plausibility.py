@@ -1,0 +1,150 @@
+"""Whether a fitted swing explains its video: what a person would see at once, as numbers.
+
+A fit always gives a swing, also where it took a fence rail for the club or a waggle for the
+upswing; its joints and angles look like any other's. So what is known of every swing is held
+against the result: the order and pace of its key postures, the figure it should lie on, the club
+where it was detected, the joints that a person placed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from keyrecon.body import LSP14
+from keyrecon.golf.fit.residuals import sample_distance
+from keyrecon.golf.records import FittedSwing, Observations
+
+DOWNSWING_SECONDS = (0.15, 0.5)
+"""From the top to the hit. Tour players take .23-.28 s, amateurs .25-.4 (Cochran & Stobbs, The
+Search for the Perfect Swing, 1968; Novosel & Garrity, Tour Tempo, 2004)."""
+TEMPO = (1.5, 6.0)
+"""Upswing to downswing: 3 to 1 for tour players, 2 to 4 for most others (Novosel & Garrity)."""
+ON_FIGURE = 0.03
+"""A joint this near to the player's mask lies on it, body heights: half a wrist's width."""
+LEAST_ON_FIGURE = 0.8
+"""Share of the joints of the swing that lie on the figure, at least: a mask loses a hand or a foot
+here and there, never a fifth of the joints."""
+CLUB_ANGLE = np.radians(15)
+"""A fitted club this far from the detected one is another one."""
+LEAST_CLUB_AGREED, LEAST_CLUB_SEEN = 0.6, 0.25
+"""Share of the detections between start and hit that the fitted club agrees with, and share of
+these frames that have one, at least."""
+FARTHEST_CLICK = 0.1
+"""Mean distance of fitted joints from those that a person placed, body heights, at most."""
+EDGE = 1.0
+"""Frames from either end of the film within which a key posture was not found but cut off."""
+
+
+@dataclass(frozen=True)
+class SwingDoubt:
+    """Something that a right fit does not show."""
+
+    text: str
+    """A clause: what was found and what is usual."""
+    frame: int
+    """Where to look, and to mark."""
+
+
+def find_doubts(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """What speaks against a fit; nothing where it explains its video."""
+    return [
+        *_doubt_order(fitted),
+        *_doubt_figure(fitted, observations),
+        *_doubt_club(fitted, observations),
+        *_doubt_clicks(fitted, observations),
+    ]
+
+
+def _doubt_order(fitted: FittedSwing) -> list[SwingDoubt]:
+    """Key postures in order, inside of the film, at a pace that people have."""
+    keys, time = fitted.keys, fitted.motion.time
+    start, top, hit, finish = keys
+    if not np.isfinite(keys).all() or not start < top < hit < finish:
+        return [SwingDoubt("start, top, hit and finish are not in order", _frame(fitted, top))]
+    doubts = []
+    for name, key in (("top", top), ("hit", hit)):
+        if not EDGE < key < len(time) - 1 - EDGE:
+            doubts.append(SwingDoubt(f"the {name} lies at the film's end", _frame(fitted, key)))
+    up, down = np.diff(np.interp([start, top, hit], np.arange(len(time)), time))
+    shortest, longest = DOWNSWING_SECONDS
+    if not shortest <= down <= longest:
+        doubts.append(
+            SwingDoubt(
+                f"the downswing takes {down:.2f} s, where golfers take {shortest:g} to {longest:g} "
+                "(is the video slow motion?)",
+                _frame(fitted, top),
+            )
+        )
+    elif not TEMPO[0] <= up / down <= TEMPO[1]:
+        doubts.append(
+            SwingDoubt(
+                f"the tempo is {up / down:.1f} to 1, where golfers have {TEMPO[0]:g} to "
+                f"{TEMPO[1]:g}",
+                _frame(fitted, start),
+            )
+        )
+    return doubts
+
+
+def _frame(fitted: FittedSwing, key: float) -> int:
+    """The frame next to a key posture."""
+    last = len(fitted.motion.time) - 1
+    return int(np.clip(np.nan_to_num(np.round(key)), 0, last))
+
+
+def _swing(fitted: FittedSwing, end: int) -> slice:
+    """Frames from the start to a key posture; at least one."""
+    first, last = _frame(fitted, fitted.keys[0]), _frame(fitted, fitted.keys[end])
+    return slice(min(first, last), max(first, last) + 1)
+
+
+def _doubt_figure(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """Joints lie on the player's mask."""
+    distance = observations.silhouette_distance
+    if not len(distance):
+        return []
+    during = _swing(fitted, 3)
+    points = fitted.motion.points2d[during]
+    away = sample_distance(distance[during], points)[0].reshape(points.shape[:2])
+    on = away < ON_FIGURE * observations.height
+    if on.mean() >= LEAST_ON_FIGURE:
+        return []
+    worst = during.start + int(on.mean(axis=1).argmin())
+    return [SwingDoubt(f"only {on.mean():.0%} of the joints lie on the player", worst)]
+
+
+def _doubt_club(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """The club was seen on the way to the hit, where the fit has it."""
+    during = _swing(fitted, 2)
+    detected, expected = (
+        ends[during, 1] - ends[during, 0] for ends in (observations.club, fitted.club2d)
+    )
+    seen = np.isfinite(detected).all(axis=1)
+    if seen.mean() < LEAST_CLUB_SEEN:
+        text = f"the club was detected in {seen.mean():.0%} of the frames of the swing"
+        return [SwingDoubt(text, during.start)]
+    cross = detected[:, 0] * expected[:, 1] - detected[:, 1] * expected[:, 0]
+    angle = np.abs(np.arctan2(cross, (detected * expected).sum(axis=1)))
+    agreed = angle[seen] < CLUB_ANGLE
+    if agreed.mean() >= LEAST_CLUB_AGREED:
+        return []
+    worst = during.start + int(np.where(seen, np.nan_to_num(angle), 0).argmax())
+    text = f"the fitted club agrees with the detected one in {agreed.mean():.0%} of the frames"
+    return [SwingDoubt(text, worst)]
+
+
+def _doubt_clicks(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """The joints that a person placed are where they were placed."""
+    initial, points = observations.initial, fitted.motion.points2d[observations.initial.frame]
+    if not initial.names:
+        return []
+    hips = (points[LSP14.index("right_hip")] + points[LSP14.index("left_hip")]) / 2
+    places = [hips if name == "root" else points[LSP14.index(name)] for name in initial.names]
+    far = np.linalg.norm(np.array(places) - initial.places, axis=1) / observations.height
+    if far.mean() <= FARTHEST_CLICK:
+        return []
+    worst = initial.names[int(far.argmax())]
+    text = (
+        f"the clicked joints are {far.mean():.0%} of the body height away, {worst} {far.max():.0%}"
+    )
+    return [SwingDoubt(text, initial.frame)]

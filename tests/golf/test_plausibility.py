@@ -1,0 +1,94 @@
+"""What speaks against a fitted swing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from golf_truth import camera_before, even_times, observe
+
+from keyrecon.body import LSP14
+from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.plausibility import find_doubts
+from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
+from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingState
+from keyrecon.io.formats.model_file import read_motion_model
+
+CAMERA = Camera(1000.0, np.array([640.0, 360.0]))
+FRAMES = 50
+TIME = np.arange(FRAMES) / 30
+"""Its swings take 1.33 s, a fifth of it downwards."""
+
+
+@pytest.fixture(scope="module")
+def played():
+    """A swing as it is, seen without noise by a camera in front: (fitted, observations)."""
+    model, body = read_motion_model(), size_body(1.8)
+    rotation, position = camera_before(180.0)
+    state = SwingState(
+        np.zeros(len(model.components)),
+        even_times(FRAMES, 5),
+        np.tile(rotation, (FRAMES, 1, 1)),
+        np.tile(position, (FRAMES, 1)),
+    )
+    pose = place_body(body, posture_at(model, state.phase, state.coefficients), state)
+    observations = observe(find_joints(body, pose), find_club(body, pose), CAMERA, noise=0.1)
+    fitted = describe_fit(SwingFit(model, body, state), observations, TIME)
+    return fitted, observations
+
+
+def texts(fitted, observations):
+    return " ".join(doubt.text for doubt in find_doubts(fitted, observations))
+
+
+def test_nothing_speaks_against_a_swing_that_is_where_it_was_seen(played):
+    assert find_doubts(*played) == []
+
+
+def test_key_postures_out_of_order_or_at_the_films_end_are_told(played):
+    fitted, observations = played
+    assert "not in order" in texts(replace(fitted, keys=np.array([-1.0, 0, 0, 30])), observations)
+    ended = replace(fitted, keys=np.array([5.0, 42.0, 48.5, 49.0]))
+    assert "the hit lies at the film's end" in texts(ended, observations)
+
+
+def test_a_pace_that_nobody_swings_at_is_told(played):
+    fitted, observations = played
+    slow = replace(fitted, motion=replace(fitted.motion, time=TIME * 6))
+    assert "slow motion?" in texts(slow, observations)
+    _, top, hit, finish = fitted.keys
+    hasty = replace(fitted, keys=np.array([top - 0.5 * (hit - top), top, hit, finish]))
+    assert "the tempo is 0.5 to 1" in texts(hasty, observations)
+
+
+def test_a_club_elsewhere_or_nowhere_is_told(played):
+    fitted, observations = played
+    turned = observations.club[:, ::-1]
+    assert "agrees with the detected one in 0%" in texts(fitted, replace(observations, club=turned))
+    none = replace(observations, club=np.full_like(turned, np.nan))
+    assert "detected in 0%" in texts(fitted, none)
+
+
+def test_a_body_beside_the_figure_is_told_with_a_frame(played):
+    fitted, observations = played
+    shape = (FRAMES, 720 // SILHOUETTE_STEP, 1280 // SILHOUETTE_STEP)
+    on = replace(observations, silhouette_distance=np.zeros(shape))
+    assert find_doubts(fitted, on) == []
+    off = replace(observations, silhouette_distance=np.full(shape, 50.0))
+    (doubt,) = find_doubts(fitted, off)
+    assert "only 0% of the joints" in doubt.text
+    assert 0 <= doubt.frame < FRAMES
+
+
+def test_clicks_that_the_fit_is_not_near_are_told(played):
+    fitted, observations = played
+    names = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
+    points = fitted.motion.points2d[0]
+    hips = (points[LSP14.index("right_hip")] + points[LSP14.index("left_hip")]) / 2
+    places = np.array([hips if n == "root" else points[LSP14.index(n)] for n in names])
+    clicked = replace(observations, initial=InitialJoints(0, names, places))
+    assert find_doubts(fitted, clicked) == []
+    aside = replace(observations, initial=InitialJoints(0, names, places + np.array([60.0, 0.0])))
+    assert "clicked joints are 20% of the body height away" in texts(fitted, aside)
