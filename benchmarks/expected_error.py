@@ -9,8 +9,8 @@ and holds the refined joints against the marks by eye that nobody made for the p
                    was expected and what it was, in player heights. Each clip is predicted by
                    tables that were fitted to the other clips
     clips          the same for each clip
-    others         what speed (heights per frame) and the time to the nearest mark would add:
-                   mean of log p + error / p, smaller is better, and the rank correlation
+    others         the same with fewer and with other predictors, the time to the nearest mark among
+                   them: mean of log p + error / p, smaller is better, and the rank correlation
     reported       arms, legs and heads of frames that would be reported (mean expected error above
                    UNCERTAIN): how many of them have a joint that is off by more than .08 and
                    .05 heights, and how many of those that have are reported
@@ -29,23 +29,27 @@ from scipy.stats import spearmanr
 
 from keyrecon.body import LSP14
 from keyrecon.uncertainty import (
+    ERROR_TABLES,
     MAX_ERROR,
     UNCERTAIN,
     body_parts,
+    error_predictors,
     find_bins,
-    measure_correction,
     player_height,
     predict_error,
 )
 
 EDGES = {
+    "correction": (0.0, 0.004, 0.008, 0.012, 0.02, 0.03, 0.05),
+    "part_correction": (0.0, 0.004, 0.006, 0.009, 0.013, 0.02, 0.03),
+    "part_confidence": (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7),
+    "speed": (0.0, 0.001, 0.003, 0.008, 0.02, 0.04),
     "confidence": (0.0, 0.001, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8),
-    "correction": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05),
-    "speed": (0.0, 0.001, 0.005, 0.01, 0.02, 0.04, 0.08),
     "time": (0.0, 0.1, 0.2, 0.4),
 }
 """Lower ends of the bins: about equal numbers of joints, more of them where errors are large."""
-RISES = {"confidence": False, "correction": True, "speed": True, "time": True}
+FALLS = "confidence", "part_confidence"
+USED = "correction", "part_correction", "part_confidence", "speed"
 PRIOR = 20
 """Joints of the mean error that every bin is begun with, so that a rare one is not overrated."""
 GROUPS = 8
@@ -66,7 +70,7 @@ def collect(name: str, work: Path) -> Sample:
     rows, joints = np.nonzero(used)
     at = frames[rows], joints
     error = np.linalg.norm(motion.points2d[frames] - clip.truth.joints, axis=2) / height[frames]
-    speed = np.linalg.norm(np.gradient(motion.points2d, axis=0), axis=2) / height
+    predictors = error_predictors(motion)
     marked = np.isfinite(result.marks.joints[..., 0])
     away = [np.abs(result.marks.frames[marked[:, j]] - t).min() for t, j in zip(*at, strict=True)]
     return {
@@ -74,9 +78,8 @@ def collect(name: str, work: Path) -> Sample:
         "frame": at[0],
         "joint": at[1],
         "error": np.minimum(error[rows, joints], MAX_ERROR),
+        **{name: values[at] for name, values in predictors.items()},
         "confidence": motion.confidence[at],
-        "correction": measure_correction(motion)[at],
-        "speed": speed[at],
         "time": np.array(away) / clip.video.fps,
     }
 
@@ -97,7 +100,7 @@ def fit(sample: Sample, used: tuple[str, ...]) -> tuple[float, dict[str, np.ndar
             actual = np.bincount(bins[name], weight * error, size) + PRIOR * mean
             expected = np.bincount(bins[name], weight * others, size) + PRIOR * mean
             tables[name] = isotonic_regression(
-                actual / expected, weights=expected, increasing=RISES[name]
+                actual / expected, weights=expected, increasing=name not in FALLS
             ).x
         product = np.prod([tables[n][bins[n]] for n in used], axis=0)
         mean = float((weight * error).sum() / (weight * product).sum())
@@ -166,24 +169,25 @@ def main() -> None:
     samples = [collect(n, words.work) for n in chosen if not words.only or n in words.only]
     sample = {key: np.concatenate([one[key] for one in samples]) for key in samples[0]}
     if words.half == "report":
-        expected = predict_error(sample["confidence"], sample["correction"])
+        expected = predict_error({name: sample[name] for name in ERROR_TABLES})
         print_reliability(sample, expected)
         print_reported(sample, expected)
         return
-    used = ("confidence", "correction")
-    left_out = leave_one_out(sample, used)
+    left_out = leave_one_out(sample, USED)
     print_reliability(sample, left_out)
     print_reported(sample, left_out)
-    for more in (("confidence",), ("correction",), used, (*used, "speed"), (*used, "time")):
+    pair = ("confidence", "correction")
+    for more in (("confidence",), pair, (*pair, "speed"), USED, (*USED, "time")):
         expected = leave_one_out(sample, more)
         score = float((np.log(expected) + sample["error"] / expected).mean())
         rank = spearmanr(expected, sample["error"])[0]
-        print(f"{' '.join(more):<32} score {score:7.3f}   rank correlation {rank:.3f}")
-    mean, tables = fit(sample, used)
-    print(f"MEAN_ERROR = {mean:.4f}")
-    for name in used:
+        print(f"{' '.join(more):<64} score {score:7.3f}   rank correlation {rank:.3f}")
+    mean, tables = fit(sample, USED)
+    print(f"MEAN_ERROR = {mean:.4f}\nERROR_TABLES = {{")
+    for name in USED:
         factors = ", ".join(f"{value:.2f}" for value in tables[name])
-        print(f"{name.upper()}_EDGES = {EDGES[name]}\n{name.upper()}_FACTORS = ({factors})")
+        print(f'    "{name}": ({EDGES[name]}, ({factors})),')
+    print("}")
 
 
 if __name__ == "__main__":

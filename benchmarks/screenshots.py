@@ -69,8 +69,15 @@ def main() -> None:
         context = chromium.new_context(viewport=SCREEN)
         person = Person(context, server.credentials.address)
         show_keyframe(person, answers, int(answers.marks.frames[7]), arguments.out)
-        for key, page, name in (("Alt+1", "pick", "colours"), ("Alt+3", "motion", "motion")):
-            person.press(key)
+        for key, page, name in (
+            ("Alt+1", "bodies", "body"),
+            (None, "pick", "colours"),
+            ("Alt+3", "motion", "motion"),
+        ):
+            if key is None:
+                person.page.click("#bodies-colours")
+            else:
+                person.press(key)
             person.page.wait_for_selector(f"#{page}-picture[data-frame]")
             person.page.wait_for_timeout(4000)
             photograph(person, arguments.out, name)

@@ -1,10 +1,11 @@
 """How far off each joint probably is, and the stretches that are worst.
 
-Two things tell of the error of a joint in a frame: the confidence with which it was propagated, and
-the correction, how far the refinement had to move it in the picture. Each has a monotone table of
-factors; the expected error, in player heights, is their product times a mean,
+Four things tell of the error of a joint in a frame: the correction, how far the refinement had
+to move it in the picture; the mean correction of its part of the body (arms, legs, head); the
+mean confidence with which that part was propagated; and the speed of the joint. Each has a
+monotone table of factors; the expected error, in player heights, is their product times a mean,
 
-    E|error| = mean * f(confidence) * g(correction),
+    E|error| = mean * f(correction) * g(part's correction) * h(part's confidence) * k(speed),
 
 cut at `MAX_ERROR`: a joint that is farther off is lost, by how much does not matter.
 
@@ -12,6 +13,7 @@ The tables were fitted to joints marked by eye on real clips. `python benchmarks
 makes them and prints what they are worth, every clip predicted from the others alone.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,25 +22,39 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.records import HalfName, Motion, Track
 
-MEAN_ERROR = 0.0453
-"""Player heights. Fitted, as the tables below, to 2634 joints of nine clips. With every clip
-predicted from the others, eight groups of joints expected to be off by .010, .013, .014, .017,
-.020, .025, .035 and .109 heights were off by .010, .013, .011, .019, .019, .022, .037 and .129, and
-clips by .6 to 1.8 of what was expected. Tried besides: with speed in heights per frame the score
-(mean of log p + error / p) was -2.854 in place of -2.838, with the time to the nearest mark -2.835:
-neither is worth a table."""
-CONFIDENCE_EDGES = (0.0, 0.001, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8)
-"""Lower ends of the bins of confidence."""
-CONFIDENCE_FACTORS = (1.39, 1.36, 1.30, 0.99, 0.92, 0.92, 0.72, 0.66)
-CORRECTION_EDGES = (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05)
-"""Lower ends of the bins of the correction, player heights."""
-CORRECTION_FACTORS = (0.30, 0.42, 0.58, 0.73, 0.82, 1.77, 3.11)
+MEAN_ERROR = 0.0229
+"""Player heights. Fitted, as the tables, to 2643 joints of nine clips. With every clip
+predicted from the others, eight groups of joints expected to be off by .008, .010, .012, .014,
+.017, .023, .031 and .059 heights were off by .007, .010, .012, .014, .017, .023, .032 and .058,
+and clips by .74 to 1.4 of what was expected. The score (mean of log p + error / p) was -3.055;
+with the joint's own confidence and correction alone -2.975, with its confidence alone -2.908,
+with the time to the nearest mark added -3.053: that tells nothing more."""
+ERROR_TABLES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    "correction": (
+        (0.0, 0.004, 0.008, 0.012, 0.02, 0.03, 0.05),
+        (0.69, 0.69, 0.79, 0.93, 1.20, 1.54, 1.64),
+    ),
+    "part_correction": (
+        (0.0, 0.004, 0.006, 0.009, 0.013, 0.02, 0.03),
+        (0.67, 0.73, 0.90, 1.19, 1.19, 1.59, 1.59),
+    ),
+    "part_confidence": (
+        (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7),
+        (1.45, 1.45, 1.45, 1.03, 0.85, 0.80, 0.80),
+    ),
+    "speed": (
+        (0.0, 0.001, 0.003, 0.008, 0.02, 0.04),
+        (0.75, 0.84, 1.07, 1.07, 1.24, 1.56),
+    ),
+}
+"""By predictor the lower ends of its bins, and their factors."""
 MAX_ERROR = 0.25
 """Expected error of a joint that is lost, player heights: the length of a thigh."""
 UNCERTAIN = 0.04
-"""Mean expected error of arms, legs or head from which a stretch is reported, player heights. Of
-such parts of frames marked by eye 71 % had a joint that was off by more than .08, and 78 % of those
-that had one were reported; at .05 it was 79 and 65 %, at .03 51 and 83 %."""
+"""Mean expected error of arms, legs or head from which a stretch is reported, player heights.
+Of the parts of frames marked by eye 86 of 647 were reported; 63 % of these had a joint off by
+more than .05 and 49 % by more than .08, where 11 % of all parts had; of the latter 59 % were
+reported."""
 MERGED_SECONDS = 0.2
 """Uncertain frames that are nearer to each other than this make one stretch."""
 LEAST_SECONDS = 0.1
@@ -82,26 +98,44 @@ def player_height(motion: Motion) -> Float[np.ndarray, "T"]:
 
 
 def measure_correction(motion: Motion) -> Float[np.ndarray, "T J"]:
-    """How far the refinement moved each joint in the picture, player heights; infinite where the
-    joint was not propagated."""
+    """How far the refinement moved each joint in the picture, player heights, at most `MAX_ERROR`,
+    which stands for joints that were not propagated."""
     moved = np.linalg.norm(motion.points2d - motion.points2d_propagated, axis=2)
     correction = moved / player_height(motion)[:, None]
-    return np.where(np.isfinite(correction), correction, np.inf)
+    return np.minimum(np.where(np.isfinite(correction), correction, MAX_ERROR), MAX_ERROR)
+
+
+def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
+    """What tells of each joint's error: `correction` and `part_correction` in player heights,
+    `part_confidence`, and `speed` in player heights per frame."""
+    correction, confidence = measure_correction(motion), motion.confidence
+    part_correction, part_confidence = np.zeros_like(correction), np.zeros_like(correction)
+    for members in body_parts(motion.skeleton).values():
+        part_correction[:, members] = correction[:, members].mean(axis=1, keepdims=True)
+        part_confidence[:, members] = confidence[:, members].mean(axis=1, keepdims=True)
+    step = np.zeros_like(motion.points2d)
+    if len(step) > 1:
+        step = np.gradient(motion.points2d, axis=0)
+    return {
+        "correction": correction,
+        "part_correction": part_correction,
+        "part_confidence": part_confidence,
+        "speed": np.linalg.norm(step, axis=2) / player_height(motion)[:, None],
+    }
 
 
 def expected_error(motion: Motion) -> Float[np.ndarray, "T J"]:
     """Expected distance of `points2d` from where a person would mark the joints, px."""
-    share = predict_error(motion.confidence, measure_correction(motion))
-    return share * player_height(motion)[:, None]
+    return predict_error(error_predictors(motion)) * player_height(motion)[:, None]
 
 
-def predict_error(
-    confidence: Float[np.ndarray, "*n"], correction: Float[np.ndarray, "*n"]
-) -> Float[np.ndarray, "*n"]:
+def predict_error(predictors: Mapping[str, Float[np.ndarray, "*n"]]) -> Float[np.ndarray, "*n"]:
     """Expected error in player heights."""
-    by_confidence = np.array(CONFIDENCE_FACTORS)[find_bins(confidence, CONFIDENCE_EDGES)]
-    by_correction = np.array(CORRECTION_FACTORS)[find_bins(correction, CORRECTION_EDGES)]
-    return np.minimum(MEAN_ERROR * by_confidence * by_correction, MAX_ERROR)
+    factors = [
+        np.array(table)[find_bins(predictors[name], edges)]
+        for name, (edges, table) in ERROR_TABLES.items()
+    ]
+    return np.minimum(MEAN_ERROR * np.prod(factors, axis=0), MAX_ERROR)
 
 
 def find_bins(values: Float[np.ndarray, "*n"], edges: tuple[float, ...]) -> Int[np.ndarray, "*n"]:

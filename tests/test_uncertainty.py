@@ -12,7 +12,6 @@ from keyrecon.uncertainty import (
     expected_error,
     measure_correction,
     player_height,
-    predict_error,
     uncertain_stretches,
     unsure_track,
     worst_frames,
@@ -61,13 +60,16 @@ def test_a_player_is_as_tall_as_the_bones_say():
     assert player_height(metres) == pytest.approx(PIXELS)
 
 
-def test_less_confidence_and_more_correction_never_make_an_error_smaller():
-    confidence, correction = np.meshgrid(np.linspace(0, 1, 30), np.linspace(0, 0.2, 30))
-    errors = predict_error(confidence, correction)
-    assert (np.diff(errors, axis=1) <= 0).all()
-    assert (np.diff(errors, axis=0) >= 0).all()
+def test_every_table_is_monotone_so_that_more_doubt_never_makes_an_error_smaller():
+    for name, (edges, factors) in uncertainty.ERROR_TABLES.items():
+        assert len(edges) == len(factors)
+        assert (np.diff(edges) > 0).all()
+        steps = np.diff(factors)
+        assert (steps <= 0).all() if name == "part_confidence" else (steps >= 0).all()
+    errors = make_motion().expected_error
     assert (errors > 0).all()
-    assert errors.max() <= uncertainty.MAX_ERROR
+    lost = with_lost_arms(0, FRAMES - 1).expected_error
+    assert errors.max() < lost[:, ARMS].min() <= uncertainty.MAX_ERROR * PIXELS
 
 
 def test_a_joint_that_was_not_propagated_counts_as_moved_far():
@@ -75,7 +77,7 @@ def test_a_joint_that_was_not_propagated_counts_as_moved_far():
     lost = motion.points2d_propagated.copy()
     lost[3, 4] = np.nan
     motion = replace(motion, points2d_propagated=lost)
-    assert measure_correction(motion)[3, 4] == np.inf
+    assert measure_correction(motion)[3, 4] == uncertainty.MAX_ERROR
     assert expected_error(motion)[3, 4] > 2 * expected_error(motion)[3, 5]
 
 

@@ -52,8 +52,9 @@ def doubts(material: ReportMaterial) -> str:
     ]
     about = note(
         "How far each joint of the drawn pose probably is from where a person would mark it, as "
-        "learnt from real videos that were marked by eye; of what is reported here seven in ten "
-        f"were wrong there. Mean over this motion: {np.mean(motion.expected_error):.1f} px."
+        "learnt from real videos that were marked by eye; of what was reported as uncertain "
+        "there, six in ten had a joint far off. Mean over this motion: "
+        f"{np.mean(motion.expected_error):.1f} px."
     )
     listed = f'<ul class="doubts">{lines}</ul>' if lines else note("No stretch stands out.")
     worst = table(("frame", "least sure joints, expected error"), rows, "Worst frames", "texts")

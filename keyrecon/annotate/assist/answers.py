@@ -217,7 +217,7 @@ def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]
             "suspicion": round(float(check.suspicion), 3),
             "text": check.text,
         }
-        for check in find_checks(annotations, body.size, neighbours)
+        for check in find_checks(annotations, body.size, neighbours, preparation.track)
     ]
 
 

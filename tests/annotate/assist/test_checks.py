@@ -94,3 +94,35 @@ def test_a_half_that_nobody_began_lacks_nothing(careful):
     joints[ROW, LSP14.is_lower] = np.nan
     found = checked(preparation, replace(annotations, joints=joints))
     assert "missing" not in {c.kind for c in found}
+
+
+def test_a_player_whose_shanks_are_long_in_every_frame_is_not_told_of_them(careful):
+    """The table knows the usual player, the other frames this one."""
+    preparation, annotations = careful
+    joints = annotations.joints.copy()
+    for side in ("left", "right"):
+        knee, ankle = (LSP14.index(f"{side}_{part}") for part in ("knee", "ankle"))
+        joints[:, ankle] = joints[:, knee] + 1.3 * (joints[:, ankle] - joints[:, knee])
+    body = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    found = find_checks(replace(annotations, joints=joints), body.size, ())
+    assert [c for c in found if c.kind == "long"] == []
+
+
+def test_shoulders_and_hips_that_face_opposite_ways_are_told(careful):
+    preparation, annotations = careful
+    sides = [(f"left_{part}", f"right_{part}") for part in ("shoulder", "elbow", "wrist")]
+    swapped = {a: place(annotations, b) for pair in sides for a, b in (pair, pair[::-1])}
+    body = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    found = find_checks(changed(annotations, **swapped), body.size, ())
+    assert [(c.kind, c.frame) for c in found if c.kind == "crossed"] == [("crossed", ROW)]
+
+
+def test_marks_of_another_frame_are_where_the_player_is_not(careful):
+    preparation, annotations = careful
+    joints = annotations.joints.copy()
+    joints[ROW] += 0.5 * preparation.track.height[ROW]
+    body = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    elsewhere = replace(annotations, joints=joints)
+    found = find_checks(elsewhere, body.size, (), preparation.track)
+    assert [(c.kind, c.frame) for c in found if c.kind == "off"] == [("off", ROW)]
+    assert "another frame" in found[0].text
