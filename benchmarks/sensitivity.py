@@ -136,7 +136,7 @@ class Bench:
             found = self.run(clip, {"changed": None}, {}, None)
             if "fault" in found:
                 raise SystemExit(f"{clip} cannot be run as it is: {found['fault']}")
-            file.write_text(json.dumps(found))
+            file.write_text(json.dumps({**found, "commit": commit_of_code()}))
         found = json.loads(file.read_text())
         called = {
             stage: {module: set(names) for module, names in modules.items()}
@@ -344,10 +344,10 @@ class Study:
 
 def headline(bench: Bench, study: Study) -> str:
     """What was measured on what."""
-    commit = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"],
-        capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
+    commits = {}
+    for file in bench.words.work.glob("*/sensitivity/base-*.json"):
+        commits[file.stem.split("-")[1]] = json.loads(file.read_text()).get("commit", "?")
+    used = dict.fromkeys(commits.get(row.code, "?") for row in bench.rows)
     clips = []
     for clip in study.clips:
         base = bench.base(clip)
@@ -355,13 +355,21 @@ def headline(bench: Bench, study: Study) -> str:
         clips.append(f"- {clip}: PCK {base.pck:.1%}{solid if np.isfinite(base.pa) else ''}")
     return "\n".join([
         "# What hangs on each number that somebody set", "",
-        f"Made by `python benchmarks/sensitivity.py --summary` at commit {commit}; the largest",
-        "changes of carried PCK@0.2 and of PA-MPJPE (with depth signs from the person and, for",
-        "numbers of lifting, without) over these clips, either way:", "",
+        "Made by `python benchmarks/sensitivity.py --summary`; measured at commits",
+        f"{', '.join(used)} (a number's rows count while its value is the same). Largest changes,",
+        "either way, of carried PCK@0.2 and of PA-MPJPE (with depth signs from the person and, for",
+        "numbers of lifting, without) over these clips:", "",
         *clips, "",
-        f"Of rendered clips the first {bench.frames} frames. '-': not measured, as halving and",
-        f"doubling changed at most {SMALL_PCK:g} points and {SMALL_PA:g} mm.",
+        f"Of rendered clips the first {bench.frames} frames. Numbers of tracking and segmentation",
+        "are measured with the keyframes as they are. '-': not measured; a quarter less and more",
+        f"only where halving or doubling changes more than {SMALL_PCK:g} points or {SMALL_PA:g} mm.",
     ])  # fmt: skip
+
+
+def commit_of_code() -> str:
+    """The commit that is checked out."""
+    call = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
+    return subprocess.run(call, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def wanted(number: TunedNumber, words: argparse.Namespace) -> bool:

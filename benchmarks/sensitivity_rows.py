@@ -97,6 +97,8 @@ class Effect:
     pa: float
     """mm, with signs or without."""
     clips: int
+    directions: tuple[str, ...]
+    """Changes that were measured."""
     alone: bool
     """Whether nothing else was changed with it."""
     same: bool
@@ -115,6 +117,7 @@ class Effect:
             float(values[:, 0].max(initial=0)),
             float(values[:, 1:].max(initial=0)),
             len({row.clip for row in good}),
+            tuple(sorted({row.change for row in good})),
             not any(row.others and not row.same for row in good),
             bool(good) and all(row.same for row in good),
             tuple(sorted({f"{row.change}: {row.fault}" for row in latest if row.fault})),
@@ -135,7 +138,9 @@ class Effect:
         if not self.clips:
             return "; ".join(self.faults) or "-"
         told = "same bits" if self.same else f"{self.pck:.1f} points, {self.pa:.1f} mm"
-        return told + ("" if self.alone else " (with others)")
+        notes = [] if len(self.directions) > 1 else [f"{self.directions[0]} alone"]
+        notes += [] if self.alone else ["with others"]
+        return told + (f" ({', '.join(notes)})" if notes else "")
 
 
 def by_number(rows: Iterable[Row]) -> dict[str, list[Row]]:
@@ -169,7 +174,7 @@ def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None
     )
     nothing = [n for n, (q, w) in effects.items() if w.is_nothing and not q.is_much]
     rest = [name for name in effects if name not in much and name not in nothing]
-    print_table("Less than that", rest, effects, of)
+    print_table("Less than that, or not measured by a quarter", rest, effects, of)
     print(f"\n## Halved or doubled they change nothing ({len(nothing)})\n")
     for name in nothing:
         quiet = "no bit" if effects[name][1].same else f"less than {NOTHING:g} points and mm"
