@@ -361,8 +361,8 @@ def headline(bench: Bench, study: Study) -> str:
         "numbers of lifting, without) over these clips:", "",
         *clips, "",
         f"Of rendered clips the first {bench.frames} frames. Numbers of tracking and segmentation",
-        "are measured with the keyframes as they are. '-': not measured; a quarter less and more",
-        f"only where halving or doubling changes more than {SMALL_PCK:g} points or {SMALL_PA:g} mm.",
+        "are measured with the keyframes as they are. '-': not measured; a quarter more or less",
+        f"where halving or doubling changes over {SMALL_PCK:g} points or {SMALL_PA:g} mm.",
     ])  # fmt: skip
 
 

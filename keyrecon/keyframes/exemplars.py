@@ -16,7 +16,7 @@ from keyrecon.progress import Progress, silent
 
 MAX_LAG = 64
 """Longest distance in frames between a frame and its exemplar. It bounds the time of comparing, and
-no exemplar needs more before a video has 2 x 64 frames for each of them: half a million for 4000."""
+no exemplar needs more before a video has 2 x 64 frames for each of them: 512 000 for 4000."""
 WINDOW_FRAMES = 448
 """Frames compared at a time, the next MAX_LAG on top."""
 
