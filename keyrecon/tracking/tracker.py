@@ -50,29 +50,40 @@ from keyrecon.tracking.visibility import is_visible
 Record = TypeVar("Record", Crops, CameraPath, Track)
 
 TRAINING_RATE = 16.0
-"""Frames per second that are linked to train the second filters on."""
+"""Frames per second that are linked to train the second filters on. Halved: at most 0.4 points, 1.1
+mm on one clip."""
 FOOT_RADIUS = 0.035
-"""Foreground counts this far around a foot, player heights: half the length of a shoe."""
+"""Foreground counts this far around a foot, player heights: half the length of a shoe. Halved: at
+most 0.7 points, 0.2 mm on one clip."""
 FOOT_BACKGROUND_WEIGHT = 0.3
-"""Weight of a foot where nothing differs from the scene: a line, or a shoe of its colour."""
+"""Weight of a foot where nothing differs from the scene: a line, or a shoe of its colour. Halved,
+others with it: at most 0.2 points, 0.5 mm on one clip."""
 MIN_FOREGROUND = 0.5
-"""Less foreground around a foot makes it less likely."""
+"""Less foreground around a foot makes it less likely. Halved, others with it: at most 0.2 points,
+0.5 mm on one clip."""
 LEG_TOP, LEG_BOTTOM, LEG_ASIDE = 0.07, 0.2, 0.04
 """A foot has nothing of the player beneath it from the first to the second of these, and as far
-aside as the third, player heights; a place on the shin has."""
+aside as the third, player heights; a place on the shin has. Halved, others with it: at most 0.2
+points, 0.5 mm on one clip."""
 LEG_PENALTY, LEG_SHARE = 0.5, 0.5
-"""Share of the response that a place loses which has this share of the player's colours beneath."""
+"""Share of the response that a place loses which has this share of the player's colours beneath.
+Halved, others with it: at most 0.5 points, 0.8 mm on one clip."""
 FEET_BELOW_HEAD = 0.4
-"""Feet are farther below the head than this, player heights: those of a deep crouch."""
+"""Feet are farther below the head than this, player heights: those of a deep crouch. Halved, others
+with it: at most 0.5 points, 0.8 mm on one clip."""
 MEMORY_SECONDS = 0.24
-"""An occluded foot is propagated for this long: a step lasts about as long."""
+"""An occluded foot is propagated for this long: a step lasts about as long. Halved, others with it:
+at most 0.5 points, 0.8 mm on one clip."""
 FIRST_OCCLUSION_COST, OCCLUSION_COST = 2.0, 1.0
 """Costs of taking a foot for hidden behind the other: filters trained on clear frames only respond
-weakly to a foot in a rarer place, the next ones do not."""
+weakly to a foot in a rarer place, the next ones do not. Halved, others with it: at most 0.5 points,
+0.8 mm on one clip."""
 MARK_WEIGHT = 3
-"""Examples that a marked frame counts for: it is right, a tracked one may not be."""
+"""Examples that a marked frame counts for: it is right, a tracked one may not be. Halved, others
+with it: at most 0.5 points, 0.8 mm on one clip."""
 MAX_HEADS, MAX_FEET = 4, 8
-"""Candidates kept of each, per frame."""
+"""Candidates kept of each, per frame. Halved, others with it: at most 0.5 points, 0.8 mm on one
+clip."""
 
 
 @dataclass(frozen=True)
@@ -82,17 +93,23 @@ class TrackOptions:
     method: Literal["filters", "paper"] = "filters"
     """'filters': trained on the clear frames; 'paper': colour and radial symmetry alone."""
     player: float = 56.0
-    """Height of the player in the crops, px; smaller is faster and less exact."""
+    """Height of the player in the crops, px; smaller is faster and less exact. Halved, others with
+    it: at most 0.5 points, 0.8 mm on one clip."""
     examples: int = 160
-    """Frames that the filters are trained on, at most."""
+    """Frames that the filters are trained on, at most. Halved, others with it: at most 1.0 points,
+    0.2 mm on one clip."""
     head_speed: float = 3.0
-    """Usual speed of the head, player heights per second."""
+    """Usual speed of the head, player heights per second. Halved, others with it: at most 1.0
+    points, 0.2 mm on one clip."""
     foot_speed: float = 2.0
-    """Usual speed of the feet, player heights per second; a step is faster, a stance slower."""
+    """Usual speed of the feet, player heights per second; a step is faster, a stance slower.
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip."""
     foot_rate: float = 4.0
-    """Feet that move to and fro more often than this are smoothed, times per second."""
+    """Feet that move to and fro more often than this are smoothed, times per second. Halved, others
+    with it: at most 1.0 points, 0.2 mm on one clip."""
     envelope: float = 5.0
-    """The standing height may change over this time, seconds."""
+    """The standing height may change over this time, seconds. Halved, others with it: at most 1.0
+    points, 0.2 mm on one clip."""
 
 
 def track_player(
