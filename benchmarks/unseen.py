@@ -5,6 +5,7 @@ sequences among them. Measured with it, a sequence would be one that it knows. S
 lifted with a model learnt from all captures but those of its own players.
 """
 
+import hashlib
 import sys
 from pathlib import Path
 
@@ -15,17 +16,20 @@ from keyrecon.app.depth_training import learn_from_files
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
-from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.lifting.priors.depth_model import DepthModel, DepthTrainingOptions
 
 
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:
     """A model learnt without the players of a sequence, and its file in the work folder."""
     players = {player(file) for file in mocap_files(sequence, mocap)}
-    path = work / f"depths-without-{'-'.join(sorted(players))}.npz"
+    folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
+    others = [file for file in find_captures(folders) if player(file) not in players]
+    made_of = repr((DepthTrainingOptions(), [file.name for file in others]))
+    tag = hashlib.sha256(made_of.encode()).hexdigest()[:8]
+    path = work / f"depths-without-{'-'.join(sorted(players))}-{tag}.npz"
     if not path.is_file():
-        folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
-        others = [f for f in find_captures(folders) if player(f) not in players and readable(f)]
-        write_depth_model(path, learn_from_files(others, progress=show))
+        readable_ones = [file for file in others if readable(file)]
+        write_depth_model(path, learn_from_files(readable_ones, progress=show))
     return path, read_depth_model(path)
 
 
