@@ -68,8 +68,9 @@ def start(
     if opened.variable_rate:
         text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
     return (
-        f"{text}\nNext: keyrecon annotate {quoted(folder)} to click the colours on a page, or "
-        f"keyrecon pick {quoted(folder)} --frame N --head X,Y --foot X,Y ..."
+        f"{text}\nNext: keyrecon annotate {quoted(folder)} to mark one whole body on a page, or "
+        f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon keyframes "
+        f"{quoted(folder)}; keyrecon pick teaches the colours by clicks instead."
     )
 
 
