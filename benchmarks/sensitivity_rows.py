@@ -175,10 +175,11 @@ def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None
     nothing = [n for n, (q, w) in effects.items() if w.is_nothing and not q.is_much]
     rest = [name for name in effects if name not in much and name not in nothing]
     print_table("Less than that, or not measured by a quarter", rest, effects, of)
-    print(f"\n## Halved or doubled they change nothing ({len(nothing)})\n")
+    print(f"\n## Nothing changes ({len(nothing)})\n")
     for name in nothing:
-        quiet = "no bit" if effects[name][1].same else f"less than {NOTHING:g} points and mm"
-        print(f"- `{name}` = {of[name][0].old}: {quiet}, {effects[name][1].clips} clips")
+        wide = effects[name][1]
+        quiet = "no bit" if wide.same else f"less than {NOTHING:g} points and mm"
+        print(f"- `{name}` = {of[name][0].old}: {quiet}, {' and '.join(wide.directions)}")
     print(f"\n## In no code that these clips run ({len(unused)})\n")
     for number in unused:
         print(f"- `{number.key}` = {shorten(number.values)}")

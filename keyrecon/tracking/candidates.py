@@ -16,17 +16,17 @@ from keyrecon.segmentation.part_evidence import HEAD_RADIUS, SHOE_RADIUS, Eviden
 from keyrecon.tracking.radial_symmetry import ellipse, find_peaks, gradient_field, radial_symmetry
 
 SEARCHED_SCALES = (0.8, 1.0, 1.25)
-"""Shares of a part's radius that are searched: players differ, and come nearer. Halved, others with
-it: at most 0.4 points, 0.1 mm on one clip."""
+"""Shares of a part's radius that are searched: players differ, and come nearer. Halved or doubled,
+others with it: at most 0.4 points, 0.5 mm on one clip."""
 SHOE_SHAPES = tuple(ellipse(2.0, np.deg2rad(angle)) for angle in (0, 45, -45))
-"""Shoes from the side and pointing to or from the camera. Halved, others with it: at most 0.4
-points, 0.1 mm on one clip."""
+"""Shoes from the side and pointing to or from the camera. Halved or doubled, others with it: at
+most 0.4 points, 0.5 mm on one clip."""
 MAX_HEADS, MAX_FEET = 8, 10
-"""Candidates kept of each, per frame. Halved, others with it: at most 0.4 points, 0.1 mm on one
-clip."""
-MAX_LEG_ENDS = 4
-"""Ends of legs kept beside the shoes, per frame. Halved, others with it: at most 0.4 points, 0.1 mm
+"""Candidates kept of each, per frame. Halved or doubled, others with it: at most 0.4 points, 0.1 mm
 on one clip."""
+MAX_LEG_ENDS = 4
+"""Ends of legs kept beside the shoes, per frame. Halved or doubled, others with it: at most 0.4
+points, 0.1 mm on one clip."""
 MIN_LEG_SHARE = 0.3
 """Share of the player above the end of a leg, at least. Halved, others with it: at most 0.0 points,
 0.1 mm on one clip."""

@@ -21,10 +21,7 @@ clip."""
 
 @dataclass(frozen=True)
 class FootPosePrior:
-    """Where two feet usually are, player heights; what is beyond costs its square, nats.
-
-    Chosen on rendered sequences; see benchmarks/sensitivity.py.
-    """
+    """Where two feet usually are, player heights; what is beyond costs its square, nats."""
 
     same_place: float
     """Cost of two candidates in one place: one shoe taken for both explains less of the picture."""
