@@ -69,8 +69,8 @@ def start(
         text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
     return (
         f"{text}\nNext: keyrecon annotate {quoted(folder)} to mark one whole body on a page, or "
-        f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon keyframes "
-        f"{quoted(folder)}; keyrecon pick teaches the colours by clicks instead."
+        f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon "
+        f"keyframes {quoted(folder)}; keyrecon pick teaches the colours by clicks instead."
     )
 
 
