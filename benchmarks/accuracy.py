@@ -5,10 +5,12 @@
 
 Renders what is missing in the work folder, annotates the chosen keyframes from the truth with
 click noise, reconstructs and prints a table. The depth model is learnt without the players of the
-sequence. Nothing is asserted. The last columns are those of `posture.py`: peak speed of the hands
-over the true one (median and tenth percentile), errors of knees, elbows and the angle between hips
-and shoulders, and by how much knees that are straight are bent, all in degrees. With an interpreter
-that has mediapipe 0.10.21 installed, MediaPipe Pose is measured on the same videos.
+sequence. Nothing is asserted. `swaps` is the share of legs and arms that are exchanged before
+refinement, `run` the frames of the longest such run. The last columns are those of `posture.py`:
+peak speed of the hands over the true one (median and tenth percentile), errors of knees, elbows and
+the angle between hips and shoulders, and by how much knees that are straight are bent, all in
+degrees. With an interpreter that has mediapipe 0.10.21 installed, MediaPipe Pose is measured on the
+same videos.
 """
 
 import argparse
@@ -109,6 +111,30 @@ def judge_carried(motion: Motion, truth: dict[str, np.ndarray]) -> tuple[float, 
     return float(hit.mean()), float(hit[:, wrist].mean()), float(np.nanmedian(off) / tall)
 
 
+def judge_sides(motion: Motion, truth: dict[str, np.ndarray]) -> tuple[float, int]:
+    """Share of legs and arms that are exchanged before refinement, and frames of the longest run.
+
+    Exchanged as in `real.py`: the two outer joints of both sides are nearer to the other side's
+    truth than to their own, by .4 torsos in sum.
+    """
+    names = [str(n) for n in truth["joint_names"]]
+    known, joints = truth["points2d"], motion.points2d_propagated
+    torso = known[:, names.index("right_hip")] - known[:, names.index("left_shoulder")]
+    torso = float(np.median(np.linalg.norm(torso, axis=1)))
+    share, longest = [], 0
+    for limb in (("knee", "ankle"), ("elbow", "wrist")):
+        right, left = ([names.index(f"{side}_{n}") for n in limb] for side in ("right", "left"))
+        own, crossed = (
+            np.linalg.norm(joints[:, right + left] - known[:, order], axis=2).sum(axis=1)
+            for order in (right + left, left + right)
+        )
+        swapped = crossed + 0.4 * torso < own
+        share.append(swapped.mean())
+        ends = np.flatnonzero(np.diff(swapped.astype(int), prepend=0, append=0))
+        longest = max(longest, int(np.diff(ends)[::2].max(initial=0)))
+    return float(np.mean(share)), longest
+
+
 FORMS = {
     "ours": (Options(), True),
     "ours, automatic signs": (Options(), False),
@@ -117,6 +143,7 @@ FORMS = {
 COLUMNS = (
     f"{'sequence':<22}{'form':<23}{'cost':>6}{'cover':>7}{'track':>7}{'PCK':>7}{'wrist':>7}"
     f"{'median':>8}{'PA':>7}{'N':>7}{'accel':>7}{'limbs':>8}{'ms/fr':>7}"
+    f"{'swaps':>7}{'run':>5}"
     f"{posture.COLUMNS}"
 )
 
@@ -134,6 +161,7 @@ def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> 
         motion = solve(case, options, signs)
         scores = evaluate_motion(motion, case.truth)
         carried, wrist, median = judge_carried(motion, case.truth)
+        swaps, run = judge_sides(motion, case.truth)
         found, frames = case.preparation.keyframes, len(motion.time)
         cost = annotation_cost(found, frames)
         cover = min(found.upper.coverage, found.lower.coverage)
@@ -142,6 +170,7 @@ def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> 
             f"{sequence.name:<22}{form:<23}{cost:6.2%}{cover:7.1%}{judge_track(case):7.1%}"
             f"{carried:7.1%}{wrist:7.1%}{median:8.2%}{scores.pa_mpjpe:7.1f}{scores.n_mpjpe:7.1f}"
             f"{scores.acceleration:7.1f}{scores.limb_variation_max:8.4%}{spent:7.1f}"
+            f"{swaps:7.2%}{run:5d}"
             f"{posture.row(posture.judge_posture(motion, case.truth))}",
             flush=True,
         )
