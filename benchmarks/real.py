@@ -168,7 +168,7 @@ def solve(clip: Clip, cost: float, work: Path) -> Result:
     options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
     first = choose_bodies(clip, 1)
     preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
-    unsure = frames_to_mark(preparation, clip.truth.frames[first], MORE_BODIES, options)
+    unsure = frames_to_mark(preparation, clip.truth.frames[first], MORE_BODIES)
     first = np.union1d(first, nearest_rows(clip, unsure))
     bodies = take(clip, first, first)
     preparation = prepare(clip.video, (), options, store.keep, show, bodies)

@@ -239,14 +239,13 @@ def frames_to_mark(
     preparation: Preparation,
     marked: Int[np.ndarray, "n"],
     count: int,
-    options: Options = Options(),
 ) -> Int[np.ndarray, "m"]:
     """Frames in which a whole body would teach most, in addition to those marked.
 
     Where the track is least sure, and where the pose has changed most since the nearest mark.
     """
-    fps, share = preparation.video.fps, options.keyframes.pose_time
-    time = pose_seconds(preparation.pose_distances, fps, share)
+    fps = preparation.video.fps
+    time = pose_seconds(preparation.pose_distances, fps)
     return least_sure_frames(preparation.track, marked, fps, count, time)
 
 

@@ -5,6 +5,10 @@ frames may leave it out and still cover 95 in a hundred. Measured in pose change
 How fast the pose changes is the pose distance of the frames just before and just after: over a
 tenth of a second its rank correlation with the true speed of the joints is .80-.93 for the upper
 body on four rendered sequences, over one frame .61-.83, as contours differ by their noise too.
+
+Tried on three rendered sequences of 36 s, marked in 1.5 % of the frames: with a share of 0, .2 and
+.35 of time measured so, 98.8, 98.8 and 98.6 % of the carried joints were right within .2 of the
+torso, 96.6, 98.5 and 98.7 % while a wrist moves faster than 2.5 player heights per second.
 """
 
 import numpy as np
@@ -17,6 +21,8 @@ STILL_SHARE = 0.1
 """Share of the frames in which the pose does not change: what distance they have is noise."""
 REACH_SECONDS = 0.2
 """T of Eq. 1 (`KeyframeOptions.reach`)."""
+FIRST_BODIES_SHARE = 0.35
+"""Share of time measured in pose change where whole bodies are asked for before the keyframes."""
 
 
 def elapsed_time(
@@ -34,10 +40,12 @@ def elapsed_time(
     return np.rint(TIME_UNIT * np.concatenate([[0.0], np.cumsum(weight)])).astype(np.int64)
 
 
-def pose_seconds(comparison: PoseDistances, fps: float, share: float) -> Float[np.ndarray, "T"]:
+def pose_seconds(comparison: PoseDistances, fps: float) -> Float[np.ndarray, "T"]:
     """Seconds up to each frame measured so, the mean of both halves of the body."""
     reach = max(1, round(REACH_SECONDS * fps))
-    elapsed = np.mean([elapsed_time(comparison, half, reach, share) for half in (0, 1)], axis=0)
+    elapsed = np.mean(
+        [elapsed_time(comparison, half, reach, FIRST_BODIES_SHARE) for half in (0, 1)], axis=0
+    )
     return elapsed[:-1] / (TIME_UNIT * fps)
 
 

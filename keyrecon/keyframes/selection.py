@@ -6,10 +6,11 @@ many keyframes represent, or bridge by gaps of at most T frames, a share alpha o
 (Eq. 1). Upper and lower body are chosen apart.
 
 method='paper' is the choice as printed: Eq. 2-4, distances smoothed with the same beta.
-method='coverage' maximises the coverage of Eq. 1 itself, reconsiders each keyframe, and at the
-end moves keyframes to the middle of what they represent. It smooths with a beta of its own, the
-distance between consecutive frames: two frames as alike as neighbours in time do show the same
-pose, which is what justifies averaging, whereas the beta of a small budget is far larger.
+method='coverage' maximises the coverage of Eq. 1 itself, for a share alpha of the frames and of the
+time measured in pose change (`pose_time`), reconsiders each keyframe, and at the end moves
+keyframes to the middle of what they represent. It smooths with a beta of its own, the distance
+between consecutive frames: two frames as alike as neighbours in time do show the same pose, which
+is what justifies averaging, whereas the beta of a small budget is far larger.
 """
 
 from dataclasses import dataclass
@@ -66,9 +67,9 @@ class KeyframeOptions:
     smoothing: float = 0.6
     """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
     smooths. method='paper' smooths with the beta of the choice instead."""
-    pose_time: float = 0.35
-    """Share of time that is measured in pose change, 0-1: a frame counts as 1 less this, and as
-    much on average as its pose changes faster than on average. So strokes are covered as well as
+    pose_time: float = 0.2
+    """Share of time that is measured in pose change, 0-1: a frame counts as 1 less this, and this
+    times how much faster than on average its pose changes. So strokes are covered as well as
     waiting; 0 counts frames alone, as method='paper' does."""
     form: Literal["both", "mean"] = "both"
     """Smoothed distances: rows then columns averaged, or the mean of both averages."""
