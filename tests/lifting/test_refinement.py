@@ -344,3 +344,15 @@ def test_a_knee_seen_from_the_side_is_not_bent_in_depth():
     term = terms.hinge((thigh, shank), axis, spread, 1.0)
     found = solve(state, [term], Smoothness.even(3, 1.0, 1e-6 + 0 * LENGTHS), 30, 1e-12).directions
     np.testing.assert_allclose(found[:, thigh, 2], found[:, shank, 2], atol=1e-3)
+
+
+def test_a_track_that_jumps_to_and_fro_is_not_followed():
+    truth, wrist = swinging_arm(), LSP14.index("right_wrist")
+    truth = MotionState(truth.root[:40], truth.directions[:40])
+    joints = positions(truth)[..., :2].copy()
+    joints[::4, wrist] += [0.15, 0.1]
+    size = BodySize(LSP14, LENGTHS, np.array([0.145, 0.258]), np.full(40, 400.0))
+    found = refine_motion(truth, known(joints, 0.03), truth.directions, size, 50.0)
+    trembling = np.linalg.norm(np.diff(joints[:, wrist], 2, axis=0), axis=-1).mean()
+    left = np.linalg.norm(np.diff(positions(found)[:, wrist], 2, axis=0), axis=-1).mean()
+    assert left < 0.02 * trembling
