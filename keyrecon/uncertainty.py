@@ -23,28 +23,28 @@ from keyrecon.body import Skeleton
 from keyrecon.records import HalfName, Motion, Track
 
 MEAN_ERROR = 0.0229
-"""Player heights. Fitted, as the tables, to 2643 joints of nine clips. With every clip
-predicted from the others, eight groups of joints expected to be off by .008, .010, .012, .014,
-.017, .023, .031 and .059 heights were off by .007, .010, .012, .014, .017, .023, .032 and .058,
-and clips by .74 to 1.4 of what was expected. The score (mean of log p + error / p) was -3.055;
-with the joint's own confidence and correction alone -2.975, with its confidence alone -2.908,
-with the time to the nearest mark added -3.053: that tells nothing more."""
+"""Player heights. Fitted, as the tables, to 2643 joints of nine clips. With every clip predicted
+from the others, eight groups of joints expected to be off by .007, .010, .012, .014, .017, .023,
+.032 and .062 heights were off by .007, .008, .012, .015, .017, .025, .030 and .061, and clips by
+.74 to 1.4 of what was expected. The score (mean of log p + error / p) was -3.056; with the joint's
+own confidence and correction alone -2.974, with its confidence alone -2.904, with the time to the
+nearest mark added -3.058: that tells hardly more."""
 ERROR_TABLES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "correction": (
         (0.0, 0.004, 0.008, 0.012, 0.02, 0.03, 0.05),
-        (0.69, 0.69, 0.79, 0.93, 1.20, 1.54, 1.64),
+        (0.70, 0.70, 0.77, 0.98, 1.13, 1.41, 1.78),
     ),
     "part_correction": (
         (0.0, 0.004, 0.006, 0.009, 0.013, 0.02, 0.03),
-        (0.67, 0.73, 0.90, 1.19, 1.19, 1.59, 1.59),
+        (0.71, 0.71, 0.91, 1.07, 1.40, 1.51, 1.51),
     ),
     "part_confidence": (
         (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7),
-        (1.45, 1.45, 1.45, 1.03, 0.85, 0.80, 0.80),
+        (1.47, 1.47, 1.21, 1.17, 0.86, 0.82, 0.74),
     ),
     "speed": (
         (0.0, 0.001, 0.003, 0.008, 0.02, 0.04),
-        (0.75, 0.84, 1.07, 1.07, 1.24, 1.56),
+        (0.70, 0.76, 1.04, 1.09, 1.25, 1.58),
     ),
 }
 """By predictor the lower ends of its bins, and their factors."""
@@ -52,9 +52,8 @@ MAX_ERROR = 0.25
 """Expected error of a joint that is lost, player heights: the length of a thigh."""
 UNCERTAIN = 0.04
 """Mean expected error of arms, legs or head from which a stretch is reported, player heights.
-Of the parts of frames marked by eye 86 of 647 were reported; 63 % of these had a joint off by
-more than .05 and 49 % by more than .08, where 11 % of all parts had; of the latter 59 % were
-reported."""
+Of the parts of frames marked by eye 87 of 647 were reported; 69 % of these had a joint off by
+more than .05 and 54 % by more than .08; of all that had one of the latter 66 % were reported."""
 MERGED_SECONDS = 0.2
 """Uncertain frames that are nearer to each other than this make one stretch."""
 LEAST_SECONDS = 0.1
