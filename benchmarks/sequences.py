@@ -55,9 +55,7 @@ SECOND = (
     Sequence(
         "jsgiraldo-back-pan", ("jsgiraldo_Reves", "jsgiraldo_Servicio"), "back", True, 25, fps=25
     ),
-    Sequence(
-        "jsguevara-side", ("jsguevara_Derecha_17seg", "jsguevara_Servicio"), "side", False, 26
-    ),
+    Sequence("jsguevara-side", ("jsguevara_Reves_10seg", "jsguevara_Servicio"), "side", False, 26),
     Sequence(
         "secheverri-above", ("secheverri_Derecha", "secheverri_Reves"), "above", False, 27, fps=30
     ),
