@@ -40,8 +40,6 @@ from keyrecon.propagation.hypotheses import (
     track_from_keyframes,
 )
 from keyrecon.propagation.limb_identity import (
-    SideEvidence,
-    flow_evidence,
     identify_limbs,
     template_evidence,
 )
@@ -106,8 +104,6 @@ class HalfStart:
     """Pose distance of every frame to the annotated ones, player heights."""
     fixed: Complex[np.ndarray, "T G"]
     """Joints that the other half has estimated."""
-    flow: SideEvidence | None = None
-    """Marked joints followed by optical flow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +134,7 @@ def propagate_joints(
     if options.method == "paper":
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
-    tracks = _propagate_fused(preparation, annotations, flow, options, progress)
+    tracks = _propagate_fused(preparation, annotations, options, progress)
     if flow is not None:
         tracks = with_flow(tracks, flow, preparation.track.height)
     return _with_marks(annotations, marked, tracks)
@@ -174,7 +170,6 @@ def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
 def _propagate_fused(
     preparation: Preparation,
     annotations: Annotations,
-    flow: FlowTracks | None,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
@@ -198,8 +193,7 @@ def _propagate_fused(
         distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
-        followed = None if flow is None else flow_evidence(half, flow, body_frame, fps)
-        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed, followed)
+        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -227,8 +221,6 @@ def propagate_half(
     limbs_chosen.joints[:, templates.half.fixed] = start.fixed
     half, marked = templates.half, templates.poses.frames
     told = template_evidence(half, fitted.joints, fps)
-    if start.flow is not None:
-        told = told + start.flow
     identity = identify_limbs(half, limbs_chosen.joints, told, marked, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
