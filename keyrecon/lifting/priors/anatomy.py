@@ -43,7 +43,9 @@ _MEAN = {
     "arm": np.array([0.24, -0.74, 0.09, 0.02, -0.22, 0.51]),
     "leg": np.array([0.04, -0.81, 0.37, -0.01, -0.87, -0.33]),
 }
-"""Mean of the upper and the lower bone's direction: outward, up, forward of each."""
+"""Mean of the upper and the lower bone's direction: outward, up, forward of each. A quarter more of
+the first costs 3.7 mm without depth signs on a clip of 5 s, a quarter less nothing; what a player's
+own mean is in depth, a video does not show before it is lifted."""
 
 _COVARIANCE = {
     "arm": np.array(
