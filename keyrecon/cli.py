@@ -14,6 +14,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from keyrecon.app import demo as demonstration
 from keyrecon.app import depth_training as depth_job
+from keyrecon.app import keyframing
 from keyrecon.app import project as work
 from keyrecon.app.annotator import serve_annotator
 from keyrecon.app.console import show
@@ -128,8 +129,12 @@ def keyframes(
             keyrecon run --method paper; 'best' is ours (default).
         force: Make every stage again.
     """
-    chosen = work.KeyframeSettings(budget, coverage, reach)
-    print(work.find_keyframes(Workspace(project, force), options, chosen, show, method == "paper"))
+    chosen = keyframing.KeyframeSettings(budget, coverage, reach)
+    print(
+        keyframing.find_keyframes(
+            Workspace(project, force), options, chosen, show, method == "paper"
+        )
+    )
 
 
 @app.command

@@ -24,7 +24,7 @@ from keyrecon.annotate.server.address import (
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
-from keyrecon.app import project
+from keyrecon.app import keyframing, project
 from keyrecon.app.preparing import prepare_project
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
@@ -133,12 +133,12 @@ def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
 
 def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     reach = options.get("reach")
-    chosen = project.KeyframeSettings(
+    chosen = keyframing.KeyframeSettings(
         options.get("budget"), options.get("coverage"), None if reach is None else round(reach)
     )
     workspace = Workspace(folder)
     _prepare_with_bodies(workspace, workspace.video())
-    return project.find_keyframes(workspace, Options(), chosen, progress)
+    return keyframing.find_keyframes(workspace, Options(), chosen, progress)
 
 
 def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:

@@ -13,15 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.project import (
-    KeyframeSettings,
-    evaluate,
-    find_keyframes,
-    prepared,
-    run,
-    settings,
-    start,
-)
+from keyrecon.app.keyframing import KeyframeSettings, find_keyframes
+from keyrecon.app.project import evaluate, prepared, run, settings, start
 from keyrecon.body import LSP14
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.io.formats.coco import read_coco, write_coco

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,31 +17,25 @@ from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.app.preparing import prepare_project
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, quoted
-from keyrecon.io.durable import make_folder, write_durably
+from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
-from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
+from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video, open_video
-from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
-from keyrecon.keyframes.absence import absent_frames, list_stretches
-from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import (
     Options,
-    as_printed,
     with_height,
-    with_marked_keyframes,
 )
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick, Preparation
+from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
-from keyrecon.report.summary import annotation_cost
-from keyrecon.uncertainty import uncertain_stretches, unsure_track
+from keyrecon.uncertainty import uncertain_stretches
 
 
 def start(
@@ -62,7 +56,7 @@ def start(
     if skeleton is not None:
         write_durably(folder / "skeleton.json", skeleton.read_bytes())
     text = (
-        f"{folder}: {_counted(len(opened), 'frame')} of {opened.width}x{opened.height} at "
+        f"{folder}: {counted(len(opened), 'frame')} of {opened.width}x{opened.height} at "
         f"{opened.fps:.4g} frames per second."
     )
     if opened.variable_rate:
@@ -72,6 +66,11 @@ def start(
         f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon "
         f"keyframes {quoted(folder)}; keyrecon pick teaches the colours by clicks instead."
     )
+
+
+def counted(number: int, what: str) -> str:
+    """1 frame, 2 frames."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def point(text: str, flag: str) -> tuple[float, float]:
@@ -112,114 +111,6 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
     counts = {part: sum(p.part == part for p in together) for part in {p.part for p in together}}
     listed = ", ".join(f"{n} {part}" for part, n in sorted(counts.items()))
     return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {quoted(workspace.folder)}"
-
-
-@dataclass(frozen=True)
-class KeyframeSettings:
-    """The options of keyframes that commands and page offer; None leaves the project's."""
-
-    budget: float | None = None
-    coverage: float | None = None
-    reach: int | None = None
-
-    def over(self, options: KeyframeOptions) -> KeyframeOptions:
-        """Options with those that are given here in their place."""
-        return replace(
-            options,
-            budget=options.budget if self.budget is None else self.budget,
-            coverage=options.coverage if self.coverage is None else self.coverage,
-            reach=options.reach if self.reach is None else self.reach,
-        )
-
-
-def find_keyframes(
-    workspace: Workspace,
-    options: Options,
-    chosen: KeyframeSettings,
-    progress: Progress,
-    printed: bool = False,
-) -> str:
-    """Run the automatic part; write keyframes.json and a picture of each keyframe.
-
-    `printed` takes the forms that the paper prints. The project remembers its options without
-    them, so that a run by the same forms finds the same stages, and one by ours is not bound.
-    """
-    options = workspace.options(options, Options())
-    options = replace(options, keyframes=chosen.over(options.keyframes))
-    forms = as_printed(options) if printed else options
-    video = workspace.video()
-    marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
-    found = prepare_project(workspace, video, marks, forms, progress)
-    preparation = found.preparation
-    if marks is not None and not printed:
-        preparation = with_marked_keyframes(preparation, marks, options, progress)
-    workspace.remember(options, Options())
-    write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
-    write_keyframe_pictures(workspace, preparation, progress)
-    return describe_keyframes(workspace, preparation, found.contradictions())
-
-
-def describe_keyframes(
-    workspace: Workspace, preparation: Preparation, contradictions: Sequence[str] = ()
-) -> str:
-    """What was found, what of the person's does not fit it, and what to do next."""
-    found, frames = preparation.keyframes, len(preparation.video)
-    folder = quoted(workspace.folder)
-    seen = float((preparation.track.confidence > 0).mean())
-    halves = [
-        f"{name} body: {_counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
-        f"frames (beta {half.beta:.4f}; {_compare_with_printed(found, half)})."
-        for name, half in (("Upper", found.upper), ("Lower", found.lower))
-    ]
-    return "\n".join(
-        [
-            f"Player found in {seen:.1%} of {frames} frames.",
-            *contradictions,
-            *_describe_absence(preparation),
-            *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
-            *halves,
-            f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
-            f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
-            f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
-            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
-        ]
-    )
-
-
-def _compare_with_printed(found: Keyframes, half: HalfKeyframes) -> str:
-    if found.method == "paper":
-        return "chosen by Eq. 2-4 as printed"
-    return f"as printed in the paper it would take {half.printed_count}"
-
-
-def _describe_absence(preparation: Preparation) -> list[str]:
-    """Stretches in which no keyframes are asked for."""
-    visibility_score, reach = (
-        preparation.pose_distances.visibility_score,
-        preparation.keyframes.reach,
-    )
-    stretches = list_stretches(absent_frames(visibility_score, reach))
-    if not stretches:
-        return []
-    listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
-    more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
-    return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def write_keyframe_pictures(
-    workspace: Workspace, preparation: Preparation, progress: Progress
-) -> None:
-    """One PNG per keyframe, named by frame number as labelling tools keep it."""
-    make_folder(workspace.pictures)
-    frames = preparation.keyframes.frames.tolist()
-    for frame in progress(frames, "Writing keyframe pictures", len(frames)):
-        path = workspace.pictures / f"frame_{frame:06d}.png"
-        if not path.exists():
-            write_picture(path, preparation.video.frame(frame))
 
 
 def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:

@@ -10,7 +10,7 @@ from numbered_pictures import read_number
 
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.annotate.assist.preview import cut_strip
-from keyrecon.app import project
+from keyrecon.app import keyframing, project
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.picks import write_picks
@@ -44,7 +44,7 @@ def untouched(tmp_path_factory):
 def prepared(untouched):
     """(help, keyframes) of a project whose keyframes were chosen."""
     untouched.add_picks(picks(COUNT))
-    project.find_keyframes(untouched, Options(), project.KeyframeSettings(budget=0.1), silent)
+    keyframing.find_keyframes(untouched, Options(), keyframing.KeyframeSettings(budget=0.1), silent)
     return make_assistant(Workspace(untouched.folder))
 
 
