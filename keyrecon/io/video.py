@@ -2,9 +2,10 @@
 
 A frame is its index in presentation order, never time x rate. The index is built once from the
 packets (no decoding): the presentation times of all packets that are shown, sorted. A frame is
-fetched by seeking to a key packet at or before it and decoding up to its exact time. Rotation
-stored in the file is applied here, as players do. Slow-motion footage tells its factor, so
-that times are those of the world.
+fetched by seeking to a key packet at or before it and decoding up to its exact time. The quarter
+turn and the mirroring that a file asks for (phones hold their sensor sideways) are applied here, as
+players do: every other part of the program sees upright pictures and their coordinates.
+Slow-motion footage tells its factor, so that times are those of the world.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -28,6 +29,10 @@ LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p
 """Pixel formats whose first plane is the brightness, a byte each."""
 VARIABLE_RATE = 0.25
 """Frame spacing that differs by more than this share from its median counts as variable."""
+
+
+LEAST_SLOW_MOTION, MOST_SLOW_MOTION = 0.01, 1000.0
+"""Factors that a video can have: time lapse of a hundredth, and high-speed cameras."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,8 @@ class Video:
     """Frames per second of the world (median spacing)."""
     turns: int
     """Quarter turns counter-clockwise that stand the stored picture upright."""
+    mirrored: bool = False
+    """Whether left and right of the stored picture are exchanged before it is turned."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -85,7 +92,7 @@ class Video:
                 grey = pixels.reshape(plane.height, plane.line_size)[:, : plane.width]
             else:
                 grey = frame.to_ndarray(format="gray")
-            yield np.ascontiguousarray(np.rot90(grey, self.turns)) if self.turns else grey
+            yield self._upright(grey)
 
     def _decoded(self, start: int, stop: int | None) -> Iterator[av.VideoFrame]:
         """Frames start..stop-1 as they are stored, not turned."""
@@ -124,7 +131,14 @@ class Video:
             )
         else:
             picture = frame.to_ndarray(format="rgb24")
-        return np.ascontiguousarray(np.rot90(picture, self.turns)) if self.turns else picture
+        return self._upright(picture)
+
+    def _upright(self, stored: UInt8[np.ndarray, "h w *c"]) -> UInt8[np.ndarray, "y x *c"]:
+        """A stored picture as players show it."""
+        if not self.turns and not self.mirrored:
+            return stored
+        flipped = stored[:, ::-1] if self.mirrored else stored
+        return np.ascontiguousarray(np.rot90(flipped, self.turns))
 
 
 def fingerprint_file(path: Path) -> str:
@@ -150,8 +164,11 @@ def open_video(
         raise KeyreconError(f"There is no video at {path}.")
     if path.stat().st_size == 0:
         raise KeyreconError(f"{path} is empty (0 bytes).")
-    if slow_motion <= 0:
-        raise KeyreconError(f"The slow-motion factor must be positive, not {slow_motion}.")
+    if not LEAST_SLOW_MOTION <= slow_motion <= MOST_SLOW_MOTION:  # which NaN is not either
+        raise KeyreconError(
+            f"The slow-motion factor is {slow_motion:g}; it must lie between {LEAST_SLOW_MOTION:g} "
+            f"and {MOST_SLOW_MOTION:g}: 240 frames a second shown at 30 are 8."
+        )
     with _open(path) as container:
         stream = container.streams.video[0]
         stamps = np.array(sorted(_shown_stamps(container, path)), dtype=np.int64)
@@ -161,7 +178,7 @@ def open_video(
         if first.pts is not None:  # where a file was cut, pictures before lack what they refer to
             stamps = stamps[stamps >= first.pts]
         seconds_per_tick = _seconds_per_tick(stream)
-    turns = round(first.rotation / 90) % 4
+        turns, mirrored = _find_orientation(first, stream)
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
     if not 0 <= start < (end or len(stamps)) <= len(stamps):
         raise KeyreconError(
@@ -171,7 +188,26 @@ def open_video(
     stamps = stamps[start:end]
     time = (stamps - stamps[0]) * seconds_per_tick / slow_motion
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
-    return Video(path, width, height, stamps, time, fps, turns)
+    return Video(path, width, height, stamps, time, fps, turns, mirrored)
+
+
+def _find_orientation(frame: av.VideoFrame, stream: av.VideoStream) -> tuple[int, bool]:
+    """Quarter turns counter-clockwise, and whether the picture is mirrored before.
+
+    The display matrix (ISO/IEC 14496-12, 8.3.2.3) shows (x, y) at (a x + c y, b x + d y). Files of
+    older programs tell clockwise degrees in a tag instead.
+    """
+    from av.sidedata.sidedata import Type
+
+    told_with_frame: Any = frame.side_data  # PyAV's stubs know motion vectors alone
+    matrix = told_with_frame.get(Type.DISPLAYMATRIX)
+    if matrix is None:
+        tag = {name.lower(): told for name, told in stream.metadata.items()}.get("rotate", "0")
+        return (-round(int(tag) / 90) % 4 if tag.lstrip("-").isdigit() else 0), False
+    a, b, _, c, d = np.frombuffer(bytes(matrix)[:20], np.int32).astype(float)
+    mirrored = bool(a * d - b * c < 0)
+    clockwise = np.degrees(np.arctan2(-b, -a) if mirrored else np.arctan2(b, a))
+    return -round(clockwise / 90) % 4, mirrored
 
 
 def _open(path: Path) -> av.container.InputContainer:

@@ -1,3 +1,5 @@
+from itertools import islice
+
 import av
 import numpy as np
 import pytest
@@ -5,6 +7,8 @@ from numbered_pictures import read_number
 from numbered_videos import EVEN, KINDS, OPEN_GOP, UNEVEN, copy_packets, trim_with_edit_list, turn
 
 from keyrecon import KeyreconError
+from keyrecon.io.frame_reader import read_grey, read_small
+from keyrecon.io.held_video import hold_frames
 from keyrecon.io.video import open_video
 
 
@@ -60,12 +64,67 @@ def test_a_file_that_says_it_is_turned_is_turned_as_players_do(write_numbered, t
     assert numbers(video) == list(range(60))
 
 
+@pytest.mark.parametrize("degrees", [0, 90, 180, 270])
+def test_a_file_that_says_it_is_mirrored_is_shown_mirrored(write_numbered, tmp_path, degrees):
+    whole = write_numbered("whole.mp4", EVEN)
+    video = open_video(turn(whole, tmp_path / "mirrored.mp4", degrees, mirrored=True))
+    stored = open_video(whole).frame(7)
+    expected = np.rot90(stored[:, ::-1], -degrees // 90)
+    assert np.array_equal(video.frame(7), expected)
+    assert (video.height, video.width) == expected.shape[:2]
+
+
+def test_a_turn_told_by_a_tag_of_older_programs_counts(tmp_path):
+    path = tmp_path / "tagged.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 128, 64, "yuv420p"
+        stream.metadata["rotate"] = "90"
+        picture = np.zeros((64, 128, 3), np.uint8)
+        picture[:, :20] = 255
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    shown = open_video(path).frame(0)
+    assert shown.shape == (128, 64, 3)
+    assert shown[:10].mean() > 250 > 5 > shown[-10:].mean()
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 270])
+def test_every_way_of_reading_shows_a_turned_file_upright(write_numbered, tmp_path, degrees):
+    """In colour, in grey, reduced, chosen, ahead and held: the same upright picture."""
+    video = open_video(turn(write_numbered("w.mp4", EVEN), tmp_path / "t.mp4", degrees))
+    held = hold_frames(video)
+    size = (video.height, video.width)
+    upright = [p.mean(axis=2) for p in video.frames(0, 3)]
+    readers = {
+        "held": held.frames(0, 3),
+        "stored": hold_frames(video, most_in_memory=0.0).frames(0, 3),
+        "chosen": video.chosen_frames({0, 1, 2}, 2),
+        "small": read_small(held, video.width, {0, 1, 2}),
+        "grey": islice(video.grey_frames(), 3),
+        "held grey": islice(held.grey_frames(), 3),
+        "small grey": islice(read_grey(held, video.width), 3),
+    }
+    for name, pictures in readers.items():
+        for picture, expected in zip(pictures, upright, strict=True):
+            grey = picture if picture.ndim == 2 else picture.mean(axis=2)
+            assert grey.shape == size, name
+            assert np.abs(grey - expected).mean() < 20, name  # studio range, chroma
+    assert next(video.frames(0, 1, width=32)).shape[:2] == (round(32 * size[0] / size[1]), 32)
+
+
 def test_times_are_those_of_the_file_and_slow_motion_divides_them(write_numbered):
     path = write_numbered("uneven.mp4", UNEVEN)
     assert np.allclose(open_video(path).time, np.array(UNEVEN) / 600, atol=1e-3)
     assert np.allclose(open_video(path, slow_motion=4.0).time, np.array(UNEVEN) / 2400, atol=1e-3)
     assert open_video(path).variable_rate
     assert not open_video(write_numbered("even.mp4", EVEN)).variable_rate
+
+
+@pytest.mark.parametrize("factor", [0.0, -2.0, float("nan"), float("inf")])
+def test_a_slow_motion_that_cannot_be_is_refused(write_numbered, factor):
+    with pytest.raises(KeyreconError, match="slow-motion factor"):
+        open_video(write_numbered("short.mp4", EVEN), slow_motion=factor)
 
 
 def test_a_trimmed_video_counts_from_its_first_frame(write_numbered):

@@ -45,11 +45,12 @@ def trim_with_edit_list(source, target, first, count):
     return target
 
 
-def turn(source, target, degrees):
-    """The same file that says that it is to be shown turned clockwise."""
+def turn(source, target, degrees, mirrored=False):
+    """The same file that says that it is to be shown turned clockwise, mirrored before."""
     data = bytearray(source.read_bytes())
-    sine, cosine = {90: (1, 0), 180: (0, -1), 270: (-1, 0)}[degrees]
-    matrix = [cosine, sine, 0, -sine, cosine, 0, 0, 0, 1]
+    sine, cosine = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}[degrees]
+    flip = -1 if mirrored else 1
+    matrix = [flip * cosine, flip * sine, 0, -sine, cosine, 0, 0, 0, 1]
     fixed = [value << (30 if n % 3 == 2 else 16) for n, value in enumerate(matrix)]
     struct.pack_into(">9i", data, data.index(b"tkhd") + 44, *fixed)
     target.write_bytes(data)
