@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
+from keyrecon.golf.prior.skeleton import NAMES
 from keyrecon.golf.records import (
     Camera,
     Capsules,
@@ -24,6 +25,15 @@ MIRROR_X = np.array([-1.0, 1.0, 1.0])
 _OTHER_SIDE = {"left": "right", "right": "left"}
 
 
+def _mirror_name(name: str) -> str:
+    side, _, joint = name.partition("_")
+    return f"{_OTHER_SIDE[side]}_{joint}" if side in _OTHER_SIDE else name
+
+
+SEGMENT_MIRROR = np.array([NAMES.index(_mirror_name(name)) for name in NAMES])
+"""Index of each segment's mirror image."""
+
+
 def mirror_pixels(pixels: Float[np.ndarray, "*n 2"], width: int) -> Float[np.ndarray, "*n 2"]:
     """Points of a picture of some width with left and right exchanged."""
     mirrored = pixels.copy()
@@ -35,11 +45,6 @@ def mirror_initial(joints: InitialJoints, width: int) -> InitialJoints:
     """Initial joints of the mirrored player, in the same order."""
     names = tuple(_mirror_name(name) for name in joints.names)
     return InitialJoints(joints.frame, names, mirror_pixels(joints.places, width))
-
-
-def _mirror_name(name: str) -> str:
-    side, _, joint = name.partition("_")
-    return f"{_OTHER_SIDE[side]}_{joint}" if side in _OTHER_SIDE else name
 
 
 def mirror_observations(observations: Observations, width: int) -> Observations:
@@ -64,13 +69,19 @@ def mirror_observations(observations: Observations, width: int) -> Observations:
 
 
 def mirror_pose(pose: RootPose) -> RootPose:
-    """The pose in mirrored space; capsules must be mirrored with it."""
+    """The pose in mirrored space, whose right limbs are the left ones of before.
+
+    Capsules must be mirrored with it.
+    """
     flip = np.diag(MIRROR_X)
-    return RootPose(pose.origins * MIRROR_X, flip @ pose.rotations @ flip)
+    return RootPose(
+        pose.origins[:, SEGMENT_MIRROR] * MIRROR_X, flip @ pose.rotations[:, SEGMENT_MIRROR] @ flip
+    )
 
 
 def mirror_capsules(capsules: Capsules) -> Capsules:
     """Capsules of the mirrored body, for a mirrored pose."""
     return Capsules(
-        capsules.segment, capsules.start * MIRROR_X, capsules.end * MIRROR_X, capsules.radii
-    )
+        SEGMENT_MIRROR[capsules.segment], capsules.start * MIRROR_X, capsules.end * MIRROR_X,
+        capsules.radii,
+    )  # fmt: skip
