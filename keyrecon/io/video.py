@@ -51,7 +51,7 @@ class Video:
     """Frames per second of the world (median spacing)."""
     turns: int
     """Quarter turns counter-clockwise that stand the stored picture upright."""
-    mirrored: bool = False
+    mirrored: bool
     """Whether left and right of the stored picture are exchanged before it is turned."""
 
     def __len__(self) -> int:
