@@ -24,6 +24,7 @@ from accuracy import HEIGHT_ERROR, Case, mark, prepare_case
 from sequences import DATA, TENNIS, render
 from unseen import unseen_model
 
+from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.app.console import show
 from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.lifting import lifting, motion_fitting
@@ -211,7 +212,7 @@ def measure(folder: Path, case: Case, model: DepthModel) -> dict[str, list[float
     rows |= {name: judge(trial, run(trial)) for name, run in CONDITIONS.items()}
     blind = replace(trial, marks=replace(trial.marks, nearer=0 * trial.marks.nearer))
     rows["no signs from the person"] = judge(blind, lift_trial(blind))
-    half = replace(Options(), keyframes=KeyframeOptions(budget=KeyframeOptions().budget / 2))
+    half = replace(Options(), keyframes=KeyframeOptions(budget=LONG_SHARE / 2))
     fewer = carry(prepare_case(case.sequence, folder, half), model)
     rows["half the keyframes"] = judge(fewer, lift_trial(fewer))
     return rows

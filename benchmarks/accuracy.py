@@ -24,6 +24,7 @@ from peer import score_mediapipe
 from sequences import DATA, OTHER, SECOND, TENNIS, Sequence, render
 from unseen import unseen_model
 
+from keyrecon.annotation_budget import LONG_SHARE, annotation_cost
 from keyrecon.app.console import show
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
@@ -32,7 +33,6 @@ from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.pipeline import Options, as_printed, prepare, with_height
 from keyrecon.records import Annotations, Motion, Preparation
-from keyrecon.report.summary import annotation_cost
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 
 CLICK_NOISE = 3.0 / 400
@@ -155,7 +155,7 @@ def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> 
         if options.depths != "none":
             options = replace(options, depths=str(depths))
         if sequence.seconds <= SHORT:
-            budget = 2 * options.keyframes.budget
+            budget = 2 * LONG_SHARE
             options = replace(options, keyframes=replace(options.keyframes, budget=budget))
         case = prepare_case(sequence, folder, options)
         motion = solve(case, options, signs)

@@ -17,6 +17,7 @@ from sequences import OTHER, TENNIS, Sequence, render
 from unseen import unseen_model
 from variant_store import Finished, Unchanged, VariantStore
 
+from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.body import LSP14
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
@@ -111,7 +112,7 @@ def run_rendered(task: Task, sequence: Sequence, store: VariantStore) -> Outcome
     video = open_video(folder / "video.mp4", end=count)
     options = replace(Options(), depths=str(depths))
     if count / video.fps <= SHORT:
-        budget = 2 * options.keyframes.budget
+        budget = 2 * LONG_SHARE
         options = replace(options, keyframes=replace(options.keyframes, budget=budget))
     sequence = replace(sequence, seed=sequence.seed + task.seed)
     if task.clip.endswith(BODY):

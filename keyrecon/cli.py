@@ -122,7 +122,8 @@ def keyframes(
     Args:
         project: Project folder.
         budget: Share of frames that a person will mark; a half body is half a frame
-            (default 0.015).
+            (default 0.015 from half a minute on; a shorter video takes as many as half a minute,
+            up to 0.06).
         coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
         reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
         method: 'paper' tracks, compares and chooses as the paper prints it (Eq. 2-4), for

@@ -134,7 +134,8 @@ def prepare(
     Raises KeyreconError when a pick is off the picture, the player is not
     found in most frames, or the annotation budget cannot be met.
     """
-    count_labels(options.keyframes, len(video))  # a person waits minutes for the choice itself
+    # a person waits minutes for the choice itself
+    count_labels(options.keyframes, len(video), video.fps)
     camera = keep(
         "camera", estimate_camera_motion, video, options=options.camera, progress=progress
     )

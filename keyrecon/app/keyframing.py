@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from keyrecon.annotation_budget import annotation_cost
 from keyrecon.app.preparing import prepare_project
 from keyrecon.app.project import counted, load_annotations
 from keyrecon.errors import quoted
@@ -15,7 +16,6 @@ from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
-from keyrecon.report.summary import annotation_cost
 from keyrecon.uncertainty import unsure_track
 
 

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from keyrecon.annotation_budget import usual_budget
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
@@ -52,8 +53,9 @@ a 2000-frame video. Larger choices stay as the greedy choice has them, for the s
 class KeyframeOptions:
     """How many frames a person is asked to annotate, and what they must stand for."""
 
-    budget: float = 0.015
-    """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video."""
+    budget: float | None = None
+    """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video; None takes
+    what is usual for its length (`usual_budget`)."""
     coverage: float = 0.95
     """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
     reach: int = 10
@@ -110,7 +112,7 @@ class HalfDistances:
         return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score, elapsed)
 
 
-def count_labels(options: KeyframeOptions, n_frames: int) -> int:
+def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
     """Half-body labels that the budget allows in a video of `n_frames`.
 
     Raises KeyreconError where it is less than one for each half, and for impossible options.
@@ -121,14 +123,13 @@ def count_labels(options: KeyframeOptions, n_frames: int) -> int:
         )
     if options.reach < 0:
         raise KeyreconError(f"--reach is a number of frames, not {options.reach}.")
-    if not 0 < options.budget <= 1:
-        raise KeyreconError(
-            f"--budget is a share of the frames, 0.015 for 1.5 %, not {options.budget:g}."
-        )
-    labels = int(2 * options.budget * n_frames + 1e-9)
+    budget = usual_budget(n_frames, fps) if options.budget is None else options.budget
+    if not 0 < budget <= 1:
+        raise KeyreconError(f"--budget is a share of the frames, 0.015 for 1.5 %, not {budget:g}.")
+    labels = int(2 * budget * n_frames + 1e-9)
     if labels < 2 and None in (options.beta_upper, options.beta_lower):
         raise KeyreconError(
-            f"A budget of {options.budget:.2%} of {n_frames} frames is {labels} half-body "
+            f"A budget of {budget:.2%} of {n_frames} frames is {labels} half-body "
             f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
             "allows that."
         )
@@ -147,7 +148,7 @@ def choose_keyframes(
     cannot be (`count_labels`).
     """
     frames = len(comparison.row)
-    labels = count_labels(options, frames)
+    labels = count_labels(options, frames, fps)
     reach = max(1, round(options.reach * fps / 50))
     kept = np.flatnonzero(~absent_frames(comparison.visibility_score, reach))
     comparison = select_frames(comparison, kept)

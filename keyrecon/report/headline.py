@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from keyrecon.annotation_budget import annotation_cost
 from keyrecon.metrics import Scores, evaluate_motion
 from keyrecon.records import Motion
 from keyrecon.report.markup import ReportMaterial, note, table, text
-from keyrecon.report.summary import annotation_cost, missing_shares
+from keyrecon.report.summary import missing_shares
 
 
 def headline(material: ReportMaterial) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.records import SOURCES, Keyframes, Motion, Track
+from keyrecon.records import SOURCES, Motion, Track
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +36,6 @@ def arrange_truth(truth: Mapping[str, np.ndarray], skeleton: Skeleton) -> Truth:
             points3d[:, joint] = truth["points3d"][:, places[name]]
             points2d[:, joint] = truth["points2d"][:, places[name]]
     return Truth(points3d, points2d)
-
-
-def annotation_cost(keyframes: Keyframes, frames: int) -> float:
-    """Share of frames that a person marked; one half of the body counts half, as in the paper."""
-    return (len(keyframes.upper.frames) + len(keyframes.lower.frames)) / 2 / frames
 
 
 def center_on_root(points3d: Float[np.ndarray, "T J 3"], root: int) -> Float[np.ndarray, "T J 3"]:

@@ -17,7 +17,7 @@ def comparison():
 
 @pytest.fixture(scope="module")
 def chosen(comparison):
-    return choose_keyframes(comparison, 50.0)
+    return choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015))
 
 
 def every_second_frame_is_an_exemplar(poses):
@@ -40,7 +40,7 @@ def test_adopting_the_choice_gives_the_choice_back(comparison, chosen):
 
 @pytest.mark.parametrize("method", ["coverage", "paper"])
 def test_keyframes_that_were_annotated_tell_how_those_asked_for_were_chosen(comparison, method):
-    asked = choose_keyframes(comparison, 50.0, KeyframeOptions(method=method))
+    asked = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015, method=method))
     assert (
         adopt_keyframes(comparison, asked, (asked.upper.frames[1:], asked.lower.frames)).method
         == method
@@ -60,7 +60,7 @@ def test_one_more_keyframe_stands_for_what_it_is_nearest_to(comparison, chosen):
 def test_a_person_may_annotate_a_frame_that_is_no_exemplar():
     poses = sporting_poses(400, seed=4)
     comparison = every_second_frame_is_an_exemplar(poses)
-    asked = choose_keyframes(comparison, 50.0)
+    asked = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015))
     own = 101
     adopted = adopt_keyframes(comparison, asked, (np.array([own]), asked.lower.frames)).upper
     assert adopted.frames.tolist() == [own]

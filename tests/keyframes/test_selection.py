@@ -5,11 +5,18 @@ import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
 
+from keyrecon.annotation_budget import usual_budget
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.keyframes.assignment import find_neighborhoods
-from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes, count_labels
+from keyrecon.keyframes.selection import (
+    KeyframeOptions,
+    choose_keyframes,
+    count_labels,
+)
 from keyrecon.keyframes.swaps import CoverageGoal, swap_for_coverage
+
+SPARSE = KeyframeOptions(budget=0.015)
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +110,7 @@ def test_unclear_frames_are_left_to_clear_ones_as_good():
     poses = sporting_poses(300, seed=3)
     visibility_score = np.ones(300)
     visibility_score[::2] = 0.2
-    chosen = choose_keyframes(comparison_of(poses, visibility_score=visibility_score), 50.0)
+    chosen = choose_keyframes(comparison_of(poses, visibility_score=visibility_score), 50.0, SPARSE)
     assert (visibility_score[chosen.frames] == 1).mean() > 0.7
 
 
@@ -119,8 +126,10 @@ def test_exchanging_keyframes_never_covers_less(comparison):
 def test_exemplars_choose_as_their_frames_would():
     poses = sporting_poses(200, seed=4)
     twice = np.repeat(poses, 2, axis=0)
-    direct = choose_keyframes(comparison_of(twice), 100.0)
-    by_exemplars = choose_keyframes(comparison_of(poses, row=np.repeat(np.arange(200), 2)), 100.0)
+    direct = choose_keyframes(comparison_of(twice), 100.0, SPARSE)
+    by_exemplars = choose_keyframes(
+        comparison_of(poses, row=np.repeat(np.arange(200), 2)), 100.0, SPARSE
+    )
     assert by_exemplars.upper.beta == pytest.approx(direct.upper.beta, rel=0.1)
     assert len(by_exemplars.upper.nearest) == 400
     assert (by_exemplars.upper.frames % 2 == 0).all()
@@ -129,7 +138,7 @@ def test_exemplars_choose_as_their_frames_would():
 
 @pytest.mark.parametrize("method", ["coverage", "paper"])
 def test_keyframes_json_gives_back_what_was_written(comparison, method):
-    chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(method=method))
+    chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015, method=method))
     text = keyframes_to_json(chosen)
     again = keyframes_from_json(text)
     assert again.reach == chosen.reach
@@ -191,4 +200,19 @@ def test_inputs_are_left_as_they_were(comparison):
 )  # fmt: skip
 def test_what_cannot_be_asked_of_keyframes_is_told_by_its_name(option, value):
     with pytest.raises(KeyreconError, match=f"--{option} is"):
-        count_labels(KeyframeOptions(**{option: value}), 1000)
+        count_labels(KeyframeOptions(**{option: value}), 1000, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "share"), [(5, 0.06), (10, 0.045), (20, 0.0225), (30, 0.015), (3600, 0.015)]
+)
+@pytest.mark.parametrize("fps", [25.0, 50.0, 240.0])
+def test_a_short_video_takes_as_many_marks_as_half_a_minute_up_to_six_percent(seconds, share, fps):
+    frames = round(seconds * fps)
+    assert usual_budget(frames, fps) == pytest.approx(share)
+    labels = count_labels(KeyframeOptions(), frames, fps)
+    assert labels <= 2 * share * frames + 1e-6
+
+
+def test_a_video_of_a_few_frames_can_be_marked_without_naming_a_budget():
+    assert [count_labels(KeyframeOptions(), frames, 30.0) for frames in (1, 3, 16)] == [2, 2, 2]

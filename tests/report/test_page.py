@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from report_material import make_material, renamed_video, walk
 
+from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
 from keyrecon.report import summary
 from keyrecon.report.markup import pack
@@ -156,7 +157,7 @@ def test_every_frame_is_stood_for_once(material):
 
 
 def test_half_body_marks_count_half(material):
-    assert summary.annotation_cost(material.keyframes, 40) == pytest.approx((5 + 4) / 2 / 40)
+    assert annotation_cost(material.keyframes, 40) == pytest.approx((5 + 4) / 2 / 40)
 
 
 def test_poses_on_a_line_are_ordered_along_it():

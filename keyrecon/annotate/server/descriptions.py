@@ -8,6 +8,7 @@ from keyrecon.annotate.server.jobs import Job
 from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_body, of_kind, picks_of
 from keyrecon.annotate.store.journal import Entry, JournalState
 from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
+from keyrecon.annotation_budget import usual_budget
 from keyrecon.body import Skeleton
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -21,6 +22,7 @@ def describe_video(video: Video, name: str) -> Json:
     return {
         "name": name,
         "n_frames": len(video),
+        "usual_budget": usual_budget(len(video), video.fps),
         "fps": video.fps,
         "time": [round(t, 4) for t in video.time.tolist()],
         "width": video.width,

@@ -8,7 +8,7 @@ from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
 from keyrecon.body import LSP14
-from keyrecon.keyframes.selection import choose_keyframes
+from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Annotations, Motion
 
 COUNT = 200
@@ -21,7 +21,7 @@ def comparison():
 
 @pytest.fixture(scope="module")
 def keyframes(comparison):
-    return choose_keyframes(comparison, 50.0)
+    return choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015))
 
 
 def annotated(frames):

@@ -40,6 +40,7 @@ def test_the_project_is_described_to_the_page(opened, folder):
     )
     answer = ask(session, "GET", "/api/project").json()
     assert (answer["n_frames"], answer["width"], answer["height"]) == (50, 128, 64)
+    assert answer["usual_budget"] == 0.06
     assert answer["limbs"][0].keys() == {"name", "parent", "child", "half"}
     rows = {row["frame"]: row for row in answer["keyframes"]}
     assert [(f, row["half"], row["own"], row["locked"]) for f, row in rows.items()] == [

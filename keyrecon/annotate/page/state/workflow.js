@@ -141,13 +141,9 @@ export function missingParts(parts) {
   return regions.some(({ picked }) => picked) ? open : [...open, regions[0]];
 }
 
-// Share of the frames to mark that is usual for a video: some 25 keyframes, which is 1.5 % of half a
-// minute, and less where little repeats because there is little.
-export const defaultBudget = (count) => Math.max(0.015, Math.min(0.05, 25 / count));
-
 // The share that a project was set to, or the usual one, in per cent.
-export const budgetText = ({ settings, n_frames: count }) =>
-  String(Math.round(10000 * (settings.budget ?? defaultBudget(count))) / 100);
+export const budgetText = ({ settings, usual_budget: usual }) =>
+  String(Math.round(10000 * (settings.budget ?? usual)) / 100);
 
 // Frames spread over the video, to see how well the picks do elsewhere.
 export function spreadFrames(count, n) {
