@@ -1,6 +1,7 @@
 """The whole job on a small rendered clip: what a user types, and what comes out."""
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 
@@ -57,6 +58,13 @@ def clip(tmp_path_factory):
     return folder
 
 
+def new_project(clip, folder, *words):
+    """A project of the clip that finds what was made of the clip before."""
+    assert keyrecon("new", clip / "video.mp4", "--project", folder, *words) == 0
+    shutil.copytree(clip / "project" / "cache", folder / "cache", dirs_exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="module")
 def solved(clip):
     """The motion after annotation."""
@@ -73,8 +81,7 @@ def solved(clip):
 
 
 def test_a_head_clicked_on_the_scenery_is_named_and_left_aside(clip, tmp_path, capsys):
-    made = tmp_path / "project"
-    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
+    made = new_project(clip, tmp_path / "project")
     right = read_picks(clip / "picks.json")
     Workspace(made).add_picks(right)
     Workspace(made).add_picks([Pick(70, "head", 30.0, 30.0)])
@@ -140,8 +147,7 @@ def test_the_paper_form_runs_too(clip, solved, capsys):
 
 
 def test_a_run_by_the_paper_takes_the_keyframes_that_the_paper_chose(clip, tmp_path, capsys):
-    made, truth = tmp_path / "p", read_truth(clip / "truth.npz")
-    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
+    made, truth = new_project(clip, tmp_path / "p"), read_truth(clip / "truth.npz")
     Workspace(made).add_picks(read_picks(clip / "picks.json"))
     assert keyrecon("keyframes", made, "--budget", "0.06", "--method", "paper") == 0
     assert "chosen by Eq. 2-4 as printed" in capsys.readouterr().out
@@ -216,9 +222,7 @@ def test_a_skeleton_of_ones_own_goes_through(clip, tmp_path):
     joints += [{"name": n, "parent": p, "length": length} for n, p, length in toes]
     lower = [LSP14.names[i] for i in LSP14.lower] + [n for n, _, _ in toes]
     (tmp_path / "toes.json").write_text(json.dumps({"joints": joints, "lower": lower}))
-    made = tmp_path / "p"
-    words = ("--project", made, "--skeleton", tmp_path / "toes.json")
-    assert keyrecon("new", clip / "video.mp4", *words) == 0
+    made = new_project(clip, tmp_path / "p", "--skeleton", tmp_path / "toes.json")
     Workspace(made).add_picks(read_picks(clip / "picks.json"))
     assert keyrecon("keyframes", made, "--budget", "0.06") == 0
     truth = read_truth(clip / "truth.npz")
