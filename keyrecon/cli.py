@@ -24,7 +24,7 @@ from keyrecon.app.golf_demo import run_golf_demo
 from keyrecon.errors import KeyreconError
 from keyrecon.io.workspace import Workspace
 from keyrecon.lifting.priors.depth_model import DepthTrainingOptions
-from keyrecon.pipeline import Options, as_printed
+from keyrecon.pipeline import Options
 from keyrecon.records import Pick
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
@@ -197,8 +197,7 @@ def run(
     """
     workspace = Workspace(project, force)
     chosen = work.settings(workspace, options, height)
-    chosen = as_printed(chosen) if method == "paper" else chosen
-    print(work.run(workspace, chosen, show, partial))
+    print(work.run(workspace, chosen, show, partial, printed=method == "paper"))
 
 
 @app.command

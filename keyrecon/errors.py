@@ -4,23 +4,35 @@ import json
 import shlex
 from pathlib import Path
 
+MAX_WORDS = 160
+"""Characters of a library's own message that are shown; some quote the file."""
+
 
 class KeyreconError(Exception):
     """What was found, then what would help; the command line prints it as one line."""
 
 
 def explain(fault: Exception) -> str:
-    """What a reader stumbled over, in words for who has the file."""
+    """What a reader stumbled over, in words for who has the file; always one line."""
     match fault:
         case KeyError():
-            return f"no {fault}"
+            words = f"no {fault}"
         case json.JSONDecodeError():
-            return f"no JSON from line {fault.lineno}, column {fault.colno} on"
+            words = f"no JSON from line {fault.lineno}, column {fault.colno} on"
+        case UnicodeDecodeError():
+            words = f"byte {fault.start} is not {fault.encoding} text"
+        case RecursionError():
+            words = "nested too deeply"
+        case MemoryError():
+            words = "it asks for more memory than there is"
         case OSError() if fault.strerror:
-            return fault.strerror
+            words = fault.strerror
         case ValueError() if "allow_pickle" in str(fault):  # numpy's advice would be unsafe
-            return "another format"
-    return str(fault)
+            words = "another format"
+        case _:
+            words = str(fault) or type(fault).__name__
+    line = " ".join(words.split())
+    return line if len(line) <= MAX_WORDS else line[:MAX_WORDS] + " ..."
 
 
 def quoted(path: Path) -> str:

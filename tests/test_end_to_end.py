@@ -20,7 +20,7 @@ from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, as_printed
+from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.records import HalfKeyframes, Keyframes, Pick
 from keyrecon.synthetic.cameras import CameraPlanOptions
@@ -160,7 +160,7 @@ def test_a_run_by_the_paper_takes_the_keyframes_that_the_paper_chose(clip, tmp_p
     workspace = Workspace(made)
     options = project.settings(workspace, Options())
     assert options.keyframes.method == "coverage"  # a run by our forms is not bound
-    said = project.run(workspace, as_printed(options), silent)
+    said = project.run(workspace, options, silent, printed=True)
     assert "Eq. 2-4" not in said
     assert set(workspace.stages.seconds) == {"propagate", "lift"}
 

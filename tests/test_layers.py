@@ -12,7 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "keyframes", "propagation", "lifting", "golf", "world", "strokes"}
 OUTER = {"app", "cli", "pipeline", "annotate", "report", "synthetic"}
-BASE = {"records", "body", "metrics", "errors", "progress", "numerics"}
+BASE = {"records", "body", "metrics", "errors", "reading", "ranges", "progress", "numerics"}
 SHARED = BASE | {"segmentation", "io"}
 
 

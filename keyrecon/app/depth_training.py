@@ -9,6 +9,7 @@ from jaxtyping import Float
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import write_depth_model
+from keyrecon.io.option_tables import check_options
 from keyrecon.lifting.priors.depth_model import DepthModel, DepthTrainingOptions, train_depth_model
 from keyrecon.progress import Progress, silent
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
@@ -28,6 +29,7 @@ def learn(
     progress: Progress = silent,
 ) -> str:
     """Learn a depth model from captures and the built-in tennis, write it, tell what it is."""
+    check_options(options)
     model = learn_from_files(paths, options, progress)
     write_depth_model(out, model)
     return f"Wrote {out}: {model.provenance}."

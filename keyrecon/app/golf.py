@@ -74,8 +74,8 @@ def fit_file(
     workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
     options = workspace.options(options, GolfOptions())
     video = hold_frames(workspace.video())
-    workspace.remember(options, GolfOptions())
     fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress)
+    workspace.remember(options, GolfOptions())
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
     spent = time.perf_counter() - began

@@ -15,6 +15,7 @@ from keyrecon.golf.prior.training import (
 from keyrecon.golf.records import MotionModel, Swing
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import write_motion_model
+from keyrecon.io.option_tables import check_options
 from keyrecon.progress import Progress, silent
 
 
@@ -36,6 +37,7 @@ def train(
     paths: Sequence[Path], out: Path, options: TrainOptions, progress: Progress = silent
 ) -> str:
     """Learn a model from captured swings, write it, and describe what it is worth."""
+    check_options(options)
     swings = read_swings(paths)
     database = collect_swings(swings, options, progress)
     model = learn_motion(database, _provenance(swings, options), options)

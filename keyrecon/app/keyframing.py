@@ -9,6 +9,7 @@ from keyrecon.app.project import counted, load_annotations
 from keyrecon.errors import quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
+from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches
@@ -51,6 +52,7 @@ def find_keyframes(
     """
     options = workspace.options(options, Options())
     options = replace(options, keyframes=chosen.over(options.keyframes))
+    check_options(options)
     forms = as_printed(options) if printed else options
     video = workspace.video()
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None

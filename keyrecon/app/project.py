@@ -155,13 +155,11 @@ def load_annotations(workspace: Workspace, video: Video) -> Annotations:
 
 
 def settings(workspace: Workspace, told: Options, height: float | None = None) -> Options:
-    """The project's options and what is told now, with the height in metres; remembered."""
+    """The project's options and what is told now, with the height in metres."""
     if height is not None and not 0.5 < height < 2.6:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
     options = workspace.options(told, Options())
-    options = options if height is None else with_height(options, height)
-    workspace.remember(options, Options())
-    return options
+    return options if height is None else with_height(options, height)
 
 
 def run(
@@ -170,12 +168,16 @@ def run(
     progress: Progress,
     partial: bool = False,
     truth: Mapping[str, np.ndarray] | None = None,
+    printed: bool = False,
 ) -> str:
     """Everything after annotation; writes motion.npz and report.html.
 
-    `partial` goes on with what is annotated, `truth` is for the report.
+    `partial` goes on with what is annotated, `truth` is for the report, `printed` takes the forms
+    that the paper prints. The project remembers its options, without those forms, when all is
+    done: what is refused on the way leaves no trace.
     """
     started = time.perf_counter()
+    told, options = options, as_printed(options) if printed else options
     annotations = annotated(workspace, partial)
     asked = asked_for(workspace)
     found = prepare_project(workspace, workspace.video(), annotations, options, progress)
@@ -194,6 +196,7 @@ def run(
         options=options,
     )
     write_report(workspace.report_file, material, progress)
+    workspace.remember(told, Options())
     return "\n".join(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",

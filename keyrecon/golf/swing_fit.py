@@ -6,7 +6,7 @@ swing begins and ends better than club or fit do, and the model is fitted to bot
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -28,6 +28,7 @@ from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingS
 from keyrecon.io.video import Video
 from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class GolfOptions:
     """How the model is fitted to it."""
     windows: WindowOptions = field(default_factory=WindowOptions)
     """The paper's sliding windows, where they are asked for."""
-    guided_rounds: int = 2
+    guided_rounds: Annotated[int, within(0, 20)] = 2
     """How many times the club is detected again where the fitted swing expects it."""
     guided_detection: GuidedDetectionOptions = field(default_factory=GuidedDetectionOptions)
     """How it is detected then."""

@@ -7,6 +7,7 @@ marked.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -31,6 +32,7 @@ from keyrecon.golf.records import (
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Annotations, JointTracks
 
 
@@ -40,11 +42,11 @@ class SwingPriorOptions:
 
     left_handed: bool = False
     """The player swings left-handed."""
-    stature: float = 1.75
+    stature: Annotated[float, within(0.5, 2.6)] = 1.75
     """Metres; only for the perspective of a camera close by."""
-    focal: float = 1.2
+    focal: Annotated[float, within(0.2, 20)] = 1.2
     """Focal length in picture widths, where nobody knows it."""
-    spread: float = 0.02
+    spread: Annotated[float, within(0.001, 0.4)] = 0.02
     """Standard deviation of a joint of full confidence, player heights."""
     fit: FitOptions = field(default_factory=FitOptions)
     """How the swing is fitted."""

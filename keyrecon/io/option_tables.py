@@ -8,6 +8,7 @@ value where a number belongs is named in one line with what is allowed.
 import types
 from dataclasses import Field, fields, replace
 from typing import (
+    Annotated,
     Any,
     ClassVar,
     Literal,
@@ -74,6 +75,27 @@ def nested_tables(changes: dict[str, Any]) -> dict[str, Any]:
     return tables
 
 
+def flat_options(tables: object, prefix: str = "") -> dict[str, Any]:
+    """Names with dots and values of tables within tables."""
+    if not isinstance(tables, dict):
+        return {}
+    flat: dict[str, Any] = {}
+    for name, value in tables.items():
+        inside = isinstance(value, dict)
+        flat |= flat_options(value, f"{prefix}{name}.") if inside else {prefix + name: value}
+    return flat
+
+
+def former_names(name: str) -> list[str]:
+    """Names under which older project files may set an option."""
+    found: list[str] = []
+    for former, current in reversed(FORMER_NAMES.items()):
+        for known in (name, *found):
+            if known == current or known.startswith(f"{current}."):
+                found.append(former + known.removeprefix(current))
+    return found
+
+
 def with_current_names(changes: object) -> object:
     """Nested tables with the options of `FORMER_NAMES` under their present names."""
     if not isinstance(changes, dict):
@@ -112,7 +134,7 @@ def with_changes(options: Record, changes: object, where: str = "options") -> Re
     if not isinstance(changes, dict):
         raise KeyreconError(f"project.toml: {where} must be a table; found {changes!r}.")
     known = {field.name for field in fields(options)}
-    allowed = get_type_hints(type(options))
+    allowed = get_type_hints(type(options), include_extras=True)
     new: dict[str, Any] = {}
     for name, value in changes.items():
         if name not in known:
@@ -124,22 +146,34 @@ def with_changes(options: Record, changes: object, where: str = "options") -> Re
         if isinstance(current, OptionRecord):
             new[name] = with_changes(current, value, f"{where}.{name}")
         else:
-            new[name] = _checked(value, allowed[name], f"{where}.{name}")
+            new[name] = _checked(value, allowed[name], f"project.toml: {where}.{name}")
     return replace(options, **new)
+
+
+def check_options(options: OptionRecord, prefix: str = "") -> None:
+    """Raise KeyreconError that names an option with a value that it cannot have."""
+    allowed = get_type_hints(type(options), include_extras=True)
+    for field in fields(options):
+        value, name = getattr(options, field.name), f"{prefix}{field.name}"
+        if isinstance(value, OptionRecord):
+            check_options(value, f"{name}.")
+        elif isinstance(value, int | float | tuple):
+            _checked(value, allowed[field.name], f"The option {name}")
 
 
 def _checked(value: object, allowed: Any, where: str) -> Any:
     try:
         return msgspec.convert(value, type=allowed)
     except msgspec.ValidationError as fault:
-        raise KeyreconError(
-            f"project.toml: {where} cannot be {value!r}; it is {_describe(allowed)}."
-        ) from fault
+        raise KeyreconError(f"{where} cannot be {value!r}; it is {_describe(allowed)}.") from fault
 
 
 def _describe(allowed: Any) -> str:
     """A type in words."""
     origin, parts = get_origin(allowed), get_args(allowed)
+    if origin is Annotated:
+        kind, (span, *_) = parts[0], parts[1:]
+        return f"{_describe(kind)} from {span.ge:g} to {span.le:g}"
     if origin is Literal:
         return "one of " + ", ".join(f"'{choice}'" for choice in parts)
     if origin in (Union, types.UnionType):

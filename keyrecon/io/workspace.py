@@ -11,38 +11,33 @@
 What a person made is written durably and never replaced by something that does not parse.
 """
 
-import json
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
-from keyrecon.errors import KeyreconError, explain, quoted
+from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import hold_lock, make_folder, write_durably
 from keyrecon.io.formats.picks import read_picks, write_picks
 from keyrecon.io.option_tables import (
     Record,
     changed_options,
+    check_options,
     nested_tables,
     with_changes,
     with_current_names,
 )
+from keyrecon.io.project_file import (
+    new_project,
+    read_project,
+    with_options,
+    with_video_path,
+)
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, fingerprint_file, open_video
+from keyrecon.reading import read_text
 from keyrecon.records import Pick
-
-VIDEO_FIELDS = {
-    "path": (str,),
-    "fingerprint": (str,),
-    "start": (int,),
-    "end": (int,),
-    "slow_motion": (int, float),
-}
-"""What project.toml tells of the video; the first two must be there."""
-OPTIONS_TABLE = "\n# Options that differ from the defaults.\n[options]\n"
 
 
 class Workspace:
@@ -57,14 +52,7 @@ class Workspace:
                 f"{folder} is not a keyrecon project (no project.toml); "
                 f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
             )
-        try:
-            self.project = tomllib.loads(self.project_file.read_text())
-            _check_video(self.project["video"])
-        except (OSError, ValueError, KeyError, TypeError) as fault:
-            raise KeyreconError(
-                f"{self.project_file} cannot be read ({explain(fault)}); mend it or make the "
-                "project anew in another folder."
-            ) from fault
+        self.project = read_project(self.project_file)
 
     @property
     def project_file(self) -> Path:
@@ -118,12 +106,10 @@ class Workspace:
         file = folder / "project.toml"
         if file.exists():
             raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
+        told = {"path": _relative(video_file, folder), "fingerprint": video.fingerprint, **trim}
+        text = new_project(file, told)
         make_folder(folder)
-        lines = ["# A keyrecon project.", "version = 1", "", "[video]"]
-        lines += [f"path = {json.dumps(_relative(video_file, folder))}"]
-        lines += [f'fingerprint = "{video.fingerprint}"']
-        lines += [f"{name} = {value}" for name, value in trim.items() if value is not None]
-        write_durably(file, "\n".join(lines) + "\n")
+        write_durably(file, text)
         return cls(folder)
 
     def video(self) -> Video:
@@ -157,10 +143,10 @@ class Workspace:
                 f"{video_file} is not the video of this project (its fingerprint differs); "
                 "start a new project for it with: keyrecon new"
             )
-        old = f"path = {json.dumps(self.project['video']['path'])}"
-        new = f"path = {json.dumps(_relative(video_file, self.folder))}"
-        write_durably(self.project_file, self.project_file.read_text().replace(old, new, 1))
-        self.project = tomllib.loads(self.project_file.read_text())
+        with self.exclusive():
+            place = _relative(video_file, self.folder)
+            write_durably(self.project_file, with_video_path(self.project_file, place))
+        self.project = read_project(self.project_file)
 
     def _find_video(self, name: str, fingerprint: str) -> Path:
         for place in self._places_of_video():
@@ -225,28 +211,22 @@ class Workspace:
 
     def options(self, given: Record, defaults: Record) -> Record:
         """Options that this project has set, and on top of them what `given` sets otherwise."""
+        check_options(given)
         kept = with_changes(defaults, with_current_names(self.project.get("options", {})))
         return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
     def remember(self, options: Record, defaults: Record) -> None:
-        """Write the options that differ from the defaults into project.toml."""
-        text = self.project_file.read_text().split(OPTIONS_TABLE)[0]
+        """Keep the options that differ from the defaults; what else the file holds stays.
+
+        Raises KeyreconError, and writes nothing, for values that an option cannot have.
+        """
+        check_options(options)
         changed = changed_options(options, defaults)
-        if changed:
-            text += OPTIONS_TABLE + "".join(f"{n} = {json.dumps(v)}\n" for n, v in changed.items())
-        if text != self.project_file.read_text():
-            write_durably(self.project_file, text)
-            self.project = tomllib.loads(text)
-
-
-def _check_video(told: Any) -> None:
-    """Raise KeyError or TypeError where project.toml does not tell the video as we write it."""
-    if not isinstance(told, dict):
-        raise TypeError("video must be a table")
-    for name, kinds in VIDEO_FIELDS.items():
-        value = told[name] if name in ("path", "fingerprint") else told.get(name)
-        if value is not None and type(value) not in kinds:
-            raise TypeError(f"video.{name} cannot be {value!r}")
+        if with_options(self.project_file, changed) == read_text(self.project_file):
+            return
+        with self.exclusive():
+            write_durably(self.project_file, with_options(self.project_file, changed))
+        self.project = read_project(self.project_file)
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -17,7 +17,7 @@ of more than `most` frames is therefore first reduced to exemplars (see exemplar
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -34,6 +34,7 @@ from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE
 from keyrecon.keyframes.exemplars import choose_exemplars, distance_in_band, measure_band
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Edges, HalfName, PoseDistances, Track
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
@@ -46,7 +47,7 @@ FRAMES_PER_BLOCK = 16
 class CompareOptions:
     """How pose distances are measured."""
 
-    reach: float = MAX_MATCH_DISTANCE
+    reach: Annotated[float, within(0.01, 1)] = MAX_MATCH_DISTANCE
     """Farthest match of two edge elements, player heights; an element without a match counts
     as much. Larger values let wilder poses match."""
     largest: Literal["reach", "observed"] = "reach"
@@ -54,11 +55,11 @@ class CompareOptions:
     largest mean distance that any two frames of this video have, as printed."""
     symmetry: Literal["mean", "max"] = "mean"
     """How the distances from i to j and from j to i become one."""
-    cell: float = 1 / 40
+    cell: Annotated[float, within(0.005, 0.5)] = 1 / 40
     """Width of a position cell, player heights; smaller is slower and closer to exact."""
-    directions: int = 24
+    directions: Annotated[int, within(4, 360)] = 24
     """Number of direction cells in a full turn."""
-    most: int = 4000
+    most: Annotated[int, within(10, 20_000)] = 4000
     """Frames compared with one another at most: memory and time of the matrix grow with the
     square. A longer video is compared by exemplars that stand for their neighbours in time."""
 

@@ -14,7 +14,7 @@ is what justifies averaging, whereas the beta of a small budget is far larger.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -36,6 +36,7 @@ from keyrecon.keyframes.swaps import (
 )
 from keyrecon.paper.keyframe_choice import choose_as_printed
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import HalfKeyframes, Keyframes, PoseDistances
 
 BETA_PRECISION = 0.01
@@ -53,23 +54,23 @@ a 2000-frame video. Larger choices stay as the greedy choice has them, for the s
 class KeyframeOptions:
     """How many frames a person is asked to annotate, and what they must stand for."""
 
-    budget: float | None = None
+    budget: Annotated[float, within(1e-06, 1)] | None = None
     """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video; None takes
     what is usual for its length (`usual_budget`)."""
-    coverage: float = 0.95
+    coverage: Annotated[float, within(0.01, 1)] = 0.95
     """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
-    reach: int = 10
+    reach: Annotated[int, within(1, 1000)] = 10
     """T of Eq. 1: longest gap to interpolate, in frames at 50 frames per second; other rates
     get as much time."""
-    beta_upper: float | None = None
+    beta_upper: Annotated[float, within(0, 10)] | None = None
     """Pose distance up to which a keyframe represents a frame, upper body, player heights; None
     finds the smallest that the budget allows. With a value the budget does not count."""
-    beta_lower: float | None = None
+    beta_lower: Annotated[float, within(0, 10)] | None = None
     """The same for the lower body."""
-    smoothing: float = 0.6
+    smoothing: Annotated[float, within(0, 1)] = 0.6
     """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
     smooths. method='paper' smooths with the beta of the choice instead."""
-    pose_time: float = 0.2
+    pose_time: Annotated[float, within(0, 1)] = 0.2
     """Share of time that is measured in pose change, 0-1: a frame counts as 1 less this, and this
     times how much faster than on average its pose changes. So strokes are covered as well as
     waiting; 0 counts frames alone, as method='paper' does."""

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
+
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
@@ -14,21 +17,21 @@ class DepthSignOptions:
     Chosen on rendered sequences; see benchmarks/sensitivity.py.
     """
 
-    annotated: float = 8.0
+    annotated: Annotated[float, within(0, 200)] = 8.0
     """Cost of contradicting the annotated sign of a bone, nats."""
-    joint_limits: float = 0.15
+    joint_limits: Annotated[float, within(0, 3)] = 0.15
     """Weight of joint limits per frame; errors stay alike over several frames."""
-    exemplars: float = 0.3
+    exemplars: Annotated[float, within(0, 6)] = 0.3
     """Weight, per frame, of the key poses that are alike in the picture."""
-    initial_motion: float = 1.0
+    initial_motion: Annotated[float, within(0, 20)] = 1.0
     """Weight of the slerped key poses per frame."""
-    expected_depth: float = 0.7
+    expected_depth: Annotated[float, within(0, 10)] = 0.7
     """Weight, per frame, of the depth model's expectation."""
-    exemplar_spread: float = 0.08
+    exemplar_spread: Annotated[float, within(0.004, 2)] = 0.08
     """Standard deviation of bone vectors in the picture between alike poses, statures."""
-    acceleration: float = 0.1
+    acceleration: Annotated[float, within(0.005, 2)] = 0.1
     """Standard deviation of the second difference of depth over 1/50 s, statures."""
-    max_jump_cost: float = 6.0
+    max_jump_cost: Annotated[float, within(0, 100)] = 6.0
     """Largest cost of one jump, nats."""
 
 

@@ -6,7 +6,7 @@ remain are left to the robust loss of the refinement.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -36,6 +36,7 @@ from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import lift_keyframes
 from keyrecon.numerics.geometry import project_orthographic, unit_vectors
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Annotations, JointTracks, Keyframes
 
 _SPIKE_SECONDS = 0.08
@@ -51,7 +52,7 @@ in both directions of the image, sqrt 2."""
 class LiftOptions:
     """From the picture to space."""
 
-    height: float | None = None
+    height: Annotated[float, within(0.5, 2.6)] | None = None
     """Stature of the player, metres; None gives a motion in body heights."""
     method: Literal["trajectory", "paper"] = "trajectory"
     """'trajectory': robust fit of bone directions; 'paper': projected gradient descent (Fig. 9)."""

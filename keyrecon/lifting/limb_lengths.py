@@ -12,6 +12,7 @@ bone out of the plane by 25 degrees.
 
 import logging
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,6 +21,7 @@ from scipy.optimize import minimize
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.foreshortening import INCLINATIONS, log_density
+from keyrecon.ranges import within
 from keyrecon.records import Annotations, JointTracks
 
 logger = logging.getLogger(__name__)
@@ -32,20 +34,20 @@ _MIN_CONFIDENCE = 0.05
 class LengthOptions:
     """How far the body may differ from the table, and how well joints are known."""
 
-    spread: float = 0.12
+    spread: Annotated[float, within(0.006, 2)] = 0.12
     """Standard deviation of a bone length about the table, relative."""
-    tie_spread: float = 0.07
+    tie_spread: Annotated[float, within(0.004, 1)] = 0.07
     """The same for the ratio of thigh to shank and of shoulder bone to shoulder breadth."""
-    scale_spread: float = 0.03
+    scale_spread: Annotated[float, within(0.002, 0.6)] = 0.03
     """Standard deviation of the scale about the tracked height, relative."""
-    knot: float = 0.5
+    knot: Annotated[float, within(0.03, 10)] = 0.5
     """Seconds between the knots of the scale's deviation from the tracked height."""
-    click_noise: float = 0.007
+    click_noise: Annotated[float, within(0.0003, 0.1)] = 0.007
     """Standard deviation of an annotated joint, in player heights."""
-    track_noise: float = 0.009
+    track_noise: Annotated[float, within(0.0004, 0.2)] = 0.009
     """Standard deviation of a propagated joint of full confidence, in player heights; it grows
     with the inverse root of the confidence."""
-    correlation: float = 0.15
+    correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which errors of propagated joints stay alike; they count once."""
 
 

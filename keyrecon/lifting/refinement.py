@@ -14,6 +14,7 @@ believed, and sets the bone free in depth as well (see `_smoothness`).
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -28,6 +29,7 @@ from keyrecon.lifting.priors.depth_model import depth_spread
 from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
+from keyrecon.ranges import within
 
 _MIN_TRUNK_HEIGHT = 0.3
 """Height of the trunk's middle above the ankles from which the tilt of the camera is read."""
@@ -54,44 +56,44 @@ class RefineOptions:
     Chosen on rendered sequences; see benchmarks/sensitivity.py.
     """
 
-    rounds: int = 12
+    rounds: Annotated[int, within(1, 1000)] = 12
     """Steps of the trajectory solver at most."""
-    tolerance: float = 1e-3
+    tolerance: Annotated[float, within(0, 0.1)] = 1e-3
     """Relative gain below which the trajectory solver stops."""
-    acceleration: float = 0.004
+    acceleration: Annotated[float, within(0.0002, 0.08)] = 0.004
     """Second difference of a bone's end in 1/50 s where the tracks show the bone at rest, body
     heights."""
-    root_acceleration: float = 0.006
+    root_acceleration: Annotated[float, within(0.0003, 0.1)] = 0.006
     """Expected second difference of the root in 1/50 s, body heights."""
-    acceleration_window: float = 0.03
+    acceleration_window: Annotated[float, within(0.002, 0.6)] = 0.03
     """Seconds around a frame, as a standard deviation, from which its accelerations are read."""
-    depth_freedom: float = 4.0
+    depth_freedom: Annotated[float, within(0.2, 80)] = 4.0
     """Variance of accelerations in depth, in those that the picture shows per axis: a limb that
     swings turns out of the picture. Tried: 1 takes more speed from strokes, 16 gives 2 % more and
     costs a millimetre."""
-    breadth_spread: float = 0.03
+    breadth_spread: Annotated[float, within(0.002, 0.6)] = 0.03
     """How far hip and shoulder breadth may stray, body heights."""
-    head_spread: float = 0.35
+    head_spread: Annotated[float, within(0.02, 7)] = 0.35
     """How far the head may lean out of the trunk's line, radians."""
-    balance_spread: float = 0.055
+    balance_spread: Annotated[float, within(0.003, 1)] = 0.055
     """How far the middle of the trunk may be from above the feet along the line of sight, body
     heights; 0.03-0.08 in every activity."""
-    balance_correlation: float = 0.15
+    balance_correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which a lack of balance lasts; it counts once."""
-    bend_noise: float = 0.12
+    bend_noise: Annotated[float, within(0.006, 2)] = 0.12
     """Error of a limb's bend in the picture, as a difference of unit directions: two eyes place
     hips 2.2 % of the height apart per axis, knees and ankles 1 %, and a thigh is 24 % long."""
-    bend_correlation: float = 0.15
+    bend_correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which a bend lasts; it counts once."""
-    expectation: float = 0.15
+    expectation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which errors of a depth model stay alike; they count once."""
-    key_spread: float = 0.4
+    key_spread: Annotated[float, within(0.02, 8)] = 0.4
     """How far a bone may turn away from the slerped key poses at no great cost, radians."""
-    step: float = 0.2
+    step: Annotated[float, within(0.001, 2)] = 0.2
     """lambda of Fig. 9."""
-    descents: int = 3000
+    descents: Annotated[int, within(1, 100_000)] = 3000
     """Iterations of Fig. 9 at most; it stops where it has converged."""
-    sigma: float = 0.5
+    sigma: Annotated[float, within(0.01, 50)] = 0.5
     """Standard deviation of the low-pass of Fig. 9, frames."""
 
 

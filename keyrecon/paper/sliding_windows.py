@@ -16,6 +16,7 @@ Where the text leaves a choice, and what was chosen: `choices.md`, rows of U.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -45,6 +46,7 @@ from keyrecon.golf.records import (
     SwingState,
 )
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
@@ -58,19 +60,19 @@ class WindowOptions:
     predictions outweigh the picture, and errors of the speeds add up until the windows run away.
     """
 
-    frames: int = 3
+    frames: Annotated[int, within(2, 100)] = 3
     """f: frames of a window."""
-    components: int = 4
+    components: Annotated[int, within(1, 100)] = 4
     """m: coefficients."""
-    root: float = 0.1
+    root: Annotated[float, within(0.005, 2)] = 0.1
     """Metres by which the root is off its prediction; radians likewise."""
-    phase: float = 0.02
+    phase: Annotated[float, within(0.001, 0.4)] = 0.02
     """Normalised time by which a frame is off its prediction."""
-    coefficients: float = 0.1
+    coefficients: Annotated[float, within(0.005, 2)] = 0.1
     """Change of every coefficient from window to window."""
-    joint: float = 0.01
+    joint: Annotated[float, within(0.0005, 0.2)] = 0.01
     """Player heights by which tracked joints are off."""
-    steps: int = 12
+    steps: Annotated[int, within(1, 1000)] = 12
     """Steps of the solver for each window."""
 
 

@@ -15,7 +15,7 @@ For each half of the body, the lower first, it
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -46,6 +46,7 @@ from keyrecon.propagation.limb_identity import (
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.propagation.trajectory_smoothing import smooth_trajectories
+from keyrecon.ranges import within
 from keyrecon.records import (
     Annotations,
     FlowTracks,
@@ -83,13 +84,13 @@ class PropagateOptions:
     method: Literal["fused", "paper"] = "fused"
     """'paper': from the assigned keyframe alone; joints hidden there are missing. 'fused': from
     several keyframes and both neighbours in time; every joint gets a place and a confidence."""
-    similar: int = 3
+    similar: Annotated[int, within(1, 40)] = 3
     """Keyframes fitted to each frame; more take longer. Halved or doubled, others with it: at most
     0.1 points, 0.3 mm on one clip."""
-    elements: int = 96
+    elements: Annotated[int, within(8, 2000)] = 96
     """Edge elements per frame and half of the body at most; more take longer. A quarter more or
     less: at most 0.4 points, 0.4 mm on one clip."""
-    rounds: int = 3
+    rounds: Annotated[int, within(1, 100)] = 3
     """Times that edges are matched anew in the final least squares. Halved or doubled, others with
     it: at most 0.6 points, 0.2 mm on one clip."""
 

@@ -13,6 +13,7 @@ need.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from keyrecon.io.frame_reader import read_small, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Track
 from keyrecon.segmentation.color_model import to_lab
 
@@ -70,11 +72,11 @@ SQUARES *= SQUARES
 class BackgroundOptions:
     """How the scene is sampled."""
 
-    samples: int = 48
+    samples: Annotated[int, within(3, 1000)] = 48
     """Frames that the median is taken over."""
-    player: float = 128.0
+    player: Annotated[float, within(24, 1000)] = 128.0
     """Height of the player in the background, px."""
-    sure: float = 3.0
+    sure: Annotated[float, within(0.3, 30)] = 3.0
     """A pixel this many deviations off is as likely the player as not."""
 
 

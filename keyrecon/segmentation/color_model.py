@@ -14,7 +14,7 @@ which is a look-up in a table of bins: 16 of lightness, 32 of each chroma.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import cv2
 import numpy as np
@@ -23,6 +23,7 @@ from scipy.ndimage import gaussian_filter
 
 from keyrecon.errors import KeyreconError
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Colors, Pick
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ SURROUNDINGS_RADIUS = 0.75
 class ColorOptions:
     """How colours are weighed."""
 
-    surroundings: float = 1.0
+    surroundings: Annotated[float, within(0.01, 100)] = 1.0
     """k: weight of the surroundings against a part; higher finds less and is surer."""
 
 

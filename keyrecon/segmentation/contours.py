@@ -8,6 +8,7 @@ tangent.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import cut_affine, from_complex
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
@@ -41,11 +43,11 @@ SMOOTHING_KERNEL /= SMOOTHING_KERNEL.sum()
 class EdgeOptions:
     """How regions and edges are traced."""
 
-    player: int = 112
+    player: Annotated[int, within(24, 1000)] = 112
     """Player height in the crops, px; smaller is faster and coarser."""
-    step: float = 0.018
+    step: Annotated[float, within(0.004, 0.2)] = 0.018
     """Distance between edge elements along a contour, player heights."""
-    most: int = 400
+    most: Annotated[int, within(20, 10_000)] = 400
     """Edge elements of one frame at most."""
 
 

@@ -8,6 +8,7 @@ little unrest of the hands.
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter, lfilter_zi
 
 from keyrecon.numerics.geometry import look_at, project_perspective
+from keyrecon.ranges import within
 
 
 class View(StrEnum):
@@ -91,11 +93,11 @@ class CameraPlanOptions:
     """Side of the player that the camera stands on."""
     pan: bool = False
     """Follow the player instead of standing still."""
-    width: int = 1280
+    width: Annotated[int, within(64, 7680)] = 1280
     """px"""
-    height: int = 720
+    height: Annotated[int, within(64, 4320)] = 720
     """px"""
-    player_px: float = 320.0
+    player_px: Annotated[float, within(20, 4000)] = 320.0
     """Stature of the standing player in the picture; a static camera shrinks it to keep everything
     in the picture."""
 

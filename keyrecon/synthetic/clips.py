@@ -9,6 +9,7 @@ shift along the floor, in the manner of motion graphs (Kovar, Gleicher and Pighi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +18,7 @@ from scipy.interpolate import CubicSpline
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import Capture
+from keyrecon.ranges import within
 from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, estimate_stature, joint
 
 SHORTEST = 18
@@ -30,13 +32,13 @@ Points = Float[np.ndarray, "_ 14 3"]
 class JoinOptions:
     """How clips become one motion."""
 
-    seconds: float = 36.0
+    seconds: Annotated[float, within(0.5, 3600)] = 36.0
     """Length of the result; clips are repeated when they are too short."""
-    fps: float = 50.0
+    fps: Annotated[float, within(5, 1000)] = 50.0
     """Frames per second of the result."""
-    blend: float = 0.4
+    blend: Annotated[float, within(0.04, 5)] = 0.4
     """Seconds over which one clip turns into the next."""
-    search: float = 2.5
+    search: Annotated[float, within(0, 60)] = 2.5
     """Seconds before a clip's planned end, and after the next one's start, that are searched."""
 
 

@@ -1,11 +1,13 @@
 """What a careful person would mark on frames whose truth is known."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from keyrecon.body import LSP14, Skeleton
+from keyrecon.ranges import SEEDS, within
 from keyrecon.records import Annotations, Keyframes
 
 
@@ -13,11 +15,11 @@ from keyrecon.records import Annotations, Keyframes
 class MarkOptions:
     """How a person marks."""
 
-    noise: float = 2.0
+    noise: Annotated[float, within(0, 100)] = 2.0
     """Standard deviation of a click, px."""
     signs: bool = True
     """Whether the person settles which end of each limb is nearer."""
-    seed: int = 0
+    seed: Annotated[int, SEEDS] = 0
     """Of the click noise."""
 
 

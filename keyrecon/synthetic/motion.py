@@ -9,6 +9,7 @@ points; no two strokes are alike.
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from keyrecon.body import LSP14
+from keyrecon.ranges import SEEDS, within
 from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, unit
 from keyrecon.synthetic.rally import CHANNELS, PointPlan, ease, plan_points
 
@@ -26,12 +28,12 @@ _LENGTH = {LSP14.names[c]: LSP14.proportions[c] for _, c in LSP14.bones}
 class MotionOptions:
     """What is played."""
 
-    seconds: float = 36.0
-    fps: float = 50.0
-    stature: float = 1.78
+    seconds: Annotated[float, within(0.5, 3600)] = 36.0
+    fps: Annotated[float, within(5, 1000)] = 50.0
+    stature: Annotated[float, within(0.5, 2.6)] = 1.78
     """Metres."""
     left_handed: bool = False
-    seed: int = 0
+    seed: Annotated[int, SEEDS] = 0
 
 
 def play_tennis(options: MotionOptions = MotionOptions()) -> Float[np.ndarray, "T 14 3"]:

@@ -12,6 +12,7 @@ from functools import partial
 from multiprocessing import get_context
 from os import cpu_count
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -21,8 +22,10 @@ from keyrecon.body import LSP14
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.mocap import read_mocap
 from keyrecon.io.formats.picks import write_picks
+from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import SEEDS, within
 from keyrecon.records import Pick
 from keyrecon.synthetic.cameras import CameraMove, CameraPlanOptions, plan_camera
 from keyrecon.synthetic.clips import JoinOptions, join_clips
@@ -40,18 +43,18 @@ from keyrecon.synthetic.stage import Stage
 class SceneOptions:
     """How a motion is filmed."""
 
-    seed: int = 0
+    seed: Annotated[int, SEEDS] = 0
     """Decides looks, light, camera placement and noise."""
     camera: CameraPlanOptions = field(default_factory=CameraPlanOptions)
-    shutter: float = 0.012
+    shutter: Annotated[float, within(0, 0.1)] = 0.012
     """Seconds that the shutter is open."""
-    noise: float = 2.2
+    noise: Annotated[float, within(0, 50)] = 2.2
     """Spread of the sensor noise, grey levels."""
     left_handed: bool = False
     """Mirror the motion and put the racket into the left hand."""
-    crf: int = 23
+    crf: Annotated[int, within(0, 51)] = 23
     """Constant quality of the video, 18 very good to 28 coarse."""
-    workers: int = 0
+    workers: Annotated[int, within(0, 256)] = 0
     """Processes that draw; 0 for one per core. The pictures do not depend on it."""
 
 
@@ -63,7 +66,7 @@ class SynthOptions:
     """Camera, looks and noise."""
     clips: JoinOptions = field(default_factory=JoinOptions)
     """Length and frame rate of the sequence, and how clips are joined."""
-    trim: int = 30
+    trim: Annotated[int, within(0, 100_000)] = 30
     """Frames dropped at both ends of every motion-capture file, where markers come and go."""
 
 
@@ -74,6 +77,7 @@ def synthesize(
     progress: Progress = silent,
 ) -> None:
     """Render a sequence into a folder, from motion capture or from the built-in tennis motion."""
+    check_options(options)
     scene, clips = options.scene, options.clips
     if mocap:
         points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), clips)

@@ -18,6 +18,7 @@ exactly the identity.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -27,6 +28,7 @@ from keyrecon.io.frame_reader import read_grey, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.static_overlay import StaticOverlay
 
@@ -59,12 +61,12 @@ MIN_CONFIDENCE = 0.35
 class CameraMotionOptions:
     """How the background is tracked."""
 
-    width: int = 480
+    width: Annotated[int, within(64, 4096)] = 480
     """Pictures are reduced to this width, px; smaller is faster and less exact."""
-    static: float = 0.6
+    static: Annotated[float, within(0, 20)] = 0.6
     """If background corners stay within this of their place in 95 % of the frames, the camera is
     static, px of the reduced picture."""
-    leave: float = 0.3
+    leave: Annotated[float, within(0.02, 1)] = 0.3
     """A new key picture is taken when the view has moved by this share of the picture."""
 
 

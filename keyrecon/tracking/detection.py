@@ -14,6 +14,7 @@ it is an upper envelope over time, divided by the camera's zoom, not the distanc
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -23,6 +24,7 @@ from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
@@ -64,22 +66,22 @@ Halved: at most 0.9 points, 1.0 mm on one clip."""
 class FindOptions:
     """How the player is detected."""
 
-    player: float = 96.0
+    player: Annotated[float, within(24, 600)] = 96.0
     """Height of the player in the searched pictures, px; smaller is faster and less exact. Halved,
     others with it: at most 0.8 points, 0.6 mm on one clip."""
-    pace: float = 12.5
+    pace: Annotated[float, within(1, 10_000)] = 12.5
     """Pictures searched per second of the video; between them the player is interpolated. Halved,
     others with it: at most 0.8 points, 0.6 mm on one clip."""
-    head_speed: float = 3.0
+    head_speed: Annotated[float, within(0.1, 60)] = 3.0
     """Usual speed of the head, player heights per second. Halved, others with it: at most 0.8
     points, 0.6 mm on one clip."""
-    foot_speed: float = 5.0
+    foot_speed: Annotated[float, within(0.2, 100)] = 5.0
     """Usual speed of the feet, player heights per second. Halved, others with it: at most 0.8
     points, 0.6 mm on one clip."""
-    envelope: float = 5.0
+    envelope: Annotated[float, within(0.2, 100)] = 5.0
     """The standing height may change over this time, seconds. Halved, others with it: at most 0.8
     points, 0.6 mm on one clip."""
-    detected: float = 0.4
+    detected: Annotated[float, within(0, 1)] = 0.4
     """Share of the searched frames in which a head must be detected for a track to be believed;
     lower it for a player who is out of the picture most of the time."""
 

@@ -13,6 +13,7 @@ as the later mark is reached, in the reduced grey pictures that are held until t
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -26,6 +27,7 @@ from keyrecon.numerics.picture_points import (
     track_there_and_back,
 )
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Annotations, FlowTracks
 
 WHOLE_BODY = 0.8
@@ -36,20 +38,20 @@ WHOLE_BODY = 0.8
 class FlowOptions:
     """How marked joints are followed."""
 
-    player: float = 160.0
+    player: Annotated[float, within(24, 1000)] = 160.0
     """Height of the player in the pictures, px; smaller is faster. Tried on a rendered and three
     real videos: 240 and 120 have as many joints right (within half a point)."""
-    window: float = 0.13
+    window: Annotated[float, within(0.03, 1)] = 0.13
     """Side of the window that is matched, player heights: a forearm's length, two wrists. Tried:
     with .1, of the joints that flow is sure of, 1-4 of a hundred more are wrong."""
-    longest: float = 3.0
+    longest: Annotated[float, within(0, 60)] = 3.0
     """Marks farther apart than this are not joined, seconds."""
-    gap: float = 0.03
+    gap: Annotated[float, within(0.002, 0.6)] = 0.03
     """Distance of the two ways at which they begin to disagree, player heights: two eyes mark the
     same joint .016 apart in the median, .042 in the worst tenth."""
-    likeness: float = 0.5
+    likeness: Annotated[float, within(0, 1)] = 0.5
     """Correlation with the better of both marks' patches at which a place is half believed."""
-    lone_likeness: float = 0.7
+    lone_likeness: Annotated[float, within(0, 1)] = 0.7
     """The same with the only mark's, where there is one way only."""
 
     def side(self, height: float) -> int:

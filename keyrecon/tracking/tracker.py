@@ -12,7 +12,7 @@ needs no more than some frames of every second.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import cv2
 import numpy as np
@@ -22,6 +22,7 @@ from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.viterbi import TransitionModel
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
@@ -92,22 +93,22 @@ class TrackOptions:
 
     method: Literal["filters", "paper"] = "filters"
     """'filters': trained on the clear frames; 'paper': colour and radial symmetry alone."""
-    player: float = 56.0
+    player: Annotated[float, within(24, 600)] = 56.0
     """Height of the player in the crops, px; smaller is faster and less exact. Halved, others with
     it: at most 0.5 points, 0.8 mm on one clip."""
-    examples: int = 160
+    examples: Annotated[int, within(4, 5000)] = 160
     """Frames that the filters are trained on, at most. Halved, others with it: at most 1.0 points,
     0.2 mm on one clip."""
-    head_speed: float = 3.0
+    head_speed: Annotated[float, within(0.1, 60)] = 3.0
     """Usual speed of the head, player heights per second. Halved, others with it: at most 1.0
     points, 0.2 mm on one clip."""
-    foot_speed: float = 2.0
+    foot_speed: Annotated[float, within(0.1, 40)] = 2.0
     """Usual speed of the feet, player heights per second; a step is faster, a stance slower.
     Halved, others with it: at most 1.0 points, 0.2 mm on one clip."""
-    foot_rate: float = 4.0
+    foot_rate: Annotated[float, within(0.2, 80)] = 4.0
     """Feet that move to and fro more often than this are smoothed, times per second. Halved, others
     with it: at most 1.0 points, 0.2 mm on one clip."""
-    envelope: float = 5.0
+    envelope: Annotated[float, within(0.2, 100)] = 5.0
     """The standing height may change over this time, seconds. Halved, others with it: at most 1.0
     points, 0.2 mm on one clip."""
 

@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from keyrecon import KeyreconError
@@ -35,7 +37,7 @@ def test_a_new_project_never_replaces_one(project, tmp_path):
 
 def test_a_damaged_project_file_is_not_taken_for_an_empty_one(project):
     project.project_file.write_text("[video\n")
-    with pytest.raises(KeyreconError, match="cannot be read"):
+    with pytest.raises(KeyreconError, match="is not a project file"):
         Workspace(project.folder)
 
 
@@ -104,7 +106,7 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
 
 
 def test_the_athletes_height_is_remembered(project):
-    assert settings(project, Options(), 1.7).lift.height == 1.7
+    project.remember(settings(project, Options(), 1.7), Options())
     assert settings(Workspace(project.folder), Options()).lift.height == 1.7
 
 
@@ -145,3 +147,28 @@ def test_a_project_that_sets_options_under_their_former_names_keeps_them(bare):
     file.write_text(f"{file.read_text()}\n[options]\n{lines}")
     signs = Workspace(bare).options(Options(), Options()).lift.depth_signs
     assert (signs.exemplars, signs.acceleration, signs.annotated) == (0.5, 0.2, 9.0)
+
+
+@pytest.mark.parametrize("line", ["path='{}'", 'path="{}"', "path   =  '''{}''' # there"])
+def test_a_video_is_relinked_however_its_path_is_written(project, tmp_path, line):
+    text = project.project_file.read_text()
+    old = next(text for text in text.splitlines() if text.startswith("path"))
+    written = line.format("../gone.mp4")
+    project.project_file.write_text(text.replace(old, written))
+    Workspace(project.folder).relink(tmp_path / "video.mp4")
+    assert len(Workspace(project.folder).video()) == 15
+    assert ("# there" in project.project_file.read_text()) == ("# there" in line)
+
+
+@pytest.mark.parametrize("name", ["\N{TENNIS RACQUET AND BALL} é.mp4", 'a "b" \\c.mp4'])
+def test_any_name_of_a_video_gives_a_project_that_opens(project, tmp_path, name):
+    path = (tmp_path / "video.mp4").rename(tmp_path / name)
+    made = Workspace.create(tmp_path / "other", open_video(path), path, {"start": None})
+    assert len(Workspace(made.folder).video()) == 20
+
+
+def test_a_name_that_is_no_text_is_refused_before_anything_is_made(project, tmp_path):
+    path = (tmp_path / "video.mp4").rename(tmp_path / os.fsdecode(b"v\xff.mp4"))
+    with pytest.raises(KeyreconError, match="rename the video"):
+        Workspace.create(tmp_path / "other", open_video(path), path, {})
+    assert not (tmp_path / "other").exists()

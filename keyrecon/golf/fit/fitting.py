@@ -9,6 +9,7 @@ everything.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -49,23 +50,24 @@ from keyrecon.golf.observe.swing_events import keep_order
 from keyrecon.golf.prior.kinematics import place_body, pose_rates
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.records import Body, Observations, SwingFit, SwingState
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
 class WeightOptions:
     """How much each type of observation counts against the joints; 0 leaves it out."""
 
-    joints: float = 1.0
+    joints: Annotated[float, within(0, 20)] = 1.0
     """Tracked joints; their residuals are in standard deviations."""
-    club: float = 1.0
+    club: Annotated[float, within(0, 20)] = 1.0
     """Ends of the club, in standard deviations."""
-    marks: float = 1.0
+    marks: Annotated[float, within(0, 20)] = 1.0
     """Joints that a person marked; every marked frame counts as independent of all others."""
-    foreground: float = 0.5
+    foreground: Annotated[float, within(0, 10)] = 0.5
     """Lines of sight through the player's mask, made commensurate with the joints."""
-    silhouette: float = 0.15
+    silhouette: Annotated[float, within(0, 3)] = 0.15
     """Limbs that project outside of the mask, made commensurate with the joints."""
-    matches: float = 0.5
+    matches: Annotated[float, within(0, 10)] = 0.5
     """Surface points matched between consecutive frames, made commensurate with the joints."""
 
 
@@ -73,19 +75,19 @@ class WeightOptions:
 class FitOptions:
     """How a swing is fitted."""
 
-    components: int = 40
+    components: Annotated[int, within(1, 1000)] = 40
     """Components used at most; the paper used 4 of its 10 swings."""
     weights: WeightOptions = field(default_factory=WeightOptions)
     """Observations."""
     priors: PriorOptions = field(default_factory=PriorOptions)
     """Regularisation."""
-    robust: float = 3.0
+    robust: Annotated[float, within(0.1, 60)] = 3.0
     """Standard deviations beyond which a joint or club end counts less."""
-    time_knots: float = 0.1
+    time_knots: Annotated[float, within(0.005, 2)] = 0.1
     """Seconds between knots of the normalised time."""
-    root_knots: float = 0.4
+    root_knots: Annotated[float, within(0.02, 8)] = 0.4
     """Seconds between knots of the player's place and turn."""
-    steps: int = 25
+    steps: Annotated[int, within(1, 1000)] = 25
     """Steps of the solver at most."""
 
 

@@ -7,6 +7,7 @@ they are solved for by Gauss-Newton, close to the average. In turns with the fit
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -23,6 +24,7 @@ from keyrecon.golf.records import (
     SwingFit,
     SwingMarks,
 )
+from keyrecon.ranges import within
 
 PARTS = ("pelvis", "trunk", "head", "clavicle", "upper_arm", "forearm", "thigh", "shank")
 """Left and right are alike."""
@@ -34,10 +36,10 @@ STEPS = 4
 class ProportionOptions:
     """How a player's proportions are estimated."""
 
-    spread: float = 0.06
+    spread: Annotated[float, within(0.003, 1)] = 0.06
     """Share by which a part is usually longer or shorter than average: players differ by .04, and
     so do joints as they are marked from joint centres."""
-    rounds: int = 3
+    rounds: Annotated[int, within(0, 50)] = 3
     """Turns of proportions and fit."""
 
 

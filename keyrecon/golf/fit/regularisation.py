@@ -7,6 +7,7 @@ G hardly moves since the pelvis's path is part of the learnt motion, and the cam
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -15,29 +16,30 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.golf.fit.parameterisation import ROOT, SplineBasis
 from keyrecon.golf.records import SwingState
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
 class PriorOptions:
     """Standard deviations of what is expected; chosen on rendered swings (benchmarks/golf.py)."""
 
-    coefficients: float = 1.0
+    coefficients: Annotated[float, within(0.05, 20)] = 1.0
     """Of every coefficient; 1 is the spread of the database."""
-    timing: float = 0.08
+    timing: Annotated[float, within(0.004, 2)] = 0.08
     """Seconds by which the first guess of the normalised time is early or late."""
-    rest: float = 0.005
+    rest: Annotated[float, within(0.0003, 0.1)] = 0.005
     """Of the normalised time where the player stands still by that guess."""
-    relax: float = 0.05
+    relax: Annotated[float, within(0.003, 1)] = 0.05
     """Of the normalised time after the finish: many let the arms sink the way they came."""
-    pace: float = 1.5
+    pace: Annotated[float, within(0.07, 30)] = 1.5
     """Of the change of pace, normalised time per second squared, from what was guessed."""
-    turn: float = 0.07
+    turn: Annotated[float, within(0.004, 1)] = 0.07
     """Radians that G turns in a second beyond the learnt motion."""
-    shift: float = 0.04
+    shift: Annotated[float, within(0.002, 0.8)] = 0.04
     """Metres that G shifts in a second beyond the learnt motion."""
-    roll: float = 0.03
+    roll: Annotated[float, within(0.002, 0.6)] = 0.03
     """Radians by which the camera leans sideways."""
-    pitch: float = 0.06
+    pitch: Annotated[float, within(0.003, 1)] = 0.06
     """Radians by which the camera looks up or down."""
 
 

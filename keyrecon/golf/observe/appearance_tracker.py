@@ -11,12 +11,14 @@ steerable filters, and pixels off the player do not count.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.numerics.picture_points import sample_picture
+from keyrecon.ranges import within
 
 PATCH_SIDE = 21
 """Pixels of a patch along each side. Chosen on rendered swings, like all values here; see
@@ -35,17 +37,17 @@ CHROMA_WEIGHT = 1.6
 class AppearanceOptions:
     """How a patch is tracked."""
 
-    size: float = 0.1
+    size: Annotated[float, within(0.005, 2)] = 0.1
     """Side of the patch, player heights."""
-    memory: float = 0.4
+    memory: Annotated[float, within(0.02, 8)] = 0.4
     """Time over which the stable component is learnt, seconds."""
-    wander: float = 7.0
+    wander: Annotated[float, within(0.3, 100)] = 7.0
     """Deviation of a pixel from that of the last frame, grey levels."""
-    steps: int = 6
+    steps: Annotated[int, within(1, 200)] = 6
     """Steps of the least-squares at each level."""
-    turn: float = 0.05
+    turn: Annotated[float, within(0.003, 1)] = 0.05
     """Usual turn of a patch from one frame to the next, radians; its scale likewise."""
-    move: float = 0.03
+    move: Annotated[float, within(0.002, 0.6)] = 0.03
     """Usual change of the movement from one frame to the next, player heights."""
 
 

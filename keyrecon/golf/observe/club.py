@@ -12,6 +12,7 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -20,6 +21,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.viterbi import find_cheapest_path
+from keyrecon.ranges import within
 
 NOWHERE = np.full((2, 2), np.nan)
 FEWEST_SHAFTS = 5
@@ -34,26 +36,26 @@ ALONG_WEIGHT = 0.04
 class ClubOptions:
     """How a club moves; lengths in player heights, times in seconds."""
 
-    gain: float = 12.0
+    gain: Annotated[float, within(0.6, 200)] = 12.0
     """What one height of shaft is worth."""
-    hands: float = 3.0
+    hands: Annotated[float, within(0.1, 60)] = 3.0
     """Usual speed of the hands, heights per second."""
-    head: float = 12.0
+    head: Annotated[float, within(0.6, 200)] = 12.0
     """Usual speed of the club head, heights per second."""
-    jump: float = 4.0
+    jump: Annotated[float, within(0.2, 80)] = 4.0
     """Greatest cost of a movement from one frame to the next."""
-    miss: float = 0.5
+    miss: Annotated[float, within(0.03, 10)] = 0.5
     """Cost of a frame without a shaft."""
-    gap: float = 1.2
+    gap: Annotated[float, within(0.06, 20)] = 1.2
     """Longest time that is bridged: at the top a club may point at the camera for long."""
-    window: float = 0.07
+    window: Annotated[float, within(0.004, 1)] = 0.07
     """Time on either side that the local motion is fitted over."""
-    off: float = 0.035
+    off: Annotated[float, within(0.002, 0.7)] = 0.035
     """Distance from the local motion at which a shaft counts for a quarter, where it rests."""
-    off_moving: float = 0.2
+    off_moving: Annotated[float, within(0.01, 5)] = 0.2
     """The same for a moving shaft, as a share of its movement from frame to frame: a quadratic
     fits a fast club less well."""
-    min_confidence: float = 0.08
+    min_confidence: Annotated[float, within(0, 1)] = 0.08
     """A shaft that counts for less was something else."""
 
 

@@ -14,6 +14,7 @@ Arms and the club move too fast to be in any background, whether GrabCut cut the
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -25,6 +26,7 @@ from keyrecon.io.frame_reader import read_grey, read_small, reduce_picture, side
 from keyrecon.io.video import Video
 from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath
 from keyrecon.segmentation.background_model import ForegroundModel, median_background
 from keyrecon.segmentation.color_model import to_lab
@@ -69,11 +71,11 @@ MASK_BLUR = 0.6
 class ForegroundOptions:
     """How the player is separated from the scene."""
 
-    height: float = 300.0
+    height: Annotated[float, within(40, 2000)] = 300.0
     """Height of the player in the masks, px; the club is a hundredth of it wide."""
-    cut: int = 20
+    cut: Annotated[int, within(2, 1000)] = 20
     """Frames in which the player is cut out to learn the scene; fewer where little happens."""
-    sure: float = 3.0
+    sure: Annotated[float, within(0.1, 60)] = 3.0
     """A pixel this many deviations off the scene is as likely the player as not."""
 
 

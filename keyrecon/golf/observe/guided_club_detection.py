@@ -15,6 +15,7 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -26,6 +27,7 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.numerics.viterbi import find_cheapest_path
+from keyrecon.ranges import within
 
 SAMPLES_ALONG = 32
 """Places at which a line is sampled."""
@@ -46,28 +48,28 @@ Picture = Float[np.ndarray, "h w"]
 class LineOptions:
     """Which lines may be the expected one; lengths in player heights."""
 
-    turn: float = 45.0
+    turn: Annotated[float, within(1, 180)] = 45.0
     """Degrees by which the club may be turned from where it is expected."""
-    offset: float = 0.05
+    offset: Annotated[float, within(0.003, 1)] = 0.05
     """How far beside the expected hands its line may pass."""
-    usual_turn: float = 10.0
+    usual_turn: Annotated[float, within(0.5, 180)] = 10.0
     """Degrees by which it usually is turned."""
-    usual_offset: float = 0.025
+    usual_offset: Annotated[float, within(0.001, 0.5)] = 0.025
     """How far beside it usually passes."""
-    far: float = 3.0
+    far: Annotated[float, within(0.1, 60)] = 3.0
     """Usual departures beyond which it costs no more: the fit may be wrong altogether."""
-    widths: tuple[float, ...] = (0.006, 0.012)
+    widths: tuple[Annotated[float, within(0.001, 0.1)], ...] = (0.006, 0.012)
     """From the middle of the shaft to where the scene shows: less than half an arm's breadth. A
     blurred one is as broad as what it passes over while the shutter is open."""
-    contrast: float = 12.0
+    contrast: Annotated[float, within(1, 255)] = 12.0
     """Grey levels by which a sure shaft stands out."""
-    gain: float = 15.0
+    gain: Annotated[float, within(0.1, 1000)] = 15.0
     """What a club that stands out from end to end is worth, in squared standard deviations."""
-    detected: float = 3.0
+    detected: Annotated[float, within(0, 100)] = 3.0
     """What a line is worth besides for having been detected at first, without any expectation."""
-    most: int = 6
+    most: Annotated[int, within(1, 200)] = 6
     """Lines kept in a frame."""
-    shortest: float = 0.1
+    shortest: Annotated[float, within(0.005, 2)] = 0.1
     """A club that seems shorter than this points at the camera: its angle tells nothing."""
 
 
@@ -258,9 +260,9 @@ class GuidedDetectionOptions:
 
     lines: LineOptions = field(default_factory=LineOptions)
     """What may be the club."""
-    miss: float = 3.0
+    miss: Annotated[float, within(0.1, 60)] = 3.0
     """Cost of a frame without the club: it must stand out over a fifth at least."""
-    pace: float = 0.1
+    pace: Annotated[float, within(0.005, 2)] = 0.1
     """Seconds in which the fit's error may change by its usual size."""
 
 

@@ -12,6 +12,7 @@ Constants were chosen on rendered swings where no source is named; see benchmark
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from skimage.transform import probabilistic_hough_line
 from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.picture_points import sample_picture
+from keyrecon.ranges import within
 
 PARALLEL = np.deg2rad(6.0)
 """Two sides of a shaft differ by no more."""
@@ -56,16 +58,16 @@ COLLINEAR_OFFSET = 0.008
 class LineSegmentOptions:
     """What may be a part of a shaft; lengths in player heights."""
 
-    thinnest: float = 0.0015
+    thinnest: Annotated[float, within(8e-05, 0.03)] = 0.0015
     """Least width of the shaft."""
-    thickest: float = 0.024
+    thickest: Annotated[float, within(0.001, 0.5)] = 0.024
     """Greatest width of the shaft, with the blur of motion."""
-    shortest: float = 0.03
+    shortest: Annotated[float, within(0.002, 0.6)] = 0.03
     """Least length of a side."""
-    moving: float = 0.12
+    moving: Annotated[float, within(0, 1)] = 0.12
     """Least mean probability of foreground along a segment: a club at rest hardly differs from a
     scene that was learnt while it lay there, but the scene itself differs by nothing."""
-    bridge: float = 0.3
+    bridge: Annotated[float, within(0, 3)] = 0.3
     """Longest gap between two segments of one shaft."""
 
 

@@ -5,25 +5,27 @@ that do not come back to where they started, or lie where nothing holds them, ar
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.numerics.picture_points import track_there_and_back
+from keyrecon.ranges import within
 
 
 @dataclass(frozen=True)
 class MatchOptions:
     """How points are matched; lengths in player heights."""
 
-    spacing: float = 0.03
+    spacing: Annotated[float, within(0.002, 0.6)] = 0.03
     """Between points of the grid."""
-    window: float = 0.045
+    window: Annotated[float, within(0.002, 0.9)] = 0.045
     """Side of the window that is compared."""
-    back: float = 0.004
+    back: Annotated[float, within(0.0002, 0.08)] = 0.004
     """How far from its start a point may come back."""
-    texture: float = 3e-4
+    texture: Annotated[float, within(0, 1)] = 3e-4
     """Least smaller eigenvalue of the gradients around a point, as OpenCV scales it: a tenth of
     all points in clothes without a pattern have less."""
 

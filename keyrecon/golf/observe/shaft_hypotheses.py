@@ -11,6 +11,7 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from jaxtyping import Bool, Float, UInt8
 from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.golf.observe.line_segments import LineSegments
 from keyrecon.numerics.picture_points import sample_picture
+from keyrecon.ranges import within
 
 SAMPLE_STEP = 0.01
 """Places at which a line is sampled, player heights apart."""
@@ -36,25 +38,25 @@ TIP_SHARE = 0.4
 class ShaftOptions:
     """What may be a club; lengths in player heights."""
 
-    longest: float = 0.75
+    longest: Annotated[float, within(0.04, 20)] = 0.75
     """From the hands to the head of the club: a driver is about two thirds."""
-    reach: float = 0.3
+    reach: Annotated[float, within(0.01, 3)] = 0.3
     """Farthest that the detected part of a shaft begins from the hands."""
-    arms: float = 0.6
+    arms: Annotated[float, within(0.03, 10)] = 0.6
     """Farthest that the hands get from where the shoulders were clicked."""
-    on_player: float = 0.1
+    on_player: Annotated[float, within(0, 1)] = 0.1
     """Weight of what lies on the player against what lies beside."""
-    rim: float = 0.008
+    rim: Annotated[float, within(0, 0.2)] = 0.008
     """What lies no farther from the player's outline still lies on the player."""
-    free: float = 0.02
+    free: Annotated[float, within(0, 0.5)] = 0.02
     """Least distance of the head from the player: what ends at him is a gap between his arms."""
-    loose: float = 0.5
+    loose: Annotated[float, within(0, 1)] = 0.5
     """Weight of a shaft whose head would be nearer to the player than the hands that hold it."""
-    bridged: float = 0.3
+    bridged: Annotated[float, within(0, 10)] = 0.3
     """Cost of each length between the joined segments of a shaft."""
-    least: float = 0.05
+    least: Annotated[float, within(0.001, 1)] = 0.05
     """Less of a shaft is nothing."""
-    most: int = 24
+    most: Annotated[int, within(1, 1000)] = 24
     """Hypotheses kept in a frame."""
 
 

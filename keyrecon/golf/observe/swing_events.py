@@ -20,6 +20,7 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -33,6 +34,7 @@ from keyrecon.golf.prior.key_postures import REST_SPEED, SMOOTH
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.video import Video
 from keyrecon.numerics.picture_points import track_there_and_back
+from keyrecon.ranges import within
 
 LARGEST_NOISE = 0.15
 """What is farther from the address, player heights, is no noise."""
@@ -46,21 +48,21 @@ FEWEST_POINTS = 3
 class TimingOptions:
     """How a swing is recognised; lengths in player heights, times in seconds."""
 
-    upswing: float = 1.2
+    upswing: Annotated[float, within(0.06, 20)] = 1.2
     """Longest time from the top to the hit, slowed down threefold at most."""
-    finish: float = 1.6
+    finish: Annotated[float, within(0.08, 30)] = 1.6
     """Longest time from the hit to the highest hands of the finish."""
-    rise: float = 0.15
+    rise: Annotated[float, within(0, 3)] = 0.15
     """The hands must rise by this before and after the hit."""
-    valley: float = 0.05
+    valley: Annotated[float, within(0, 1)] = 0.05
     """Hands lower than the highest ones by less still are at the top."""
-    smooth: float = 0.03
+    smooth: Annotated[float, within(0.001, 1)] = 0.03
     """Standard deviation of the low-pass."""
-    address: float = 0.03
+    address: Annotated[float, within(0, 0.6)] = 0.03
     """Movement of hands and head together by which a club has left its address."""
-    rest: float = 0.1
+    rest: Annotated[float, within(0.001, 1)] = 0.1
     """Speed at the finish, where the club sways on behind resting hands, as a share of its peak."""
-    pause: float = 0.05
+    pause: Annotated[float, within(0, 5)] = 0.05
     """Time for which it must rest there: many let it sink at once."""
 
 
@@ -186,24 +188,24 @@ def _return_to_address(
 class SwingEventOptions:
     """How resting hands are detected; lengths in player heights, times in seconds."""
 
-    around: float = 0.15
+    around: Annotated[float, within(0.007, 3)] = 0.15
     """How much earlier or later than fitted the swing may begin or end."""
-    hands: float = 0.04
+    hands: Annotated[float, within(0.002, 0.8)] = 0.04
     """Radius around the fitted hands in which points are tracked."""
-    grid: float = 0.008
+    grid: Annotated[float, within(0.0004, 0.2)] = 0.008
     """Distance between these points."""
-    player: float = 0.02
+    player: Annotated[float, within(0.001, 0.4)] = 0.02
     """Distance from a sample of the player's mask within which a point is on the player."""
-    patch: float = 0.03
+    patch: Annotated[float, within(0.002, 0.6)] = 0.03
     """Side of the patch by which a point is tracked."""
-    return_error: float = 0.004
+    return_error: Annotated[float, within(0.0002, 0.08)] = 0.004
     """A point that is not back within this, tracked forward and then backward, is lost."""
-    direction: float = 0.1
+    direction: Annotated[float, within(0.005, 2)] = 0.1
     """Time over which the fitted hands tell how much of their speed the picture shows."""
-    quiet: float = 0.2
+    quiet: Annotated[float, within(0.001, 1)] = 0.2
     """Share of the peak speed that fitted hands may have where they rest: filmed along their way,
     moving hands seem to rest too."""
-    least: float = 0.01
+    least: Annotated[float, within(0.0001, 1)] = 0.01
     """Share of the peak speed below which all is rest: a player sways, a picture has noise."""
 
 

@@ -13,6 +13,7 @@ that the others and their variations span, and both are compared as joints of th
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -34,6 +35,7 @@ from keyrecon.golf.prior.variation import VariationOptions, vary_swing
 from keyrecon.golf.records import MotionModel, Swing
 from keyrecon.metrics import mpjpe, pa_mpjpe
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
 
 SWING_PRIOR_VERSION = 1
 """Of segments and motion vectors; a model of another version does not fit this program."""
@@ -49,7 +51,7 @@ SMALLEST = 1e-4
 class TrainOptions:
     """How the model is learnt."""
 
-    components: int = 40
+    components: Annotated[int, within(1, 1000)] = 40
     """Components kept at most; fewer if there are fewer swings. A fit may use fewer still."""
     variation: VariationOptions = field(default_factory=VariationOptions)
     """Plausible variations that join the captured swings; count 0 for captured swings alone."""

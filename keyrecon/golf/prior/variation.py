@@ -9,6 +9,7 @@ floor and hands on the club (`retarget`).
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from keyrecon.golf.prior.captured_swing import change_swing, retarget_swing
 from keyrecon.golf.prior.skeleton import CLUB, NAMES, PARENTS, turns_from_swing
 from keyrecon.golf.records import Body, Swing
+from keyrecon.ranges import SEEDS, within
 
 PELVIS, TRUNK, HEAD = (NAMES.index(name) for name in ("pelvis", "trunk", "head"))
 ARMS = tuple(p for p, name in enumerate(NAMES) if "arm" in name)
@@ -30,31 +32,31 @@ Turns = Float[np.ndarray, "T P 3 3"]
 class VariationOptions:
     """How far swings differ; standard deviations."""
 
-    count: int = 100
+    count: Annotated[int, within(0, 10_000)] = 100
     """Variations of every captured swing."""
-    seed: int = 0
+    seed: Annotated[int, SEEDS] = 0
     """Decides which."""
-    turn: float = 0.12
+    turn: Annotated[float, within(0, 2)] = 0.12
     """Share by which pelvis, trunk and arms turn more or less at top and finish; a shoulder turn
     of 100 degrees varies by 10 between golfers."""
-    plane: float = 8.0
+    plane: Annotated[float, within(0, 200)] = 8.0
     """Degrees by which the arms are steeper or flatter at top and finish."""
-    lead: float = 0.012
+    lead: Annotated[float, within(0, 0.2)] = 0.012
     """Normalised time by which the pelvis is earlier or later than the arms."""
-    pace: float = 0.015
+    pace: Annotated[float, within(0, 0.3)] = 0.015
     """Normalised time by which the middle of a phase comes early or late."""
-    posture: float = 5.0
+    posture: Annotated[float, within(0, 100)] = 5.0
     """Degrees by which spine and head bend at address, and stay bent."""
-    stance: float = 0.12
+    stance: Annotated[float, within(0, 2)] = 0.12
     """Share by which the feet stand wider or closer."""
-    sway: float = 0.015
+    sway: Annotated[float, within(0, 0.3)] = 0.015
     """Statures by which the pelvis shifts sideways, sinks, or comes forward at top and finish."""
-    cock: float = 10.0
+    cock: Annotated[float, within(0, 200)] = 10.0
     """Degrees by which the wrists cock more or less."""
-    habit: float = 6.0
+    habit: Annotated[float, within(0, 100)] = 6.0
     """Degrees by which any segment is held otherwise, at each of the key postures on its own and
     throughout: what no coach names, and what captures differ in by their marker sets."""
-    build: float = 0.04
+    build: Annotated[float, within(0, 0.8)] = 0.04
     """Share by which arms, legs and trunk are longer or shorter."""
 
 

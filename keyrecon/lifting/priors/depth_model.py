@@ -18,6 +18,7 @@ from one linear system (ridge regression): the same captures give the same rule.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import scipy.linalg
@@ -29,6 +30,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
+from keyrecon.ranges import SEEDS, within
 
 DEPTH_MODEL_VERSION = 1
 """Of the bones and terms that a model has coefficients for."""
@@ -142,24 +144,27 @@ _BATCH = 20_000
 class DepthTrainingOptions:
     """How a depth model is learnt."""
 
-    poses: int = 400_000
+    poses: Annotated[int, within(1, 100_000_000)] = 400_000
     """Poses drawn, rounded up to batches of 20000."""
-    ridge: float = 1e-4
+    ridge: Annotated[float, within(1e-09, 10)] = 1e-4
     """What a squared coefficient costs, in mean squared errors."""
-    limb_turn: float = 0.2
+    limb_turn: Annotated[float, within(0, 2)] = 0.2
     """Standard deviation by which limbs are turned, radians per axis; half of it within limbs
     and for the body above the hips."""
-    camera_up: tuple[float, float] = (-3.0, 20.0)
+    camera_up: tuple[Annotated[float, within(-90, 90)], Annotated[float, within(-90, 90)]] = (
+        -3.0,
+        20.0,
+    )
     """Range of the angle by which the camera looks down, degrees: from a tripod to a stand. Tried:
     up to 32, where volleys filmed from 29 degrees above are 1 mm better, and ground strokes filmed
     from a tripod, without signs from the person, 6 mm worse."""
-    camera_roll: float = 1.5
+    camera_roll: Annotated[float, within(0, 90)] = 1.5
     """Standard deviation of the camera's roll, degrees."""
-    length_error: float = 0.06
+    length_error: Annotated[float, within(0, 1)] = 0.06
     """Standard deviation of bone lengths, as shares."""
-    joint_error: float = 0.04
+    joint_error: Annotated[float, within(0, 1)] = 0.04
     """Standard deviation of a bone's vector in the picture, in lengths of the bone."""
-    seed: int = 0
+    seed: Annotated[int, SEEDS] = 0
     """Of the poses drawn."""
 
 

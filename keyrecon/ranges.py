@@ -1,0 +1,16 @@
+"""The values that an option can have, beside its type: `reach: Annotated[int, within(1, 100)]`.
+
+A range is wide: it holds what someone may try in earnest, and keeps out what would only end in a
+division by zero, hours of work or a motion of NaN. `io.option_tables` holds options against it.
+"""
+
+from msgspec import Meta
+
+
+def within(least: int | float, most: int | float) -> Meta:
+    """Values from `least` to `most`, both included; never NaN."""
+    return Meta(ge=least, le=most)
+
+
+SEEDS = within(0, 2**32 - 1)
+"""What NumPy's generators take."""
