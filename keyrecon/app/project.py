@@ -27,10 +27,7 @@ from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import (
-    Options,
-    with_height,
-)
+from keyrecon.pipeline import Options, as_printed, with_height
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
