@@ -103,10 +103,10 @@ def test_a_proposed_command_can_be_pasted_whatever_the_folder_is_called(
     [
         ("start = 'x'", ("video.start cannot be 'x'",)),
         ("end = true", ("video.end cannot be True",)),
-        ("video = 3", ("project.toml cannot be read",)),
+        ("video = 3", ("project.toml is not a project file",)),
         ("[options]\nlift = 3", ("options.lift must be a table; found 3",)),
         ("[options.lift]\nheigth = 2.0", ("options.lift.heigth", "does not exist")),
-        ("[", ("project.toml cannot be read",)),
+        ("[", ("project.toml is not a project file",)),
     ],
 )
 def test_a_project_file_with_a_slip_is_told(keyrecon, project, line, words):
