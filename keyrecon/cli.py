@@ -26,6 +26,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.lifting.priors.depth_model import DepthTrainingOptions
 from keyrecon.pipeline import Options
 from keyrecon.records import Pick
+from keyrecon.report.overlay import OverlayOptions
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
 Advanced = Annotated[Options, arg(name="")]
@@ -201,7 +202,12 @@ def run(
 
 
 @app.command
-def export(project: Positional[Path], files: Positional[tuple[Path, ...]]) -> None:
+def export(
+    project: Positional[Path],
+    files: Positional[tuple[Path, ...]],
+    frames: Annotated[str | None, arg(metavar="A-B")] = None,
+    overlay: Annotated[OverlayOptions, arg(name="")] = OverlayOptions(),
+) -> None:
     """Write the motion in other formats, told by suffix.
 
     .bvh .trc .c3d .csv .nc .npz .glb, .json (COCO keypoints of every frame), .mp4 (overlay).
@@ -209,8 +215,10 @@ def export(project: Positional[Path], files: Positional[tuple[Path, ...]]) -> No
     Args:
         project: Project folder.
         files: Files to write.
+        frames: First and last frame to write; all by default.
+        overlay: How the overlay video shows the motion.
     """
-    for line in export_files(Workspace(project), files, show):
+    for line in export_files(Workspace(project), files, show, frames, overlay):
         print(line)
 
 

@@ -5,47 +5,87 @@ owner needs: `keyrecon export rally rally/annotations.json` must not put a compu
 place of what a person marked, nor an overlay in the place of the video it is drawn on.
 """
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.export import check_suffix, export_motion
+from keyrecon.io.formats.export import check_suffix, cut_motion, export_motion
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
-from keyrecon.report.overlay import write_overlay
+from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
 
 OVERLAY = ".mp4"
 WITH_VIDEO = (OVERLAY, ".json")
 """Suffixes of files that need the video: its pictures, or their size."""
 
 
-def export(workspace: Workspace, files: Sequence[Path], progress: Progress) -> list[str]:
-    """Write the motion in other formats; returns a line for each file."""
+def export(
+    workspace: Workspace,
+    files: Sequence[Path],
+    progress: Progress,
+    frames: str | None = None,
+    overlay: OverlayOptions = OverlayOptions(),
+) -> list[str]:
+    """Write the motion in other formats; returns a line for each file.
+
+    `frames` are the first and the last to be written, "A-B"; `overlay` is for the video alone.
+    """
     if not files:
         raise KeyreconError("No file was named; give one or more, such as motion.bvh motion.trc.")
     for file in files:
         check_suffix(file, (OVERLAY,))
         _check_place(file, workspace)
+    check_overlay(overlay)
+    if overlay != OverlayOptions() and not any(f.suffix.lower() == OVERLAY for f in files):
+        raise KeyreconError(
+            "--view, --skeleton, --slowmo and --size are for the overlay video; name an .mp4 file, "
+            "or leave them out."
+        )
     motion = load_motion(workspace.folder)
-    return [_write(file, motion, workspace, progress) for file in files]
+    first, last = chosen_frames(frames, len(motion.time))
+    cut = cut_motion(motion, first, last)
+    lines = []
+    for file in files:
+        if file.suffix.lower() == OVERLAY:
+            shown = None if frames is None else (first, last)
+            write_overlay(file, workspace.video(), motion, progress, overlay, shown)
+            lines.append(f"Wrote {file}.")
+        else:
+            lines.append(_write(file, cut, workspace, first))
+    return lines
+
+
+def chosen_frames(text: str | None, count: int) -> tuple[int, int]:
+    """First and last frame of "A-B"; all `count` of them where nothing is said."""
+    if text is None:
+        return 0, count - 1
+    found = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
+    if not found:
+        raise KeyreconError(
+            f"--frames takes the first and the last, such as 120-180; got '{text}'."
+        )
+    first, last = int(found[1]), int(found[2])
+    if not first <= last < count:
+        raise KeyreconError(
+            f"--frames {text} cannot be: the motion has frames 0 to {count - 1}, and the first "
+            "comes before the last."
+        )
+    return first, last
 
 
 def _check_place(file: Path, workspace: Workspace) -> None:
     if not file.parent.is_dir():
         raise KeyreconError(f"There is no folder {file.parent} to write {file.name} into; make it.")
-    if file.exists() and any(kept.samefile(file) for kept in workspace.kept_files()):
+    if workspace.needs(file):
         raise KeyreconError(
             f"{file} belongs to the project and would be lost; export to another name or folder."
         )
 
 
-def _write(file: Path, motion: Motion, workspace: Workspace, progress: Progress) -> str:
-    suffix = file.suffix.lower()
-    video = workspace.video() if suffix in WITH_VIDEO else None
-    if video is not None and suffix == OVERLAY:
-        write_overlay(file, video, motion, progress)
-    else:
-        export_motion(file, motion, (video.width, video.height) if video else None)
-    return f"Wrote {file}."
+def _write(file: Path, motion: Motion, workspace: Workspace, first_frame: int) -> str:
+    video = workspace.video() if file.suffix.lower() in WITH_VIDEO else None
+    size = (video.width, video.height) if video else None
+    return f"Wrote {file}: {export_motion(file, motion, size, first_frame)}."

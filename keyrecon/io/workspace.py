@@ -39,6 +39,12 @@ from keyrecon.io.video import Video, fingerprint_file, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
 
+OWN_NAMES = (
+    *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
+    *("annotate.sqlite", "motion.npz", "report.html"),
+)
+"""Files that a project has or may come to have."""
+
 
 class Workspace:
     """A project folder."""
@@ -203,6 +209,16 @@ class Workspace:
         video = Path(self.project["video"]["path"])
         places = [self.folder / video, *(place / video.name for place in self._places_of_video())]
         return own + [file for file in places if file.is_file()]
+
+    def needs(self, file: Path) -> bool:
+        """Whether a file's place is one of the project's own, whether there is a file or not."""
+        inside = file.parent.exists() and file.parent.samefile(self.folder)
+        video = self.folder / self.project["video"]["path"]
+        return (
+            (inside and file.name.lower() in OWN_NAMES)
+            or file.resolve() == video.resolve()
+            or (file.exists() and any(kept.samefile(file) for kept in self.kept_files()))
+        )
 
     def put_aside(self, file: Path) -> None:
         """Keep a copy of a file that a person made, before it changes."""

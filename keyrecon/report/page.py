@@ -14,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
 from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.conventions import stature
 from keyrecon.progress import Progress, silent
 from keyrecon.report import charts, sections, tables
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
@@ -21,7 +22,7 @@ from keyrecon.report.headline import headline
 from keyrecon.report.markup import ReportMaterial, data_block, note, pack, section, text, to_json
 from keyrecon.report.pictures import Pictures, cut_pictures
 from keyrecon.report.scripts import bundle_scripts
-from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth, stature
+from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "

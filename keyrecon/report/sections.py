@@ -5,10 +5,11 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.body import Skeleton
+from keyrecon.io.formats.conventions import stature
 from keyrecon.records import HalfKeyframes
 from keyrecon.report.markup import ReportMaterial, note, section, table, text, to_json
 from keyrecon.report.pictures import Pictures, png_uri
-from keyrecon.report.summary import center_on_root, scale_truth, stature
+from keyrecon.report.summary import center_on_root, scale_truth
 from keyrecon.report.views import VIEWS, pose_drawing
 from keyrecon.uncertainty import uncertain_stretches, worst_frames
 

@@ -69,12 +69,6 @@ def bone_lengths(
     return np.linalg.norm(points3d[:, child] - points3d[:, parent], axis=-1)
 
 
-def stature(motion: Motion) -> float:
-    """Standing height in the units of the motion, from all bones and their known proportions."""
-    lengths = np.nanmedian(bone_lengths(motion.points3d, motion.skeleton), axis=0)
-    return float(lengths.sum() / motion.skeleton.lengths.sum())
-
-
 def hinges(skeleton: Skeleton) -> list[int]:
     """Joints that bend between two bones of one limb: elbows and knees, left before right."""
     children = [skeleton.parents.count(joint) for joint in range(len(skeleton.names))]

@@ -5,6 +5,7 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
+from keyrecon.io.formats.conventions import stature
 from keyrecon.records import Motion
 from keyrecon.report.charts import plain_name
 from keyrecon.report.markup import ReportMaterial, note, number, section, table
@@ -14,7 +15,6 @@ from keyrecon.report.summary import (
     foot_speed,
     joint_acceleration,
     missing_shares,
-    stature,
     truth_error_2d,
 )
 

@@ -1,17 +1,23 @@
 """Exporting from a project: everything is looked at before anything is written."""
 
+import json
+import re
 import shutil
 
 import av
+import numpy as np
 import pytest
 from small_motion import make_motion
 
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.formats.export import cut_motion
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
+from keyrecon.report.overlay import OverlayOptions
 
 
 @pytest.fixture
@@ -23,6 +29,11 @@ def project(tmp_path, write_numbered):
     (tmp_path / "p" / "annotations.json").write_text("what a person marked")
     (tmp_path / "p" / "annotations.old-1.json").write_text("marked before")
     return Workspace(tmp_path / "p")
+
+
+def frames_of(path):
+    with av.open(str(path)) as container:
+        return sum(1 for _ in container.decode(video=0))
 
 
 def contents(folder):
@@ -43,11 +54,96 @@ def assert_refused(project, *names, match):
         "p/annotations.json",
         "p/annotations.old-1.json",
         "p/../p/motion.npz",
+        "p/skeleton.json",
+        "p/keyframes.json",
+        "p/picks.JSON",
         "rally.mp4",
     ],
 )
 def test_nothing_that_the_project_needs_is_written_over(project, name):
     assert_refused(project, name, match="belongs to the project and would be lost")
+
+
+def test_a_place_that_the_project_may_come_to_need_is_kept_free(project):
+    (project.folder / "annotations.json").unlink()
+    assert_refused(project, "p/annotations.json", match="belongs to the project")
+    (project.folder.parent / "rally.mp4").unlink()
+    assert_refused(project, "rally.mp4", match="belongs to the project")
+
+
+def test_fbx_is_refused_with_the_way_there(project):
+    assert_refused(project, "a.fbx", match=r"write \.glb or \.bvh, open it in Blender .* FBX")
+
+
+def test_a_range_is_written_with_the_videos_frame_numbers(project):
+    folder = project.folder.parent
+    names = ("a.csv", "a.npz", "a.json", "a.bvh", "a.trc", "a.mp4")
+    export(project, [folder / name for name in names], silent, "5-11")
+    rows = [line for line in (folder / "a.csv").read_text().splitlines() if line[0].isdigit()]
+    assert [row.split(",")[0] for row in rows] == [str(frame) for frame in range(5, 12)]
+    motion = read_motion(folder / "a.npz")
+    whole = read_motion(project.motion_file)
+    assert np.array_equal(motion.points3d, whole.points3d[5:12])
+    assert np.array_equal(motion.time, whole.time[5:12])
+    images = json.loads((folder / "a.json").read_text())["images"]
+    assert [image["frame"] for image in images] == list(range(5, 12))
+    assert "Frames: 7\n" in (folder / "a.bvh").read_text()
+    assert (folder / "a.trc").read_text().splitlines()[2].split("\t")[6:] == ["6", "7"]
+    assert frames_of(folder / "a.mp4") == 7
+
+
+def test_keyframes_of_a_range_count_from_its_start():
+    cut = cut_motion(make_motion(60), 20, 40)  # keyframes at 0 and 30
+    assert cut.keyframes.tolist() == [10]
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [("5-40", "has frames 0 to 19"), ("9-3", "has frames 0 to 19"), ("7", "such as 120-180")],
+)
+def test_a_range_that_cannot_be_is_told(project, frames, words):
+    folder = project.folder.parent
+    with pytest.raises(KeyreconError, match=words):
+        export(project, [folder / "a.bvh"], silent, frames)
+    assert not (folder / "a.bvh").exists()
+
+
+def test_slow_motion_plays_the_same_frames_slower(project):
+    folder = project.folder.parent
+    export(project, [folder / "a.mp4"], silent)
+    export(project, [folder / "b.mp4"], silent, None, OverlayOptions(slowmo=4.0))
+    usual, slow = open_video(folder / "a.mp4"), open_video(folder / "b.mp4")
+    assert len(usual) == len(slow)
+    assert slow.fps == pytest.approx(usual.fps / 4, rel=1e-3)
+
+
+@pytest.mark.parametrize("slowmo", [0.0, -1.0, float("nan"), float("inf"), 1e6])
+def test_a_speed_that_cannot_be_is_told(project, slowmo):
+    with pytest.raises(KeyreconError, match="--slowmo says how many times"):
+        folder = project.folder.parent
+        export(project, [folder / "a.mp4"], silent, None, OverlayOptions(slowmo=slowmo))
+
+
+def test_views_stand_beside_the_video_at_the_size_asked_for(project):
+    folder = project.folder.parent
+    options = OverlayOptions(view=("camera", "right", "above"), size=96)
+    export(project, [folder / "a.mp4"], silent, None, options)
+    video = open_video(folder / "a.mp4")
+    assert video.height == 96
+    assert video.width > 1.5 * 96 * 128 / 64 / 1.5 + 2 * 60
+
+
+def test_choices_for_the_overlay_without_an_overlay_are_told(project):
+    with pytest.raises(KeyreconError, match=r"for the overlay video; name an \.mp4"):
+        export(project, [project.folder.parent / "a.bvh"], silent, None, OverlayOptions(slowmo=2.0))
+
+
+def test_a_line_says_what_was_done_to_each_file(project):
+    folder = project.folder.parent
+    told = export(project, [folder / "a.bvh", folder / "a.csv"], silent)
+    assert "feet on the floor at 0" in told[0]
+    assert "20 frames, those of the video" in told[0]
+    assert "camera axes; 20 frames" in told[1]
 
 
 def test_a_link_to_the_video_is_the_video(project):
@@ -64,9 +160,9 @@ def test_one_name_that_cannot_be_keeps_all_from_being_written(project):
 def test_suffixes_may_be_written_in_capitals(project):
     folder = project.folder.parent
     told = export(project, [folder / "A.BVH", folder / "OVERLAY.MP4", folder / "a.json"], silent)
-    assert [line.split("/")[-1] for line in told] == ["A.BVH.", "OVERLAY.MP4.", "a.json."]
-    with av.open(str(folder / "OVERLAY.MP4")) as container:
-        assert sum(1 for _ in container.decode(video=0)) == 20
+    names = [re.split(r"[:]|[.]$", line.split("/")[-1])[0] for line in told]
+    assert names == ["A.BVH", "OVERLAY.MP4", "a.json"]
+    assert frames_of(folder / "OVERLAY.MP4") == 20
 
 
 def test_an_overlay_that_breaks_off_leaves_the_one_there_was(project):

@@ -5,6 +5,7 @@ from report_material import make_material
 
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
+from keyrecon.progress import silent
 from keyrecon.report.drawing import (
     LEFT,
     RIGHT,
@@ -14,7 +15,7 @@ from keyrecon.report.drawing import (
     head_bone,
     trunk_outline,
 )
-from keyrecon.report.overlay import write_overlay
+from keyrecon.report.overlay import GROUND, PAPER, OverlayOptions, overlay_frames, write_overlay
 
 GREY = np.full((240, 240, 3), 120, np.uint8)
 
@@ -101,3 +102,31 @@ def test_the_overlay_has_every_frame_of_the_video_with_the_player_drawn(tmp_path
     assert len(overlay) == len(material.video)
     assert (overlay.width, overlay.height) == (material.video.width, material.video.height)
     assert overlay.fps == material.video.fps
+
+
+def test_an_overlay_can_show_one_half_of_the_body_or_nothing(tmp_path):
+    material = make_material(tmp_path, 12)
+
+    def drawn(skeleton):
+        return next(
+            overlay_frames(
+                material.video, material.motion, silent, OverlayOptions(skeleton=skeleton)
+            )
+        )
+
+    bare = drawn("none")
+    changed = {part: (drawn(part) != bare).any(axis=2) for part in ("all", "upper", "lower")}
+    assert changed["all"].sum() > changed["upper"].sum() > 0
+    assert changed["lower"].any()
+    rows = {part: np.flatnonzero(mask.any(axis=1)).mean() for part, mask in changed.items()}
+    assert rows["upper"] < rows["lower"]
+
+
+def test_the_figure_from_elsewhere_stands_on_its_floor(tmp_path):
+    material = make_material(tmp_path, 12)
+    options = OverlayOptions(view=("right",), size=200)
+    pane = next(overlay_frames(material.video, material.motion, silent, options))
+    ground = (pane[:, -1] == GROUND).all(axis=1)
+    assert 0 < ground.sum() < 40
+    figure = ((pane != PAPER) & (pane != GROUND)).any(axis=2)[:170]
+    assert figure.any()

@@ -17,10 +17,9 @@ Against bones this is wrong by 1-2 cm at limbs and 2-3 cm at hips, shoulders and
 lengths vary by some per cent over a swing because skin moves. A marker that is missing for some
 frames is interpolated by a shape-preserving cubic and held at the ends.
 
-C3D: joints as markers at a constant rate, for biomechanics programs.
-
-Written with the `c3d` package, because it keeps files of more than 65,535 frames whole (22
-minutes at 50 fps); millimetres, as such programs expect, or body heights.
+Written are joints as markers at a constant rate, for biomechanics programs: with the `c3d`
+package, because it keeps files of more than 65,535 frames whole (22 minutes at 50 fps), in
+millimetres and with Z up, as such programs expect, or in body heights.
 """
 
 import io
@@ -28,6 +27,7 @@ import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -36,7 +36,7 @@ from scipy.interpolate import PchipInterpolator
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import at_constant_rate
+from keyrecon.io.formats.conventions import stand_on_floor
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 
@@ -53,6 +53,9 @@ HALF_WIDTHS = {"knee": 0.055, "elbow": 0.040, "ankle": 0.042}
 
 CLUB_MARKERS = "WEP"
 """How the names of markers on a club or bat begin in the CMU database."""
+
+NOTES_GROUP = 61
+"""Number of our own group of parameters; standard ones are counted from 1."""
 
 HEAD_BAND_TO_CROWN = 0.09
 """Height of the crown above a head band at the forehead, metres."""
@@ -200,10 +203,11 @@ def _hinge(upper: Points, side: Points, marker: Points, lower: Points) -> tuple[
     return marker, frame @ (local / np.linalg.norm(local))
 
 
-def write_c3d(path: Path, motion: Motion) -> None:
-    """Write joints with Y up, x right, z towards the camera.
+def write_c3d(path: Path, motion: Motion) -> str:
+    """Write joints with Z up, x right, y away from the camera; returns what was done to them.
 
-    A motion at a variable rate is resampled. Raises KeyreconError without the c3d package.
+    The same stands in the parameter KEYRECON:NOTES. Raises KeyreconError
+    without the c3d package.
     """
     try:
         import c3d
@@ -211,14 +215,17 @@ def write_c3d(path: Path, motion: Motion) -> None:
         raise KeyreconError(
             "Writing C3D needs the c3d package; install it with: pip install 'keyrecon[c3d]'"
         ) from fault
-    points = at_constant_rate(motion)
+    standing = stand_on_floor(motion)
     millimetres = motion.units == "m"
     # The column behind x, y, z is the residual: 0, measured by one camera group.
-    rows = np.zeros((*points.shape[:2], 5), dtype=np.float32)
-    rows[..., :3] = points * 1000 if millimetres else points
-    writer = c3d.Writer(point_rate=motion.fps, point_units="mm" if millimetres else "bh")
+    rows = np.zeros((*standing.points.shape[:2], 5), dtype=np.float32)
+    rows[..., :3] = standing.points[..., [0, 2, 1]] * np.array([1, -1, 1])
+    rows[..., :3] *= 1000 if millimetres else 1
+    writer = c3d.Writer(point_rate=standing.fps, point_units="mm" if millimetres else "bh")
     writer.set_point_labels(list(motion.skeleton.names))
-    writer.set_screen_axis(X="+X", Y="+Y")
+    writer.set_screen_axis(X="+X", Y="+Z")
+    axes = "Z up, x right, y away from the camera"
+    _add_notes(writer, axes, standing.placing, standing.timing)
     no_analog = np.zeros((0, 0), dtype=np.float32)
     writer.add_frames([(row, no_analog) for row in rows])
     buffer = io.BytesIO()
@@ -226,3 +233,12 @@ def write_c3d(path: Path, motion: Motion) -> None:
         warnings.filterwarnings("ignore", "No analog data", UserWarning)
         writer.write(buffer)
     write_durably(path, buffer.getvalue())
+    return f"{axes}; {standing.placing}; {standing.timing}"
+
+
+def _add_notes(writer: Any, *notes: str) -> None:
+    """Text as a parameter of our own; a line of the format holds 255 characters at most."""
+    width = min(255, max(map(len, notes)))
+    lines = "".join(note[:width].ljust(width) for note in notes)
+    group = writer.add_group(NOTES_GROUP, "KEYRECON", "How the points were made")
+    group.add_str("NOTES", "", lines, width, len(notes))

@@ -252,14 +252,18 @@ def write_coco(path: Path, annotations: Annotations, size: tuple[int, int]) -> N
     write_durably(path, coco_text(annotations, size))
 
 
-def write_coco_motion(path: Path, motion: Motion, size: tuple[int, int]) -> None:
+def write_coco_motion(
+    path: Path, motion: Motion, size: tuple[int, int], first_frame: int = 0
+) -> None:
     """Write the joints of all frames, px; `size` is the picture's width and height.
+
+    `first_frame` is the video's frame that the motion begins with.
 
     v is 2 where a joint was seen (annotated or propagated) and 1 where it was computed from
     others; confidence and source of every joint stand in `attributes`.
     """
     seen = np.isin(motion.source, [SOURCES.index("annotated"), SOURCES.index("propagated")])
-    frames = np.arange(len(motion.time))
+    frames = first_frame + np.arange(len(motion.time))
     signs = np.zeros((len(frames), len(motion.skeleton.bones)), dtype=np.int64)
     data = annotations_to_coco(
         Annotations(motion.skeleton, frames, motion.points2d, seen, signs), size

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.conventions import describe_times
 from keyrecon.records import SOURCES, Motion
 
 
-def write_csv(path: Path, motion: Motion) -> None:
+def write_csv(path: Path, motion: Motion, first_frame: int = 0) -> str:
     """Write a table that pandas reads with `read_csv(path, comment="#")`.
 
-    Unknown numbers are empty. The comment lines on top say units and axes.
+    Unknown numbers are empty. The comment lines on top say units, axes and times; returns the
+    latter two. `first_frame` is the video's frame that comes first.
     """
     names = motion.skeleton.names
     head = [
@@ -19,7 +21,8 @@ def write_csv(path: Path, motion: Motion) -> None:
         f"# x, y, z: {motion.units}, camera axes (x right, y down, z away from the camera)",
         "# u, v: px (u right, v down, pixel centres at integers)",
         f"# confidence: 0 to 1; source: one of {' '.join(SOURCES)}",
-        "# frame: from 0 in presentation order; time: seconds",
+        "# frame: the video's, from 0 in presentation order; time: seconds",
+        f"# {describe_times(motion)}",
     ]
     columns = ["x", "y", "z", "u", "v", "confidence", "source"]
     head.append(",".join(["frame", "time", *(f"{n}_{c}" for n in names for c in columns)]))
@@ -28,9 +31,10 @@ def write_csv(path: Path, motion: Motion) -> None:
     )
     rows = []
     for frame, (values, source) in enumerate(zip(numbers, motion.source, strict=True)):
-        cells = [str(frame), f"{motion.time[frame]:.6f}"]
+        cells = [str(first_frame + frame), f"{motion.time[frame]:.6f}"]
         for joint, origin in zip(values, source, strict=True):
             cells += ["" if np.isnan(v) else f"{v:.6g}" for v in joint]
             cells.append(SOURCES[origin])
         rows.append(",".join(cells))
     write_durably(path, "\n".join(head + rows) + "\n")
+    return f"camera axes; {describe_times(motion)}"

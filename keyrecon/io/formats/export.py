@@ -1,56 +1,84 @@
 """A motion in other programs' formats, told by suffix. The overlay video is the report's work."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.bvh_motion import write_bvh
 from keyrecon.io.formats.c3d import write_c3d
 from keyrecon.io.formats.coco import write_coco_motion
+from keyrecon.io.formats.conventions import describe_times
 from keyrecon.io.formats.csv_table import write_csv
 from keyrecon.io.formats.glb import write_glb
-from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.formats.motion_file import ARRAYS, OPTIONAL, write_motion
 from keyrecon.io.formats.netcdf import write_netcdf
 from keyrecon.io.formats.trc import write_trc
 from keyrecon.records import Motion
 
-WRITERS: dict[str, Callable[[Path, Motion], None]] = {
+WRITERS: dict[str, Callable[[Path, Motion], str]] = {
     ".bvh": write_bvh,
     ".c3d": write_c3d,
-    ".csv": write_csv,
     ".glb": write_glb,
     ".nc": write_netcdf,
-    ".npz": write_motion,
+}
+NUMBERED_WRITERS: dict[str, Callable[[Path, Motion, int], str]] = {
+    ".csv": write_csv,
     ".trc": write_trc,
 }
-"""What writes a motion, by suffix; .json (COCO) needs the picture's size besides."""
+"""What writes the numbers of the video's frames besides. .npz and .json (COCO) are apart."""
 
-SUFFIXES = (*WRITERS, ".json")
+SUFFIXES = (*WRITERS, *NUMBERED_WRITERS, ".npz", ".json")
+ELSEWHERE = {
+    ".fbx": "write .glb or .bvh, open it in Blender (File > Import) and save it there "
+    "(File > Export > FBX)",
+    ".usd": "write .glb, open it in Blender (File > Import) and save it there "
+    "(File > Export > USD)",
+    ".gltf": "write .glb, the same in one file",
+    ".mov": "write .mp4",
+    ".avi": "write .mp4",
+}
+"""Formats that people ask for, and the way to them."""
 
 
 def check_suffix(path: Path, more: tuple[str, ...] = ()) -> None:
     """Raise KeyreconError for a file whose suffix is neither ours nor one of `more`."""
-    known = (*SUFFIXES, *more)
-    if path.suffix.lower() not in known:
-        raise KeyreconError(
-            f"{path}: there is no export to '{path.suffix}'; use {', '.join(sorted(known))}."
-        )
+    known, suffix = (*SUFFIXES, *more), path.suffix.lower()
+    if suffix not in known:
+        way = ELSEWHERE.get(suffix, f"use {', '.join(sorted(known))}")
+        raise KeyreconError(f"{path}: there is no export to '{path.suffix}'; {way}.")
 
 
-def export_motion(path: Path, motion: Motion, size: tuple[int, int] | None = None) -> None:
-    """Write `motion` in the format of the path's suffix; `size` is the picture's, px.
+def export_motion(
+    path: Path, motion: Motion, size: tuple[int, int] | None = None, first_frame: int = 0
+) -> str:
+    """Write `motion` in the format of the path's suffix; returns what was done to it.
 
+    `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with.
     Raises KeyreconError for a suffix that is not known, an optional library that is not
     installed, or a motion that the format cannot hold.
     """
     check_suffix(path)
     suffix = path.suffix.lower()
-    if suffix == ".json":
-        if size is None:
-            raise KeyreconError(
-                f"{path}: COCO states the size of the pictures; export from the project whose "
-                "video is in place."
-            )
-        write_coco_motion(path, motion, size)
-    else:
-        WRITERS[suffix](path, motion)
+    if suffix in WRITERS:
+        return WRITERS[suffix](path, motion)
+    if suffix in NUMBERED_WRITERS:
+        return NUMBERED_WRITERS[suffix](path, motion, first_frame)
+    if suffix == ".npz":
+        write_motion(path, motion)
+        return f"camera axes; {describe_times(motion)}"
+    if size is None:
+        raise KeyreconError(
+            f"{path}: COCO states the size of the pictures; export from the project whose "
+            "video is in place."
+        )
+    write_coco_motion(path, motion, size, first_frame)
+    return f"pixels; {describe_times(motion)}"
+
+
+def cut_motion(motion: Motion, first: int, last: int) -> Motion:
+    """Frames first..last; times stay those of the video, keyframes count from the new start."""
+    per_frame = [n for n, axes in (ARRAYS | OPTIONAL).items() if axes.startswith("T")]
+    kept = {n: v[first : last + 1] for n in per_frame if (v := getattr(motion, n)) is not None}
+    inside = (motion.keyframes >= first) & (motion.keyframes <= last)
+    return replace(motion, **kept, keyframes=motion.keyframes[inside] - first)

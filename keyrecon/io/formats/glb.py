@@ -1,54 +1,64 @@
-"""GLB (binary glTF 2.0): an animated stick figure that any 3D viewer shows.
+"""GLB (binary glTF 2.0): an animated, skinned figure for Blender, Unity, three.js and viewers.
 
-A ball for every joint and a stick for every bone, moved by keys at the frames' own times (a
-variable rate needs no resampling). Y up, Z towards the camera; metres or body heights.
+Joints are a tree of nodes with a skin, so that programs see an armature and can retarget it; the
+rest pose is the T-pose of `formats.humanoid`, whose names they know, and the mesh is a simple
+body around it. Keys stand at the frames' own times: a variable rate needs no resampling. Y up, Z
+towards the camera, the figure faces +Z at rest; metres or body heights.
+
+A skeleton that is no person's has its joints as a tree of nodes too, moved by translations alone,
+and capsules that follow both of a bone's ends.
 """
 
 import json
 import struct
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from keyrecon import __version__
-from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import y_up
+from keyrecon.io.formats.body_mesh import MeshPart, body_parts, capsule, rest_places
+from keyrecon.io.formats.conventions import StandingMotion, stand_on_floor
+from keyrecon.io.formats.humanoid import make_humanoid, missing_joints
 from keyrecon.records import Motion
 
 Json = dict[str, Any]
 
-BALL, STICK = 0.016, 0.010
-"""Radii of joints and bones in statures."""
 RIGHT, LEFT, MIDDLE = (0.85, 0.35, 0.13, 1.0), (0.10, 0.45, 0.75, 1.0), (0.45, 0.45, 0.45, 1.0)
 """Colours of the sides, linear RGBA."""
+STICK = 0.012
+"""Radius of the bones of a skeleton that is no person's, statures."""
 
 FLOAT, UNSIGNED_SHORT = 5126, 5123
+VERTICES, INDICES = 34962, 34963
+"""What a part of the buffer is for."""
+KINDS = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 
 
+@dataclass(eq=False)
 class _Buffer:
     """The binary part of the file, and the accessors that describe it."""
 
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[Json] = []
-        self.accessors: list[Json] = []
+    data: bytearray = field(default_factory=bytearray)
+    views: list[Json] = field(default_factory=list)
+    accessors: list[Json] = field(default_factory=list)
 
-    def add(self, array: np.ndarray, bounds: bool = False) -> int:
+    def add(self, array: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
         """Append an array; returns the number of its accessor."""
         floats = array.dtype.kind == "f"
         stored = np.ascontiguousarray(array, dtype="<f4" if floats else "<u2")
-        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes})
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes}
+        self.views.append(view | ({} if target is None else {"target": target}))
         self.data += stored.tobytes() + bytes(-stored.nbytes % 4)
-        width = 1 if stored.ndim == 1 else stored.shape[1]
         accessor = {
             "bufferView": len(self.views) - 1,
             "componentType": FLOAT if floats else UNSIGNED_SHORT,
             "count": len(stored),
-            "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[width],
+            "type": KINDS[stored.shape[1:]],
         }
         if bounds:
             accessor["min"] = np.atleast_1d(stored.min(axis=0)).tolist()
@@ -57,135 +67,176 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def write_glb(path: Path, motion: Motion) -> None:
-    """Write an animated figure; raises KeyreconError where a joint is missing."""
-    points = y_up(motion.points3d)
-    if not np.isfinite(points).all():
-        frame, joint = np.argwhere(~np.isfinite(points).all(axis=2))[0]
-        raise KeyreconError(
-            f"Frame {frame} has no {motion.skeleton.names[joint]}; this format needs every joint, "
-            "use .csv or .npz."
-        )
-    size = 1.75 if motion.units == "m" else 1.0
+@dataclass(frozen=True, eq=False)
+class _Figure:
+    """What moves: joints, parents first, at rest and over time."""
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    rest: Float[np.ndarray, "n 3"]
+    """Places at rest, where no joint is turned."""
+    moves: dict[int, Float[np.ndarray, "T 3"]]
+    """Translations relative to the parent, of the joints that have any."""
+    turns: dict[int, Float[np.ndarray, "T 4"]]
+    """Rotations relative to the parent, x y z w."""
+    parts: list[MeshPart]
+    weights: list[Int[np.ndarray, "V"]]
+    """The joint that each vertex of a part follows."""
+
+
+def write_glb(path: Path, motion: Motion) -> str:
+    """Write an animated figure; returns what was done, as the scene's extras say too.
+
+    Raises KeyreconError where a joint is missing.
+    """
+    standing = stand_on_floor(motion, even_times=False)
+    person = not missing_joints(motion.skeleton.names)
+    figure = _person(standing) if person else _sticks(standing)
     buffer = _Buffer()
-    meshes = _meshes(buffer, BALL * size, STICK * size)
-    nodes, animation = _animate(buffer, motion, points)
+    nodes, skin = _joint_nodes(buffer, figure)
+    mesh, materials = _mesh(buffer, figure)
+    nodes.append({"name": "Body", "mesh": 0, "skin": 0})
+    told = {
+        "units": motion.units,
+        "axes": "Y up, x to the right of the picture, z towards the camera",
+        "placing": standing.placing,
+        "times": standing.timing,
+    }
     document = {
-        "asset": {"version": "2.0", "generator": f"keyrecon {__version__}"},
+        "asset": {"version": "2.0", "generator": f"keyrecon {__version__}", "extras": told},
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(nodes))), "extras": {"units": motion.units}}],
+        "scenes": [{"nodes": [0, len(nodes) - 1], "extras": told}],
         "nodes": nodes,
-        "meshes": meshes,
-        "materials": [
-            {
-                "pbrMetallicRoughness": {
-                    "baseColorFactor": colour,
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": 0.8,
-                }
-            }
-            for colour in (MIDDLE, LEFT, RIGHT)
-        ],
-        "animations": [animation],
+        "skins": [skin],
+        "meshes": [mesh],
+        "materials": materials,
+        "animations": [_animation(buffer, figure, standing.time)],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
     write_durably(path, _pack(document, bytes(buffer.data)))
+    return f"Y up; {standing.placing}; {standing.timing}"
 
 
-def _meshes(buffer: _Buffer, ball: float, stick: float) -> list[Json]:
-    """Ball and stick in the three colours; the stick is 1 long along +Y."""
-    meshes = []
-    for name, (vertices, normals, faces) in (("joint", _ball()), ("bone", _stick())):
-        shape = np.array([ball] * 3 if name == "joint" else [stick, 1.0, stick])
-        attributes = {
-            "POSITION": buffer.add(vertices * shape, bounds=True),
-            "NORMAL": buffer.add(normals),
-        }
-        indices = buffer.add(faces.ravel())
-        for material, side in enumerate(("middle", "left", "right")):
-            primitive = {"attributes": attributes, "indices": indices, "material": material}
-            meshes.append({"name": f"{name} {side}", "primitives": [primitive]})
-    return meshes
+def _person(standing: StandingMotion) -> _Figure:
+    rig = make_humanoid(standing)
+    parts = body_parts(rig, standing.stature)
+    return _Figure(
+        names=tuple(joint.name for joint in rig.joints),
+        parents=tuple(joint.parent for joint in rig.joints),
+        rest=rest_places(rig),
+        moves={0: rig.root},
+        turns={n: _quaternions(rig.local_turn(n)) for n in range(len(rig.joints))},
+        parts=parts,
+        weights=[np.full(len(part.vertices), part.joint) for part in parts],
+    )
 
 
-def _ball() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A unit ball of 8 x 12 facets: vertices, normals, faces."""
-    rows, columns = 9, 13
-    polar, turn = np.meshgrid(np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, columns))
-    across = np.sin(polar)
-    grid = np.stack([across * np.cos(turn), np.cos(polar), -across * np.sin(turn)], axis=2)
-    return grid.reshape(-1, 3), grid.reshape(-1, 3), _grid_faces(columns, rows)
+def _sticks(standing: StandingMotion) -> _Figure:
+    """Any skeleton: the first frame is the rest pose, bones are stretched between their joints."""
+    skeleton = standing.skeleton
+    order = [skeleton.root, *skeleton.bones[:, 1].tolist()]
+    points = standing.points[:, order]
+    parents = tuple(-1 if k == skeleton.root else order.index(skeleton.parents[k]) for k in order)
+    radius = STICK * standing.stature
+    parts, weights = [], []
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            surface = capsule(points[0, parent], points[0, joint], (radius, radius))
+            parts.append(MeshPart(joint, *surface))
+            half = len(surface[0]) // 2
+            weights.append(np.repeat([parent, joint], half))
+    return _Figure(
+        names=tuple(skeleton.names[k] for k in order),
+        parents=parents,
+        rest=points[0],
+        moves={
+            joint: points[:, joint] - (points[:, parent] if parent >= 0 else 0)
+            for joint, parent in enumerate(parents)
+        },
+        turns={},
+        parts=parts,
+        weights=weights,
+    )
 
 
-def _stick() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """An open cylinder of radius 1 from y = 0 to 1: vertices, normals, faces."""
-    columns = 9
-    height, turn = np.meshgrid([1.0, 0.0], np.linspace(0, 2 * np.pi, columns))
-    normals = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=2)
-    grid = normals + np.stack([np.zeros_like(turn), height, np.zeros_like(turn)], axis=2)
-    return grid.reshape(-1, 3), normals.reshape(-1, 3), _grid_faces(columns, 2)
-
-
-def _grid_faces(columns: int, rows: int) -> np.ndarray:
-    """Triangles of a grid of vertices, counter-clockwise from outside."""
-    corner = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
-    below, beside, opposite = corner + 1, corner + rows, corner + rows + 1
-    faces = [np.stack([corner, below, opposite], 1), np.stack([corner, opposite, beside], 1)]
-    return np.concatenate(faces).astype(np.uint16)
-
-
-def _animate(
-    buffer: _Buffer, motion: Motion, points: Float[np.ndarray, "T J 3"]
-) -> tuple[list[Json], Json]:
-    """Nodes of joints and bones, and the animation that moves them."""
-    times = buffer.add(motion.time - motion.time[0], bounds=True)
-    names, colours = motion.skeleton.names, _colours(motion)
+def _joint_nodes(buffer: _Buffer, figure: _Figure) -> tuple[list[Json], Json]:
+    """A node for each joint, and the skin that binds the mesh to them."""
     nodes: list[Json] = []
+    for joint, name in enumerate(figure.names):
+        parent = figure.parents[joint]
+        offset = figure.rest[joint] - (figure.rest[parent] if parent >= 0 else 0)
+        node: Json = {"name": name, "translation": [round(v, 6) for v in offset.tolist()]}
+        children = [k for k, above in enumerate(figure.parents) if above == joint]
+        nodes.append(node | ({"children": children} if children else {}))
+    inverse = np.tile(np.eye(4), (len(nodes), 1, 1))
+    inverse[:, 3, :3] = -figure.rest  # stored column by column
+    skin = {
+        "name": "Armature",
+        "joints": list(range(len(nodes))),
+        "skeleton": 0,
+        "inverseBindMatrices": buffer.add(inverse),
+    }
+    return nodes, skin
+
+
+def _mesh(buffer: _Buffer, figure: _Figure) -> tuple[Json, list[Json]]:
+    """The body in the colours of its sides, each part bound to its joints."""
+    sides = [_side(figure.names[part.joint]) for part in figure.parts]
+    primitives: list[Json] = []
+    materials: list[Json] = []
+    for name, colour in (("middle", MIDDLE), ("left", LEFT), ("right", RIGHT)):
+        own = [k for k, side in enumerate(sides) if side == name]
+        if not own:
+            continue
+        parts = [figure.parts[k] for k in own]
+        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])[:-1]
+        joint = np.concatenate([figure.weights[k] for k in own])
+        joints = np.stack([joint, *np.zeros((3, len(joint)), dtype=np.int64)], axis=1)
+        weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(joint), 1))
+        vertices = np.concatenate([part.vertices for part in parts])
+        faces = np.concatenate([part.faces + s for part, s in zip(parts, starts, strict=True)])
+        attributes = {
+            "POSITION": buffer.add(vertices, VERTICES, bounds=True),
+            "NORMAL": buffer.add(np.concatenate([part.normals for part in parts]), VERTICES),
+            "JOINTS_0": buffer.add(joints, VERTICES),
+            "WEIGHTS_0": buffer.add(weights, VERTICES),
+        }
+        indices = buffer.add(faces.ravel(), INDICES)
+        primitives.append(
+            {"attributes": attributes, "indices": indices, "material": len(materials)}
+        )
+        look = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.8}
+        materials.append({"name": name, "pbrMetallicRoughness": look})
+    return {"name": "Body", "primitives": primitives}, materials
+
+
+def _side(name: str) -> str:
+    word = name.lower()
+    if word.startswith("left") or name == "LHipJoint":
+        return "left"
+    return "right" if word.startswith("right") or name == "RHipJoint" else "middle"
+
+
+def _animation(buffer: _Buffer, figure: _Figure, time: Float[np.ndarray, "T"]) -> Json:
+    keys = buffer.add(time, bounds=True)
     samplers: list[Json] = []
     channels: list[Json] = []
-    moves = [buffer.add(points[:, j]) for j in range(len(names))]
-
-    def animate(path: str, values: int) -> None:
-        samplers.append({"input": times, "output": values, "interpolation": "LINEAR"})
-        target = {"node": len(nodes) - 1, "path": path}
-        channels.append({"sampler": len(samplers) - 1, "target": target})
-
-    for joint, name in enumerate(names):
-        nodes.append({"name": name, "mesh": colours[joint]})
-        animate("translation", moves[joint])
-    for parent, child in motion.skeleton.bones:
-        bone = points[:, child] - points[:, parent]
-        length = np.linalg.norm(bone, axis=1)
-        nodes.append({"name": f"{names[parent]} to {names[child]}", "mesh": 3 + colours[child]})
-        animate("translation", moves[parent])
-        animate("rotation", buffer.add(_quaternions(bone / np.maximum(length, 1e-9)[:, None])))
-        animate(
-            "scale", buffer.add(np.stack([np.ones_like(length), length, np.ones_like(length)], 1))
-        )
-    return nodes, {"name": "motion", "samplers": samplers, "channels": channels}
+    for path, tracks in (("translation", figure.moves), ("rotation", figure.turns)):
+        for node, values in tracks.items():
+            samplers.append({"input": keys, "output": buffer.add(values)})
+            target = {"node": node, "path": path}
+            channels.append({"sampler": len(samplers) - 1, "target": target})
+    return {"name": "motion", "samplers": samplers, "channels": channels}
 
 
-def _colours(motion: Motion) -> list[int]:
-    """Material of every joint: 0 on the midline, 1 left, 2 right."""
-    colours = [0] * len(motion.skeleton.names)
-    for left, right in motion.skeleton.mirrored:
-        colours[left], colours[right] = 1, 2
-    return colours
-
-
-def _quaternions(directions: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 4"]:
-    """Shortest rotations from +Y to each direction, x y z w, without flips of sign."""
-    axis = np.cross([0.0, 1.0, 0.0], directions)
-    sine = np.linalg.norm(axis, axis=1)
-    angle = np.arctan2(sine, directions[:, 1])
-    # Straight down, any horizontal axis will do.
-    safe = np.where(sine[:, None] > 1e-9, axis / np.maximum(sine, 1e-9)[:, None], [1.0, 0.0, 0.0])
-    turns = Rotation.from_rotvec(safe * angle[:, None]).as_quat()
-    flips = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
-    turns[1:] *= np.cumprod(np.where(flips < 0, -1.0, 1.0))[:, None]
-    return turns
+def _quaternions(turns: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 4"]:
+    """x y z w without flips of sign."""
+    quaternions = Rotation.from_matrix(turns).as_quat()
+    flips = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
+    quaternions[1:] *= np.cumprod(np.where(flips < 0, -1.0, 1.0))[:, None]
+    return quaternions
 
 
 def _pack(document: Json, data: bytes) -> bytes:

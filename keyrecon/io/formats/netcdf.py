@@ -7,13 +7,15 @@ import numpy as np
 from keyrecon import __version__
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.conventions import describe_times
 from keyrecon.records import SOURCES, Motion
 
 
-def write_netcdf(path: Path, motion: Motion) -> None:
+def write_netcdf(path: Path, motion: Motion) -> str:
     """Write `position` (time, space, keypoint, individual) and `confidence`, plus `source`.
 
-    Camera axes; metres or body heights as the attribute `space_unit` says. Raises KeyreconError
+    Camera axes; metres or body heights as the attribute `space_unit` says, times as `times` says
+    and as is returned. Raises KeyreconError
     without xarray, h5netcdf and h5py.
     """
     try:
@@ -44,6 +46,7 @@ def write_netcdf(path: Path, motion: Motion) -> None:
         attrs={
             "fps": motion.fps,
             "time_unit": "seconds",
+            "times": describe_times(motion),
             "space_unit": motion.units,
             "axes": "relative to the camera: x right, y down, z away",
             "source_software": f"keyrecon {__version__}",
@@ -52,3 +55,4 @@ def write_netcdf(path: Path, motion: Motion) -> None:
         },
     )
     write_durably(path, bytes(data.to_netcdf(engine="h5netcdf")))
+    return f"camera axes; {describe_times(motion)}"

@@ -1,5 +1,5 @@
 import json
-import struct
+import re
 import sys
 from dataclasses import replace
 
@@ -9,12 +9,9 @@ from small_motion import FPS, make_motion
 
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.bvh import read_bvh
-from keyrecon.io.formats.conventions import at_constant_rate, y_up
+from keyrecon.io.formats.conventions import stand_on_floor
 from keyrecon.io.formats.export import SUFFIXES, check_suffix, export_motion
-from keyrecon.io.formats.mocap import read_capture
 from keyrecon.io.formats.motion_file import read_motion, write_motion
-from keyrecon.io.formats.rigs import find_joints
 
 SIZE = (1280, 720)
 
@@ -81,77 +78,9 @@ def test_files_that_are_no_motion_are_refused(tmp_path, motion):
         read_motion(path)
 
 
-@pytest.mark.parametrize("wildness", [0.0, 0.3, 1.0])
-def test_joints_come_back_from_bvh(tmp_path, wildness):
-    motion = make_motion(wildness=wildness)
-    export_motion(tmp_path / "a.bvh", motion, SIZE)
-    figure = read_bvh(tmp_path / "a.bvh")
-    joints, _ = find_joints(figure)
-    error = np.abs(joints - y_up(motion.points3d)).max()
-    # Offsets stand for lengths that vary by up to 0.1 %, at most 0.6 mm on a hip.
-    assert error < 0.001
-    assert figure.fps == FPS
-
-
-def test_our_bvh_is_a_person_to_the_motion_capture_reader(tmp_path):
-    motion = make_motion(wildness=0.2)
-    export_motion(tmp_path / "a.bvh", motion, SIZE)
-    capture = read_capture(tmp_path / "a.bvh")
-    assert np.abs(capture.joints - y_up(motion.points3d)).max() < 0.001
-
-
-def test_the_rest_pose_of_bvh_is_a_t_pose_that_faces_plus_z(tmp_path, motion):
-    export_motion(tmp_path / "a.bvh", motion, SIZE)
-    lines = (tmp_path / "a.bvh").read_text().splitlines()
-    start = lines.index("MOTION")
-    width = sum(int(line.split()[1]) for line in lines if line.strip().startswith("CHANNELS"))
-    # Without position channels, offsets alone are the rest pose.
-    hierarchy = [line.replace("CHANNELS 6 Xposition Yposition Zposition", "CHANNELS 3")
-                 for line in lines[:start]]  # fmt: skip
-    width = sum(int(line.split()[1]) for line in hierarchy if line.strip().startswith("CHANNELS"))
-    zeros = " ".join(["0"] * width)
-    rest = [*hierarchy, "MOTION", "Frames: 1", "Frame Time: 0.02", zeros]
-    (tmp_path / "rest.bvh").write_text("\n".join(rest))
-    joints, toes = find_joints(read_bvh(tmp_path / "rest.bvh"))
-    at = {name: joints[0, j] for j, name in enumerate(LSP14.names)}
-    assert np.allclose(at["right_wrist"][1:], at["right_shoulder"][1:], atol=1e-5)
-    assert at["right_wrist"][0] < at["right_shoulder"][0] < 0 < at["left_wrist"][0]
-    assert np.allclose(at["left_ankle"][[0, 2]], at["left_hip"][[0, 2]], atol=1e-5)
-    assert at["head_top"][1] > at["neck"][1] > at["left_hip"][1] > at["left_ankle"][1]
-    assert (toes[0, :, 2] > 0).all()
-
-
-def test_angles_in_bvh_do_not_jump_by_full_turns(tmp_path):
-    frames = 120
-    motion = make_motion(frames, wildness=0.05)
-    turn = np.linspace(0, 4 * np.pi, frames)
-    spun = motion.points3d - [0.2, -0.5, 12]
-    spun = np.stack(
-        [
-            spun[..., 0] * np.cos(turn)[:, None] + spun[..., 2] * np.sin(turn)[:, None],
-            spun[..., 1],
-            spun[..., 2] * np.cos(turn)[:, None] - spun[..., 0] * np.sin(turn)[:, None],
-        ],
-        axis=2,
-    )
-    export_motion(tmp_path / "a.bvh", replace(motion, points3d=spun), SIZE)
-    text = (tmp_path / "a.bvh").read_text()
-    values = np.array([line.split() for line in text.splitlines() if line[:1] in "-0123456789"])
-    hips = values[:, 3:6].astype(float)
-    assert np.abs(np.diff(hips, axis=0)).max() < 90
-    assert np.ptp(hips[:, 2]) > 600
-
-
 def two_joints(motion, skeleton):
     names = ("points3d", "points2d", "points2d_propagated", "confidence", "source")
     return replace(motion, skeleton=skeleton, **{n: getattr(motion, n)[:, :2] for n in names})
-
-
-def test_bvh_needs_a_person(tmp_path, motion):
-    stick = Skeleton(("a", "b"), (-1, 0), (), (0.0, 1.0), ())
-    short = two_joints(motion, stick)
-    with pytest.raises(KeyreconError, match="has no right_hip"):
-        export_motion(tmp_path / "a.bvh", short, SIZE)
 
 
 def read_trc(path):
@@ -170,7 +99,8 @@ def test_joints_come_back_from_trc(tmp_path, motion):
     assert (meta["Units"], meta["DataRate"], meta["NumFrames"]) == ("m", "50", "60")
     assert rows[:, 0].tolist() == list(range(1, 61))
     assert np.allclose(rows[:, 1], motion.time)
-    assert np.allclose(rows[:, 2:].reshape(60, 14, 3), y_up(motion.points3d), atol=1e-6)
+    points = stand_on_floor(motion).points
+    assert np.allclose(rows[:, 2:].reshape(60, 14, 3), points, atol=1e-6)
 
 
 def test_joints_come_back_from_c3d_by_another_reader(tmp_path, motion):
@@ -182,7 +112,9 @@ def test_joints_come_back_from_c3d_by_another_reader(tmp_path, motion):
     assert group["UNITS"]["value"][0].strip() == "mm"
     assert group["RATE"]["value"][0] == FPS
     points = file["data"]["points"][:3].transpose(2, 1, 0)
-    assert np.allclose(points, 1000 * y_up(motion.points3d), atol=0.01)
+    x, y, z = 1000 * stand_on_floor(motion).points.transpose(2, 0, 1)
+    assert np.allclose(points, np.stack([x, -z, y], axis=2), atol=0.01)
+    assert group["Y_SCREEN"]["value"] == ["+Z"]
 
 
 def test_units_without_a_height_are_said_aloud(tmp_path):
@@ -227,95 +159,66 @@ def test_coco_of_all_frames_holds_the_projected_joints(tmp_path, motion):
     assert np.array_equal(row[:, 2] == 2, motion.source[7] < 2)
 
 
-def read_glb(path):
-    data = path.read_bytes()
-    magic, version, total = struct.unpack_from("<4sII", data)
-    assert (magic, version, total) == (b"glTF", 2, len(data))
-    length, kind = struct.unpack_from("<I4s", data, 12)
-    assert kind == b"JSON"
-    document = json.loads(data[20 : 20 + length])
-    size, kind = struct.unpack_from("<I4s", data, 20 + length)
-    assert kind == b"BIN\0"
-    return document, data[28 + length : 28 + length + size]
-
-
-def accessor(document, binary, number):
-    entry = document["accessors"][number]
-    view = document["bufferViews"][entry["bufferView"]]
-    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[entry["type"]]
-    kind = {5126: "<f4", 5123: "<u2"}[entry["componentType"]]
-    assert view["byteOffset"] % 4 == 0
-    raw = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
-    return np.frombuffer(raw, kind).reshape(entry["count"], width)
-
-
-def test_the_animated_figure_holds_joints_and_bones(tmp_path, motion):
-    export_motion(tmp_path / "a.glb", motion, SIZE)
-    document, binary = read_glb(tmp_path / "a.glb")
-    assert document["buffers"][0]["byteLength"] == len(binary)
-    animation = document["animations"][0]
-    tracks = {}
-    for channel in animation["channels"]:
-        sampler = animation["samplers"][channel["sampler"]]
-        times = accessor(document, binary, sampler["input"])
-        assert (np.diff(times, axis=0) > 0).all()
-        name = document["nodes"][channel["target"]["node"]]["name"]
-        tracks[name, channel["target"]["path"]] = accessor(document, binary, sampler["output"])
-    points = y_up(motion.points3d)
-    for joint, name in enumerate(LSP14.names):
-        assert np.allclose(tracks[name, "translation"], points[:, joint], atol=1e-5)
-    for parent, child in LSP14.bones:
-        name = f"{LSP14.names[parent]} to {LSP14.names[child]}"
-        x, y, z, w = tracks[name, "rotation"].T
-        up = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
-        tip = tracks[name, "translation"] + tracks[name, "scale"][:, 1:2] * up
-        assert np.allclose(tip, points[:, child], atol=1e-5)
-
-
-def test_meshes_of_the_figure_face_outwards(tmp_path, motion):
-    export_motion(tmp_path / "a.glb", motion, SIZE)
-    document, binary = read_glb(tmp_path / "a.glb")
-    for mesh in document["meshes"]:
-        primitive = mesh["primitives"][0]
-        vertices = accessor(document, binary, primitive["attributes"]["POSITION"])
-        normals = accessor(document, binary, primitive["attributes"]["NORMAL"])
-        faces = accessor(document, binary, primitive["indices"]).reshape(-1, 3)
-        assert faces.max() < len(vertices)
-        a, b, c = vertices[faces].transpose(1, 0, 2)
-        facing = (np.cross(b - a, c - a) * normals[faces].mean(axis=1)).sum(axis=1)
-        assert facing.min() > -1e-9
-
-
 def uneven_time(frames):
     return np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, frames)) / FPS
 
 
-def test_an_even_motion_keeps_its_frames(motion):
-    assert np.array_equal(at_constant_rate(motion), y_up(motion.points3d))
+def count_frames(path):
+    """Frames in an exported file, by what its own format says."""
+    if path.suffix == ".bvh":
+        return int(re.search(r"Frames: (\d+)", path.read_text())[1])
+    if path.suffix == ".trc":
+        _, meta, rows = read_trc(path)
+        assert meta["NumFrames"] == meta["OrigNumFrames"] == str(len(rows))
+        return len(rows)
+    if path.suffix == ".c3d":
+        file = pytest.importorskip("ezc3d").c3d(str(path))
+        return file["data"]["points"].shape[2]
+    if path.suffix == ".csv":
+        return sum(line[0].isdigit() for line in path.read_text().splitlines())
+    if path.suffix == ".json":
+        return len(json.loads(path.read_text())["images"])
+    with pytest.importorskip("xarray").open_dataset(path, engine="h5netcdf") as data:
+        return data.sizes["time"]
 
 
-def test_resampling_keeps_bone_lengths(motion):
-    uneven = make_motion(time=uneven_time(60))
-    points = at_constant_rate(uneven)
-    lengths = np.linalg.norm(points[:, LSP14.bones[:, 1]] - points[:, LSP14.bones[:, 0]], axis=2)
-    assert np.allclose(lengths, 1.8 * LSP14.lengths)
+@pytest.mark.parametrize("suffix", [".bvh", ".trc", ".c3d", ".csv", ".nc", ".json"])
+@pytest.mark.parametrize("frames", [60, 61, 97])
+def test_every_format_has_as_many_frames_as_the_video(tmp_path, suffix, frames):
+    export_motion(tmp_path / f"a{suffix}", make_motion(frames, time=uneven_time(frames)), SIZE)
+    assert count_frames(tmp_path / f"a{suffix}") == frames
 
 
-def test_resampling_takes_joints_to_where_they_are_at_even_times():
-    time = uneven_time(60)
-    still = make_motion(time=time, wildness=0.0)
-    shift = (time - time[0])[:, None, None] * np.array([1.0, 0, 0])
-    points = at_constant_rate(replace(still, points3d=still.points3d + shift))
-    expected = y_up(still.points3d[:1]) + np.arange(len(points))[:, None, None] / FPS * np.array(
-        [1.0, 0, 0]
-    )
-    assert np.allclose(points, expected)
-
-
-@pytest.mark.parametrize("suffix", [".trc", ".bvh", ".c3d"])
-def test_formats_of_constant_rate_take_uneven_motions(tmp_path, suffix):
+@pytest.mark.parametrize(
+    ("suffix", "words"),
+    [
+        (".trc", "as many as in the video, moved from its uneven times to even ones"),
+        (".c3d", "as many as in the video, moved from its uneven times to even ones"),
+        (".csv", "those of the video, at its own uneven times"),
+        (".glb", "those of the video, at its own uneven times"),
+        (".nc", "those of the video, at its own uneven times"),
+    ],
+)
+def test_a_file_says_what_was_done_to_uneven_times(tmp_path, suffix, words):
     export_motion(tmp_path / f"a{suffix}", make_motion(time=uneven_time(60)), SIZE)
-    assert (tmp_path / f"a{suffix}").stat().st_size > 1000
+    assert words.encode() in (tmp_path / f"a{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", [".trc", ".c3d", ".glb"])
+def test_a_file_says_where_its_floor_and_origin_are(tmp_path, motion, suffix):
+    export_motion(tmp_path / f"a{suffix}", motion, SIZE)
+    data = (tmp_path / f"a{suffix}").read_bytes()
+    assert b"feet on the floor at 0" in data
+    assert b"Z up" in data if suffix == ".c3d" else b"Y up" in data
+
+
+def test_trc_of_uneven_times_lasts_as_long_as_the_video(tmp_path):
+    motion = make_motion(time=uneven_time(60))
+    export_motion(tmp_path / "a.trc", motion, SIZE)
+    _, meta, rows = read_trc(tmp_path / "a.trc")
+    assert rows[-1, 1] == pytest.approx(motion.time[-1] - motion.time[0])
+    assert float(meta["DataRate"]) == pytest.approx(59 / rows[-1, 1])
+    assert float(meta["OrigDataRate"]) == FPS
 
 
 @pytest.mark.parametrize("suffix", [".trc", ".bvh", ".c3d", ".glb"])
