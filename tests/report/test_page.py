@@ -217,14 +217,6 @@ def test_joints_that_the_truth_lacks_are_unknown(material):
     assert np.isnan(summary.arrange_truth(few, LSP14).points3d[:, 3:]).all()
 
 
-def test_the_stature_of_a_body_of_average_proportions_is_found(material):
-    pose = np.zeros((40, 14, 3))
-    for (parent, child), length in zip(LSP14.bones, LSP14.lengths, strict=True):
-        pose[:, child] = pose[:, parent] + (0, 1.8 * length, 0)
-    standing = replace(material.motion, points3d=pose)
-    assert summary.stature(standing) == pytest.approx(1.8)
-
-
 def test_views_are_rotations_and_the_first_is_the_camera():
     for view in VIEWS.values():
         np.testing.assert_array_equal(view @ view.T, np.eye(3))
