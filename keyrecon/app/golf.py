@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.click_checks import check_direction, check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.golf.observation import observe_swing
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
@@ -31,6 +32,7 @@ from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.held_video import hold_frames
+from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.numerics.geometry import warp_points
@@ -43,6 +45,9 @@ from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 CLICKS_FILE = "golf_clicks.json"
 OVERLAY_FILE = "overlay.mp4"
+SHORTEST_SWING = 0.7
+"""Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take
+0.93 (21 + 7 frames at 30 a second: 0.7 + 0.23; Novosel & Garrity, Tour Tempo, 2004)."""
 LARGEST_SHIFT = 0.04
 """Share of the picture's width by which a standing camera may seem to move: a player who fills
 the picture and a hand on the tripod move it by half of that."""
@@ -71,6 +76,9 @@ def fit_file(
     clicks, model = read_clicks(clicks_file), read_motion_model(prior)
     video = open_video(video_file, slow_motion=slow_motion)
     check_clicks(clicks, len(video), (video.width, video.height))
+    check_pose(clicked_pose(clicks), model, str(clicks_file))
+    check_length(video, slow_motion)
+    check_options(options)
     workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
     options = workspace.options(options, GolfOptions())
     video = hold_frames(workspace.video())
@@ -111,6 +119,7 @@ def fit_video(
         options=options.observation,
         progress=progress,
     )
+    check_direction(observations, clicked_pose(clicks), model, "The clicks")
     return fit_observed(video, observations, model, options, keep, progress)
 
 
@@ -151,6 +160,17 @@ def refine_fit(
         fitted, observations = guided.fitted, guided.update(first.observations)
     fitted = keep("result", finish_fit, observations, fitted, video, options=options.events)
     return GolfFit(fitted, observations)
+
+
+def check_length(video: Video, slow_motion: float) -> None:
+    """Raises KeyreconError where a video is too short for a swing."""
+    seconds = float(video.time[-1])
+    if seconds < SHORTEST_SWING:
+        told = f" ({slow_motion:g} times slower than life)" if slow_motion != 1 else ""
+        raise KeyreconError(
+            f"{video.path} lasts {seconds:.2f} s{told}, but from the upswing to the hit alone a "
+            f"swing takes {SHORTEST_SWING:g} s or more; use the whole clip, and see to --slowmo."
+        )
 
 
 def require_still_camera(camera: CameraPath, video: Video) -> None:

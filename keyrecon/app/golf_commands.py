@@ -1,15 +1,21 @@
-"""The commands under `keyrecon golf`."""
+"""The commands under `keyrecon golf`.
+
+Only what a person would set is an option here; how a video is observed and a prior fitted stands in
+the options records of the stages, for programs, with the evidence for each value.
+"""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from keyrecon.app import golf as golf_job
 from keyrecon.app import golf_training as mocap_swings
 from keyrecon.app.console import show
+from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.prior.training import TrainOptions
+from keyrecon.golf.prior.variation import VariationOptions
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR
 
@@ -20,7 +26,9 @@ golf = SubcommandApp()
 def train_(
     swings: Positional[tuple[Path, ...]],
     out: Path = Path("prior.npz"),
-    options: OmitArgPrefixes[Annotated[TrainOptions, arg(name="")]] = TrainOptions(),
+    components: int = TrainOptions().components,
+    variations: int = VariationOptions().count,
+    seed: int = VariationOptions().seed,
 ) -> None:
     """Learn a swing prior from motion capture and print what it is worth.
 
@@ -29,7 +37,11 @@ def train_(
     Args:
         swings: .bvh, .amc (with its .asf) or .c3d files, or folders of them, one swing each.
         out: File to write.
+        components: Components kept at most; a fit may use fewer still.
+        variations: Plausible variations that join each capture; 0 for captures alone.
+        seed: Of the variations.
     """
+    options = TrainOptions(components, VariationOptions(variations, seed))
     print(mocap_swings.train(swings, out, options, show))
 
 
@@ -40,21 +52,35 @@ def fit(
     out: Path = Path("swing"),
     prior: Path = BUILT_IN_SWING_PRIOR,
     slowmo: float = 1.0,
+    method: Literal["swing", "windows"] = "swing",
+    components: int = FitOptions().components,
     force: bool = False,
-    options: Annotated[GolfOptions, arg(name="")] = GolfOptions(),
 ) -> None:
     """Fit the swing prior to a video filmed by one camera that stands still.
 
     Makes the project folder OUT and writes motion.npz, overlay.mp4 and report.html into it. An
     interrupted fit goes on where it stopped, and `keyrecon export OUT` writes other formats.
 
+    CLICKS is a small JSON file: six joints of the player in one frame, best at the address.
+
+        {"keyrecon_golf_clicks": 1, "frame": 0, "size": [1280, 720],
+         "stature": 1.80, "left_handed": false,
+         "joints": {"head_top": [640, 180], "root": [640, 400],
+                    "right_knee": [600, 510], "left_knee": [680, 510],
+                    "right_ankle": [590, 620], "left_ankle": [690, 620]}}
+
+    "size" is that of the video, "root" lies between the hips, "right_" is the player's own right
+    (on the left of a picture from the front). "stature" in metres may be left out.
+
     Args:
         video: A whole swing, from the address to the finish.
-        clicks: JSON file with a few joints clicked in one frame, and the player's height.
+        clicks: JSON file with a few joints clicked in one frame.
         out: Project folder; made if need be.
         prior: A swing prior of `keyrecon golf train`.
         slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
+        method: 'swing' fits all frames at once, 'windows' slides over three as the paper does.
+        components: Components of the prior used at most; fewer keep nearer to its mean swing.
         force: Make every stage again.
-        options: How the video is observed and the prior fitted.
     """
+    options = GolfOptions(method, fit=FitOptions(components))
     print(golf_job.fit_file(video, clicks, out, prior, slowmo, force, options, show))

@@ -36,8 +36,12 @@ def read_swings(paths: Iterable[Path]) -> tuple[Swing, ...]:
 def train(
     paths: Sequence[Path], out: Path, options: TrainOptions, progress: Progress = silent
 ) -> str:
-    """Learn a model from captured swings, write it, and describe what it is worth."""
+    """Learn a model from captured swings, write it, and describe what it is worth.
+
+    Raises KeyreconError for captures, options or a place to write that cannot be, before it learns.
+    """
     check_options(options)
+    _check_place(out)
     swings = read_swings(paths)
     database = collect_swings(swings, options, progress)
     model = learn_motion(database, _provenance(swings, options), options)
@@ -46,6 +50,14 @@ def train(
     lines.append("")
     lines += tabulate(model, cross_validate(database, options))
     return "\n".join([*lines, "", f"Wrote {out}: {model.provenance}."])
+
+
+def _check_place(out: Path) -> None:
+    """Raises KeyreconError for a file that could not be written after minutes of learning."""
+    if out.suffix != ".npz" or out.is_dir():
+        raise KeyreconError(f"{out} cannot hold a prior; name a .npz file with --out.")
+    if not out.parent.is_dir():
+        raise KeyreconError(f"There is no folder {out.parent} to write {out.name} into; make it.")
 
 
 def _provenance(swings: Sequence[Swing], options: TrainOptions) -> str:

@@ -27,6 +27,17 @@ HEAD_DEPTH = 0.06
 SHOULDERS = 0.2
 """Height of the middle between the shoulders, share of the way from the head's top to the feet:
 roughly the shoulder line of `keyrecon.body`."""
+STATURES = (0.8, 2.5)
+"""Metres; players from four years on."""
+FOCALS = (0.2, 60.0)
+"""Focal lengths that lenses have, picture widths: from a fisheye's to a telescope's."""
+LONGEST_CLICK_LIMB, SHORTEST_CLICK_LIMB = 0.45, 0.08
+"""From the root to a knee and from a knee to its ankle, in heights from head to ankles. On six
+real swings 0.20 to 0.33, marked by eye in any frame."""
+TRUNK_SHARE = (0.3, 0.75)
+"""From the top of the head to the root, likewise; on these swings 0.46 to 0.60."""
+WIDEST_STANCE = 0.75
+"""Between the ankles, likewise; on these swings at most 0.35."""
 SHORTEST_PLAYER = 60.0
 """px from the head to the ankles: below it a shaft, 10 mm, is a third of a pixel."""
 
@@ -123,9 +134,10 @@ def clicked_pose(clicks: GolfClicks) -> ClickedPose:
 def check_clicks(clicks: GolfClicks, n_frames: int, size: tuple[int, int]) -> None:
     """Raises KeyreconError where clicks do not belong to a video of this length and size."""
     if clicks.size != size:
+        turned = " (on its side)" if clicks.size == size[::-1] else ""
         raise KeyreconError(
             f"The clicks were made on pictures of {clicks.size[0]} x {clicks.size[1]} px, but this "
-            f"video has {size[0]} x {size[1]}; click again in this video."
+            f"video has {size[0]} x {size[1]}{turned}; click again in this video."
         )
     if not 0 <= clicks.frame < n_frames:
         raise KeyreconError(
@@ -133,8 +145,40 @@ def check_clicks(clicks: GolfClicks, n_frames: int, size: tuple[int, int]) -> No
         )
 
 
+def check_numbers(clicks: GolfClicks, origin: str) -> None:
+    """Stature, focal length, principal point and size as players and cameras have them.
+
+    Raises KeyreconError that names `origin`, the file they come from.
+    """
+    if min(clicks.size) < 1:
+        raise KeyreconError(
+            f"{origin}: pictures of {clicks.size[0]} x {clicks.size[1]} px do not exist; "
+            "'size' is width and height of the video's pictures."
+        )
+    if not STATURES[0] <= clicks.stature <= STATURES[1]:
+        raise KeyreconError(
+            f"{origin}: the stature is {clicks.stature:g}, but it is the player's height in "
+            f"metres, {STATURES[0]:g} to {STATURES[1]:g}; leave it out where it is not known."
+        )
+    shares = np.array(FOCALS) * clicks.size[0]
+    if clicks.focal is not None and not shares[0] <= clicks.focal <= shares[1]:
+        raise KeyreconError(
+            f"{origin}: the focal length is {clicks.focal:g} px, but for pictures "
+            f"{clicks.size[0]} px wide lenses have {shares[0]:.0f} to {shares[1]:.0f}; leave it "
+            "out where it is not known."
+        )
+    if clicks.principal is not None:
+        middle = np.array(clicks.principal) / clicks.size
+        if not (np.abs(middle - 0.5) <= 1).all():
+            raise KeyreconError(
+                f"{origin}: the principal point ({clicks.principal[0]:g}, "
+                f"{clicks.principal[1]:g}) is far outside the picture; leave it out where it is "
+                "not known."
+            )
+
+
 def check_joints(clicks: GolfClicks, origin: str) -> None:
-    """The joints that a start needs, inside the picture, the right way up.
+    """The joints that a start needs, inside the picture, the right way up, of one person.
 
     Raises KeyreconError that names `origin`, the file they come from.
     """
@@ -148,6 +192,8 @@ def check_joints(clicks: GolfClicks, origin: str) -> None:
     )
     if missing := [name for name in NEEDED if name not in given]:
         raise KeyreconError(f"{origin} lacks a click on {' and '.join(missing)}; add it.")
+    if strange := sorted(set(clicks.hidden) - set(clicks.joints)):
+        raise KeyreconError(f"{origin}: '{strange[0]}' is hidden but was not clicked; click it.")
     for name, (x, y) in clicks.joints.items():
         if not (0 <= x < clicks.size[0] and 0 <= y < clicks.size[1]):
             raise KeyreconError(
@@ -163,9 +209,30 @@ def _check_posture(pose: ClickedPose, origin: str) -> None:
             f"{origin}: head and ankles are only {pose.height:.0f} px apart; the player must be "
             f"at least {SHORTEST_PLAYER:.0f} px tall. Check the clicks or crop the video."
         )
+    aside, down = np.abs(pose.feet - pose.place("head_top"))
+    if aside > down:
+        raise KeyreconError(
+            f"{origin}: the player lies on his side from head to ankles; turn the video upright "
+            "and click again."
+        )
     head, root, feet = pose.place("head_top")[1], pose.place("root")[1], pose.feet[1]
     if not head < root < feet:
         raise KeyreconError(
             f"{origin}: the head, the root and the ankles must be clicked from top to bottom, but "
             f"they are at y = {head:g}, {root:g} and {feet:g}; click the address posture again."
         )
+    for first, second, (least, most) in _LIMB_BOUNDS:
+        length = float(np.linalg.norm(pose.place(first) - pose.place(second))) / pose.height
+        if not least <= length <= most:
+            raise KeyreconError(
+                f"{origin}: {first} and {second} are {length:.2f} of the player's height apart, "
+                f"where one person has {least:g} to {most:g}; click all joints of one player."
+            )
+
+
+_LIMB = (SHORTEST_CLICK_LIMB, LONGEST_CLICK_LIMB)
+_LIMB_BOUNDS = (
+    ("head_top", "root", TRUNK_SHARE), ("root", "right_knee", _LIMB), ("root", "left_knee", _LIMB),
+    ("right_knee", "right_ankle", _LIMB), ("left_knee", "left_ankle", _LIMB),
+    ("right_ankle", "left_ankle", (0.0, WIDEST_STANCE)),
+)  # fmt: skip

@@ -46,6 +46,26 @@ def test_the_root_lies_between_both_hips(tmp_path):
         ({"joints": {**JOINTS, "root": (90, 290)}}, "from top to bottom"),
         ({"joints": {k: (90, 100 + y / 20) for k, (_, y) in JOINTS.items()}}, "12 px apart"),
         ({"joints": 7}, "not a file of golf clicks"),
+        ({"joints": {**JOINTS, "root": (float("nan"), 160)}}, "root at .* outside the picture"),
+        ({"joints": {**JOINTS, "left_ankle": (199, 298)}}, "left_knee and left_ankle are 0."),
+        ({"joints": {**JOINTS, "right_knee": (0, 240)}}, "root and right_knee are 0."),
+        ({"joints": {k: (30 + y / 2, 60 + x / 2) for k, (x, y) in JOINTS.items()}}, "on his side"),
+        ({"joints": {k: (x, 299 - y) for k, (x, y) in JOINTS.items()}}, "from top to bottom"),
+        ({"hidden": ["left_wrist"]}, "'left_wrist' is hidden but was not clicked"),
+        ({"stature": -1}, "the stature is -1, but it is the player's height in metres"),
+        ({"stature": 0}, "the stature is 0"),
+        ({"stature": 180}, "the stature is 180"),
+        ({"stature": float("nan")}, "the stature is nan"),
+        ({"stature": "tall"}, "not a file of golf clicks"),
+        ({"focal": 0}, "the focal length is 0 px, .* lenses have 40 to 12000"),
+        ({"focal": float("nan")}, "the focal length is nan"),
+        ({"focal": -900}, "the focal length is -900"),
+        ({"principal": [5000, 100]}, "principal point .5000, 100. is far outside"),
+        ({"principal": [float("nan"), 100]}, "principal point"),
+        ({"size": [0, 300]}, "pictures of 0 x 300 px do not exist"),
+        ({"frame": 0.5}, "0.5 is not a whole number"),
+        ({"frame": float("inf")}, "not a file of golf clicks"),
+        ({"left_handed": "false"}, "'left_handed' is 'false'; it must be true or false"),
     ],
 )
 def test_a_file_that_cannot_start_a_fit_says_why(tmp_path, changes, message):
@@ -53,9 +73,17 @@ def test_a_file_that_cannot_start_a_fit_says_why(tmp_path, changes, message):
         read_clicks(file_of(tmp_path, **changes))
 
 
+def test_what_nobody_knows_may_be_left_out(tmp_path):
+    clicks = read_clicks(file_of(tmp_path, stature=None, focal=None, principal=None))
+    assert clicks.stature == 1.75
+    assert clicked_pose(clicks).camera.focal == 1.2 * 200
+
+
 def test_clicks_of_another_video_are_noticed():
     clicks = GolfClicks(30, (200, 300), JOINTS)
     with pytest.raises(KeyreconError, match="200 x 300 px, but this video has 100 x 150"):
         check_clicks(clicks, 100, (100, 150))
+    with pytest.raises(KeyreconError, match=r"300 x 200 \(on its side\)"):
+        check_clicks(clicks, 100, (300, 200))
     with pytest.raises(KeyreconError, match="frame 30, but the video has frames 0 to 19"):
         check_clicks(clicks, 20, (200, 300))

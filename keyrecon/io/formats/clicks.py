@@ -9,12 +9,15 @@
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import STATURE, GolfClicks, check_joints
+from keyrecon.golf.clicks import STATURE, GolfClicks, check_joints, check_numbers
 from keyrecon.io.durable import write_durably
 
+Number = TypeVar("Number", int, float)
 FORMAT = 1
 """Version of the file."""
 
@@ -29,21 +32,27 @@ def read_clicks(path: Path) -> GolfClicks:
                 f"{path} is a file of clicks of version {version}; this keyrecon reads {FORMAT}."
             )
         principal, focal = content.get("principal"), content.get("focal")
+        stature, left_handed = content.get("stature"), content.get("left_handed", False)
+        if not isinstance(left_handed, bool):
+            raise KeyreconError(
+                f"{path}: 'left_handed' is {left_handed!r}; it must be true or false."
+            )
         clicks = GolfClicks(
-            frame=int(content["frame"]),
-            size=_pair(content["size"], int),
-            joints={str(n): _pair(p, float) for n, p in content["joints"].items()},
+            frame=_whole(content["frame"]),
+            size=_pair(content["size"], _whole),
+            joints={n: _pair(p, float) for n, p in content["joints"].items()},
             hidden=tuple(str(n) for n in content.get("hidden", ())),
-            left_handed=bool(content.get("left_handed", False)),
-            stature=float(content.get("stature") or STATURE),
+            left_handed=left_handed,
+            stature=STATURE if stature is None else float(stature),
             focal=None if focal is None else float(focal),
             principal=None if principal is None else _pair(principal, float),
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+    except (OSError, ArithmeticError, ValueError, KeyError, TypeError, AttributeError) as fault:
         raise KeyreconError(
             f"{path} is not a file of golf clicks ({fault!r}); it is a JSON object with "
             '"keyrecon_golf_clicks", "frame", "size" and "joints".'
         ) from fault
+    check_numbers(clicks, str(path))
     check_joints(clicks, str(path))
     return clicks
 
@@ -65,6 +74,13 @@ def write_clicks(path: Path, clicks: GolfClicks) -> None:
     write_durably(path, f'{{\n  {body},\n  "joints": {{\n    {joints}\n  }}\n}}\n')
 
 
-def _pair(values: list, kind: type) -> tuple:
+def _pair(values: list, kind: Callable[[Any], Number]) -> tuple[Number, Number]:
     first, second = values
     return kind(first), kind(second)
+
+
+def _whole(number: Any) -> int:
+    """A whole number; raises ValueError for any other, which `int` would cut."""
+    if int(number) != number:
+        raise ValueError(f"{number!r} is not a whole number")
+    return int(number)
