@@ -109,7 +109,7 @@ def test_a_project_of_another_video_is_left_alone(swing, decoded_at_first, tmp_p
     other = tmp_path / "other.mp4"
     size = open_video(swing / "video.mp4")
     picture = np.zeros((size.height, size.width, 3), np.uint8)
-    write_video(other, (picture for _ in range(5)), 24.0)
+    write_video(other, (picture for _ in range(25)), 24.0)
     with pytest.raises(KeyreconError, match="is the project of another video"):
         fit_file(other, swing / "clicks.json", swing / "project", options=QUICK)
 
@@ -124,7 +124,7 @@ def test_a_project_with_keyframes_is_left_alone(swing, tmp_path):
 
 def test_another_slow_motion_needs_another_folder(swing, decoded_at_first):
     with pytest.raises(KeyreconError, match="was made with --slowmo 1"):
-        fit(swing, swing / "project", slow_motion=4.0)
+        fit(swing, swing / "project", slow_motion=1.5)
 
 
 def test_other_clicks_stay_beside_the_new_ones(swing, tmp_path):
