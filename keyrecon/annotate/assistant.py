@@ -23,7 +23,8 @@ class Assistant:
     """What can be computed while a person marks."""
 
     keyframes: Callable[[dict[int, str]], Json] | None = None
-    """Added keyframes -> {"frames": {frame: {"stands_for", "why"}}, "height_px"}."""
+    """Added keyframes -> {"frames": {frame: {"stands_for", "why"}}, "height_px", "boxes"}; the
+    boxes tell where the player is in every frame."""
     bodies: Callable[[], list[Json] | None] | None = None
     """Frames in which a whole body, marked before there are keyframes, would teach most, as
     {"frame", "box"}; None before the player was followed."""

@@ -1,6 +1,7 @@
 """`keyrecon annotate`: the page's server put together with what it calls, and its address."""
 
 import asyncio
+import re
 import socket
 import webbrowser
 from collections.abc import Callable
@@ -25,7 +26,9 @@ from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import keyframing, project
+from keyrecon.app.exporting import export
 from keyrecon.app.preparing import prepare_project
+from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -105,6 +108,7 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
         "follow": partial(_follow_player, folder),
         "keyframes": partial(_find_keyframes, folder),
         "run": partial(_run, folder),
+        "export": partial(_export, folder),
     }
 
 
@@ -138,10 +142,26 @@ def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -
     )
     workspace = Workspace(folder)
     _prepare_with_bodies(workspace, workspace.video())
-    return keyframing.find_keyframes(workspace, Options(), chosen, progress)
+    return _contradictions(keyframing.find_keyframes(workspace, Options(), chosen, progress))
 
 
 def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
     settings = project.settings(workspace, Options(), options.get("height"))
-    return project.run(workspace, settings, progress, partial=True)
+    return _contradictions(project.run(workspace, settings, progress, partial=True))
+
+
+def _contradictions(told: str) -> str:
+    """Of what a command tells, the clicks and marks that do not fit the rest: the page shows
+    everything else in places of its own."""
+    named = re.compile(r"The [\w ]+ (clicked|marked) in frame \d+")
+    return "\n".join(line for line in told.splitlines() if named.match(line))
+
+
+def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
+    """Files for other programs, named after the project, into its folder `exports`."""
+    workspace = Workspace(folder)
+    make_folder(workspace.exports)
+    name = folder.resolve().name
+    files = [workspace.exports / f"{name}{suffix}" for suffix in options.get("formats", ())]
+    return "\n".join(export(workspace, files, progress))

@@ -6,6 +6,7 @@
     annotations.json   what a person marked
     skeleton.json      joints and bones, where they are not the default ones
     motion.npz, report.html
+    exports/           files for other programs that the page wrote
     cache/             results of the stages; safe to delete
 
 What a person made is written durably and never replaced by something that does not parse.
@@ -94,6 +95,16 @@ class Workspace:
     def report_file(self) -> Path:
         """report.html"""
         return self.folder / "report.html"
+
+    @property
+    def exports(self) -> Path:
+        """Folder for files that the page writes for other programs."""
+        return self.folder / "exports"
+
+    def exported_files(self) -> list[Path]:
+        """What stands in that folder."""
+        found = self.exports.iterdir() if self.exports.is_dir() else ()
+        return sorted(f for f in found if f.is_file() and not f.name.startswith("."))
 
     @property
     def skeleton(self) -> Skeleton:

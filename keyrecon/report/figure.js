@@ -52,6 +52,7 @@ function scene() {
     center: [0, level - 0.5 * data.stature, 0],
     level,
     unit: data.stature,
+    ground: `ground, squares of ${(data.stature / 6).toFixed(2)} ${data.units}`,
     trunk: data.trunk,
     head: data.head,
     other: truth ? { points: pose(truth3d), color: cssColor("truth"), width: 4, alpha: 0.6 } : null,

@@ -109,14 +109,115 @@ function drawFlat(pen, bones, place, { color, width, alpha = 1 }) {
   pen.globalAlpha = 1;
 }
 
+const CAMERA = { away: 0.62, size: 0.05 }; // from the center and half its width, body heights
+const LABEL_FONT = "12px system-ui, sans-serif";
+
+function drawText(pen, text, [x, y], align) {
+  pen.font = LABEL_FONT;
+  pen.textAlign = align;
+  pen.textBaseline = "middle";
+  pen.fillStyle = cssColor("muted");
+  pen.fillText(text, x, y);
+}
+
+// On the ground, in front of the body: which way the camera looks. z points away from it.
+function drawCamera(pen, project, { center, level, unit }) {
+  const [x, z] = [center[0], center[2] - CAMERA.away * unit],
+    half = CAMERA.size * unit;
+  const at = (dx, dy, dz) => project([x + dx * half, level + dy * half, z + dz * half]);
+  const lens = [at(-1, 0, 2), at(1, 0, 2), at(1, -1.6, 2), at(-1, -1.6, 2)],
+    eye = at(0, -0.8, -0.5);
+  pen.strokeStyle = pen.fillStyle = cssColor("accent");
+  pen.lineWidth = 1.5;
+  pen.beginPath();
+  for (const [n, corner] of lens.entries()) {
+    pen.moveTo(eye[0], eye[1]);
+    pen.lineTo(corner[0], corner[1]);
+    pen.lineTo(...lens[(n + 1) % 4].slice(0, 2));
+  }
+  pen.stroke();
+  pen.beginPath();
+  pen.arc(eye[0], eye[1], 2.5, 0, 2 * Math.PI);
+  pen.fill();
+  const top = Math.min(eye[1], ...lens.map(([, y]) => y));
+  drawText(pen, "camera", [eye[0], top - 10], "center");
+}
+
+// From where the body is seen, in words.
+export function viewInWords({ yaw, pitch }) {
+  const [across, up] = [yaw, pitch].map((angle) => Math.round((angle * 180) / Math.PI)),
+    turn = ((((across + 180) % 360) + 360) % 360) - 180;
+  if (up > 75) return "from above";
+  const parts = [
+    Math.abs(turn) < 3 ? "from the camera" : `${Math.abs(turn)}° to the ${turn > 0 ? "right" : "left"} of the camera`,
+    Math.abs(up) < 3 ? "" : `${Math.abs(up)}° ${up > 0 ? "from above" : "from below"}`,
+  ];
+  return parts.filter(Boolean).join(", ");
+}
+
+// What the colours and the squares mean, and from where the body is seen.
+function drawLegend(pen, [width, height], { view, ground }) {
+  drawText(pen, viewInWords(view), [10, height - 12], "left");
+  drawText(pen, ground, [10, height - 28], "left");
+  for (const [n, side] of ["right", "left"].entries()) {
+    const y = height - 12 - 16 * n;
+    drawText(pen, side, [width - 10, y], "right");
+    pen.fillStyle = cssColor(side);
+    drawEnd(pen, [width - 46, y], side, 4);
+  }
+}
+
+// Where the chest points: without it nobody tells front from back.
+function drawFront(pen, project, { points, trunk, unit }) {
+  const [leftShoulder, rightShoulder, rightHip, leftHip] = trunk.map((key) => points[key]);
+  if (![leftShoulder, rightShoulder, rightHip, leftHip].every((point) => point && Number.isFinite(point[0])))
+    return;
+  const middle = (a, b) => [0, 1, 2].map((axis) => (a[axis] + b[axis]) / 2),
+    [chest, hips] = [middle(leftShoulder, rightShoulder), middle(leftHip, rightHip)];
+  const front = chestDirection(points, trunk),
+    start = [0, 1, 2].map((axis) => chest[axis] + 0.25 * (hips[axis] - chest[axis])),
+    end = start.map((value, axis) => value + 0.16 * unit * front[axis]);
+  const [a, b] = [project(start), project(end)],
+    along = Math.hypot(b[0] - a[0], b[1] - a[1]);
+  pen.strokeStyle = pen.fillStyle = cssColor("trunk");
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.moveTo(a[0], a[1]);
+  pen.lineTo(b[0], b[1]);
+  pen.stroke();
+  if (along < 4) return;
+  const [ux, uy] = [(b[0] - a[0]) / along, (b[1] - a[1]) / along];
+  pen.beginPath();
+  pen.moveTo(b[0] + 6 * ux, b[1] + 6 * uy);
+  pen.lineTo(b[0] - 4 * uy, b[1] + 4 * ux);
+  pen.lineTo(b[0] + 4 * uy, b[1] - 4 * ux);
+  pen.fill();
+}
+
+// The way the chest points, a unit vector: down the trunk crossed with right to left.
+export function chestDirection(points, [leftShoulder, rightShoulder, rightHip, leftHip]) {
+  const [ls, rs, rh, lh] = [leftShoulder, rightShoulder, rightHip, leftHip].map((key) => points[key]);
+  const across = [0, 1, 2].map((axis) => ls[axis] - rs[axis] + lh[axis] - rh[axis]),
+    down = [0, 1, 2].map((axis) => lh[axis] + rh[axis] - ls[axis] - rs[axis]);
+  const front = [0, 1, 2].map((n) => {
+    const [i, j] = [(n + 1) % 3, (n + 2) % 3];
+    return down[i] * across[j] - down[j] * across[i];
+  });
+  const length = Math.hypot(...front) || 1;
+  return front.map((part) => part / length);
+}
+
 // The trunk as a tinted plane and the head as a ball, so that the eye sees which way it faces.
 function drawVolumes(pen, project, { points, trunk, head }, zoom) {
   pen.fillStyle = cssColor("trunk");
   pen.globalAlpha = 0.18;
   pen.beginPath();
-  for (const key of trunk) pen.lineTo(...project(points[key]).slice(0, 2));
-  pen.fill();
-  if (head.length) {
+  const known = (key) => points[key] && Number.isFinite(points[key][0]);
+  if (trunk.every(known)) {
+    for (const key of trunk) pen.lineTo(...project(points[key]).slice(0, 2));
+    pen.fill();
+  }
+  if (head.length && head.every(known)) {
     const [low, high] = head.map((key) => points[key]);
     const along = [0, 1, 2].map((axis) => high[axis] - low[axis]),
       length = Math.hypot(...along);
@@ -155,7 +256,8 @@ function drawBones(pen, bones, { boneWidth, marksEnds }, zoom) {
 // `scene()` tells what is to be drawn, or null for nothing:
 //   points   by key, [x, y, z] or nothing; bones [{from, to, side: "left" | "right" | "trunk"}]
 //   center   the point that stays in the middle; level: y of the ground; unit: the body's height
-//   trunk    keys around the trunk, head: its lower and upper key; both may be empty
+//   ground   what is said of the ground, such as the size of its squares
+//   trunk    keys around the trunk (left shoulder, right shoulder, right hip, left hip), head: its lower and upper key; both may be empty
 //   other    a second pose to compare with: {points, color, width, alpha}, or null
 // `style` is what differs between pages: start (yaw, pitch), fit(width, height) in body heights, grid
 // {lines, step} in body heights, boneWidth (px), marksEnds, and whether a plain wheel scrolls the page.
@@ -183,8 +285,11 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
       const there = (key) => now.other.points[key] && project(now.other.points[key]);
       drawFlat(pen, now.bones, there, now.other);
     }
+    drawCamera(pen, project, now);
     if (now.trunk.length) drawVolumes(pen, project, now, view.zoom);
     drawBones(pen, sortBones(now, project), style, view.zoom);
+    if (now.trunk.length) drawFront(pen, project, now);
+    drawLegend(pen, [width, height], { view, ground: now.ground });
   }
 
   // At most once for every picture on the screen.

@@ -231,6 +231,7 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
         "bones": drawn_bones(skeleton).tolist(),
         "sides": bone_sides(skeleton).tolist(),
         "stature": stature(motion),
+        "units": motion.units,
         "trunk": trunk_outline(skeleton),
         "head": head_bone(skeleton),
         "points3d": pack(center_on_root(motion.points3d, skeleton.root)),

@@ -1,7 +1,7 @@
 // The figure in space: where a turned point is seen, and what lies before what.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { createProjection, sortBones, turned, zoomed } from "../../keyrecon/report/figure3d.js";
+import { chestDirection, createProjection, sortBones, turned, viewInWords, zoomed } from "../../keyrecon/report/figure3d.js";
 
 const SCENE = { center: [1, 2, 3], unit: 1.8, scale: 100, size: [400, 300] };
 const AHEAD = { yaw: 0, pitch: 0, zoom: 1 };
@@ -43,4 +43,19 @@ test("bones are drawn far to near, those of unknown ends not at all", () => {
   const bones = ["near", "far", "lost", "nowhere"].map((to) => ({ from: "hip", to, side: "left" }));
   const sorted = sortBones({ points, bones }, createProjection(AHEAD, SCENE));
   assert.deepEqual(sorted.map(({ to }) => to), ["far", "near"]);
+});
+
+test("the chest of somebody who faces the camera points at it, turned away it points away", () => {
+  const trunk = ["left", "right", "rightHip", "leftHip"];
+  const facing = { left: [1, 0, 0], right: [-1, 0, 0], leftHip: [0.6, 3, 0], rightHip: [-0.6, 3, 0] };
+  assert.deepEqual(chestDirection(facing, trunk).map((part) => Math.round(part) + 0), [0, 0, -1]);
+  const away = { ...facing, left: facing.right, right: facing.left, leftHip: facing.rightHip, rightHip: facing.leftHip };
+  assert.deepEqual(chestDirection(away, trunk).map((part) => Math.round(part) + 0), [0, 0, 1]);
+});
+
+test("where the body is seen from is told in words", () => {
+  assert.equal(viewInWords({ yaw: 0, pitch: 0 }), "from the camera");
+  assert.equal(viewInWords({ yaw: Math.PI / 2, pitch: 0 }), "90° to the right of the camera");
+  assert.equal(viewInWords({ yaw: -0.5, pitch: 0.2 }), "29° to the left of the camera, 11° from above");
+  assert.equal(viewInWords({ yaw: 1, pitch: Math.PI / 2 }), "from above");
 });

@@ -1,5 +1,6 @@
 """A project to be marked in a browser: a short video, keyframes, and a body that is known."""
 
+import json
 import time
 
 import numpy as np
@@ -7,9 +8,10 @@ import numpy as np
 from keyrecon.app.project import start
 from keyrecon.body import LSP14
 from keyrecon.io.formats.keyframes import keyframes_to_json
+from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
-from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.records import HalfKeyframes, Keyframes, Motion
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
 FPS, FRAMES, SIZE = 25.0, 100, (640, 360)
@@ -88,3 +90,35 @@ def follow_at_once(folder, options, progress):
     """Nothing is followed; what asks for more bodies finds that it was."""
     (folder / "followed").touch()
     return "Followed."
+
+
+def write_true_motion(folder):
+    """The motion that is known, and a report, as a run leaves them."""
+    points3d, points2d = truth()
+    motion = Motion(
+        skeleton=LSP14,
+        points3d=points3d,
+        points2d=points2d,
+        points2d_propagated=points2d,
+        confidence=np.ones(points2d.shape[:2]),
+        source=np.zeros(points2d.shape[:2], dtype=np.int64),
+        scale=np.full(FRAMES, PIXELS),
+        fps=FPS,
+        time=np.arange(FRAMES) / FPS,
+        units="m",
+        keyframes=np.array([10, 40, 70]),
+    )
+    write_motion(folder / "motion.npz", motion)
+    script = """<script>
+      let seen = "a cookie";
+      try { document.cookie; } catch { seen = "no cookie"; }
+      document.body.append(`, ${seen} for its script`);
+    </script>"""
+    (folder / "report.html").write_text(f"<!doctype html><body>A report{script}</body>")
+
+
+def run_at_once(folder, options, progress):
+    """A run that knows the motion; notes the options that it was told."""
+    (folder / "told.json").write_text(json.dumps(options))
+    write_true_motion(folder)
+    return ""

@@ -64,7 +64,11 @@ def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:
         }
         for frame, reason in reasons.items()
     }
-    return {"frames": frames, "height_px": float(np.median(preparation.track.height))}
+    return {
+        "frames": frames,
+        "height_px": float(np.median(preparation.track.height)),
+        "boxes": [_rounded(box, 0) if np.isfinite(box).all() else None for box in boxes],
+    }
 
 
 MORE_BODIES = 3

@@ -8,6 +8,7 @@ import { createModel } from "./state/model.js";
 import { createBodies } from "./views/bodies.js";
 import { createDepth } from "./views/depth.js";
 import { byId } from "./views/dom.js";
+import { createExports } from "./views/exports.js";
 import { createFiles } from "./views/files.js";
 import { createJoints } from "./views/joints.js";
 import { belongsTo, interpret, keyframeCommands } from "./views/keyboard.js";
@@ -18,7 +19,7 @@ import { createPick } from "./views/pick.js";
 import { createPrompt, createScrub } from "./views/prompt.js";
 import { createShell } from "./views/shell.js";
 
-const VIEWS = ["bodies", "keyframes", "motion"];
+const VIEWS = ["bodies", "keyframes", "motion", "files"];
 
 const model = await createModel();
 const { ui } = model;
@@ -47,13 +48,14 @@ const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
 createFiles(model);
+const exports = createExports(model, shell);
 
 let opening = null; // {frame, at}: a keyframe that is not drawn yet, to measure how long it takes
 
 function opened(frame) {
   opening = { frame, at: performance.now() };
   const places = Object.values(model.marks(frame)).filter(([, , v]) => v);
-  viewer.frameBox(enclosing(model.keyframe()?.box ?? bodies.box(frame), places));
+  viewer.frameBox(enclosing(model.box(frame) ?? bodies.box(frame), places));
   history.replaceState(null, "", `#frame=${frame}`);
   model.poses.requestSuggestion(frame);
   prefetchAround();
@@ -99,12 +101,14 @@ model.onDraw(() => {
   if (ui.view === "bodies") bodies.draw();
   if (ui.view === "pick") pick.draw();
   if (ui.view === "motion") motion.draw();
+  if (ui.view === "files") exports.draw();
 });
 
 function go(view) {
   actions.dropDragged();
   model.update({ view });
   if (view === "pick") pick.opened();
+  if (view === "files") exports.opened();
 }
 
 const commands = {
@@ -113,11 +117,13 @@ const commands = {
     redo: actions.redo,
     help: shell.help,
     page: ({ index }) => go(VIEWS[index]),
+    stage: toggleStage,
   },
   keyframes: keyframeCommands(model, { actions, viewer, lists }),
   bodies: bodies.commands,
   pick: pick.commands,
   motion: motion.commands,
+  files: exports.commands,
 };
 
 function execute(command, key) {
@@ -150,6 +156,13 @@ function onPress(selector, command) {
 }
 onPress("[data-swap]", (button) => commands.keyframes[button.dataset.swap]());
 onPress("#alternatives button", (_, n) => actions.confirmAlternative(n));
+// The body in space on the whole stage, or beside the picture.
+function toggleStage() {
+  const page = byId(ui.view);
+  if (page.dataset.stage) delete page.dataset.stage;
+  else page.dataset.stage = "figure";
+}
+onPress("[data-stage]", toggleStage);
 onPress("#bodies-colours", () => go("pick"));
 onPress("#pick-bodies", () => go("bodies"));
 onPress("#undo", actions.undo);

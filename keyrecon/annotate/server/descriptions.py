@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from keyrecon.annotate.server.jobs import Job
+from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_body, of_kind, picks_of
 from keyrecon.annotate.store.journal import Entry, JournalState
 from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
@@ -189,4 +190,4 @@ def describe_changes(changes: Iterable[Change]) -> list[Json]:
 
 def describe_job(job: Job) -> Json:
     """How far a job is."""
-    return asdict(job)
+    return asdict(job) | {"text": in_page_words(job.text)}

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from msgspec import Meta, Struct
-from starlette.responses import Response
+from msgspec import Meta, Struct, to_builtins
+from starlette.responses import FileResponse, Response
 
 from keyrecon.annotate.server.descriptions import (
     describe_changes,
@@ -37,6 +37,16 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.records import SOURCES, Motion
 
 Json = dict[str, Any]
+REPORT_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; media-src data: blob:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
+)
+"""What the report may do: show itself."""
+REPORT_HEADERS = {
+    "Content-Security-Policy": REPORT_POLICY,
+    "Cross-Origin-Opener-Policy": "unsafe-none",  # no browser opens a sealed page with another
+}
 
 
 @dataclass(frozen=True)
@@ -68,11 +78,22 @@ class PreviewRequest(Struct, forbid_unknown_fields=True):
     frames: Annotated[list[Frame], Meta(min_length=1, max_length=60)]
 
 
+class JobOptions(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """How work is done; what is not told is as in the project."""
+
+    budget: float | None = None
+    coverage: float | None = None
+    reach: float | None = None
+    height: float | None = None
+    formats: Annotated[tuple[Annotated[str, Meta(max_length=8)], ...], Meta(max_length=12)] = ()
+    """Suffixes of the files to be written."""
+
+
 class JobRequest(Struct, forbid_unknown_fields=True):
     """Work to begin."""
 
     kind: Name
-    options: dict[Literal["budget", "coverage", "reach", "height"], float | None] = {}
+    options: JobOptions = JobOptions()
 
 
 class ImportRequest(Struct, forbid_unknown_fields=True):
@@ -180,7 +201,8 @@ def jobs(session: Session, request: ApiRequest) -> list[Json]:
 
 def begin_job(session: Session, request: ApiRequest) -> Json:
     """Start work."""
-    return {"job": describe_job(session.jobs.start(request.body.kind, request.body.options))}
+    options = to_builtins(request.body.options)
+    return {"job": describe_job(session.jobs.start(request.body.kind, options))}
 
 
 def cancel_job(session: Session, request: ApiRequest) -> Json:
@@ -191,6 +213,44 @@ def cancel_job(session: Session, request: ApiRequest) -> Json:
 def motion(session: Session, request: ApiRequest) -> Json:
     """A stretch of the result."""
     return _motion_stretch(session.workspace.motion_file, request.query)
+
+
+def report(session: Session, request: ApiRequest) -> Response:
+    """The report of the last run. It is one file with scripts of its own, so it is shown apart:
+    it may load nothing, and has no access to the page's server."""
+    file = session.workspace.report_file
+    if not file.is_file():
+        raise KeyreconError("There is no report yet: make the motion first.")
+    return Response(file.read_bytes(), media_type="text/html", headers=REPORT_HEADERS)
+
+
+def exports(session: Session, request: ApiRequest) -> list[Json]:
+    """The files that were written for other programs, the latest first."""
+    files = session.workspace.exported_files()
+    stamps = {file: file.stat() for file in files}
+    files.sort(key=lambda file: stamps[file].st_mtime_ns, reverse=True)
+    return [
+        {
+            "name": file.name,
+            "bytes": stamps[file].st_size,
+            "place": str(file.parent),
+            "current": stamps[file].st_mtime_ns >= _last_change(session.workspace.motion_file),
+        }
+        for file in files
+    ]
+
+
+def _last_change(file: Path) -> int:
+    return file.stat().st_mtime_ns if file.is_file() else 0
+
+
+def exported_file(session: Session, request: ApiRequest) -> Response:
+    """One of these files, to be kept."""
+    name = request.path["name"]
+    for file in session.workspace.exported_files():
+        if file.name == name:
+            return FileResponse(file, filename=name, media_type="application/octet-stream")
+    raise KeyreconError(f"There is no file '{name}' among the exports.")
 
 
 def import_file(session: Session, request: ApiRequest) -> Json:
@@ -214,6 +274,7 @@ def _motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
         "from": first,
         "to": last,
         "units": motion.units,
+        "stature": _stature(motion),
         "points2d": np.round(motion.points2d[chosen], 1).tolist(),
         "points3d": np.round(motion.points3d[chosen], 4).tolist(),
         "confidence": np.round(motion.confidence[chosen], 2).tolist(),
@@ -223,6 +284,13 @@ def _motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
         "source": motion.source[chosen].tolist(),
         "source_names": list(SOURCES),
     }
+
+
+def _stature(motion: Motion) -> float:
+    """The player's height in the motion's units, from all bones and their usual share of it."""
+    parents, children = motion.skeleton.bones.T
+    lengths = np.linalg.norm(motion.points3d[:, children] - motion.points3d[:, parents], axis=-1)
+    return round(float(np.nanmedian(lengths / motion.skeleton.lengths)), 4)
 
 
 @lru_cache(maxsize=1)

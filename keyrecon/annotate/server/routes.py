@@ -21,6 +21,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from keyrecon.annotate.server import handlers
+from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.security import Credentials, SecurityMiddleware
 from keyrecon.annotate.server.session import Session
 from keyrecon.annotate.store.edits import EditList
@@ -64,6 +65,9 @@ ROUTES = (
     ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
     ApiRoute("DELETE", "/api/jobs/{job:int}", handlers.cancel_job),
     ApiRoute("GET", "/api/motion", handlers.motion),
+    ApiRoute("GET", "/api/report", handlers.report),
+    ApiRoute("GET", "/api/exports", handlers.exports),
+    ApiRoute("GET", "/api/exports/{name}", handlers.exported_file),
     ApiRoute("POST", "/api/import", handlers.import_file, handlers.ImportRequest),
     ApiRoute("GET", "/api/export/{format}", handlers.export_file),
 )
@@ -150,7 +154,7 @@ def _json(answer: Any, status: int = 200) -> Response:
 
 
 def _error(status: int, text: str) -> Response:
-    return _json({"error": text}, status)
+    return _json({"error": in_page_words(text)}, status)
 
 
 async def _frame(session: Session, request: Request) -> Response:

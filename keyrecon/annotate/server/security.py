@@ -140,7 +140,7 @@ def _with_headers(send: Send) -> Any:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in ANSWER_HEADERS.items():
-                headers[name] = value
+                headers.setdefault(name, value)
             headers.setdefault("Cache-Control", "no-store")
         await send(message)
 

@@ -17,6 +17,7 @@ from keyrecon.annotate.server.descriptions import (
 from keyrecon.annotate.server.events import Events
 from keyrecon.annotate.server.frame_cache import FrameCache
 from keyrecon.annotate.server.jobs import Command, Jobs
+from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.store.cells import by_frame, picks_of
 from keyrecon.annotate.store.edits import Limits
 from keyrecon.annotate.store.kept_keyframes import KeptKeyframes, halves_by_frame
@@ -87,11 +88,13 @@ def describe_project(session: Session) -> Json:
         ),
         "bodies": None if bodies is None else [body["frame"] for body in bodies],
         "height_px": explained.get("height_px"),
+        "boxes": explained.get("boxes"),
         "settings": describe_settings(Workspace(session.workspace.folder)),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),
             "motion": session.workspace.motion_file.is_file(),
+            "report": session.workspace.report_file.is_file(),
             "assistant": bool(explained),
         },
     }
@@ -124,7 +127,7 @@ class ProjectWatch:
             self._session.store.refresh()
             self._session.keyframes.current()
         except KeyreconError as fault:
-            trouble = str(fault)
+            trouble = in_page_words(str(fault))
         if trouble != self._trouble:
             self._trouble = trouble
             self._session.events.publish({"trouble": trouble})

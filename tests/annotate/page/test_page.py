@@ -18,6 +18,7 @@ from page_project import (
     true_signs,
     truth,
     write_numbered_video,
+    write_true_motion,
 )
 
 from keyrecon.annotate.assist.answers import describe_pose
@@ -268,7 +269,7 @@ def test_a_list_of_five_hundred_keyframes_makes_few_rows(person):
 
 def test_no_key_of_any_page_fails(person):
     pages = person.call("views/keyboard", "m.KEYS")
-    for number, page in ((1, "bodies"), (1, "pick"), (2, "keyframes"), (3, "motion")):
+    for number, page in ((1, "bodies"), (1, "pick"), (2, "keyframes"), (3, "motion"), (4, "files")):
         person.press(f"Alt+{number}")
         if page == "pick":
             person.page.click("#bodies-colours")
@@ -335,7 +336,8 @@ def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
     box = person.page.locator("#pick-picture").bounding_box()
     for dx in (0, 20, 40, 60):
         person.page.mouse.click(box["x"] + 300 + dx, box["y"] + 200)
-    person.await_text("#pick-text", "The colours are known")
+    person.await_text("#pick-text", "Click the shorts.*or go on")
+    assert "last click was taken for the shirt" in person.text("#pick-more")
     person.await_saved()
     picks = person.server.ask("state")["picks"]
     assert [pick["part"] for pick in sorted(picks, key=lambda pick: pick["x"])] == [
@@ -346,6 +348,25 @@ def test_colours_are_picked_by_clicks_and_removed_by_clicks(person, folder):
     ]
     person.page.mouse.click(box["x"] + 300, box["y"] + 200)
     person.await_text("#pick-text", "Click the middle of the head")
+
+
+def test_what_a_click_is_taken_for_is_asked_part_by_part_and_then_chosen(person):
+    person.press("Alt+1")
+    person.page.click("#bodies-colours")
+    person.page.wait_for_selector("#pick-picture[data-frame]")
+    box = person.page.locator("#pick-picture").bounding_box()
+    for n in range(8):
+        person.page.mouse.click(box["x"] + 200 + 25 * n, box["y"] + 200)
+    person.await_text("#pick-text", "The colours are known")
+    person.await_text("#notice-text", "Choose on the right what the click is to show")
+    person.await_saved()
+    picks = person.server.ask("state")["picks"]
+    parts = [pick["part"] for pick in sorted(picks, key=lambda pick: pick["x"])]
+    assert parts == ["head", "foot", "foot", "shirt", "shorts", "skin", "hair"]
+    assert person.text("#pick-count") == "7 clicks"
+    cut = "[...document.querySelectorAll('.parts kbd')].filter((key) =>"
+    cut += " key.getBoundingClientRect().right > key.parentElement.getBoundingClientRect().right)"
+    assert person.page.evaluate(f"{cut}.length") == 0
 
 
 class MarksOnly(ProjectCache):
@@ -390,6 +411,8 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
         person.await_text("#motion-text", "Make the motion")
         person.press("Enter")
         person.await_text("#job-text", "Counting")
+        job = person.page.locator("#job").bounding_box()
+        assert job["y"] + job["height"] <= person.page.locator("header").bounding_box()["height"]
         person.page.click("#job-cancel")
         person.await_text("#notice-text", "Cancelled")
         person.await_text("#motion-text", "Make the motion")
@@ -455,3 +478,67 @@ def test_edits_made_without_the_server_can_be_taken_back(person, folder):
     person.server.start()
     person.await_saved()
     assert np.isfinite(marks_on_file(folder).joints[0, :, 0]).sum() == 1
+
+
+def player_known():
+    """Where the player is in every frame, as the track knows it."""
+    boxes = np.hstack([POINTS2D.min(axis=1), POINTS2D.max(axis=1)]).tolist()
+    return Assistant(keyframes=lambda added: {"frames": {}, "height_px": 240.0, "boxes": boxes})
+
+
+def view_of(person):
+    return [*map(float, person.page.get_attribute("#picture", "data-view").split())]
+
+
+def test_a_frame_that_a_person_adds_opens_at_the_player_and_z_shows_the_whole(context, folder):
+    write_true_motion(folder)
+    with serving(folder, player_known()) as server:
+        person = Person(context, server.credentials.address)
+        person.press("Alt+3")
+        person.await_text("#motion-text", "The motion is made")
+        for _ in range(26):
+            person.press("e")
+        person.press("k")
+        person.await_text("#position", "frame 26 of")
+        person.page.wait_for_selector("#picture[data-frame='26']")
+        near = view_of(person)
+        person.press("z")
+        person.await_drawn()
+        assert view_of(person)[0] < 0.8 * near[0]
+        person.press("z")
+        person.await_drawn()
+        assert view_of(person) == near
+        context.close()
+    assert person.complaints == []
+
+
+INK = """
+() => {
+  const canvas = document.querySelectorAll("#picture canvas")[1], pen = canvas.getContext("2d");
+  return pen.getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0);
+}
+"""
+"""Whether anything is drawn over the picture."""
+
+
+def test_marks_wait_for_the_picture_they_belong_to(person, context):
+    person.open(10)
+    person.click(place_of(10, "head_top"))
+    person.click(place_of(10, "neck"))
+    person.await_drawn()
+    assert person.page.evaluate(INK)
+    context.route("**/api/frame/*", lambda route: route.abort())
+    person.press("e")
+    person.await_text("#position", "frame 11 of")
+    person.await_drawn()
+    assert not person.page.evaluate(INK)
+    person.press("q")
+    person.page.evaluate("location.hash = 'frame=70'")
+    person.await_text("#position", "frame 70 of")
+    person.await_drawn()
+    person.page.mouse.click(*[value / 2 for value in SCREEN.values()])
+    assert not person.page.evaluate(INK)
+    context.unroute("**/api/frame/*")
+    person.point_at(place_of(70, "neck"))
+    person.page.wait_for_selector("#picture[data-frame='70']")
+    assert {*person.server.ask("state")["marks"]} == {"10"}

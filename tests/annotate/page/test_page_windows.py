@@ -55,6 +55,7 @@ def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, s
         (None, "pick"),
         ("Alt+2", "keyframes"),
         ("Alt+3", "motion"),
+        ("Alt+4", "files"),
     ):
         if key is None:
             person.page.click("#bodies-colours")
@@ -66,4 +67,4 @@ def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, s
         wide = person.page.evaluate("document.documentElement.scrollWidth")
         assert wide <= size[0], page
     context.close()
-    assert found == {"bodies": [], "pick": [], "keyframes": [], "motion": []}
+    assert found == {"bodies": [], "pick": [], "keyframes": [], "motion": [], "files": []}

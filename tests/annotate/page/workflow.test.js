@@ -116,3 +116,13 @@ test("every joint of the figure has words", () => {
   assert.equal(Object.keys(FIGURE).length, 14);
   assert.equal(jointWords("tail"), "");
 });
+
+test("a height is metres or centimetres, and nothing else", () => {
+  assert.equal(workflow.heightIn("188").metres, 1.88);
+  assert.equal(workflow.heightIn("188 cm").metres, 1.88);
+  assert.equal(workflow.heightIn(" 1,75 m ").metres, 1.75);
+  assert.equal(workflow.heightIn("1.8").said, "metres");
+  assert.deepEqual(workflow.heightIn("").wrong, false);
+  for (const text of ["18", "0", "-1.8", "six feet", "1.8.0", "300", "1e3"])
+    assert.equal(workflow.heightIn(text).wrong, true, text);
+});

@@ -14,7 +14,8 @@ export function createViewer({ root, project, frames, redraw }) {
   const picture = [project.width, project.height];
   let view = null,
     box = null,
-    drawn = null; // what is on the canvas
+    drawn = null, // what is on the canvas
+    shown = null; // the frame that is on the canvas
 
   const size = () => [above.clientWidth, above.clientHeight];
   const whole = () => fit([0, 0, ...picture], size());
@@ -32,11 +33,13 @@ export function createViewer({ root, project, frames, redraw }) {
     if (!view) setView(near());
     const image = widths.map((width) => frames.get(frame, width)).find(Boolean);
     const label = `${frame}/${image?.width}/${size()}/${root.dataset.view}`;
+    root.classList.toggle("late", !image && shown !== null && shown !== frame);
     if (!image || drawn === label) return Boolean(image);
     const [pen] = prepareCanvas(below);
     pen.imageSmoothingQuality = "medium";
     pen.drawImage(image, view.x, view.y, view.scale * picture[0], view.scale * picture[1]);
     drawn = label;
+    shown = frame;
     root.dataset.frame = frame;
     return true;
   }
@@ -105,6 +108,8 @@ export function createViewer({ root, project, frames, redraw }) {
         size().map((extent) => extent / 2),
       ),
     scale: () => view.scale,
+    // The frame whose picture is on the canvas, null before the first: what is drawn over it belongs to it.
+    shown: () => shown,
     // Shows the surroundings of a box, or the whole picture.
     frameBox(next) {
       box = next ?? null;

@@ -119,6 +119,21 @@ export function createMotionCache(project, arrived) {
       const named = row.map((point, joint) => [project.joints[joint], point]);
       return Object.fromEntries(named.filter(([, point]) => point && point[0] !== null));
     },
+    // {level, unit, units} of a frame: the height of the ground, that of the lower foot on average over
+    // half a second, and the player's stature; null while it is not known.
+    ground(frame) {
+      const number = Math.floor(frame / CHUNK),
+        chunk = chunks.get(number);
+      if (!chunk) return null;
+      const radius = Math.max(1, Math.round(project.fps / 4)),
+        at = frame - number * CHUNK,
+        around = chunk.points3d.slice(Math.max(0, at - radius), at + radius + 1);
+      const lows = around.map((row) => Math.max(...row.map((point) => point?.[1] ?? -Infinity)));
+      const known = lows.filter(Number.isFinite);
+      if (!known.length) return null;
+      const level = known.reduce((sum, low) => sum + low, 0) / known.length;
+      return { level, unit: chunk.stature, units: chunk.units };
+    },
     // {joint: px}: how far off each joint probably is; null while it is not known.
     errors(frame) {
       const number = Math.floor(frame / CHUNK),

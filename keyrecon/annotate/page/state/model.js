@@ -188,6 +188,11 @@ export async function createModel() {
   model.nearer = (frame = model.ui.frame) => nearerOf(model.state, frame);
   model.keyframes = () => allKeyframes(model.project, model.state);
   model.keyframe = () => model.keyframes().find(({ frame }) => frame === model.ui.frame);
+  // Where the player is in a frame, keyframe or not; null while that is not known.
+  model.box = (frame) =>
+    model.keyframes().find((keyframe) => keyframe.frame === frame)?.box ??
+    model.project.boxes?.[frame] ??
+    null;
   model.isDone = (keyframe) =>
     isDone(model.project, keyframe, marksOf(model.state, keyframe.frame));
   // The marks, a joint that is being dragged where the pointer has it: name -> [x, y, v].

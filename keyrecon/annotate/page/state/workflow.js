@@ -106,6 +106,21 @@ export function whyNoAssistant({ has }) {
   return "The stored results are missing or of another version. Make the motion, and this works again.";
 }
 
+const HEIGHTS = [0.5, 2.6]; // of a player, metres
+
+// A height as it was typed: {metres, said, wrong}; metres is null for an empty field. Centimetres are
+// taken as such: nobody is 188 m tall.
+export function heightIn(text) {
+  const [, number, unit] = text.trim().replace(",", ".").match(/^([\d.]+)\s*(cm|m)?$/i) ?? [],
+    typed = Number(number);
+  if (!text.trim()) return { metres: null, said: "lengths in body heights", wrong: false };
+  const centimetres = unit ? unit.toLowerCase() === "cm" : typed > 10,
+    metres = Math.round(centimetres ? typed * 10 : typed * 1000) / 1000;
+  if (metres > HEIGHTS[0] && metres < HEIGHTS[1])
+    return { metres, said: centimetres ? `taken as ${metres.toFixed(2)} m` : "metres", wrong: false };
+  return { metres: null, said: "metres or centimetres: 1.80, 180", wrong: true };
+}
+
 // Parts whose colours are picked: those that the tracker cannot do without, then regions of one colour.
 export const REQUIRED_PARTS = [
   { part: "head", text: "head", hint: "the middle of the head", count: 1 },
@@ -140,6 +155,10 @@ export function missingParts(parts) {
   const regions = parts.slice(REQUIRED_PARTS.length);
   return regions.some(({ picked }) => picked) ? open : [...open, regions[0]];
 }
+
+// What is asked for next: what cannot be done without, then each common part once; null after that.
+export const nextPart = (parts) =>
+  missingParts(parts)[0] ?? parts.find(({ part, picked }) => !picked && COMMON_PARTS.includes(part)) ?? null;
 
 // The share that a project was set to, or the usual one, in per cent.
 export const budgetText = ({ settings, usual_budget: usual }) =>

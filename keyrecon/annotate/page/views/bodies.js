@@ -119,7 +119,7 @@ export function createBodies(model, { frames, shell, actions, colors }) {
   // What is marked on the frame that is shown.
   function drawMarks() {
     const [pen] = viewer.overlay(),
-      marks = Object.entries(model.marks(frame)).filter(([, place]) => place[2]);
+      marks = Object.entries(model.marks(viewer.shown() ?? frame)).filter(([, place]) => place[2]);
     const at = Object.fromEntries(marks.map(([name, place]) => [name, viewer.toScreen(place)]));
     const color = (name) => colors[model.sides[name]];
     for (const { name, parent } of project.limbs)

@@ -9,7 +9,7 @@ import { createGuide } from "./guide.js";
 const EMPTY = "The body in space appears here as joints are placed.";
 const STYLE = {
   start: { yaw: 0.6, pitch: 0.25 },
-  fit: (width, height) => Math.min(width, height) / 1.35,
+  fit: (width, height) => Math.min(width, height) / 1.45,
   grid: { lines: 3, step: 1 / 4 },
   shadowWidth: 6,
   boneWidth: 6,
@@ -17,32 +17,63 @@ const STYLE = {
   wheelScrolls: false,
 };
 
-// A body in space on a canvas of the page; `show(points, other)` takes places by joint.
+// Bones to draw: the limbs, and the line between both hips that closes the trunk.
+function bonesOf({ limbs, mirror, halves }, sides) {
+  const parent = Object.fromEntries(limbs.map((limb) => [limb.name, limb.parent]));
+  const closing = mirror.filter(
+    ([left, right]) => halves.lower.includes(left) && parent[left] && parent[left] === parent[right],
+  );
+  return [
+    ...limbs.map((limb) => ({
+      from: limb.parent,
+      to: limb.name,
+      side: { left: "left", right: "right", middle: "trunk" }[sides[limb.name]],
+    })),
+    ...closing.map(([from, to]) => ({ from, to, side: "trunk" })),
+  ];
+}
+
+// The joints around the trunk, left shoulder first; none where a skeleton has no such joints.
+export const trunkOf = ({ joints }) => {
+  const names = ["left_shoulder", "right_shoulder", "right_hip", "left_hip"];
+  return names.every((name) => joints.includes(name)) ? names : [];
+};
+const headOf = ({ joints }) =>
+  ["neck", "head_top"].every((name) => joints.includes(name)) ? ["neck", "head_top"] : [];
+
+// Ground and size of a single pose: the lowest joint stands on the ground.
+function placeOf(points) {
+  const all = Object.values(points);
+  const ranges = [0, 1, 2].map((axis) => {
+    const values = all.map((point) => point[axis]);
+    return [Math.min(...values), Math.max(...values)];
+  });
+  const [top, level] = ranges[1];
+  return {
+    center: ranges.map(([low, high]) => (low + high) / 2),
+    level,
+    unit: Math.max(level - top, 1e-6),
+    ground: "ground",
+  };
+}
+
+// A body in space on a canvas of the page; `show(points, other, place)` takes places by joint, and
+// where the ground is when more is known of it than this pose shows.
 export function createPoseFigure(canvas, model) {
-  const bones = model.project.limbs.map(({ name, parent }) => ({
-    from: parent,
-    to: name,
-    side: { left: "left", right: "right", middle: "trunk" }[model.sides[name]],
-  }));
+  const bones = bonesOf(model.project, model.sides),
+    [trunk, head] = [trunkOf(model.project), headOf(model.project)];
   let points = null,
-    other = null;
+    other = null,
+    place = null;
 
   function scene() {
-    const all = Object.values(points ?? {});
-    if (all.length < 2) return null;
-    const ranges = [0, 1, 2].map((axis) => {
-      const values = all.map((point) => point[axis]);
-      return [Math.min(...values), Math.max(...values)];
-    });
-    const [top, level] = ranges[1];
+    if (Object.keys(points ?? {}).length < 2) return null;
     return {
+      ...(place ?? placeOf(points)),
       points,
       bones,
-      center: ranges.map(([low, high]) => (low + high) / 2),
-      level,
-      unit: Math.max(level - top, 1e-6),
-      trunk: [],
-      head: [],
+      trunk,
+      head,
       other: other && { points: other, color: cssColor("rule"), width: 3 },
     };
   }
@@ -54,10 +85,11 @@ export function createPoseFigure(canvas, model) {
 
   return {
     // Drawn when it changes, not with every move of the pointer.
-    show(next = null, faint = null) {
+    show(next = null, faint = null, ground = null) {
       if (next === points && faint === other) return;
       points = next;
       other = faint;
+      place = ground;
       figure.redraw();
     },
   };

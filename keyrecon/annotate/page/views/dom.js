@@ -14,6 +14,9 @@ export function make(tag, properties = {}, ...children) {
   return element;
 }
 
+// "1 click", "2 clicks"
+export const counted = (n, word) => `${n} ${word}${n === 1 ? "" : "s"}`;
+
 export const toggle = (element, name, on) => element.classList.toggle(name, Boolean(on));
 
 // The number in a field of text; null when it is empty, NaN when it holds something else.

@@ -11,8 +11,7 @@ const FORMATS = [
 const MAX_LISTED = 12; // conflicts shown one by one
 
 export function createFiles(model) {
-  const panel = byId("files-panel"),
-    comparison = make("div");
+  const comparison = make("div");
   const chosen = make("input", { type: "file", accept: ".json,.csv,.xml", id: "import-file" });
 
   async function compare() {
@@ -53,7 +52,8 @@ export function createFiles(model) {
   async function accept(content, mode) {
     await api.send("import", { ...content, accept: true, mode });
     await model.readState();
-    panel.close();
+    comparison.replaceChildren();
+    chosen.value = "";
     model.notify("The marks were taken in; Undo takes them out again.");
   }
 
@@ -62,12 +62,7 @@ export function createFiles(model) {
       comparison.replaceChildren(make("p", { className: "wrong" }, fault.message)),
     );
   chosen.addEventListener("change", failing(compare));
-  panel.append(
-    make(
-      "form",
-      { method: "dialog" },
-      make("button", { className: "plain close", "aria-label": "Close" }, "✕"),
-    ),
+  byId("marks-files").append(
     make("h2", {}, "Take marks from a file"),
     make(
       "p",
@@ -81,7 +76,7 @@ export function createFiles(model) {
       "p",
       { className: "choices" },
       ...FORMATS.map(([format, name, file]) =>
-        make("a", { href: `/api/export/${format}`, download: file }, name),
+        make("a", { href: `/api/export/${format}`, download: file, className: "button" }, name),
       ),
     ),
     make(
@@ -90,9 +85,4 @@ export function createFiles(model) {
       "annotations.json in the project folder is always a COCO file of what is marked now.",
     ),
   );
-  byId("files").addEventListener("click", () => {
-    comparison.replaceChildren();
-    chosen.value = "";
-    panel.showModal();
-  });
 }

@@ -7,7 +7,7 @@ export const KEYS = {
   any: [
     [["Ctrl+z"], "undo", "undo"],
     [["Ctrl+Shift+z", "Ctrl+y"], "redo", "redo"],
-    [["1", "2", "3"].map((n) => `Alt+${n}`), "body, keyframes, motion", "page"],
+    [["1", "2", "3", "4"].map((n) => `Alt+${n}`), "body, keyframes, motion, files", "page"],
     [["?"], "show or hide the keys", "help"],
   ],
   keyframes: [
@@ -35,6 +35,7 @@ export const KEYS = {
     [["z"], "the player or the whole picture", "zoom"],
     [["+", "-"], "zoom in, out", "zoomBy"],
     [["h"], "hide the skeleton while held", "hide"],
+    [["m"], "the body in space large or small", "stage"],
     [["g"], "go to the most suspicious place, then to the next", "check"],
     [["y"], "mark the frame that would help most", "suggestion"],
     [["l"], "lock or unlock the keyframe", "lock"],
@@ -66,7 +67,9 @@ export const KEYS = {
     [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
     [["Enter"], "make the motion from what is marked", "primary"],
     [["k"], "add this frame to the keyframes", "add"],
+    [["m"], "the body in space large or small", "stage"],
   ],
+  files: [[["Enter"], "write the chosen files", "primary"]],
 };
 
 const shiftMatters = (key) => key.startsWith("Arrow") || key.length > 1;

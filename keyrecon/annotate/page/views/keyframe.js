@@ -25,7 +25,7 @@ export function createKeyframePicture(model, { actions, viewer, colors }) {
 
   // {joint} or {limb} under a place of the canvas, or null.
   function hit(at) {
-    if (!at || actions.offKeyframe()) return null;
+    if (!at || actions.offKeyframe() || viewer.shown() !== ui.frame) return null;
     const marks = onScreen(model.placed());
     const joint = nearestPlace(at, { ...marks, ...suggestionOnScreen() }, JOINT_RADIUS);
     if (joint) return { joint };
@@ -56,6 +56,7 @@ export function createKeyframePicture(model, { actions, viewer, colors }) {
     click: (at, event) => {
       const target = hit(at);
       if (actions.offKeyframe()) actions.scrub(0);
+      else if (viewer.shown() !== ui.frame) return; // its picture is still to come
       else if (isAsked(ui.joint))
         actions.place(ui.joint, viewer.toPicture(at), event.shiftKey ? 1 : 2);
       else if (target?.joint) actions.select(target.joint);
@@ -149,7 +150,7 @@ export function createKeyframePicture(model, { actions, viewer, colors }) {
     const drawn = viewer.drawPicture(frame, ui.offset ? [SMALL_WIDTH] : [undefined, SMALL_WIDTH]);
     const [pen] = viewer.overlay();
     viewer.cursor(cursor());
-    if (ui.offset === 0 && !ui.hidden) {
+    if (ui.offset === 0 && !ui.hidden && viewer.shown() === frame) {
       drawMarks(pen);
       drawSuggestion(pen);
       drawHints(pen);

@@ -3,8 +3,8 @@ import { drawHalo, drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
 import { createPoseFigure } from "./depth.js";
-import { label } from "../state/workflow.js";
-import { byId, make, numberIn, setText } from "./dom.js";
+import { heightIn, label } from "../state/workflow.js";
+import { byId, make, setText, toggle } from "./dom.js";
 
 const PREFETCHED = 24; // frames fetched ahead while playing
 const WIDTH = 960; // of the pictures, px
@@ -29,7 +29,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   });
 
   const exists = () => model.project.has.motion;
-  const points = (kind) => (exists() ? motion.points(frame, kind) : null);
+  const points = (kind, at = frame) => (exists() ? motion.points(at, kind) : null);
   model.onProject(motion.forget); // a new run makes new motion
 
   function show(number) {
@@ -51,12 +51,13 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   }
 
   function primary() {
-    const height = numberIn(byId("height"));
-    if (Number.isNaN(height)) model.notify("The height is a number of metres, such as 1.80.");
-    else if (!shell.runningJob()) shell.startJob("run", height === null ? {} : { height });
+    const { metres, wrong } = heightIn(byId("height").value);
+    if (wrong) byId("height").focus();
+    else if (!shell.runningJob()) shell.startJob("run", metres === null ? {} : { height: metres });
   }
 
   byId("height").value = project.settings.height ?? "";
+  byId("height").addEventListener("input", model.redraw);
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);
@@ -65,9 +66,10 @@ export function createMotion(model, { frames, shell, actions, colors }) {
 
   function drawSkeleton() {
     const [pen] = viewer.overlay(),
-      places = Object.entries(points("points2d") ?? {});
+      shown = viewer.shown() ?? frame, // a picture may come later than it is asked for
+      places = Object.entries(points("points2d", shown) ?? {});
     const at = Object.fromEntries(places.map(([name, place]) => [name, viewer.toScreen(place)]));
-    const errors = exists() ? motion.errors(frame) : null;
+    const errors = exists() ? motion.errors(shown) : null;
     for (const [name, place] of Object.entries(at))
       if (errors) drawHalo(pen, place, errors[name] * viewer.scale(), colors[sides[name]]);
     for (const { name, parent } of project.limbs) {
@@ -87,6 +89,17 @@ export function createMotion(model, { frames, shell, actions, colors }) {
       mean = worst.reduce((sum, [, px]) => sum + px, 0) / worst.length;
     const named = worst.slice(0, 3).map(([name, px]) => `${label(name)} ±${Math.round(px)}`);
     return `Expected error here: ${mean.toFixed(0)} px; least sure: ${named.join(", ")}. Discs show it.`;
+  }
+
+  // Where the figure stands: the ground does not follow each step, nor its size each bend.
+  function groundBelow(body) {
+    const ground = motion.ground(frame),
+      around = ["left_hip", "right_hip"].map((name) => body[name]).filter(Boolean);
+    if (!ground || !around.length) return null;
+    const { level, unit, units } = ground,
+      mean = (axis) => around.reduce((sum, point) => sum + point[axis], 0) / around.length,
+      square = units === "m" ? `${Math.round(unit * 25)} cm` : "a quarter of the body's height";
+    return { center: [mean(0), level - unit / 2, mean(2)], level, unit, ground: `ground, squares of ${square}` };
   }
 
   function drawStretches() {
@@ -119,7 +132,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const left = open
       ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
       : "All keyframes are marked.";
-    if (exists()) return ["The motion", left];
+    if (exists()) return ["The motion is made", left];
     if (open < keyframes.length) return ["Make the motion", left];
     return [
       "No marks yet",
@@ -135,6 +148,12 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     setText(byId("motion-text"), text);
     setText(byId("motion-more"), more);
     byId("motion-primary").hidden = byId("height-row").hidden = !idle;
+    const { said, wrong } = heightIn(byId("height").value);
+    setText(byId("height-said"), said);
+    toggle(byId("height-said"), "wrong", wrong);
+    byId("motion-primary").disabled = Boolean(wrong);
+    byId("motion-report").hidden = !model.project.has.report;
+    byId("motion-files").hidden = !exists();
     setText(byId("motion-primary"), exists() ? "Make it anew" : "Make the motion");
     setText(
       byId("motion-note"),
@@ -151,7 +170,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     drawSkeleton();
     const body = points("points3d");
     byId("motion-empty").hidden = body !== null;
-    figure.show(body);
+    figure.show(body, null, body && groundBelow(body));
   }
 
   const commands = {

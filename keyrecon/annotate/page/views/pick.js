@@ -4,7 +4,7 @@ import { drawCross, drawLabel } from "../draw/canvas.js";
 import { nearestPlace } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import { addPick, newId, removePick } from "../state/edits.js";
-import { REQUIRED_PARTS, budgetText, missingParts, partsOf } from "../state/workflow.js";
+import { REQUIRED_PARTS, budgetText, missingParts, nextPart, partsOf } from "../state/workflow.js";
 import { byId, make, setText } from "./dom.js";
 import { arrowStep } from "./keyboard.js";
 import { createStrip } from "./strip.js";
@@ -21,7 +21,8 @@ export function createPick(model, { frames, shell }) {
   const palette = createPalette({ choose, show, remove, name });
   const selection = {
     frame: Math.round(last / 2),
-    part: "head",
+    part: "head", // what a click is taken for; null when everything was clicked once
+    last: null, // what the last click was taken for
     named: [],
     cross: null,
     pointer: null,
@@ -29,7 +30,8 @@ export function createPick(model, { frames, shell }) {
   let map = null; // where the part's colour is, to be laid over the picture
 
   const picks = () => model.state.picks;
-  const here = () => picks().filter(({ frame }) => frame === selection.frame);
+  const on = (number) => picks().filter(({ frame }) => frame === number);
+  const here = () => on(selection.frame);
   const parts = () => partsOf(picks(), selection.named);
 
   function show(frame) {
@@ -50,12 +52,14 @@ export function createPick(model, { frames, shell }) {
   }
 
   function add([x, y]) {
+    if (viewer.shown() !== selection.frame) return; // its picture is still to come
+    if (selection.part === null) return model.notify("Choose on the right what the click is to show.");
     if (x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
     const [px, py] = [x, y].map((value) => Math.round(value * 10) / 10);
     model.edit(addPick({ id: newId(), frame: selection.frame, part: selection.part, x: px, y: py }));
-    const next = missingParts(parts())[0],
-      now = parts().find(({ part }) => part === selection.part);
-    if (next && now.picked >= now.count) choose(next.part);
+    const now = parts().find(({ part }) => part === selection.part);
+    selection.last = now.text;
+    if (now.picked >= now.count) choose(nextPart(parts())?.part ?? null);
   }
 
   // What was clicked wrong is to be clicked again.
@@ -67,8 +71,9 @@ export function createPick(model, { frames, shell }) {
   async function loadMap() {
     map = null;
     if (!byId("show-map").checked) return;
-    const { frame, part } = selection,
-      query = new URLSearchParams({ part, revision: model.state.revision });
+    const { frame, part } = selection;
+    if (part === null) return;
+    const query = new URLSearchParams({ part, revision: model.state.revision });
     const response = await fetch(`/api/backprojection/${frame}?${query}`).catch(() => null);
     const picture = response?.status === 200 && (await createImageBitmap(await response.blob()));
     if (picture && frame === selection.frame && part === selection.part) map = picture;
@@ -121,14 +126,19 @@ export function createPick(model, { frames, shell }) {
       const scale = viewer.scale();
       pen.drawImage(map, ...viewer.toScreen([0, 0]), scale * project.width, scale * project.height);
     }
-    for (const pick of here()) {
+    for (const pick of on(viewer.shown() ?? selection.frame)) {
       const at = viewer.toScreen([pick.x, pick.y]);
       drawCross(pen, at, palette.colorOf(pick.part));
       drawLabel(pen, [at[0] + 10, at[1] - 14], pick.part);
     }
     if (selection.cross) drawCross(pen, viewer.toScreen(selection.cross), "#fff");
     if (selection.pointer)
-      drawLabel(pen, [selection.pointer[0] + 14, selection.pointer[1] + 18], selection.part, true);
+      drawLabel(
+        pen,
+        [selection.pointer[0] + 14, selection.pointer[1] + 18],
+        selection.part ?? "nothing chosen",
+        true,
+      );
     viewer.cursor("crosshair");
   }
 
@@ -136,15 +146,13 @@ export function createPick(model, { frames, shell }) {
     const now = parts().find(({ part }) => part === selection.part);
     if (shell.runningJob())
       return ["The keyframes are being chosen", "When cancelled, it goes on from there later."];
-    if (missingParts(parts()).length) {
-      return [
-        `Click ${now.hint}`,
-        "On any frame where it is well seen. A click on a pick removes it.",
-      ];
-    }
+    const taken = selection.last ? `The last click was taken for the ${selection.last}. ` : "";
+    if (missingParts(parts()).length)
+      return [`Click ${now.hint}`, `${taken}On any frame where it is well seen; a click on a cross takes it away.`];
+    if (now) return [`Click ${now.hint}, or go on`, `${taken}What the player does not wear is left out.`];
     return [
       "The colours are known",
-      "Are head and feet on the player in the strip? More clicks make it surer.",
+      `${taken}Are head and feet on the player in the strip? To add clicks, choose a part first.`,
     ];
   }
 
@@ -223,7 +231,7 @@ function createPalette({ choose, show, remove, name }) {
       { data: { part } },
       swatch,
       text,
-      make("small", {}, picked ? String(picked) : required ? "needed" : ""),
+      make("small", required ? { className: "needed", title: "needed" } : {}, picked ? String(picked) : ""),
       make("kbd", {}, n < 9 ? String(n + 1) : ""),
     );
     button.setAttribute("aria-pressed", part === current);

@@ -1,6 +1,6 @@
 // The bar over the picture: the next step in words, and the button that Enter presses; and the slider
 // below it.
-import { byId, setText } from "./dom.js";
+import { byId, counted, setText } from "./dom.js";
 import { jointWords } from "../state/joint_words.js";
 import { label, nextBeginning, requiredJoints, unmarked } from "../state/workflow.js";
 
@@ -10,10 +10,6 @@ const SIDES = { left: "the player's left", right: "the player's right", middle: 
 function named(model, joint) {
   const side = model.sides[joint];
   return `${SIDES[side]} ${label(joint).replace(/^(left|right) /, "")}`;
-}
-
-function counted(n, word) {
-  return `${n} ${word}${n === 1 ? "" : "s"}`;
 }
 
 const sentence = (words) => (words ? `${words[0].toUpperCase()}${words.slice(1)}. ` : "");

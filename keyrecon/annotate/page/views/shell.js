@@ -1,7 +1,7 @@
 // What surrounds every page: the steps, whether all is saved, notices, long work on the server, and
 // the table of keys.
 import * as api from "../state/api.js";
-import { byId, make, numberIn, setText } from "./dom.js";
+import { byId, counted, make, numberIn, setText } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
 
 const SAVING = {
@@ -9,7 +9,8 @@ const SAVING = {
   saving: () => "Saving …",
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
-const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion" };
+const LASTING = {}; // an offer of nothing: the notice stays until it is closed
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files" };
 
 function keyElements(keys) {
   const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
@@ -100,7 +101,7 @@ export function createShell(model, go) {
     const { text, offer } = model.notice ?? {};
     byId("notice").hidden = !text;
     setText(byId("notice-text"), text ?? "");
-    byId("notice-offer").hidden = !offer;
+    byId("notice-offer").hidden = !offer?.text;
     setText(byId("notice-offer"), offer?.text ?? "");
   }
 
@@ -111,7 +112,7 @@ export function createShell(model, go) {
       done = keyframes.filter(model.isDone).length,
       counts = keyframes.length ? `${done} of ${keyframes.length}` : "",
       picked = model.state.picks.length;
-    setText(byId("pick-count"), picked ? `${picked} picks` : "");
+    setText(byId("pick-count"), picked ? counted(picked, "click") : "");
     setText(byId("body-count"), has.keyframes ? "" : counts);
     setText(byId("done-count"), has.keyframes ? counts : "");
     setText(byId("motion-state"), has.motion ? "made" : "");
@@ -123,7 +124,7 @@ export function createShell(model, go) {
     const { view } = model.ui;
     document.body.dataset.view = view;
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
-    document.querySelectorAll("[data-go]").forEach((button) => {
+    document.querySelectorAll("nav [data-go]").forEach((button) => {
       const beginning = view === "pick" || (view === "keyframes" && !model.project.has.keyframes),
         own = button.dataset.go === (beginning ? "bodies" : view);
       button.setAttribute("aria-current", own ? "step" : "false");
@@ -173,6 +174,7 @@ function createJobs(model) {
     if (job.state === "cancelled")
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
+    if (job.text) model.notify(job.text, LASTING);
     model.readProject().then(() => {
       if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });

@@ -1,0 +1,184 @@
+"""From the marks to what they are made for, on the page alone: figure, report, video, files."""
+
+import json
+from functools import partial
+
+import av
+import pytest
+from page_driver import CHROMIUM, Person, serving
+from page_project import (
+    FRAMES,
+    make_project,
+    run_at_once,
+    truth,
+    write_numbered_video,
+    write_true_motion,
+)
+
+from keyrecon.annotate.assistant import Assistant
+from keyrecon.app.annotator import job_commands
+from keyrecon.app.exporting import OVERLAY
+from keyrecon.body import LSP14
+from keyrecon.io.formats.export import SUFFIXES
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+)
+SCREENS = ((1440, 900), (1920, 1080))
+POINTS2D = truth()[1]
+INK = """
+(id) => {
+  const canvas = document.getElementById(id), pen = canvas.getContext("2d");
+  const data = pen.getImageData(0, 0, canvas.width, canvas.height).data;
+  let count = 0;
+  for (let n = 3; n < data.length; n += 4) count += data[n] > 0;
+  return count;
+}
+"""
+"""How many pixels of a canvas are drawn on."""
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory):
+    return write_numbered_video(tmp_path_factory.mktemp("results") / "numbered.mp4")
+
+
+@pytest.fixture
+def folder(tmp_path, video):
+    return make_project(tmp_path / "rally", video)
+
+
+@pytest.fixture
+def visit(chromium):
+    """Opens the page of a project, for somebody whom nothing may disturb."""
+    opened = []
+
+    def go(server, size=SCREENS[0]):
+        context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+        opened.append((context, Person(context, server.credentials.address)))
+        return opened[-1][1]
+
+    yield go
+    for context, person in opened:
+        context.close()
+        assert person.complaints == []
+
+
+def mark_and_run(person, height=""):
+    person.open(40)
+    person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+    person.await_saved()
+    person.press("Alt+3")
+    person.await_text("#motion-text", "Make the motion")
+    person.page.fill("#height", height)
+    person.page.click("#motion-primary")
+    person.await_text("#motion-text", "The motion is made")
+
+
+NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}
+
+
+def test_after_the_first_run_all_that_it_gave_is_there_without_a_reload(folder, visit):
+    def next_frames(annotations, taken):
+        return [NEXT] if (folder / "motion.npz").exists() else []
+
+    assistant = Assistant(next_frames=next_frames)
+    with serving(folder, assistant, {"run": partial(run_at_once, folder)}) as server:
+        person = visit(server)
+        mark_and_run(person)
+        person.page.wait_for_function(f"() => ({INK})('motion-canvas') > 500")
+        assert not person.page.is_visible("#motion-empty")
+        person.press("Alt+2")
+        person.page.click("[data-tab=next]")
+        person.await_text("#next-list", "Frame 22")
+
+
+@pytest.mark.parametrize(
+    ("typed", "said", "metres"),
+    [("188", "taken as 1.88 m", 1.88), ("1,75", "metres", 1.75), ("", "body heights", None)],
+)
+def test_a_height_in_centimetres_is_taken_as_such_and_said_at_once(
+    folder, visit, typed, said, metres
+):
+    with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
+        person = visit(server)
+        mark_and_run(person, typed)
+        assert said in person.text("#height-said")
+        assert json.loads((folder / "told.json").read_text()).get("height") == metres
+
+
+def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
+    write_true_motion(folder)
+    with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
+        person = visit(server)
+        person.open(40)
+        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.press("Alt+3")
+        for typed in ("18", "0", "1.8.0", "tall"):
+            person.page.fill("#height", typed)
+            person.await_text("#height-said", "metres or centimetres")
+            assert person.page.is_disabled("#motion-primary")
+
+
+def test_every_format_there_is_can_be_chosen(folder, visit):
+    with serving(folder) as server:
+        person = visit(server)
+        offered = person.call("views/exports", "m.FORMATS.map(([suffix]) => suffix)")
+        assert {*offered, OVERLAY} == {*SUFFIXES, OVERLAY}
+
+
+def test_report_video_and_files_without_a_command_line(folder, visit):
+    write_true_motion(folder)
+    with serving(folder, commands=job_commands(folder)) as server:
+        person = visit(server)
+        person.press("Alt+3")
+        person.page.click("#motion-files")
+        with person.page.expect_popup() as opened:
+            person.page.click("#report")
+        opened.value.wait_for_load_state()
+        assert opened.value.inner_text("body") == "A report, no cookie for its script"
+        opened.value.close()
+        for suffix in (".trc", ".csv"):
+            person.page.check(f"#formats [value='{suffix}']")
+        person.press("Enter")
+        person.await_text("#export-list", "rally.csv")
+        person.page.click("#export-overlay")
+        person.await_text("#export-list", "rally.mp4")
+        with person.page.expect_download() as saved:
+            person.page.click("#export-list a >> text=rally.mp4")
+        with av.open(str(saved.value.path())) as made:
+            assert made.streams.video[0].frames == FRAMES
+        assert (folder / "exports" / "rally.trc").read_text().startswith("PathFileType")
+        person.complaints.clear()
+
+
+def edges(person, selector):
+    box = person.page.locator(selector).bounding_box()
+    return box["x"], box["y"], box["x"] + box["width"], box["y"] + box["height"]
+
+
+@pytest.mark.parametrize(
+    ("size", "page", "key", "picture"),
+    [
+        (SCREENS[0], "keyframes", "Alt+2", "#picture"),
+        (SCREENS[1], "motion", "Alt+3", "#motion-picture"),
+    ],
+)
+def test_the_body_in_space_takes_the_whole_stage_and_gives_it_back(
+    folder, visit, size, page, key, picture
+):
+    figure = f"#{page} .figure"
+    write_true_motion(folder)
+    with serving(folder) as server:
+        person = visit(server, size)
+        person.press(key)
+        person.page.wait_for_selector(f"#{page}:not([hidden])")
+        small, stage = edges(person, figure), edges(person, picture)
+        person.page.click(f"#{page} [data-stage]")
+        large = edges(person, figure)
+        assert large == pytest.approx(stage, abs=6)
+        aside = edges(person, picture)
+        assert aside[0] >= large[2]
+        assert aside[3] <= edges(person, f"#{page} .side:last-child > :nth-child(2)")[1] + 60
+        person.press("m")
+        assert edges(person, figure) == pytest.approx(small, abs=1)
