@@ -105,3 +105,16 @@ def test_a_spoilt_file_is_read_or_refused_and_changes_nothing(opened, form):
         statuses.add(ask(session, "POST", "/api/import", question).status)
     assert statuses == {200, 400}
     assert session.store.state == before
+
+
+def test_of_the_files_only_those_that_were_exported_go_out(opened, folder):
+    session = opened()
+    (folder / "exports").mkdir()
+    (folder / "exports" / "p.bvh").write_text("HIERARCHY")
+    (folder / "exports" / ".p.trc.1.part").write_text("half")
+    assert [file["name"] for file in ask(session, "GET", "/api/exports").json()] == ["p.bvh"]
+    sent = ask(session, "GET", "/api/exports/p.bvh")
+    assert sent.content == b"HIERARCHY"
+    for name in ("..%2Fproject.toml", ".p.trc.1.part", "q.bvh", "%2e%2e"):
+        assert ask(session, "GET", f"/api/exports/{name}").status in (400, 404)
+    assert ask(session, "GET", "/api/report").status == 400

@@ -46,7 +46,7 @@ def session(tmp_path_factory, write_numbered):
 @pytest.fixture(scope="module")
 def routes(session):
     """(method, address) of every route, from the table itself."""
-    filled = {"{frame:int}": "3", "{job:int}": "1", "{format}": "coco"}
+    filled = {"{frame:int}": "3", "{job:int}": "1", "{format}": "coco", "{name}": "rally.bvh"}
     table = []
     for route in server.make_routes(session, server.read_page()):
         path = route.path
