@@ -147,38 +147,76 @@ def uncertain_stretches(
 ) -> list[UncertainStretch]:
     """The worst stretches of a motion, in the order of time.
 
-    Stretches whose best frame is among `marked` were helped already since the motion was made.
-    Nothing for a motion without expected errors.
+    None is longer than what the marks of one frame help (`TAUGHT_SECONDS` to either side). Those
+    whose best frame is among `marked` were helped already since the motion was made. Nothing for
+    a motion without expected errors.
     """
     if motion.expected_error is None:
         return []
-    height, fps = player_height(motion), motion.fps
     done = np.setdiff1d(np.array([] if marked is None else marked, int), motion.keyframes)
-    parts = body_parts(motion.skeleton)
-    doubt = {
-        name: motion.expected_error[:, members].mean(axis=1) / height
-        for name, members in parts.items()
-    }
-    uncertain = np.max([*doubt.values()], axis=0) > UNCERTAIN
-    found = []
-    for first, last in _runs(uncertain, round(MERGED_SECONDS * fps)):
-        if last - first + 1 < LEAST_SECONDS * fps:
+    doubt = _doubt_by_part(motion)
+    least = LEAST_SECONDS * motion.fps
+    found, open_runs = [], _runs(_is_uncertain(doubt), round(MERGED_SECONDS * motion.fps))
+    while open_runs:
+        first, last = open_runs.pop()
+        if last - first + 1 < least:
             continue
-        inside = slice(first, last + 1)
-        means = {name: float(values[inside].mean()) for name, values in doubt.items()}
-        bad = [name for name in parts if means[name] > UNCERTAIN]
-        bad = bad or [max(parts, key=lambda name: means[name])]
-        members = np.concatenate([parts[name] for name in bad])
-        total = np.sum([doubt[name] for name in bad], axis=0)
-        frame = first + int(_taught(total, round(TAUGHT_SECONDS * fps))[inside].argmax())
-        lower = motion.skeleton.is_lower[members]
-        half = "both" if lower.any() and not lower.all() else "lower" if lower.all() else "upper"
-        error = float(motion.expected_error[inside][:, members].mean())
-        stretch = UncertainStretch(first, last, " and ".join(bad), error, frame, half)
-        if frame not in done:
-            found.append((float(total[inside].sum()), stretch))
+        stretch, weight = _worst_stretch(motion, doubt, first, last)
+        open_runs += [(first, stretch.first - 1), (stretch.last + 1, last)]
+        if stretch.frame not in done:
+            found.append((weight, stretch))
     worst = sorted(found, key=lambda row: -row[0])[:count]
     return sorted((stretch for _, stretch in worst), key=lambda s: s.first)
+
+
+def uncertain_share(motion: Motion) -> float:
+    """Share of the frames in which arms, legs or head are uncertain."""
+    if motion.expected_error is None:
+        return 0.0
+    return float(_is_uncertain(_doubt_by_part(motion)).mean())
+
+
+def _doubt_by_part(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
+    """Mean expected error of each part of the body, player heights."""
+    height, errors = player_height(motion), motion.expected_error
+    assert errors is not None  # callers ask first
+    return {
+        name: errors[:, members].mean(axis=1) / height
+        for name, members in body_parts(motion.skeleton).items()
+    }
+
+
+def _is_uncertain(doubt: Mapping[str, Float[np.ndarray, "T"]]) -> Bool[np.ndarray, "T"]:
+    return np.max([*doubt.values()], axis=0) > UNCERTAIN
+
+
+def _worst_stretch(
+    motion: Motion, doubt: Mapping[str, Float[np.ndarray, "T"]], first: int, last: int
+) -> tuple[UncertainStretch, float]:
+    """The part of an uncertain run that marks of one frame would help most, and by how much."""
+    reach = round(TAUGHT_SECONDS * motion.fps)
+    run = slice(first, last + 1)
+    bad = _bad_parts(doubt, run)
+    taught = _taught(np.sum([doubt[name] for name in bad], axis=0), reach)
+    frame = first + int(taught[run].argmax())
+    first, last = max(first, frame - reach), min(last, frame + reach)
+    inside = slice(first, last + 1)
+    bad = _bad_parts(doubt, inside)
+    parts = body_parts(motion.skeleton)
+    members = np.concatenate([parts[name] for name in bad])
+    lower = motion.skeleton.is_lower[members]
+    half = "both" if lower.any() and not lower.all() else "lower" if lower.all() else "upper"
+    height = player_height(motion)[inside]
+    error = float(np.mean([doubt[name][inside] * height for name in bad]))
+    total = float(np.sum([doubt[name][inside] for name in bad]))
+    return UncertainStretch(first, last, " and ".join(bad), error, frame, half), total
+
+
+def _bad_parts(doubt: Mapping[str, Float[np.ndarray, "T"]], inside: slice) -> list[str]:
+    """Parts that are uncertain in the mean of some frames; the worst where none is."""
+    means = {name: float(values[inside].mean()) for name, values in doubt.items()}
+    bad = [name for name, mean in means.items() if mean > UNCERTAIN]
+    return bad or [max(means, key=lambda name: means[name])]
 
 
 def unsure_track(track: Track, reach: int, count: int = 3) -> list[UncertainStretch]:

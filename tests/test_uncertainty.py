@@ -12,6 +12,7 @@ from keyrecon.uncertainty import (
     expected_error,
     measure_correction,
     player_height,
+    uncertain_share,
     uncertain_stretches,
     unsure_track,
     worst_frames,
@@ -90,6 +91,23 @@ def test_a_stretch_is_told_with_its_part_its_size_and_the_frame_to_mark():
         f"Frames 41-50: arms uncertain, about {stretch.error:.0f} px; marking frame "
         f"{stretch.frame} would help most."
     )
+
+
+def test_no_line_covers_more_than_one_mark_can_help():
+    stretches = uncertain_stretches(with_lost_arms(5, 94), count=9)
+    reach = round(uncertainty.TAUGHT_SECONDS * 25)
+    for stretch in stretches:
+        assert stretch.first <= stretch.frame <= stretch.last
+        assert stretch.frame - stretch.first <= reach >= stretch.last - stretch.frame
+    told = np.concatenate([np.arange(s.first, s.last + 1) for s in stretches])
+    assert len(np.unique(told)) == len(told)
+    assert len(told) >= 0.8 * 90
+
+
+def test_the_share_of_uncertain_frames_is_that_of_the_frames_with_lost_parts():
+    assert uncertain_share(make_motion()) == 0
+    assert uncertain_share(with_lost_arms(41, 60)) == pytest.approx(0.2)
+    assert uncertain_share(replace(make_motion(), expected_error=None)) == 0
 
 
 def test_a_sure_motion_and_one_of_a_former_version_tell_nothing():

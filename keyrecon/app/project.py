@@ -32,7 +32,7 @@ from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
-from keyrecon.uncertainty import uncertain_stretches
+from keyrecon.uncertainty import uncertain_share, uncertain_stretches
 
 
 def start(
@@ -199,11 +199,22 @@ def run(
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
             *found.contradictions(),
-            *(stretch.text for stretch in uncertain_stretches(motion)),
+            *_describe_doubt(motion),
             *_other_choice(workspace, options, preparation.keyframes),
             f"Took {time.perf_counter() - started:.0f} s.",
         ]
     )
+
+
+def _describe_doubt(motion: Motion) -> list[str]:
+    """How much of the motion is uncertain, and the worst stretches."""
+    stretches = uncertain_stretches(motion)
+    if not stretches:
+        return []
+    share = (
+        f"Arms, legs or head are uncertain in {uncertain_share(motion):.0%} of the frames. Worst:"
+    )
+    return [share, *(stretch.text for stretch in stretches)]
 
 
 def _other_choice(workspace: Workspace, options: Options, asked: Keyframes) -> list[str]:
