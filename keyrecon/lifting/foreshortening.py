@@ -51,7 +51,7 @@ def _density(inclination: float) -> RectBivariateSpline:
     weight = _inclination_weight(share, inclination)
     density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
     table = np.log(foreshortening[:, None] * density + _OUTLIER_SHARE)
-    return RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=1)
+    return RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=2)
 
 
 @cache
@@ -72,10 +72,16 @@ def log_density(
     noise: Float[np.ndarray, "*n"],
     inclination: float = 0.0,
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
-    """Logarithm of the density of log q, and its derivative by q."""
+    """Logarithm of the density of log q, and what it loses per unit of the log full length.
+
+    A longer bone makes both the foreshortening and the relative noise smaller.
+    """
     at = _grid(foreshortening, noise)
     table = _density(inclination)
-    return table.ev(*at), table.ev(*at, dx=1)
+    by_q = np.where(foreshortening < _MAX_FORESHORTENING, table.ev(*at, dx=1), 0.0)
+    tabulated = (_MIN_NOISE < noise) & (noise < _MAX_NOISE)
+    by_noise = np.where(tabulated, table.ev(*at, dy=1), 0.0)
+    return table.ev(*at), by_q * at[0] + by_noise
 
 
 def depth_share(

@@ -267,7 +267,7 @@ def _log_likelihood(
     weight = np.exp(value - best)
     total = weight.sum(axis=0)
     mean_slope = ((weight / total)[:, group] * np.array(slopes)).sum(axis=0)
-    return float((best + np.log(total)).sum()), mean_slope * foreshortening
+    return float((best + np.log(total)).sum()), mean_slope
 
 
 def _initial_factor(

@@ -232,8 +232,17 @@ def test_long_lengths_in_the_picture_are_likelier_than_short_ones_up_to_the_full
     foreshortening = np.array([0.3, 0.7, 0.97, 1.3])
     value, slope = log_density(foreshortening, np.full(4, 0.03))
     assert value[0] < value[1] < value[2] and value[3] < value[0]
-    nudged, _ = log_density(foreshortening + 1e-5, np.full(4, 0.03))
-    np.testing.assert_allclose((nudged - value) / 1e-5, slope, rtol=0.02, atol=0.02)
+
+
+@pytest.mark.parametrize("inclination", [-1.0, 0.0, 8.0])
+def test_what_a_length_in_the_picture_loses_when_the_bone_grows_is_its_slope(inclination):
+    length = np.array([0.1, 0.3, 0.7, 0.97, 1.3, 2.5])
+    for noise in (0.001, 0.011, 0.03, 0.2, 1.5):  # over the full length, in the table and beyond
+        (low, _), (_, slope), (high, _) = (
+            log_density(length / full, np.full(6, noise / full), inclination)
+            for full in np.exp([-1e-5, 0.0, 1e-5])
+        )
+        np.testing.assert_allclose((low - high) / 2e-5, slope, rtol=1e-3, atol=1e-3)
 
 
 def test_balance_turns_a_leaning_body_upright_and_leaves_an_upright_one_alone():
