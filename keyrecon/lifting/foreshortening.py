@@ -79,7 +79,7 @@ def log_density(
     at = _grid(foreshortening, noise)
     table = _density(inclination)
     by_q = np.where(foreshortening < _MAX_FORESHORTENING, table.ev(*at, dx=1), 0.0)
-    tabulated = (_MIN_NOISE < noise) & (noise < _MAX_NOISE)
+    tabulated = (noise > _MIN_NOISE) & (noise < _MAX_NOISE)
     by_noise = np.where(tabulated, table.ev(*at, dy=1), 0.0)
     return table.ev(*at), by_q * at[0] + by_noise
 

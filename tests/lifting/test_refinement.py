@@ -230,7 +230,7 @@ def test_expected_depth_is_taylors_without_noise():
 
 def test_long_lengths_in_the_picture_are_likelier_than_short_ones_up_to_the_full_length():
     foreshortening = np.array([0.3, 0.7, 0.97, 1.3])
-    value, slope = log_density(foreshortening, np.full(4, 0.03))
+    value, _ = log_density(foreshortening, np.full(4, 0.03))
     assert value[0] < value[1] < value[2] and value[3] < value[0]
 
 
