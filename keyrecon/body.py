@@ -10,7 +10,6 @@ Bone lengths are fractions of stature, all of them in `MARKED_LENGTHS` and `JOIN
 with their sources.
 """
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +17,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.errors import KeyreconError, explain
+from keyrecon.errors import KeyreconError
+from keyrecon.reading import parse_json, read_text, reading, real
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,8 @@ De Leva is J. Biomechanics 29, 1996, men; Bell is Bell, Pedersen and Brand, J. B
 than the marked ones, and the limbs differ by where a shoulder ends and an arm begins. The two
 tables stay apart: one is a prior of what is marked in pictures, the other the size of the
 simulated player whose motion prior was learnt with it."""
+MAX_LENGTH = 2.0
+"""No bone is longer, statures."""
 ANKLE_HEIGHT = 0.039
 """Ankle above the floor as a fraction of stature (Winter)."""
 
@@ -221,16 +223,28 @@ def read_skeleton(path: Path) -> Skeleton:
     `parent` is null at the root, `length` is in statures, mirrored pairs are the names that
     differ only in left_ and right_. Raises KeyreconError when the tree is not one.
     """
-    try:
-        data = json.loads(path.read_text())
-        rows = [(j["name"], j["parent"], float(j["length"] or 0)) for j in data["joints"]]
-        skeleton = _skeleton_from_rows(rows, data["lower"])
-    except (OSError, ValueError, KeyError, TypeError) as fault:
-        raise KeyreconError(
-            f"{path} is not a skeleton file ({explain(fault)}); it needs 'joints' with name, "
-            "parent and length, and 'lower' with joint names."
-        ) from fault
+    remedy = "it needs 'joints' with name, parent and length, and 'lower' with joint names"
+    with reading(path, "a skeleton file", remedy):
+        data = parse_json(read_text(path))
+        rows = [(j["name"], j["parent"], real(j["length"] or 0)) for j in data["joints"]]
+        if strange := [n for n, _, _ in rows if not isinstance(n, str) or not n.strip()]:
+            raise ValueError(f"{strange[0]!r} is not the name of a joint")
+        return check_skeleton(_skeleton_from_rows(rows, data["lower"]))
+
+
+def check_skeleton(skeleton: Skeleton) -> Skeleton:
+    """The skeleton; ValueError where it is not one tree of joints of a body."""
+    names, count = skeleton.names, len(skeleton.names)
+    if len(set(names)) < count:
+        raise ValueError(f"the joint {max(names, key=names.count)} is there twice")
+    if not all(-1 <= parent < count for parent in skeleton.parents):
+        raise ValueError("a joint hangs on one that is not there")
     roots = skeleton.parents.count(-1)
-    if roots != 1 or len(skeleton.bones) != len(skeleton.names) - 1:
-        raise KeyreconError(f"{path}: the joints must form one tree; found {roots} root(s).")
+    if roots != 1 or len(skeleton.bones) != count - 1:
+        raise ValueError(f"the joints must form one tree; found {roots} root(s)")
+    for (_, child), length in zip(skeleton.bones, skeleton.lengths, strict=True):
+        if not 0 < length <= MAX_LENGTH:
+            raise ValueError(f"{names[child]} cannot be {length:g} statures from its parent")
+    if not 0 < len({*skeleton.lower}) < count or not {*skeleton.lower} < {*range(count)}:
+        raise ValueError("'lower' must name some of the joints, and not all")
     return skeleton

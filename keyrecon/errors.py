@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from zipfile import BadZipFile
 
 MAX_WORDS = 160
 """Characters of a library's own message that are shown; some quote the file."""
@@ -28,6 +29,8 @@ def explain(fault: Exception) -> str:
         case OSError() if fault.strerror:
             words = fault.strerror
         case ValueError() if "allow_pickle" in str(fault):  # numpy's advice would be unsafe
+            words = "another format"
+        case BadZipFile() if "not a zip" in str(fault):
             words = "another format"
         case _:
             words = str(fault) or type(fault).__name__

@@ -19,12 +19,12 @@ gives millimetres.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.errors import KeyreconError, explain
+from keyrecon.errors import KeyreconError
+from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.records import Motion
 
 Points = Float[np.ndarray, "T J 3"]
@@ -182,11 +182,8 @@ def read_truth(path: Path) -> dict[str, np.ndarray]:
 
     Raises KeyreconError for a file of another kind, or arrays that do not fit each other.
     """
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            truth = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, TypeError, EOFError, BadZipFile) as fault:
-        raise KeyreconError(f"{path} is not a truth.npz ({explain(fault)}).") from fault
+    with reading(path, "a truth.npz", "it holds points3d, points2d, joint_names and fps"):
+        truth = read_arrays(path)
     if missing := {"points3d", "points2d", "joint_names", "fps"} - truth.keys():
         raise KeyreconError(
             f"{path} has no {', '.join(sorted(missing))}; a truth.npz holds points3d, points2d, "
@@ -199,6 +196,11 @@ def read_truth(path: Path) -> dict[str, np.ndarray]:
             f"{path}: points3d {shape} and points2d {truth['points2d'].shape} do not fit "
             f"{joints} joint names; they must be (frames, joints, 3) and (frames, joints, 2)."
         )
+    with reading(path, "a truth.npz", "render or export it again"):
+        for name in ("points3d", "points2d", "fps"):
+            check_numbers(name, truth[name])
+        if truth["fps"].size != 1 or not truth["fps"].item() > 0 or not len(truth["points3d"]):
+            raise ValueError("it has no frames, or they have no rate")
     return truth
 
 

@@ -33,7 +33,8 @@ def reading(path: Path, what: str, remedy: str) -> Iterator[None]:
     try:
         if path.exists() and not path.is_file():  # a pipe would keep its reader waiting
             raise ValueError("a folder" if path.is_dir() else "no file but a pipe or device")
-        yield
+        with np.errstate(all="ignore"):  # numbers out of hand are named, not warned of
+            yield
     except KeyreconError:
         raise
     except Exception as fault:

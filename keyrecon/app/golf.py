@@ -33,7 +33,7 @@ from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_mod
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.option_tables import check_options
-from keyrecon.io.video import Video, open_video
+from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.pipeline import Keep, call_stage
@@ -210,7 +210,7 @@ def open_golf_project(
 def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) -> None:
     """Raises KeyreconError where a project is not that of a golf fit of this video."""
     folder, kept = workspace.folder, workspace.project["video"]
-    if video.fingerprint != kept["fingerprint"]:
+    if not has_fingerprint(video.path, kept["fingerprint"]):
         raise KeyreconError(
             f"{folder} is the project of another video ({Path(kept['path']).name}); name another "
             "folder for this one with --out."

@@ -21,7 +21,7 @@ from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
-from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import Workspace
@@ -246,7 +246,7 @@ def asked_for(workspace: Workspace) -> Keyframes:
         raise KeyreconError(
             f"No keyframes have been chosen yet; run: keyrecon keyframes {quoted(workspace.folder)}"
         )
-    asked = keyframes_from_json(workspace.keyframes_file.read_text())
+    asked = read_keyframes(workspace.keyframes_file)
     n_frames = len(workspace.video())
     if len(asked.upper.nearest) != n_frames:
         raise KeyreconError(

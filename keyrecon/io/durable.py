@@ -6,9 +6,12 @@ rename without that is atomic but not durable. What can be made again needs no s
 disk: it too appears whole to whoever reads it, but a loss of power may tear it.
 """
 
+import hashlib
 import os
+import platform
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import IO
@@ -16,6 +19,11 @@ from typing import IO
 from filelock import FileLock, Timeout
 
 from keyrecon.errors import KeyreconError
+
+STALE_SECONDS = 3600.0
+"""Half-written files older than this were left by a process that was killed."""
+_MACHINE = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+"""Tells this computer from others that may write to the same drive."""
 
 
 def write_durably(path: Path, content: bytes | str) -> None:
@@ -64,8 +72,9 @@ def replacing(path: Path, durably: bool = True) -> Iterator[IO[bytes]]:
 def _beside(path: Path) -> Iterator[IO[bytes]]:
     """A file in the same folder and with the same permissions, gone if the block fails."""
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
+    writer = f"{_MACHINE}-{os.getpid()}"
     with NamedTemporaryFile(
-        dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
+        dir=path.parent, prefix=f".{path.name}.{writer}.", suffix=".part", delete=False
     ) as file:
         try:
             os.fchmod(file.fileno(), mode)
@@ -73,6 +82,29 @@ def _beside(path: Path) -> Iterator[IO[bytes]]:
         except BaseException:
             Path(file.name).unlink(missing_ok=True)
             raise
+
+
+def clear_leftovers(folder: Path) -> None:
+    """Delete what a process left half-written: one of this machine that is gone, or long ago."""
+    for file in folder.glob(".*.part"):
+        writer = file.name.split(".")[-3]
+        with suppress(OSError):
+            if _is_gone(writer) or file.stat().st_mtime < time.time() - STALE_SECONDS:
+                file.unlink()
+
+
+def _is_gone(writer: str) -> bool:
+    """Whether a process of this machine wrote a file and has ended since."""
+    machine, _, process = writer.rpartition("-")
+    if machine != _MACHINE or not process.isdecimal():
+        return False
+    try:
+        os.kill(int(process), 0)  # signal 0 only asks
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
 
 
 def make_folder(path: Path) -> None:

@@ -9,6 +9,7 @@ import hashlib
 import inspect
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path, PosixPath
@@ -35,8 +36,6 @@ KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""
 PLAIN_TYPES = (bool, int, float, complex, str, bytes, type(None), Path, PosixPath)
 """Values whose text tells all of them; anything else would collide or never be found again."""
-STALE_SECONDS = 3600.0
-"""Half-written results older than this were left by a process that was killed."""
 
 
 Inputs = ParamSpec("Inputs")
@@ -64,14 +63,13 @@ class StageStore:
     ) -> Result:
         """The result of a stage: stored if the same inputs and options made it, else made."""
         key, path = self._place(name, stage, inputs, named)
-        if path.is_file() and not self.force:
-            result = load_record(path)
-        else:
+        result = _NOTHING if self.force else _stored(path)
+        if result is _NOTHING:
             started = time.perf_counter()
             result = stage(*inputs, **named)
             self.seconds[name] = time.perf_counter() - started
-            self._forget(name)
             save_record(path, result)
+            self._forget(name, path)
         self._keys[id(result)] = (result, key)
         return result
 
@@ -85,9 +83,8 @@ class StageStore:
     ) -> Result:
         """The stored result of a stage, as `keep` would find it; KeyreconError if there is none."""
         key, path = self._place(name, stage, inputs, named)
-        if not path.is_file():
+        if (result := _stored(path)) is _NOTHING:
             raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
-        result = load_record(path)
         self._keys[id(result)] = (result, key)
         return result
 
@@ -103,13 +100,15 @@ class StageStore:
         key = self._key((_code_of(stage), name, told, *inputs))
         return key, self.folder / f"{name}-{key}.npz"
 
-    def _forget(self, name: str) -> None:
-        """Drop all but the latest few results of a stage."""
-        found = sorted(self.folder.glob(f"{name}-*.npz"), key=lambda p: p.stat().st_mtime)
-        long_ago = time.time() - STALE_SECONDS
-        stale = [p for p in self.folder.glob("*.part") if p.stat().st_mtime < long_ago]
-        for old in (*found[: -KEPT_RESULTS + 1], *stale):
-            old.unlink()
+    def _forget(self, name: str, made: Path) -> None:
+        """Drop all but the latest few results of a stage; another process may do the same."""
+        found: list[tuple[float, Path]] = []
+        for path in self.folder.glob(f"{name}-*.npz"):
+            with suppress(FileNotFoundError):
+                found.append((path.stat().st_mtime, path))
+        for _, old in sorted(found)[:-KEPT_RESULTS]:
+            if old != made:
+                old.unlink(missing_ok=True)
 
     def _key(self, value: object) -> str:
         digest = hashlib.sha256()
@@ -139,6 +138,18 @@ class StageStore:
             digest.update(repr(value).encode())
         else:
             raise TypeError(f"a stage was given a {type(value).__name__}, which has no digest")
+
+
+_NOTHING: Any = object()
+"""In place of a result; None can be one."""
+
+
+def _stored(path: Path) -> Any:
+    """What is stored there; nothing where no file is, or what a loss of power left of one."""
+    try:
+        return load_record(path) if path.is_file() else _NOTHING
+    except KeyreconError:
+        return _NOTHING
 
 
 def _code_of(stage: Callable[..., Any]) -> str:

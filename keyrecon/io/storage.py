@@ -10,12 +10,11 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
-from keyrecon.errors import KeyreconError, explain
 from keyrecon.io.durable import make_folder, replacing
+from keyrecon.reading import read_arrays, reading
 
 Tree = dict[str, Any]
 Arrays = dict[str, np.ndarray]
@@ -33,14 +32,9 @@ def save_record(path: Path, value: object) -> None:
 
 def load_record(path: Path) -> Any:
     """Read what `save_record` wrote; raises KeyreconError for a file of another kind."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            tree = json.loads(stored["tree"].tobytes())
-            return _put_together(tree, stored)
-    except (OSError, ValueError, KeyError, TypeError, ImportError, BadZipFile) as fault:
-        raise KeyreconError(
-            f"{path} is not a stored result ({explain(fault)}); delete it and run again."
-        ) from fault
+    with reading(path, "a stored result", "delete it and run again"):
+        stored = read_arrays(path)
+        return _put_together(json.loads(stored["tree"].tobytes()), stored)
 
 
 def _take_apart(value: object, arrays: Arrays) -> Tree:

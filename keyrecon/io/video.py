@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError
+from keyrecon.reading import reading
 
 if TYPE_CHECKING:
     import av
@@ -31,6 +32,19 @@ VARIABLE_RATE = 0.25
 """Frame spacing that differs by more than this share from its median counts as variable."""
 
 
+MEGABYTE = 1 << 20
+SAMPLES = 64
+"""Megabytes of a file that its fingerprint reads: all of a small one."""
+SAMPLED = "64-"
+"""How fingerprints begin; those of former versions were of the first and last megabyte alone."""
+MAX_PIXELS = 1 << 26
+"""Of a picture: twice those of 8K video."""
+MIN_FPS, MAX_FPS = 0.05, 100_000.0
+"""Frames per second of a video, from time lapse to high-speed cameras."""
+MIN_DISTINCT = 0.9
+"""Share of pictures that must have a time of their own; of others with the same, one is shown."""
+PICTURES = ("image2", "_pipe")
+"""Ends of the names of FFmpeg's formats that are pictures and no videos."""
 LEAST_SLOW_MOTION, MOST_SLOW_MOTION = 0.01, 1000.0
 """Factors that a video can have: time lapse of a hundredth, and high-speed cameras."""
 
@@ -66,7 +80,7 @@ class Video:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Tells this file from others: its size, first and last megabyte."""
+        """Tells this file from others."""
         return fingerprint_file(self.path)
 
     def frames(
@@ -107,6 +121,12 @@ class Video:
                     continue
                 if frame.pts != wanted[found]:
                     break
+                if {frame.width, frame.height} != {self.width, self.height}:
+                    raise KeyreconError(
+                        f"{self.path}: from frame {start + found} on the pictures are "
+                        f"{frame.width}x{frame.height}; use a part of one size by --start and "
+                        "--end, or re-encode the video."
+                    )
                 yield frame
                 found += 1
                 if found == len(wanted):
@@ -142,13 +162,26 @@ class Video:
 
 
 def fingerprint_file(path: Path) -> str:
-    """Hash of a file's size, first and last megabyte."""
+    """Hash of a file's size and of what it holds, of a large file of samples throughout."""
+    megabytes = -(-path.stat().st_size // MEGABYTE)
+    return f"{SAMPLED}{_hash_samples(path, min(SAMPLES, max(1, megabytes)))}"
+
+
+def has_fingerprint(path: Path, fingerprint: str) -> bool:
+    """Whether a file is the one of a fingerprint, also of one that a former version took."""
+    if fingerprint.startswith(SAMPLED):
+        return fingerprint_file(path) == fingerprint
+    return _hash_samples(path, 2) == fingerprint
+
+
+def _hash_samples(path: Path, samples: int) -> str:
+    """Hash of a file's size and of some megabytes of it, evenly from the first to the last."""
     size = path.stat().st_size
     digest = hashlib.sha256(str(size).encode())
     with path.open("rb") as file:
-        digest.update(file.read(1 << 20))
-        file.seek(max(0, size - (1 << 20)))
-        digest.update(file.read())
+        for start in np.linspace(0, max(0, size - MEGABYTE), samples).astype(int).tolist():
+            file.seek(start)
+            digest.update(file.read(MEGABYTE))
     return digest.hexdigest()[:32]
 
 
@@ -169,9 +202,17 @@ def open_video(
             f"The slow-motion factor is {slow_motion:g}; it must lie between {LEAST_SLOW_MOTION:g} "
             f"and {MOST_SLOW_MOTION:g}: 240 frames a second shown at 30 are 8."
         )
+    with reading(path, "a video that can be read", "repair or re-encode it"):
+        return _index(path, start, end, slow_motion)
+
+
+def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video:
+    """Find the times of the frames and how the pictures stand."""
     with _open(path) as container:
         stream = container.streams.video[0]
-        stamps = np.array(sorted(_shown_stamps(container, path)), dtype=np.int64)
+        if stream.width * stream.height > MAX_PIXELS:
+            raise ValueError(f"pictures of {stream.width}x{stream.height} are too large")
+        stamps = _distinct(np.array(sorted(_shown_stamps(container, path)), dtype=np.int64))
         first = next(_decode_from(container, int(stamps[0])), None)
         if first is None:
             raise KeyreconError(f"{path}: no picture can be decoded; the file is damaged.")
@@ -180,7 +221,7 @@ def open_video(
         seconds_per_tick = _seconds_per_tick(stream)
         turns, mirrored = _find_orientation(first, stream)
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
-    if not 0 <= start < (end or len(stamps)) <= len(stamps):
+    if not 0 <= start < (len(stamps) if end is None else end) <= len(stamps):
         raise KeyreconError(
             f"{path} has {len(stamps)} frames, counted from 0; it cannot be used from frame "
             f"{start} {'on' if end is None else f'up to before frame {end}'}."
@@ -188,7 +229,17 @@ def open_video(
     stamps = stamps[start:end]
     time = (stamps - stamps[0]) * seconds_per_tick / slow_motion
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
+    if not MIN_FPS <= fps <= MAX_FPS or not time[-1] < len(time) / MIN_FPS:
+        raise ValueError(f"{len(time)} frames in {time[-1]:g} s")
     return Video(path, width, height, stamps, time, fps, turns, mirrored)
+
+
+def _distinct(stamps: Int[np.ndarray, "N"]) -> Int[np.ndarray, "T"]:
+    """Each time once; ValueError where many pictures have none of their own."""
+    distinct = np.unique(stamps)
+    if len(distinct) < MIN_DISTINCT * len(stamps):
+        raise ValueError(f"only {len(distinct)} of {len(stamps)} pictures have a time of their own")
+    return distinct
 
 
 def _find_orientation(frame: av.VideoFrame, stream: av.VideoStream) -> tuple[int, bool]:
@@ -215,7 +266,7 @@ def _open(path: Path) -> av.container.InputContainer:
     import av
 
     try:
-        container = av.open(str(path))
+        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (av.FFmpegError, ValueError) as fault:
         raise KeyreconError(
             f"{path} cannot be read as a video ({getattr(fault, 'strerror', fault)}); it may be "
@@ -224,6 +275,9 @@ def _open(path: Path) -> av.container.InputContainer:
     if not container.streams.video:
         container.close()
         raise KeyreconError(f"{path} holds no pictures, only sound; a video is needed.")
+    if container.format.name.endswith(PICTURES):
+        container.close()
+        raise KeyreconError(f"{path} is a single picture; a video is needed.")
     container.streams.video[0].thread_type = "AUTO"
     return container
 
@@ -260,11 +314,14 @@ def _decode_from(container: av.container.InputContainer, stamp: int) -> Iterator
     stream = container.streams.video[0]
     before = stamp
     for back in (0.0, 2.0, 10.0, None):
-        if back is None:
-            container.seek(0)
-        else:
-            before = stamp - int(back / _seconds_per_tick(stream))
-            container.seek(before, stream=stream, backward=True, any_frame=False)
+        try:
+            if back is None:
+                container.seek(0)
+            else:
+                before = stamp - int(back / _seconds_per_tick(stream))
+                container.seek(before, stream=stream, backward=True, any_frame=False)
+        except av.FFmpegError:  # where the index is damaged, some places cannot be sought
+            continue
         frames = container.decode(stream)
         try:
             first = next(frames, None)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
-from keyrecon.io.durable import hold_lock, make_folder, write_durably
+from keyrecon.io.durable import clear_leftovers, hold_lock, make_folder, write_durably
 from keyrecon.io.formats.picks import read_picks, write_picks
 from keyrecon.io.option_tables import (
     Record,
@@ -36,7 +36,7 @@ from keyrecon.io.project_file import (
     with_video_path,
 )
 from keyrecon.io.stages import StageStore
-from keyrecon.io.video import Video, fingerprint_file, open_video
+from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
 
@@ -60,6 +60,8 @@ class Workspace:
                 f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
             )
         self.project = read_project(self.project_file)
+        for place in (folder, self.stages.folder, self.pictures):
+            clear_leftovers(place)
 
     @property
     def project_file(self) -> Path:
@@ -135,7 +137,7 @@ class Workspace:
         path = (self.folder / wanted["path"]).resolve()
         if not path.is_file():
             path = self._find_video(Path(wanted["path"]).name, wanted["fingerprint"])
-        elif fingerprint_file(path) != wanted["fingerprint"]:
+        elif not has_fingerprint(path, wanted["fingerprint"]):
             raise KeyreconError(
                 f"{path} has changed since the project was made (its fingerprint differs); "
                 "bring the old file back, or start a new project for the new one."
@@ -155,7 +157,7 @@ class Workspace:
         """Point the project at the place its video has moved to."""
         if not video_file.is_file():
             raise KeyreconError(f"There is no video at {video_file}.")
-        if fingerprint_file(video_file) != self.project["video"]["fingerprint"]:
+        if not has_fingerprint(video_file, self.project["video"]["fingerprint"]):
             raise KeyreconError(
                 f"{video_file} is not the video of this project (its fingerprint differs); "
                 "start a new project for it with: keyrecon new"
@@ -168,7 +170,7 @@ class Workspace:
     def _find_video(self, name: str, fingerprint: str) -> Path:
         for place in self._places_of_video():
             candidate = place / name
-            if candidate.is_file() and fingerprint_file(candidate) == fingerprint:
+            if candidate.is_file() and has_fingerprint(candidate, fingerprint):
                 return candidate
         raise KeyreconError(
             f"The video {self.project['video']['path']} is not where the project expects it; "

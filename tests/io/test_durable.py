@@ -6,6 +6,7 @@ import time
 import pytest
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io import durable
 from keyrecon.io.durable import hold_lock, write_durably
 
 
@@ -70,3 +71,18 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path):
         text = path.read_text()
         assert len(text) == 300_000
         assert len(set(text)) == 1
+
+
+def test_what_a_killed_process_left_half_written_goes_and_what_another_writes_stays(tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    mine = durable._MACHINE
+    left = tmp_path / f".a.json.{mine}-{ended.pid}.x1.part"
+    old = tmp_path / ".b.json.x2.part"
+    living = tmp_path / f".c.json.{mine}-{os.getpid()}.x3.part"
+    elsewhere = tmp_path / f".d.json.00000000-{ended.pid}.x4.part"
+    for file in (left, old, living, elsewhere):
+        file.write_text("half")
+    os.utime(old, (0, 0))
+    durable.clear_leftovers(tmp_path)
+    assert {*tmp_path.iterdir()} == {living, elsewhere}

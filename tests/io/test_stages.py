@@ -1,3 +1,4 @@
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,3 +80,23 @@ def test_a_result_is_recalled_without_ever_being_made(tmp_path):
     power = again.recall("power", raise_to, values, options=PowerOptions())
     assert np.array_equal(again.recall("add", add_one, power), made)
     assert CALLS == [2, "add"]
+
+
+@pytest.mark.parametrize("keep", [0, 30, 0.5, -1])
+def test_a_result_that_a_loss_of_power_tore_is_made_again(tmp_path, keep):
+    first = recipe(StageStore(tmp_path), np.arange(3.0))
+    for file in tmp_path.glob("*.npz"):
+        data = file.read_bytes()
+        file.write_bytes(data[: round(keep * len(data)) if isinstance(keep, float) else keep])
+    assert np.array_equal(recipe(StageStore(tmp_path), np.arange(3.0)), first)
+    assert CALLS == [2, "add"] * 2
+
+
+def test_processes_that_try_out_options_side_by_side_do_not_stumble_over_one_another(tmp_path):
+    def work(_):
+        store = StageStore(tmp_path)
+        return [recipe(store, np.arange(3.0), PowerOptions(power)) for power in range(12)]
+
+    with ThreadPoolExecutor(4) as pool:
+        for made in pool.map(work, range(8)):
+            assert [values[2] for values in made] == [2.0**power + 1 for power in range(12)]

@@ -7,7 +7,7 @@ from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.annotation_budget import usual_budget
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
+from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json, read_keyframes
 from keyrecon.keyframes.assignment import find_neighborhoods
 from keyrecon.keyframes.selection import (
     KeyframeOptions,
@@ -163,21 +163,31 @@ def test_keyframes_of_a_version_that_did_not_tell_were_chosen_for_coverage(compa
     data = json.loads(keyframes_to_json(choose_keyframes(comparison, 50.0)))
     del data["method"]
     assert keyframes_from_json(json.dumps(data)).method == "coverage"
-    with pytest.raises(KeyreconError, match="'method' must be one of coverage, paper"):
+    with pytest.raises(ValueError, match="'method' must be one of coverage, paper"):
         keyframes_from_json(json.dumps(data | {"method": "luck"}))
 
 
-def test_a_damaged_keyframes_json_says_what_is_wrong(comparison):
-    data = json.loads(keyframes_to_json(choose_keyframes(comparison, 50.0)))
+def test_a_damaged_keyframes_json_says_what_is_wrong(comparison, tmp_path):
+    data, file = (
+        json.loads(keyframes_to_json(choose_keyframes(comparison, 50.0))),
+        tmp_path / "keyframes.json",
+    )
     for change, message in (
         ({"upper": [900]}, "outside 0..399"),
         ({"lower": [5, 3]}, "ascending"),
         ({"n_frames": 12}, "outside"),
+        ({"T": -5}, "'T' cannot be -5"),
+        ({"T": 2.5}, "2.5 is not a whole number"),
+        ({"alpha": float("nan")}, "NaN is not a number"),
+        ({"represented": {"upper": [[0, 900]], "lower": []}}, "frames 0 to 900"),
     ):
-        with pytest.raises(KeyreconError, match=message):
-            keyframes_from_json(json.dumps({**data, **change}))
-    with pytest.raises(KeyreconError, match=r"keyframes\.json cannot be read"):
-        keyframes_from_json("{")
+        file.write_text(json.dumps({**data, **change}))
+        with pytest.raises(KeyreconError, match=rf"keyframes\.json .*{message}"):
+            read_keyframes(file)
+    for damaged in (b"{", b"", b"\xff", b"[" * 10**5, b'{"T": 1e999}'):
+        file.write_bytes(damaged)
+        with pytest.raises(KeyreconError, match=r"keyframes\.json is not a choice of keyframes"):
+            read_keyframes(file)
 
 
 def test_inputs_are_left_as_they_were(comparison):

@@ -49,5 +49,5 @@ def make_motion(frames=60, units="m", time=None, wildness=0.5):
         fps=FPS,
         time=np.arange(frames) / FPS if time is None else time,
         units=units,
-        keyframes=np.array([0, 30]),
+        keyframes=np.array([0, min(30, frames - 1)]),
     )

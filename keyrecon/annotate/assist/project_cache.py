@@ -24,7 +24,7 @@ from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, choose_sour
 from keyrecon.annotate.assist.preview import Strip, cut_strip
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.coco import read_coco
-from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -199,7 +199,7 @@ class ProjectCache:
         preparation = prepare(video, picks, options, recall, marks=marks)
         if not workspace.keyframes_file.is_file():
             return preparation
-        keyframes = keyframes_from_json(workspace.keyframes_file.read_text())
+        keyframes = read_keyframes(workspace.keyframes_file)
         if len(keyframes.upper.nearest) != len(preparation.video):
             raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")
         return replace(preparation, keyframes=keyframes)

@@ -9,7 +9,7 @@ import json
 
 from keyrecon.annotate.store.cells import Change, by_frame, marked_frames
 from keyrecon.annotate.store.store import Store
-from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Keyframes
 
@@ -30,7 +30,7 @@ class KeptKeyframes:
         status = self._file.stat()
         signature = (status.st_mtime_ns, status.st_size)
         if self._read is None or self._read[0] != signature:
-            keyframes = keyframes_from_json(self._file.read_text())
+            keyframes = read_keyframes(self._file)
             self._keep_worked_on(halves_by_frame(keyframes))
             self._read = (signature, keyframes)
         return self._read[1]

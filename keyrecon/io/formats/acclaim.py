@@ -17,11 +17,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.rigs import CapturedFigure
+from keyrecon.io.formats.rigs import MAX_RATE, MIN_RATE, CapturedFigure
+from keyrecon.reading import check_numbers, reading
 
 CMU_RATE = 120.0
 """Frames per second of the CMU database's captures; the format itself has no place for a rate, so
 this is assumed, with a warning, where no comment of the file tells it."""
+ROOT_CHANNELS = {"TX", "TY", "TZ", "RX", "RY", "RZ"}
 RATE_WORDS = ("framerate", "frame-rate", "fps", "samples-per-second")
 """Words of comments and keyword lines under which exporters note the rate."""
 logger = logging.getLogger(__name__)
@@ -55,16 +57,12 @@ def find_asf(path: Path) -> Path:
 def read_acclaim(path: Path) -> CapturedFigure:
     """Read an AMC file with its ASF; raises KeyreconError for a broken or missing one."""
     skeleton = find_asf(path)
-    try:
+    pair = f"a whole ASF/AMC pair with {skeleton.name}"
+    with reading(path, pair, "download both again"):
         order, degrees, bones = _read_asf(skeleton.read_text(errors="replace"))
         text = path.read_text(errors="replace")
         fps = _noted_rate(text)
         figure = _place_bones(order, degrees, bones, _read_amc(text), fps or CMU_RATE)
-    except (OSError, ValueError, KeyError, IndexError) as fault:
-        raise KeyreconError(
-            f"{path} with {skeleton.name} is not a whole ASF/AMC pair ({fault}); "
-            "download both again."
-        ) from fault
     if fps is None:
         logger.warning(
             "%s does not say its rate; taken as %g frames per second, CMU's.", path, CMU_RATE
@@ -85,7 +83,9 @@ def _read_asf(text: str) -> tuple[list[str], bool, list[_Bone]]:
             sections[name].append(line)
     if missing := {"root", "bonedata", "hierarchy"} - sections.keys():
         raise ValueError(f"no section :{sorted(missing)[0]}")
-    order = next(line.split()[1:] for line in sections["root"] if line.split()[:1] == ["order"])
+    orders = [line.split()[1:] for line in sections["root"] if line.split()[:1] == ["order"]]
+    if not orders or {word.upper() for word in orders[0]} != ROOT_CHANNELS:
+        raise ValueError("no 'order' of TX TY TZ RX RY RZ in :root")
     units = " ".join(sections.get("units", [])).lower()
     blocks = re.findall(r"\bbegin\b(.*?)\bend\b", "\n".join(sections["bonedata"]), re.DOTALL)
     described = {values["name"][0]: values for values in map(_read_block, blocks)}
@@ -95,7 +95,7 @@ def _read_asf(text: str) -> tuple[list[str], bool, list[_Bone]]:
         if parent in ("begin", "end"):
             continue
         bones += [_make_bone(child, parent, described[child]) for child in children]
-    return [word.upper() for word in order], "rad" not in units, bones
+    return [word.upper() for word in orders[0]], "rad" not in units, bones
 
 
 def _read_block(block: str) -> dict[str, list[str]]:
@@ -116,7 +116,9 @@ def _noted_rate(text: str) -> float | None:
     for line in text.splitlines():
         words = line.lstrip("#: ").lower().replace("=", " ").replace(":", " ").split()
         if line[:1] in ("#", ":") and len(words) > 1 and words[0] in RATE_WORDS:
-            return float(words[1])
+            if not MIN_RATE <= (rate := float(words[1])) <= MAX_RATE:
+                raise ValueError(f"it tells of {rate:g} frames per second")
+            return rate
     return None
 
 
@@ -151,13 +153,23 @@ def _place_bones(
     turns = [i for i, word in enumerate(order) if word.startswith("R")]
     turn_order = "".join(order[i][1].lower() for i in turns)
     rotations[:, 0] = Rotation.from_euler(turn_order, root[:, turns], degrees=degrees).as_matrix()
+    if len(set(names)) < len(names):
+        raise ValueError("a bone stands in :hierarchy twice")
     for i, bone in enumerate(bones, start=1):
         above = names.index(bone.parent)
+        if above >= i:
+            raise ValueError(f"{bone.name} stands in :hierarchy before its parent {bone.parent}")
         turn = _turn(bone, frames, degrees).as_matrix()
         rotations[:, i] = rotations[:, above] @ turn
         positions[:, i] = positions[:, above] + rotations[:, i] @ np.array(bone.end)
     parents = (-1, *(names.index(bone.parent) for bone in bones))
-    return CapturedFigure(tuple(names), parents, positions, rotations, fps)
+    return CapturedFigure(
+        tuple(names),
+        parents,
+        check_numbers("a position", positions),
+        check_numbers("a rotation", rotations),
+        fps,
+    )
 
 
 def _turn(bone: _Bone, frames: dict[str, np.ndarray], degrees: bool) -> Rotation:

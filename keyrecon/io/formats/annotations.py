@@ -12,6 +12,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.coco import read_coco
 from keyrecon.io.formats.cvat import read_cvat
 from keyrecon.io.formats.dlc import read_dlc
+from keyrecon.reading import reading
 from keyrecon.records import Annotations
 
 
@@ -23,11 +24,8 @@ def read_annotations(
     `size` is the width and height of the video's pictures, px. Raises KeyreconError for files of
     another kind and for marks that do not fit the video or the skeleton.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(4096)
-    except OSError as fault:
-        raise KeyreconError(f"{path} cannot be read ({fault.strerror}); check the path.") from fault
+    with reading(path, "a file that can be read", "check the path"), path.open("rb") as file:
+        start = file.read(4096)
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if text.startswith(b"{"):
         return read_coco(path, skeleton, n_frames, size)

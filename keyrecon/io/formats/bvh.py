@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.rigs import CapturedFigure
+from keyrecon.io.formats.rigs import MAX_RATE, MIN_RATE, CapturedFigure
+from keyrecon.reading import check_numbers, reading
 
 
 @dataclass
@@ -29,25 +29,18 @@ class _ReadNode:
 
 def read_bvh(path: Path) -> CapturedFigure:
     """Read a BVH file and put its figure in place; raises KeyreconError for a broken file."""
-    try:
+    with reading(path, "a whole BVH file", "export it again from its source"):
         words = path.read_text(encoding="utf-8", errors="replace").split()
-    except OSError as fault:
-        raise KeyreconError(f"{path} cannot be read ({fault.strerror}).") from fault
-    try:
         nodes, start = _read_hierarchy(words)
         values, seconds = _read_motion(words, start, sum(len(n.channels) for n in nodes))
-    except (ValueError, IndexError) as fault:
-        raise KeyreconError(
-            f"{path} is not a whole BVH file ({fault}); export it again from its source."
-        ) from fault
-    positions, rotations = place_joints(nodes, values)
-    return CapturedFigure(
-        names=tuple(n.name for n in nodes),
-        parents=tuple(n.parent for n in nodes),
-        positions=positions,
-        rotations=rotations,
-        fps=round(1 / seconds, 3),
-    )
+        positions, rotations = place_joints(nodes, values)
+        return CapturedFigure(
+            names=tuple(n.name for n in nodes),
+            parents=tuple(n.parent for n in nodes),
+            positions=check_numbers("a position", positions),
+            rotations=check_numbers("a rotation", rotations),
+            fps=round(1 / seconds, 3),
+        )
 
 
 def _read_hierarchy(words: list[str]) -> tuple[list[_ReadNode], int]:
@@ -85,6 +78,9 @@ def _read_property(node: _ReadNode, words: list[str], i: int) -> int:
     if words[i].upper() == "CHANNELS":
         end = i + 2 + int(words[i + 1])
         node.channels = [_channel(word) for word in words[i + 2 : end]]
+        if end < i + 2 or len(set(node.channels)) < len(node.channels):
+            told = " ".join(words[i : max(end, i + 2)])
+            raise ValueError(f"the joint {node.name} cannot have '{told}'")
         return end
     raise ValueError(f"'{words[i]}' in the hierarchy is not understood")
 
@@ -110,8 +106,10 @@ def _read_motion(
             f"{values.size} numbers for {count} frames of {width} channels; "
             f"{count * width} are expected"
         )
-    if count < 1 or not seconds > 0 or not np.isfinite(values).all():
-        raise ValueError("no frames, no frame time, or numbers that are not finite")
+    if count < 1 or not np.isfinite(values).all():
+        raise ValueError("no frames, or numbers that are not finite")
+    if not 1 / MAX_RATE <= seconds <= 1 / MIN_RATE:
+        raise ValueError(f"a frame cannot take {seconds:g} s")
     return values.reshape(count, width), seconds
 
 

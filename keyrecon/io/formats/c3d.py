@@ -26,6 +26,7 @@ import io
 import warnings
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,9 @@ from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import stand_on_floor
+from keyrecon.io.formats.rigs import MAX_RATE, MIN_RATE
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.reading import reading
 from keyrecon.records import Motion
 
 Points = Float[np.ndarray, "T 3"]
@@ -78,7 +81,7 @@ class MarkerJoints:
 def read_markers(path: Path) -> MarkerJoints:
     """Read a C3D file with CMU's or Plug-in Gait's markers.
 
-    Raises KeyreconError for a file that is no C3D, that lacks markers, or without ezc3d.
+    Raises KeyreconError for a file that is no C3D, that lacks markers, or without c3d.
     """
     markers, fps = read_points(path)
     named = {}
@@ -104,27 +107,51 @@ def read_markers(path: Path) -> MarkerJoints:
 
 
 def read_points(path: Path) -> tuple[dict[str, Points], float]:
-    """Trajectories by label, metres, NaN where missing (residual below 0), and the frame rate."""
+    """Trajectories by label, metres, NaN where missing (residual below 0), and the frame rate.
+
+    Raises KeyreconError for a file that is damaged or holds fewer frames than it tells of.
+    """
     try:
-        import ezc3d
+        import c3d
     except ImportError as fault:
         raise KeyreconError(
-            "Reading C3D needs ezc3d; install it with: pip install 'keyrecon[c3d]'"
+            "Reading C3D needs the c3d package; install it with: pip install 'keyrecon[c3d]'"
         ) from fault
-    try:
-        file = ezc3d.c3d(str(path))
-    except (OSError, ValueError, RuntimeError, IndexError) as fault:
-        raise KeyreconError(f"{path} is not a C3D file ({fault}); export it again.") from fault
-    group = file["parameters"]["POINT"]
-    units = group["UNITS"]["value"] if "UNITS" in group else ["mm"]
-    metres = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(units[0].strip().lower() if units else "mm")
+    with reading(path, "a whole C3D file", "export it again"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what c3d wonders about, what matters is checked here
+        with path.open("rb") as file:
+            reader = c3d.Reader(file)
+            if not reader.point_used:
+                raise ValueError("it has no markers")
+            count = reader.last_frame - _first_frame(reader) + 1
+            frames = [points.copy() for _, points, _ in islice(reader.read_frames(), count)]
+        if count < 1 or len(frames) < count:
+            raise ValueError(f"it tells of {count} frames and holds {len(frames)}")
+        rate = float(reader.point_rate)
+        if not MIN_RATE <= rate <= MAX_RATE:
+            raise ValueError(f"it tells of {rate:g} frames per second")
+        labels = [str(label).strip() for label in reader.point_labels]
+        points = _metres_per_unit(reader) * np.array(frames, dtype=np.float64).transpose(1, 0, 2)
+        points[points[..., 3] < 0, :3] = np.nan
+        return dict(zip(labels, points[..., :3], strict=False)), rate
+
+
+def _first_frame(reader: Any) -> int:
+    """The number of the first frame; c3d itself counts its second word as 65535 frames each."""
+    told = reader.get("TRIAL:ACTUAL_START_FIELD")
+    if told is None:
+        return int(reader.header.first_frame)
+    low, high = (int(word) for word in told.uint16_array[:2])
+    return low + 65536 * high
+
+
+def _metres_per_unit(reader: Any) -> float:
+    told = reader.get("POINT:UNITS")
+    unit = "mm" if told is None else told.string_value.strip(" \0").lower() or "mm"
+    metres = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(unit)
     if metres is None:
-        raise KeyreconError(f"{path} is in '{units[0]}'; millimetres, centimetres or metres work.")
-    points = metres * file["data"]["points"][:3].transpose(1, 2, 0)
-    points[file["data"]["meta_points"]["residuals"][0] < 0] = np.nan
-    return dict(zip(group["LABELS"]["value"], points, strict=False)), float(
-        group["RATE"]["value"][0]
-    )
+        raise ValueError(f"it is in '{unit}'; millimetres, centimetres or metres work")
+    return metres
 
 
 def fill_gaps(points: Points) -> Points:

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import STATURE, GolfClicks, check_joints, check_numbers
 from keyrecon.io.durable import write_durably
+from keyrecon.reading import parse_json, read_text, reading, real, whole
 
 Number = TypeVar("Number", int, float)
 FORMAT = 1
@@ -24,8 +25,9 @@ FORMAT = 1
 
 def read_clicks(path: Path) -> GolfClicks:
     """Read and check a file of clicks; raises KeyreconError with what is wrong and what helps."""
-    try:
-        content = json.loads(path.read_text())
+    remedy = 'it is a JSON object with "keyrecon_golf_clicks", "frame", "size" and "joints"'
+    with reading(path, "a file of golf clicks", remedy):
+        content = parse_json(read_text(path))
         version = content["keyrecon_golf_clicks"]
         if version != FORMAT:
             raise KeyreconError(
@@ -38,23 +40,18 @@ def read_clicks(path: Path) -> GolfClicks:
                 f"{path}: 'left_handed' is {left_handed!r}; it must be true or false."
             )
         clicks = GolfClicks(
-            frame=_whole(content["frame"]),
-            size=_pair(content["size"], _whole),
-            joints={n: _pair(p, float) for n, p in content["joints"].items()},
+            frame=whole(content["frame"]),
+            size=_pair(content["size"], whole),
+            joints={n: _pair(p, real) for n, p in content["joints"].items()},
             hidden=tuple(str(n) for n in content.get("hidden", ())),
             left_handed=left_handed,
-            stature=STATURE if stature is None else float(stature),
-            focal=None if focal is None else float(focal),
-            principal=None if principal is None else _pair(principal, float),
+            stature=STATURE if stature is None else real(stature),
+            focal=None if focal is None else real(focal),
+            principal=None if principal is None else _pair(principal, real),
         )
-    except (OSError, ArithmeticError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise KeyreconError(
-            f"{path} is not a file of golf clicks ({fault!r}); it is a JSON object with "
-            '"keyrecon_golf_clicks", "frame", "size" and "joints".'
-        ) from fault
-    check_numbers(clicks, str(path))
-    check_joints(clicks, str(path))
-    return clicks
+        check_numbers(clicks, str(path))
+        check_joints(clicks, str(path))
+        return clicks
 
 
 def write_clicks(path: Path, clicks: GolfClicks) -> None:
@@ -77,10 +74,3 @@ def write_clicks(path: Path, clicks: GolfClicks) -> None:
 def _pair(values: list, kind: Callable[[Any], Number]) -> tuple[Number, Number]:
     first, second = values
     return kind(first), kind(second)
-
-
-def _whole(number: Any) -> int:
-    """A whole number; raises ValueError for any other, which `int` would cut."""
-    if int(number) != number:
-        raise ValueError(f"{number!r} is not a whole number")
-    return int(number)

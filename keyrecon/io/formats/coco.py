@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.errors import KeyreconError, explain
+from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.annotation_checks import (
     Mark,
@@ -30,6 +30,7 @@ from keyrecon.io.formats.annotation_checks import (
     canonical_name,
     frame_of_picture,
 )
+from keyrecon.reading import parse_json, read_text, reading, real, whole
 from keyrecon.records import SOURCES, Annotations, Motion
 
 Json = dict[str, Any]
@@ -46,8 +47,9 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
     frame and the joint.
     """
     sheet = MarkSheet(path, skeleton, n_frames, size)
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+    remedy = "it needs images, annotations with keypoints, and categories with the joints' names"
+    with reading(path, "a COCO keypoints file", remedy):
+        data = parse_json(read_text(path))
         images = {image["id"]: image for image in data["images"]}
         categories = {c["id"]: c for c in data["categories"] if c.get("keypoints")}
         marks: list[Mark] = []
@@ -61,16 +63,7 @@ def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, in
                 signs = _nearer(annotation, category, frame, sheet)
                 nearer[frame] = np.where(signs, signs, nearer.get(frame, 0))
                 absent |= _absent(annotation, frame, sheet)
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as fault:
-        raise KeyreconError(
-            f"{path} is not a COCO keypoints file ({explain(fault)}); it needs images, "
-            "annotations with keypoints, and categories with the joints' names."
-        ) from fault
-    return annotations_from_marks(marks, sheet, nearer, absent)
-
-
-def _refuse_constant(word: str) -> float:
-    raise ValueError(f"{word} is not a number")
+        return annotations_from_marks(marks, sheet, nearer, absent)
 
 
 def _frame(annotation: Json, images: dict[Any, Json], sheet: MarkSheet) -> int:
@@ -81,11 +74,11 @@ def _frame(annotation: Json, images: dict[Any, Json], sheet: MarkSheet) -> int:
             f"{annotation['image_id']}, which is not in the list of images."
         )
     image = images[annotation["image_id"]]
-    sheet.check_size(int(image.get("width") or 0), int(image.get("height") or 0))
+    sheet.check_size(whole(image.get("width") or 0), whole(image.get("height") or 0))
     frame = image.get("frame")
     if frame is None:
         frame = frame_of_picture(image["file_name"], sheet.path)
-    if not isinstance(frame, int):
+    if not isinstance(frame, int) or isinstance(frame, bool):
         raise KeyreconError(f"{sheet.path}: {frame!r} is not a frame number.")
     sheet.check_frame(frame)
     return frame
@@ -106,7 +99,7 @@ def _marks(annotation: Json, category: Json, frame: int, sheet: MarkSheet) -> It
                 "labelled), 1 (hidden) or 2 (visible)."
             )
         if v:
-            yield Mark(frame, name, float(x), float(y), v == 2)
+            yield Mark(frame, name, real(x), real(y), v == 2)
 
 
 def _absent(annotation: Json, frame: int, sheet: MarkSheet) -> set[tuple[int, str]]:

@@ -7,10 +7,9 @@ number at the end of the picture's name is the frame. Documents with a DTD are r
 
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from keyrecon.body import Skeleton
@@ -21,27 +20,24 @@ from keyrecon.io.formats.annotation_checks import (
     annotations_from_marks,
     frame_of_picture,
 )
+from keyrecon.reading import reading
 from keyrecon.records import Annotations
 
 
 def read_cvat(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
     sheet = MarkSheet(path, skeleton, n_frames, size)
-    try:
+    remedy = "export the task as 'CVAT for video' or 'CVAT for images' 1.1"
+    with reading(path, "a CVAT XML 1.1 file", remedy):
         root = fromstring(path.read_bytes(), forbid_dtd=True)
         if root.tag != "annotations":
             raise ValueError(f"it holds <{root.tag}> and not <annotations>")
         marks = [*_from_tracks(root, sheet), *_from_images(root, sheet)]
-    except (OSError, ValueError, KeyError, ParseError, DefusedXmlException) as fault:
-        raise KeyreconError(
-            f"{path} is not a CVAT XML 1.1 file ({fault}); export the task as 'CVAT for video' or "
-            "'CVAT for images' 1.1."
-        ) from fault
-    if not marks:
-        raise KeyreconError(
-            f"{path} has no skeletons with marked joints; annotate with a skeleton label."
-        )
-    return annotations_from_marks(marks, sheet)
+        if not marks:
+            raise KeyreconError(
+                f"{path} has no skeletons with marked joints; annotate with a skeleton label."
+            )
+        return annotations_from_marks(marks, sheet)
 
 
 def _from_tracks(root: Element, sheet: MarkSheet) -> Iterator[Mark]:

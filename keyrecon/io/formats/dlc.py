@@ -22,6 +22,7 @@ from keyrecon.io.formats.annotation_checks import (
     annotations_from_marks,
     frame_of_picture,
 )
+from keyrecon.reading import read_text, reading
 from keyrecon.records import Annotations
 
 SURE = 0.6
@@ -34,20 +35,17 @@ Columns = dict[str, dict[str, int]]
 def read_dlc(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
     sheet = MarkSheet(path, skeleton, n_frames, size)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        rows = [row for row in csv.reader(io.StringIO(text)) if any(row)]
+    remedy = (
+        "its heading has the rows scorer, bodyparts and coords, and every row a picture and numbers"
+    )
+    with reading(path, "a DeepLabCut file", remedy):
+        rows = [row for row in csv.reader(io.StringIO(read_text(path))) if any(row)]
         head = _heading(rows, path)
         columns = _columns(head)
         first = min(column for part in columns.values() for column in part.values())
         body = rows[len(head) :]
         marks = [mark for row in body for mark in _marks(row, first, columns, path)]
-    except (OSError, ValueError, IndexError, csv.Error) as fault:
-        raise KeyreconError(
-            f"{path} is not a DeepLabCut file ({fault}); its heading has the rows scorer, "
-            "bodyparts and coords, and every row a picture and numbers."
-        ) from fault
-    return annotations_from_marks(marks, sheet)
+        return annotations_from_marks(marks, sheet)
 
 
 def _heading(rows: list[list[str]], path: Path) -> dict[str, list[str]]:
@@ -81,8 +79,10 @@ def _columns(head: dict[str, list[str]]) -> Columns:
 
 def _marks(row: list[str], first: int, columns: Columns, path: Path) -> Iterator[Mark]:
     """The joints labelled in one row."""
-    name = next(word for word in reversed(row[:first]) if word)
-    frame = int(name) if name.isdigit() else frame_of_picture(name, path)
+    name = next((word for word in reversed(row[:first]) if word), None)
+    if name is None:
+        raise ValueError(f"the row {','.join(row)} names no picture")
+    frame = int(name) if name.isdecimal() else frame_of_picture(name, path)
     for part, column in columns.items():
         x, y = row[column["x"]].strip(), row[column["y"]].strip()
         sure = float(row[column["likelihood"]] or 0) if "likelihood" in column else 1.0

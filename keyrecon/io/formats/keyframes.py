@@ -13,12 +13,13 @@ as [first, end) stretches.
 """
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
 
-from keyrecon.errors import KeyreconError, explain
+from keyrecon.reading import parse_json, read_text, reading, real, whole
 from keyrecon.records import HalfKeyframes, Keyframes
 
 HALVES = ("upper", "lower")
@@ -53,23 +54,35 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
+def read_keyframes(path: Path) -> Keyframes:
+    """Read a file that `keyframes_to_json` wrote; raises KeyreconError that says what is wrong."""
+    with reading(path, "a choice of keyframes", "make it again with keyrecon keyframes"):
+        return keyframes_from_json(read_text(path))
+
+
 def keyframes_from_json(text: str) -> Keyframes:
-    """Read what `keyframes_to_json` wrote; raises KeyreconError that names what is wrong."""
-    try:
-        data = json.loads(text)
-        halves = {name: _half(data, name) for name in HALVES}
-        return Keyframes(
-            upper=halves["upper"],
-            lower=halves["lower"],
-            reach=int(data["T"]),
-            alpha=float(data["alpha"]),
-            method=_method(data),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise KeyreconError(
-            f"keyframes.json cannot be read ({explain(fault)}); make it again with keyrecon "
-            "keyframes."
-        ) from fault
+    """What `keyframes_to_json` wrote; ValueError and others for any other text."""
+    data = parse_json(text)
+    halves = {name: _half(data, name) for name in HALVES}
+    return Keyframes(
+        upper=halves["upper"],
+        lower=halves["lower"],
+        reach=_at_least(1, whole(data["T"]), "T"),
+        alpha=_share(data["alpha"], "alpha"),
+        method=_method(data),
+    )
+
+
+def _at_least(least: int, number: int, name: str) -> int:
+    if number < least:
+        raise ValueError(f"'{name}' cannot be {number}")
+    return number
+
+
+def _share(value: object, name: str) -> float:
+    if not 0 <= (share := real(value)) <= 1:
+        raise ValueError(f"'{name}' cannot be {share:g}")
+    return share
 
 
 def _method(data: dict[str, Any]) -> str:
@@ -80,10 +93,10 @@ def _method(data: dict[str, Any]) -> str:
 
 
 def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
-    n_frames = int(data["n_frames"])
-    frames = np.array(data[name], dtype=np.int64)
-    nearest = np.array(data["nearest"][name], dtype=np.int64)
-    distance = np.array(data["distance"][name], dtype=np.float64)
+    n_frames = _at_least(1, whole(data["n_frames"]), "n_frames")
+    frames = np.array([whole(frame) for frame in data[name]], dtype=np.int64)
+    nearest = np.array([whole(frame) for frame in data["nearest"][name]], dtype=np.int64)
+    distance = np.array([real(value) for value in data["distance"][name]])
     if not len(frames) or (np.diff(frames) <= 0).any():
         raise ValueError(f"'{name}' must list frame numbers in ascending order")
     if frames[0] < 0 or frames[-1] >= n_frames:
@@ -96,10 +109,10 @@ def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
         frames=frames,
         nearest=nearest,
         represented=_from_stretches(data["represented"][name], n_frames),
-        coverage=float(data["coverage"][name]),
-        beta=float(data["beta"][name]),
+        coverage=_share(data["coverage"][name], "coverage"),
+        beta=real(data["beta"][name]),
         distance=distance,
-        printed_count=int(data["printed_count"][name]),
+        printed_count=_at_least(0, whole(data["printed_count"][name]), "printed_count"),
     )
 
 
@@ -112,5 +125,7 @@ def _stretches(flags: Bool[np.ndarray, "T"]) -> list[list[int]]:
 def _from_stretches(stretches: list[list[int]], n_frames: int) -> Bool[np.ndarray, "T"]:
     flags = np.zeros(n_frames, dtype=bool)
     for first, end in stretches:
+        if not 0 <= whole(first) < whole(end) <= n_frames:
+            raise ValueError(f"'represented' has frames {first} to {end} of {n_frames}")
         flags[first:end] = True
     return flags

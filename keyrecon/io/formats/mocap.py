@@ -17,6 +17,7 @@ from keyrecon.io.formats.acclaim import read_acclaim
 from keyrecon.io.formats.bvh import read_bvh
 from keyrecon.io.formats.c3d import read_markers
 from keyrecon.io.formats.rigs import find_joints, metres_per_unit, upright
+from keyrecon.reading import check_numbers, reading
 
 SUFFIXES = (".bvh", ".amc", ".c3d")
 """Of files that hold a motion."""
@@ -65,7 +66,9 @@ def read_capture(path: Path, trim: int = 0) -> Capture:
     if not path.is_file():
         raise KeyreconError(f"{path} does not exist; check the path.")
     try:
-        capture = _read(path)
+        with reading(path, "motion capture of a person", "export it again"):
+            capture = _read(path)
+            check_numbers("a joint", capture.joints)
     except KeyreconError as fault:
         if str(path) in str(fault):
             raise

@@ -7,15 +7,20 @@ is that of segments and motion vectors. Single precision is .01 degrees.
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
+from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.prior.skeleton import SEGMENTS
 from keyrecon.golf.prior.training import SWING_PRIOR_VERSION
 from keyrecon.golf.records import MotionModel
-from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, DepthModel
+from keyrecon.io.durable import make_folder, replacing
+from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, TERMS, DepthModel
+from keyrecon.reading import check_numbers, read_arrays, reading
 
+TURN_ERROR = 1e-4
+"""Of a rotation in single precision, many times over."""
 PACKAGE = Path(__file__).parent.parent.parent
 
 
@@ -31,10 +36,10 @@ def write_model(
     path: Path, version: int, provenance: str, arrays: Mapping[str, np.ndarray]
 ) -> None:
     """Write arrays and where they come from; the folder is made if need be."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     single = {name: values.astype(np.float32) for name, values in arrays.items()}
     described = {"version": np.array(version), "provenance": np.array(provenance)}
-    with path.open("wb") as file:
+    with replacing(path) as file:
         np.savez_compressed(file, **described, **single)  # type: ignore[arg-type]  # as in storage.py
 
 
@@ -42,15 +47,13 @@ def read_model(
     path: Path, kind: ModelKind, names: Sequence[str]
 ) -> tuple[str, dict[str, np.ndarray]]:
     """Provenance and arrays; raises KeyreconError for files of another kind or version."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            version, provenance = int(stored["version"]), str(stored["provenance"])
-            arrays = {name: stored[name].astype(np.float64) for name in names}
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as fault:
-        why = fault.strerror if isinstance(fault, OSError) and fault.strerror else "another format"
-        raise KeyreconError(
-            f"{path} is not a {kind.name} ({why}); make one with: {kind.command}"
-        ) from fault
+    with reading(path, f"a {kind.name}", f"make one with: {kind.command}"):
+        stored = read_arrays(path)
+        version, provenance = int(stored["version"]), str(stored["provenance"])
+        arrays = {
+            name: check_numbers(name, stored[name]).astype(np.float64)
+            for name in (names if version == kind.version else ())
+        }
     if version != kind.version:
         raise KeyreconError(
             f"{path} is a {kind.name} of version {version} and this program needs {kind.version}; "
@@ -74,7 +77,10 @@ def write_depth_model(path: Path, model: DepthModel) -> None:
 def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
     provenance, arrays = read_model(path, _DEPTH_MODEL, ("coefficients",))
-    return DepthModel(arrays["coefficients"], provenance)
+    with reading(path, f"a {_DEPTH_MODEL.name}", f"make one with: {_DEPTH_MODEL.command}"):
+        if arrays["coefficients"].shape != (TERMS, len(LSP14.bones)):
+            raise ValueError(f"its coefficients are not {TERMS} x {len(LSP14.bones)}")
+        return DepthModel(arrays["coefficients"], provenance)
 
 
 BUILT_IN_SWING_PRIOR = PACKAGE / "golf" / "prior" / "prior.npz"
@@ -93,4 +99,26 @@ def write_motion_model(path: Path, model: MotionModel) -> None:
 def read_motion_model(path: Path = BUILT_IN_SWING_PRIOR) -> MotionModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
     provenance, arrays = read_model(path, _SWING_PRIOR, _ARRAYS)
-    return MotionModel(version=SWING_PRIOR_VERSION, provenance=provenance, **arrays)
+    with reading(path, f"a {_SWING_PRIOR.name}", f"make one with: {_SWING_PRIOR.command}"):
+        _check_motion_model(**arrays)
+        return MotionModel(version=SWING_PRIOR_VERSION, provenance=provenance, **arrays)
+
+
+def _check_motion_model(
+    centre: np.ndarray,
+    mean: np.ndarray,
+    components: np.ndarray,
+    keys: np.ndarray,
+    explained: np.ndarray,
+) -> None:
+    """Raise ValueError for arrays that do not fit each other, or the body of a swing."""
+    parts = len(SEGMENTS)
+    if centre.shape != (parts, 3, 3) or mean.ndim != 2 or mean.shape[1] != 3 * parts + 3:
+        raise ValueError(f"it is not of {parts} segments")
+    if len(mean) < 2 or not len(components) or components.shape[1:] != mean.shape:
+        raise ValueError("its components do not fit its mean")
+    if keys.shape != (4,) or (np.diff(keys) <= 0).any() or explained.shape != components.shape[:1]:
+        raise ValueError("it needs four key postures, and what each component explains")
+    turned = centre @ centre.transpose(0, 2, 1)
+    if np.abs(turned - np.eye(3)).max() > TURN_ERROR or (np.linalg.det(centre) < 0).any():
+        raise ValueError("its mean turns are no rotations")

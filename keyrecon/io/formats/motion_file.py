@@ -1,15 +1,14 @@
 """motion.npz: everything that is known of a motion, as plain arrays without pickles."""
 
 import io
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from keyrecon import __version__
-from keyrecon.body import Skeleton
-from keyrecon.errors import KeyreconError, explain
+from keyrecon.body import Skeleton, check_skeleton
 from keyrecon.io.durable import write_durably
+from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.records import SOURCES, Motion
 
 ARRAYS = {
@@ -23,6 +22,10 @@ ARRAYS = {
     "keyframes": "K",
 }
 """Arrays of a `Motion` and the letters of their axes."""
+KINDS = {"source": np.int64, "keyframes": np.int64}
+"""Arrays that are whole numbers."""
+WITH_GAPS = ("points2d_propagated", "expected_error")
+UNITS = ("m", "body heights")
 OPTIONAL = {"expected_error": "TJ"}
 """Arrays that files of former versions and of golf fits lack."""
 
@@ -53,21 +56,17 @@ def _known(motion: Motion) -> list[str]:
 
 def read_motion(path: Path) -> Motion:
     """Read what `write_motion` wrote; raises KeyreconError for any other file."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            data = {name: stored[name] for name in stored.files}
+    with reading(path, "a motion", "make it with keyrecon run"):
+        data = read_arrays(path)
         _check_shapes(data)
+        _check_values(data)
         return Motion(
-            skeleton=_skeleton(data),
-            **{name: data[name] for name in ARRAYS},
-            **{name: data[name] for name in OPTIONAL if name in data},
+            skeleton=check_skeleton(_skeleton(data)),
+            **{name: data[name].astype(KINDS.get(name, np.float64)) for name in ARRAYS},
+            **{name: data[name].astype(np.float64) for name in OPTIONAL if name in data},
             fps=float(data["fps"]),
             units=str(data["units"]),
         )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
-        raise KeyreconError(
-            f"{path} is not a motion ({explain(fault)}); make it with keyrecon run."
-        ) from fault
 
 
 def _skeleton(data: dict[str, np.ndarray]) -> Skeleton:
@@ -78,6 +77,24 @@ def _skeleton(data: dict[str, np.ndarray]) -> Skeleton:
         proportions=tuple(data["proportions"].tolist()),
         lower=tuple(data["lower"].tolist()),
     )
+
+
+def _check_values(data: dict[str, np.ndarray]) -> None:
+    """Raise ValueError for values that no motion has; joints that nobody saw are NaN in pixels."""
+    for name in (*ARRAYS, *(OPTIONAL.keys() & data.keys()), "fps", "proportions"):
+        check_numbers(name, data[name], gaps=name in WITH_GAPS)
+    for name in (*KINDS, "parents", "mirrored", "lower"):
+        if data[name].dtype.kind not in "iu" and data[name].size:
+            raise ValueError(f"{name} are no whole numbers")
+    if not len(data["time"]) or (np.diff(data["time"]) <= 0).any():
+        raise ValueError("it has no frames, or their times do not grow")
+    if not data["fps"].item() > 0 or not (data["scale"] > 0).all():
+        raise ValueError("fps and scale must be above 0")
+    if str(data["units"]) not in UNITS:
+        raise ValueError(f"units must be one of {', '.join(UNITS)}")
+    keyframes = data["keyframes"]
+    if not ((keyframes >= 0) & (keyframes < len(data["time"]))).all():
+        raise ValueError("a keyframe is outside of its frames")
 
 
 def _check_shapes(data: dict[str, np.ndarray]) -> None:

@@ -3,24 +3,26 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from keyrecon.errors import KeyreconError, explain
 from keyrecon.io.durable import write_durably
+from keyrecon.reading import parse_json, read_text, reading, real, whole
 from keyrecon.records import Pick
 
 
 def read_picks(path: Path) -> tuple[Pick, ...]:
     """Read clicks; raises KeyreconError for a file that does not hold them."""
-    try:
-        rows = json.loads(path.read_text())["picks"]
-        return tuple(
-            Pick(int(r["frame"]), str(r["part"]), float(r["x"]), float(r["y"])) for r in rows
-        )
-    except (OSError, ValueError, KeyError, TypeError) as fault:
-        raise KeyreconError(
-            f"{path} is not a file of picks ({explain(fault)}); mend it or move it away and pick "
-            "again."
-        ) from fault
+    with reading(path, "a file of picks", "mend it or move it away and pick again"):
+        return tuple(_pick(row) for row in parse_json(read_text(path))["picks"])
+
+
+def _pick(row: dict[str, Any]) -> Pick:
+    part = row["part"]
+    if not isinstance(part, str) or not part.strip():
+        raise ValueError(f"{part!r} is not the name of a part")
+    if (frame := whole(row["frame"])) < 0:
+        raise ValueError(f"{frame} is not a frame")
+    return Pick(frame, part, real(row["x"]), real(row["y"]))
 
 
 def picks_text(picks: Sequence[Pick]) -> str:

@@ -128,6 +128,9 @@ UNITS = {
 }
 """Metres per unit."""
 
+MIN_RATE, MAX_RATE = 1.0, 10_000.0
+"""Frames per second that a capture can have."""
+
 PERSON = (1.2, 2.3)
 """Statures of people, metres; so chosen that no figure fits two units."""
 

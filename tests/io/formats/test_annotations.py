@@ -348,7 +348,7 @@ def test_faults_in_cvat_files_are_named(tmp_path, marked):
 
 def test_other_files_are_told_apart(tmp_path):
     path = tmp_path / "a"
-    with pytest.raises(KeyreconError, match="cannot be read"):
+    with pytest.raises(KeyreconError, match="is not a file that can be read"):
         read(path)
     path.write_text("hello")
     with pytest.raises(KeyreconError, match="no annotations that keyrecon knows"):
