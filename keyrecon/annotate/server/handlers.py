@@ -24,7 +24,15 @@ from keyrecon.annotate.server.descriptions import (
 from keyrecon.annotate.server.frame_cache import encode_png
 from keyrecon.annotate.server.session import Session, describe_project
 from keyrecon.annotate.store.cells import Cells, Change, cells_from_annotations, of_kind
-from keyrecon.annotate.store.edits import EditList, Frame, Limits, Name, Place, Sign
+from keyrecon.annotate.store.edits import (
+    EditList,
+    Frame,
+    Limits,
+    Name,
+    Place,
+    Sign,
+    check_frame,
+)
 from keyrecon.annotate.store.file_sync import picks_from_cells
 from keyrecon.annotate.store.importing import compare_marks
 from keyrecon.annotate.store.journal import Entry
@@ -146,13 +154,17 @@ def _describe_turn(session: Session, entry: Entry | None) -> Json:
 
 def pose_suggestion(session: Session, request: ApiRequest) -> Json:
     """Where the joints of a frame probably are."""
-    suggest = session.assistant.suggestion
-    return suggest(session.store.annotations(), request.path["frame"]) if suggest else {}
+    suggest, frame = session.assistant.suggestion, request.path["frame"]
+    check_frame(frame, session.limits)
+    return suggest(session.store.annotations(), frame) if suggest else {}
 
 
 def pose(session: Session, request: ApiRequest) -> Json:
     """A frame's body in space."""
     estimate, body = session.assistant.pose, request.body
+    check_frame(body.frame, session.limits)
+    for name in (*body.marks, *body.nearer):
+        session.limits.skeleton.index(name)
     marks = {name: [float(x) for x in place] for name, place in body.marks.items()}
     signs = {name: sign for name, sign in body.nearer.items() if sign}
     return estimate(session.store.annotations(), body.frame, marks, signs) if estimate else {}
@@ -188,6 +200,7 @@ def preview(session: Session, request: ApiRequest) -> Json:
 def backprojection(session: Session, request: ApiRequest) -> Response:
     """How much each pixel looks like a part, to be laid over the picture."""
     tint, picks = session.assistant.backprojection, picks_from_cells(session.store.state.cells)
+    check_frame(request.path["frame"], session.limits)
     if tint is None:
         return Response(status_code=204)
     picture = tint(tuple(picks), request.path["frame"], request.query.get("part", "head"))

@@ -1,7 +1,9 @@
 """All that the server works with for one project, and what watches the project's files."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -25,6 +27,7 @@ from keyrecon.annotate.store.store import Store
 from keyrecon.errors import KeyreconError
 from keyrecon.io.workspace import Workspace
 
+logger = logging.getLogger(__name__)
 Json = dict[str, Any]
 WATCH_SECONDS = 1.0
 """How often the files are checked: the times of three files, which costs nothing."""
@@ -118,7 +121,10 @@ class ProjectWatch:
 
     def _run(self) -> None:
         while not self._ended.wait(WATCH_SECONDS):
-            self.check()
+            try:
+                self.check()
+            except Exception:  # the thread outlives whatever befalls the files
+                logger.exception("The files of the project could not be looked at.")
 
     def check(self) -> None:
         """Take in what changed. What stands in the way is published once, and when it is gone."""
@@ -138,4 +144,11 @@ class ProjectWatch:
     def _file_stamps(self) -> list[int]:
         """When keyframes and motion were made."""
         files = (self._session.workspace.keyframes_file, self._session.workspace.motion_file)
-        return [file.stat().st_mtime_ns if file.exists() else 0 for file in files]
+        return [_stamp(file) for file in files]
+
+
+def _stamp(file: Path) -> int:
+    try:
+        return file.stat().st_mtime_ns
+    except OSError:
+        return 0

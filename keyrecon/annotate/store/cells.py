@@ -15,6 +15,7 @@ each: to apply it, to take it back, and to see that somebody else was faster.
 The sheet's marks as `Annotations`, which the rest of keyrecon reads, and back.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -119,6 +120,26 @@ def picks_of(cells: Mapping[Key, Value]) -> list[dict[str, Any]]:
 def marked_frames(cells: Mapping[Key, Value]) -> Iterator[int]:
     """Frames on which the person decided anything about the body."""
     return (int(key[1]) for key in of_kind(cells, *FILE_CELLS))
+
+
+def check_cells(cells: Mapping[Key, Value]) -> None:
+    """Raise ValueError for a cell that no edit made."""
+    for key, value in cells.items():
+        if not _is_cell(key, value):
+            raise ValueError(f"{key!r} holds {value!r}")
+
+
+def _is_cell(key: Key, value: Value) -> bool:
+    match (*key, value):
+        case ("mark", int(), str(), [x, y, (0 | 1 | 2)]):
+            return all(isinstance(n, int | float) and math.isfinite(n) for n in (x, y))
+        case ("nearer", int(), str(), (1 | -1)) | ("lock", int(), True):
+            return True
+        case ("pick", str(), {"frame": int(), "part": str(), "x": x, "y": y}):
+            return all(isinstance(n, int | float) and math.isfinite(n) for n in (x, y))
+        case ("own", int(), ("upper" | "lower" | "both")):
+            return True
+    return False
 
 
 def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> None:

@@ -167,16 +167,24 @@ def _check(change: Change, limits: Limits) -> None:
     kind, *where = change.key
     pick = change.after if kind == "pick" else None
     frame = pick["frame"] if pick else where[0]
-    if isinstance(frame, int) and frame >= limits.n_frames:
-        raise KeyreconError(
-            f"Frame {frame} is outside the video, which has frames 0 to {limits.n_frames - 1}."
-        )
+    if isinstance(frame, int):
+        check_frame(frame, limits)
     if kind in ("mark", "nearer"):
         _check_name(str(where[1]), kind, limits.skeleton)
     if kind == "mark" and change.after is not None and change.after[2]:
         _check_place(change.after[:2], limits.size, margin=1.0)
+    if pick and not pick["part"]:
+        raise KeyreconError("A click needs the name of the part that it is on.")
     if pick:
         _check_place([pick["x"], pick["y"]], limits.size, margin=0.0)
+
+
+def check_frame(frame: int, limits: Limits) -> None:
+    """Raise KeyreconError for a frame that the video does not have."""
+    if not 0 <= frame < limits.n_frames:
+        raise KeyreconError(
+            f"Frame {frame} is outside the video, which has frames 0 to {limits.n_frames - 1}."
+        )
 
 
 def _check_name(name: str, kind: str, skeleton: Skeleton) -> None:

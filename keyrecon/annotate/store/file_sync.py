@@ -30,7 +30,7 @@ from keyrecon.annotate.store.cells import (
 )
 from keyrecon.annotate.store.edits import Limits
 from keyrecon.annotate.store.journal import NotSaved
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, explain
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.coco import Lines, coco_lines, read_coco, text_of_lines
 from keyrecon.io.formats.picks import picks_text, read_picks
@@ -102,10 +102,15 @@ class FileSync:
 
         Raises NotSaved for a file that cannot be read: nothing is written over it.
         """
-        signature = _signature(self.form.path)
-        if signature is None or signature == self._signature:
-            return ()
-        digest = _digest(self.form.path.read_bytes())
+        try:
+            signature = _signature(self.form.path)
+            if signature is None or signature == self._signature:
+                return ()
+            digest = _digest(self.form.path.read_bytes())
+        except OSError as fault:
+            raise NotSaved(
+                f"{self.name} cannot be read ({explain(fault)}). {self._remedy}"
+            ) from fault
         ours = {version[1]: version for version in (self.written, self.wanted)}
         changes: tuple[Change, ...] = ()
         if digest in ours:

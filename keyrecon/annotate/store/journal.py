@@ -13,19 +13,23 @@ acknowledged survives kill -9 and a loss of power. All of it is the standard lib
 database is held exclusively: then SQLite needs no memory shared between processes, which WAL mode
 otherwise has in a mapped file that network drives do not do well.
 
-Rows are only ever added. `notes` holds small facts beside them: which revision each file shows.
+Rows are only ever added. `notes` holds small facts beside them: which revision each file shows,
+and a digest of all rows, each with that of the rows before. SQLite does not notice a flipped
+byte inside a row; at opening the rows are held against the digest.
 """
 
+import hashlib
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from keyrecon.annotate.store.cells import Cells, Change, apply_in_place
 from keyrecon.errors import KeyreconError
+from keyrecon.reading import reading
 
 Role = Literal["edit", "undo", "redo", "fixed"]
 Stack = tuple[int, ...]
@@ -83,6 +87,15 @@ def _move(undoable: Stack, redoable: Stack, entry: Entry) -> tuple[Stack, Stack]
 
 
 VERSION = 1
+DIGEST_NOTE = "digest"
+"""Under which the digest of the rows is noted, with the last revision that it covers: a keyrecon
+that does not know of it adds rows behind."""
+NO_ROWS = ""
+REMEDY = (
+    "free some space if the disk is full; if the file is damaged, move annotate.sqlite* away: the "
+    "marks themselves are in annotations.json, only undo and locks are lost"
+)
+Row = tuple[int, str, Role, int | None, str, str]
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS entries (
     revision INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, role TEXT NOT NULL, of INTEGER,
@@ -101,18 +114,13 @@ class Journal:
     def __init__(self, path: Path) -> None:
         """Open or begin the journal at `path`; KeyreconError for a file that is none."""
         self.path = path
-        try:
+        self._digest = NO_ROWS
+        with reading(path, "a whole journal of edits", REMEDY), ExitStack() as held:
             self._base = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-            with ExitStack() as held:
-                held.callback(self._base.close)
-                self._prepare()
-                held.pop_all()
-        except sqlite3.Error as fault:
-            raise KeyreconError(
-                f"{path} cannot be used as a journal of edits ({fault}). Free some space if the "
-                "disk is full; if the file is damaged, move it away: the marks themselves are in "
-                "annotations.json, only undo is lost."
-            ) from fault
+            held.callback(self._base.close)
+            self._prepare()
+            self._check()
+            held.pop_all()
 
     def _prepare(self) -> None:
         self._base.execute("PRAGMA locking_mode=EXCLUSIVE")
@@ -126,14 +134,36 @@ class Journal:
             )
         self._base.executescript(SCHEMA + f"PRAGMA user_version={VERSION};")
 
+    def _check(self) -> None:
+        """Raise ValueError where the journal is not as it was written."""
+        found = self._base.execute("PRAGMA integrity_check").fetchone()[0]
+        if found != "ok":
+            raise ValueError(found)
+        told = self.note(DIGEST_NOTE)
+        covered, expected = json.loads(told) if told else (0, NO_ROWS)
+        last = 0
+        for row in self._rows():
+            if row[0] != (last := last + 1):
+                raise ValueError(f"edit {last} is missing")
+            self._digest = _chained(self._digest, row)
+            if last == covered and self._digest != expected:
+                raise ValueError(f"the edits up to {covered} are not those that were noted")
+            entry = _entry(*row)
+            if not isinstance(entry.label, str) or entry.role not in get_args(Role):
+                raise ValueError(f"edit {last} is none")
+        if last < covered:
+            raise ValueError(f"{covered} edits were noted, and {last} are there")
+
     def entries(self, up_to: int | None = None) -> Iterator[Entry]:
         """All entries in order, or those up to a revision."""
-        rows = self._base.execute(
+        return (_entry(*row) for row in self._rows(up_to))
+
+    def _rows(self, up_to: int | None = None) -> Iterator[Row]:
+        return self._base.execute(
             "SELECT revision, id, role, of, label, changes FROM entries "
             "WHERE revision <= ? ORDER BY revision",
             (up_to if up_to is not None else 2**62,),
         )
-        return (_entry(*row) for row in rows)
 
     def entry(self, revision: int) -> Entry:
         """One entry."""
@@ -154,13 +184,18 @@ class Journal:
             (e.revision, e.id, e.role, e.of, e.label, json.dumps(e.changes, allow_nan=False))
             for e in entries
         ]
+        digest = self._digest
+        for row in rows:
+            digest = _chained(digest, row)
+        noted = {DIGEST_NOTE: json.dumps([rows[-1][0], digest])} if rows else {}
         with self._transaction():
             self._base.executemany(
                 "INSERT INTO entries (revision, id, role, of, label, changes) "
                 "VALUES (?, ?, ?, ?, ?, ?)",
                 rows,
             )
-            self._base.executemany("REPLACE INTO notes VALUES (?, ?)", notes.items())
+            self._base.executemany("REPLACE INTO notes VALUES (?, ?)", {**notes, **noted}.items())
+        self._digest = digest
 
     def note(self, name: str) -> str | None:
         """A fact noted earlier."""
@@ -183,11 +218,16 @@ class Journal:
                 if self._base.in_transaction:
                     self._base.execute("ROLLBACK")
                 raise
-        except sqlite3.OperationalError as fault:
+        except sqlite3.Error as fault:
             raise NotSaved(
                 f"{self.path} could not be written ({fault}). Free some space: the page keeps the "
                 "edit and sends it again."
             ) from fault
+
+
+def _chained(before: str, row: Row) -> str:
+    """The digest of all rows up to this one."""
+    return hashlib.sha256(f"{before}{row!r}".encode()).hexdigest()
 
 
 def _entry(revision: int, id_: str, role: Role, of: int | None, label: str, changes: str) -> Entry:

@@ -20,6 +20,7 @@ from keyrecon.annotate.store.cells import (
     Change,
     annotations_from_cells,
     apply_in_place,
+    check_cells,
     check_fit,
     effective_changes,
     invert_changes,
@@ -27,10 +28,11 @@ from keyrecon.annotate.store.cells import (
 )
 from keyrecon.annotate.store.edits import AnyEdit, Limits, changes_of
 from keyrecon.annotate.store.file_sync import FileSync, annotations_form, picks_form
-from keyrecon.annotate.store.journal import Entry, Journal, JournalState, Role, advance
+from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import hold_lock
 from keyrecon.io.workspace import Workspace
+from keyrecon.reading import reading
 from keyrecon.records import Annotations
 
 Result = dict[str, Any]
@@ -102,10 +104,13 @@ class Store:
             held.callback(_lock_project(workspace).release)
             self._journal = Journal(workspace.folder / "annotate.sqlite")
             held.callback(self._journal.close)
-            self.state = advance(JournalState(), self._journal.entries())
-            check_fit(self.state.cells, limits.skeleton, limits.n_frames)
-            forms = (annotations_form(workspace, limits), picks_form(workspace))
-            self._files = [FileSync(form, self._journal.note(form.path.name)) for form in forms]
+            with reading(self._journal.path, "a whole journal of edits", REMEDY):
+                self.state = advance(JournalState(), self._journal.entries())
+                check_cells(self.state.cells)
+                check_fit(self.state.cells, limits.skeleton, limits.n_frames)
+                forms = (annotations_form(workspace, limits), picks_form(workspace))
+                notes = [self._journal.note(form.path.name) for form in forms]
+                self._files = [FileSync(f, note) for f, note in zip(forms, notes, strict=True)]
             self.refresh()
             self._held = held.pop_all()
 

@@ -205,3 +205,31 @@ def test_what_stands_in_the_way_is_reported_once_and_when_it_is_gone(opened, fol
     (folder / "annotations.json").unlink()
     watch.check()
     assert [bool(news["trouble"]) for news in heard] == [True, False]
+
+
+def test_a_frame_beyond_the_last_one_and_a_joint_that_nobody_has_are_refused(opened):
+    session = opened(Assistant(suggestion=lambda *_: {}, pose=lambda *_: {}))
+    place = {"frame": 50, "marks": {}, "nearer": {}}
+    assert ask(session, "POST", "/api/pose", place).status == 400
+    assert ask(session, "POST", "/api/pose", {**place, "frame": 49}).status == 200
+    odd = {"frame": 3, "marks": {"toe": [1, 2, 2]}, "nearer": {}}
+    assert ask(session, "POST", "/api/pose", odd).status == 400
+    for route in ("suggestion", "backprojection"):
+        assert ask(session, "GET", f"/api/{route}/50").status == 400
+
+
+def test_the_watching_thread_outlives_bad_bytes(opened, folder):
+    session = opened()
+    published = []
+    session.events.publish = published.append
+    watch = ProjectWatch(session)
+    try:
+        for name in ("keyframes.json", "annotations.json"):
+            (folder / name).write_bytes(b"\xff\xfe{")
+            watch.check()
+            assert name in [news["trouble"] for news in published if "trouble" in news][-1]
+            (folder / name).unlink()
+            watch.check()
+        assert watch._thread.is_alive()
+    finally:
+        watch.close()

@@ -118,7 +118,7 @@ def test_marks_that_no_longer_fit_the_project_stop_the_start(open_store, bare):
 
 def test_a_journal_that_is_none_is_not_replaced(open_store, bare):
     (bare / "annotate.sqlite").write_bytes(b"something else" * 1000)
-    with pytest.raises(KeyreconError, match="cannot be used as a journal"):
+    with pytest.raises(KeyreconError, match="is not a whole journal"):
         open_store()
     assert (bare / "annotate.sqlite").read_bytes().startswith(b"something else")
 
