@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import uvicorn
@@ -28,12 +28,14 @@ from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import keyframing, project
 from keyrecon.app.exporting import export
 from keyrecon.app.preparing import prepare_project
+from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames
 from keyrecon.progress import Progress
+from keyrecon.report.overlay import Limbs, OverlayOptions, View
 
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
@@ -162,6 +164,28 @@ def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     """Files for other programs, named after the project, into its folder `exports`."""
     workspace = Workspace(folder)
     make_folder(workspace.exports)
-    name = folder.resolve().name
+    first, last = options.get("first"), options.get("last")
+    frames = None if None in (first, last) else f"{first}-{last}"
+    chosen: dict[str, Any] = {
+        name: options[name] for name in ("skeleton", "slowmo", "size") if name in options
+    }
+    if "view" in options:
+        chosen["view"] = tuple(options["view"])
+    for name, kind in (("view", View), ("skeleton", Limbs)):
+        if not {*np.atleast_1d(chosen.get(name, ()))} <= {*get_args(kind)}:
+            raise KeyreconError(f"There is no {name} '{chosen[name]}'.")
+    overlay = OverlayOptions(**chosen)
+    name = folder.resolve().name + "".join(f"_{part}" for part in _told_in_name(frames, overlay))
     files = [workspace.exports / f"{name}{suffix}" for suffix in options.get("formats", ())]
-    return "\n".join(export(workspace, files, progress))
+    export(workspace, files, progress, frames, overlay)
+    return ""
+
+
+def _told_in_name(frames: str | None, overlay: OverlayOptions) -> list[str]:
+    """What tells files of one motion apart."""
+    plain = OverlayOptions()
+    parts = [frames] if frames else []
+    parts += [*overlay.view] if overlay.view != plain.view else []
+    parts += [overlay.skeleton] if overlay.skeleton != plain.skeleton else []
+    parts += [f"slow{overlay.slowmo:g}"] if overlay.slowmo != plain.slowmo else []
+    return parts + ([f"{overlay.size}p"] if overlay.size else [])

@@ -94,7 +94,13 @@ class JobOptions(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
     reach: float | None = None
     height: float | None = None
     formats: Annotated[tuple[Annotated[str, Meta(max_length=8)], ...], Meta(max_length=12)] = ()
-    """Suffixes of the files to be written."""
+    """Suffixes of the files to be written; what follows is said for these alone."""
+    first: Frame | None = None
+    last: Frame | None = None
+    view: Annotated[tuple[Name, ...], Meta(max_length=5)] = ()
+    skeleton: Name | None = None
+    slowmo: float | None = None
+    size: int | None = None
 
 
 class JobRequest(Struct, forbid_unknown_fields=True):

@@ -2,12 +2,14 @@
 
 import json
 from functools import partial
+from typing import get_args
 
 import av
 import pytest
 from page_driver import CHROMIUM, Person, serving
 from page_project import (
-    FRAMES,
+    FPS,
+    SIZE,
     make_project,
     run_at_once,
     truth,
@@ -17,9 +19,9 @@ from page_project import (
 
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
-from keyrecon.app.exporting import OVERLAY
 from keyrecon.body import LSP14
 from keyrecon.io.formats.export import SUFFIXES
+from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
     not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
@@ -120,36 +122,57 @@ def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
             assert person.page.is_disabled("#motion-primary")
 
 
-def test_every_format_there_is_can_be_chosen(folder, visit):
+def test_every_format_and_view_there_is_can_be_chosen(folder, visit):
     with serving(folder) as server:
         person = visit(server)
-        offered = person.call("views/exports", "m.FORMATS.map(([suffix]) => suffix)")
-        assert {*offered, OVERLAY} == {*SUFFIXES, OVERLAY}
+        for name, known in (("FORMATS", SUFFIXES), ("VIEWS", get_args(View)),
+                            ("SKELETONS", get_args(Limbs))):  # fmt: skip
+            assert {*person.call("views/exports", f"m.{name}.map(([value]) => value)")} == {*known}
 
 
-def test_report_video_and_files_without_a_command_line(folder, visit):
+def test_the_report_opens_sealed_off_from_the_page(folder, visit):
     write_true_motion(folder)
-    with serving(folder, commands=job_commands(folder)) as server:
+    with serving(folder) as server:
         person = visit(server)
-        person.press("Alt+3")
-        person.page.click("#motion-files")
+        person.press("Alt+4")
         with person.page.expect_popup() as opened:
             person.page.click("#report")
         opened.value.wait_for_load_state()
         assert opened.value.inner_text("body") == "A report, no cookie for its script"
         opened.value.close()
-        for suffix in (".trc", ".csv"):
-            person.page.check(f"#formats [value='{suffix}']")
+
+
+def test_video_and_files_of_a_part_of_the_clip_without_a_command_line(folder, visit):
+    write_true_motion(folder)
+    with serving(folder, commands=job_commands(folder)) as server:
+        person = visit(server)
+        person.press("Alt+3")
+        person.page.click("#motion-files")
+        person.page.check("#formats [value='.trc']")
         person.press("Enter")
-        person.await_text("#export-list", "rally.csv")
+        person.await_text("#export-list", "rally.trc")
+        person.page.fill("[aria-label='First frame']", "90")
+        person.await_text("#export-range", "0.40 s")
+        person.page.check("#overlay-choices [value=above]")
+        person.page.select_option("[aria-label=Speed]", "4")
         person.page.click("#export-overlay")
-        person.await_text("#export-list", "rally.mp4")
+        person.await_text("#export-list", "rally_90-99_camera_above_slow4.mp4")
         with person.page.expect_download() as saved:
-            person.page.click("#export-list a >> text=rally.mp4")
-        with av.open(str(saved.value.path())) as made:
-            assert made.streams.video[0].frames == FRAMES
-        assert (folder / "exports" / "rally.trc").read_text().startswith("PathFileType")
-        person.complaints.clear()
+            person.page.click("#export-list a >> text=.mp4")
+        check_video(saved.value.path())
+        person.page.fill("[aria-label='Last frame']", "100")
+        person.await_text("#export-range", "two frames from 0 to 99")
+        assert person.page.is_disabled("#export-overlay")
+    assert (folder / "exports" / "rally.trc").read_text().startswith("PathFileType")
+
+
+def check_video(path):
+    """Ten frames, four times slower than life, two pictures side by side."""
+    with av.open(str(path)) as made:
+        stream = made.streams.video[0]
+        assert stream.frames == 10
+        assert float(stream.average_rate) == pytest.approx(FPS / 4, rel=0.01)
+        assert stream.width > SIZE[0]
 
 
 def edges(person, selector):

@@ -1,6 +1,6 @@
 // What a motion is made for: the report, files for other programs, and the video with the figure.
 import * as api from "../state/api.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, make, setText, toggle } from "./dom.js";
 
 // [suffix, what it is, who reads it]
 export const FORMATS = [
@@ -14,6 +14,30 @@ export const FORMATS = [
   [".json", "COCO", "joints in the picture, frame by frame"],
 ];
 const OVERLAY = ".mp4";
+// [value, what it is]
+export const VIEWS = [
+  ["camera", "the video itself"],
+  ["right", "from the right"],
+  ["left", "from the left"],
+  ["back", "from behind"],
+  ["above", "from above"],
+];
+export const SKELETONS = [
+  ["all", "all joints"],
+  ["upper", "the upper body"],
+  ["lower", "the lower body"],
+  ["left", "the left side"],
+  ["right", "the right side"],
+  ["none", "none"],
+];
+export const SPEEDS = [["1", "as it was"], ["2", "half"], ["4", "a quarter"], ["8", "an eighth"]];
+export const SIZES = [["", "as the video"], ["480", "480"], ["720", "720"], ["1080", "1080"]];
+
+const choice = (rows, label) => {
+  const field = make("select", { "aria-label": label });
+  field.append(...rows.map(([value, text]) => make("option", { value }, text)));
+  return field;
+};
 
 export function createExports(model, shell) {
   let files = [];
@@ -39,12 +63,51 @@ export function createExports(model, shell) {
   const chosen = () => [...boxes].filter(([, box]) => box.checked).map(([suffix]) => suffix);
   const ready = () => model.project.has.motion && !shell.runningJob();
 
+  const last = model.project.n_frames - 1,
+    range = ["First frame", "Last frame"].map((label, n) => {
+      const field = make("input", { type: "text", inputMode: "numeric", size: 6, value: n ? last : 0 });
+      field.setAttribute("aria-label", label);
+      field.addEventListener("input", model.redraw);
+      return field;
+    }),
+    said = make("small", {});
+  byId("export-range").append("Frames ", range[0], " to ", range[1], " ", said);
+  const views = VIEWS.map(([value]) => make("input", { type: "checkbox", value, checked: value === "camera" })),
+    [skeleton, speed, size] = [choice(SKELETONS, "Figure"), choice(SPEEDS, "Speed"), choice(SIZES, "Height, px")];
+  for (const box of views) box.addEventListener("change", model.redraw);
+  byId("overlay-choices").append(
+    make("b", {}, "Views, side by side"),
+    make("div", {}, ...VIEWS.map(([, text], n) => make("label", {}, views[n], text))),
+    make("b", {}, "Figure"),
+    skeleton,
+    make("b", {}, "Speed"),
+    speed,
+    make("b", {}, "Height, px"),
+    size,
+  );
+
+  // {first, last} of the part that is to be written, {} for the whole, null where it cannot be.
+  function part() {
+    const [from, to] = range.map((field) => (/^\d+$/.test(field.value.trim()) ? Number(field.value) : NaN));
+    if (!(from <= to && to <= last)) return null;
+    return from === 0 && to === last ? {} : { first: from, last: to };
+  }
+
   function write(options) {
-    if (ready()) shell.startJob("export", options);
+    if (ready() && part()) shell.startJob("export", { ...part(), ...options });
   }
   const writeMotion = () => chosen().length && write({ formats: chosen() });
+  const chosenViews = () => views.filter((box) => box.checked).map((box) => box.value);
   byId("export-motion").addEventListener("click", writeMotion);
-  byId("export-overlay").addEventListener("click", () => write({ formats: [OVERLAY] }));
+  byId("export-overlay").addEventListener("click", () =>
+    write({
+      formats: [OVERLAY],
+      view: chosenViews(),
+      skeleton: skeleton.value,
+      slowmo: Number(speed.value),
+      ...(size.value ? { size: Number(size.value) } : {}),
+    }),
+  );
 
   function fileRow({ name, bytes, current }) {
     const link = make("a", { href: `/api/exports/${encodeURIComponent(name)}`, download: name }, name);
@@ -70,8 +133,13 @@ export function createExports(model, shell) {
         : "It is written when the motion is made (3 Motion).",
     );
     byId("report").hidden = !has.report;
-    byId("export-motion").disabled = !ready() || !chosen().length;
-    byId("export-overlay").disabled = !ready();
+    const whole = part(),
+      seconds = whole && ((whole.last ?? last) - (whole.first ?? 0) + 1) / model.project.fps;
+    setText(said, whole ? `${seconds.toFixed(2)} s` : `two frames from 0 to ${last}, the first first`);
+    toggle(said, "wrong", !whole);
+    byId("export-motion").disabled = !ready() || !chosen().length || !whole;
+    byId("export-overlay").disabled = !ready() || !chosenViews().length || !whole;
+    setText(byId("files-count"), files.length ? String(files.length) : "");
     drawFiles();
   }
 
