@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.annotate.assist.answers import make_assistant
-from keyrecon.app import project
+from keyrecon.app import project, running
 from keyrecon.app.console import show
 from keyrecon.app.demo import CLICK_NOISE, run_demo
 from keyrecon.body import LSP14
@@ -137,8 +137,8 @@ def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work],
 def reconstruct(folder: Path, truth: Path, height: float) -> str:
     """Run what follows the marks, and its accuracy."""
     workspace = Workspace(folder)
-    options = project.settings(workspace, Options(), height)
-    project.run(workspace, options, show, partial=True)
+    options = running.settings(workspace, Options(), height)
+    running.run(workspace, options, show, partial=True)
     return project.evaluate(folder, truth)
 
 

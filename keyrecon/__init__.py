@@ -15,12 +15,21 @@ Conventions, the same everywhere:
 """
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
 
-try:
-    __version__ = version("keyrecon")
-except PackageNotFoundError:
-    __version__ = "0+unknown"
+if TYPE_CHECKING:
+    from keyrecon.body import LSP14 as LSP14
+    from keyrecon.body import Skeleton as Skeleton
+    from keyrecon.errors import KeyreconError as KeyreconError
+    from keyrecon.io.video import open_video as open_video
+    from keyrecon.library import reconstruct as reconstruct
+    from keyrecon.pipeline import Options as Options
+    from keyrecon.pipeline import prepare as prepare
+    from keyrecon.records import Annotations as Annotations
+    from keyrecon.records import Motion as Motion
+    from keyrecon.records import Pick as Pick
+
+    __version__: str
 
 _PUBLIC = {
     "KeyreconError": "keyrecon.errors",
@@ -37,8 +46,19 @@ _PUBLIC = {
 __all__ = ["__version__", *_PUBLIC]
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that the import itself stays light."""
+    if name == "__version__":
+        return _version()
     if name not in _PUBLIC:
         raise AttributeError(f"module 'keyrecon' has no attribute '{name}'")
     return getattr(import_module(_PUBLIC[name]), name)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("keyrecon")
+    except PackageNotFoundError:
+        return "0+unknown"

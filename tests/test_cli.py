@@ -1,12 +1,20 @@
 """What the command line says to wrong input: one line, exit code 1, nothing written over."""
 
+import ast
 import json
+import os
+import re
 import shlex
+import signal
 import subprocess
 import sys
+import time
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 
+import keyrecon as package
 from keyrecon import cli
 
 
@@ -237,3 +245,82 @@ def test_the_package_runs_as_a_module():
     assert told.returncode == 1
     assert "nowhere" in told.stderr
     assert told.stderr.count("\n") == 1
+
+
+HEAVY = "{'numpy', 'scipy', 'cv2', 'av', 'skimage', 'plotly', 'starlette', 'uvicorn', 'jaxtyping'}"
+
+
+@pytest.mark.parametrize(
+    ("words", "allowed"),
+    [
+        (("--help",), set()),
+        (("nonsense",), set()),
+        (("new", "--help"), set()),
+        (("pick", "--help"), set()),
+        (("annotate", "--help"), set()),
+        (("relink", "nowhere", "v.mp4"), {"numpy", "jaxtyping"}),
+    ],
+)
+def test_a_command_imports_only_what_it_needs(words, allowed):
+    code = (
+        f"import sys; sys.argv = ['keyrecon', *{list(words)!r}]\n"
+        "from keyrecon import cli\n"
+        "try:\n    cli.main()\nexcept SystemExit:\n"
+        f"    print('loaded', *({HEAVY} & set(sys.modules)))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(told.stdout.splitlines()[-1].split()) - {"loaded"} <= allowed
+
+
+def test_the_help_shows_every_command_by_the_first_line_of_its_docstring(keyrecon):
+    _, out, _ = keyrecon("--help")
+    shown = " ".join(re.sub(r"[│•]", " ", out).split())
+    for name, command in cli.COMMANDS.items():
+        module = import_module(f"{command.package}.{command.module}")
+        found = getattr(module, command.name)
+        first = ((found if callable(found) else module).__doc__ or "").splitlines()[0]
+        assert f"{name} {first}" in shown
+
+
+def test_a_reader_who_goes_away_is_no_fault():
+    reading, writing = os.pipe()
+    os.close(reading)
+    told = subprocess.run(
+        [sys.executable, "-m", "keyrecon", "--help"], stdout=writing, stderr=subprocess.PIPE
+    )
+    os.close(writing)
+    assert (told.returncode, told.stderr) == (141, b"")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_annotator_ends_alike_by_a_key_and_by_a_signal(project, number):
+    command = [sys.executable, "-m", "keyrecon", "annotate", str(project), "--no-browser"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert "Open in a browser" in process.stdout.readline()
+        process.stdout.readline()
+        time.sleep(0.3)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=30)
+    assert out == "Stopped. Everything that was marked is kept.\n"
+    assert (process.returncode, err) == (0, "")
+
+
+def test_a_signal_ends_work_like_a_key(keyrecon, project, monkeypatch):
+    monkeypatch.setattr("keyrecon.app.running.run", lambda *_, **__: os.kill(os.getpid(), 15))
+    code, _, err = keyrecon("run", project)
+    assert code == 130
+    assert "finished stages are kept" in err
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_public_names_are_there_for_programs_and_for_type_checkers():
+    for name in package.__all__:
+        assert getattr(package, name) is not None
+    tree = ast.parse(Path(package.__file__).read_text())
+    checked = next(node for node in tree.body if isinstance(node, ast.If))
+    imported = [
+        alias.asname for node in checked.body if hasattr(node, "names") for alias in node.names
+    ]
+    assert sorted([*imported, "__version__"]) == sorted(package.__all__)

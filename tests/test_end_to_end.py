@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from keyrecon import cli
-from keyrecon.app import project
+from keyrecon.app import running
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.coco import write_coco
@@ -128,8 +128,8 @@ def test_the_report_and_exports_are_written(clip, solved, tmp_path):
 
 def test_a_second_run_makes_no_stage_again(clip, solved):
     workspace = Workspace(clip / "project")
-    chosen = project.settings(workspace, Options(), 1.7)
-    project.run(workspace, chosen, silent)
+    chosen = running.settings(workspace, Options(), 1.7)
+    running.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
 
 
@@ -158,9 +158,9 @@ def test_a_run_by_the_paper_takes_the_keyframes_that_the_paper_chose(clip, tmp_p
     )
     write_coco(made / "annotations.json", marks, SIZE)
     workspace = Workspace(made)
-    options = project.settings(workspace, Options())
+    options = running.settings(workspace, Options())
     assert options.keyframes.method == "coverage"  # a run by our forms is not bound
-    said = project.run(workspace, options, silent, printed=True)
+    said = running.run(workspace, options, silent, printed=True)
     assert "Eq. 2-4" not in said
     assert set(workspace.stages.seconds) == {"propagate", "lift"}
 
@@ -173,10 +173,10 @@ def test_keyframes_without_marks_are_named(clip, solved):
     try:
         workspace.annotations_file.write_text(json.dumps(data))
         with pytest.raises(KeyreconError, match=rf"1 of .* not annotated: frame {gone} "):
-            project.run(workspace, workspace.options(Options(), Options()), silent)
+            running.run(workspace, workspace.options(Options(), Options()), silent)
         workspace.annotations_file.unlink()
         with pytest.raises(KeyreconError, match="not annotated"):
-            project.run(workspace, workspace.options(Options(), Options()), silent)
+            running.run(workspace, workspace.options(Options(), Options()), silent)
     finally:
         (clip / "aside.json").rename(workspace.annotations_file)
 

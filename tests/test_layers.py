@@ -11,7 +11,7 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "keyframes", "propagation", "lifting", "golf", "world", "strokes"}
-OUTER = {"app", "cli", "pipeline", "annotate", "report", "synthetic"}
+OUTER = {"app", "cli", "commands", "pipeline", "annotate", "report", "synthetic"}
 BASE = {"records", "body", "metrics", "errors", "reading", "ranges", "progress", "numerics"}
 SHARED = BASE | {"segmentation", "io"}
 

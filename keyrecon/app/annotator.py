@@ -25,7 +25,7 @@ from keyrecon.annotate.server.address import (
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
-from keyrecon.app import keyframing, project
+from keyrecon.app import keyframing, project, running
 from keyrecon.app.exporting import export
 from keyrecon.app.preparing import prepare_project
 from keyrecon.errors import KeyreconError
@@ -149,8 +149,8 @@ def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -
 
 def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
-    settings = project.settings(workspace, Options(), options.get("height"))
-    return _contradictions(project.run(workspace, settings, progress, partial=True))
+    settings = running.settings(workspace, Options(), options.get("height"))
+    return _contradictions(running.run(workspace, settings, progress, partial=True))
 
 
 def _contradictions(told: str) -> str:

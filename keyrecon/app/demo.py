@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.app.keyframing import KeyframeSettings, find_keyframes
-from keyrecon.app.project import evaluate, prepared, run, settings, start
+from keyrecon.app.project import evaluate, start
+from keyrecon.app.running import prepared, run, settings
 from keyrecon.body import LSP14
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.io.formats.coco import read_coco, write_coco

@@ -1,4 +1,4 @@
-"""The commands under `keyrecon golf`.
+"""A model of whole golf swings: train it, fit it to a video.
 
 Only what a person would set is an option here; how a video is observed and a prior fitted stands in
 the options records of the stages, for programs, with the evidence for each value.

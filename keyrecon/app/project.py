@@ -1,11 +1,7 @@
 """What the commands do to a project folder; each returns the text to show."""
 
-import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from keyrecon.annotate.store.cells import (
     Cells,
@@ -14,7 +10,6 @@ from keyrecon.annotate.store.cells import (
     cells_from_annotations,
 )
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
-from keyrecon.app.preparing import prepare_project
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import write_durably
@@ -22,17 +17,11 @@ from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outs
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import read_keyframes
-from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import Workspace
-from keyrecon.library import reconstruct
 from keyrecon.metrics import evaluate_motion, read_truth
-from keyrecon.pipeline import Options, as_printed, with_height
-from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Keyframes, Motion, Pick, Preparation
-from keyrecon.report.markup import ReportMaterial
-from keyrecon.report.page import write_report
-from keyrecon.uncertainty import uncertain_share, uncertain_stretches
+from keyrecon.records import Annotations, Keyframes, Motion, Pick
 
 
 def start(
@@ -149,94 +138,6 @@ def load_annotations(workspace: Workspace, video: Video) -> Annotations:
     """The project's annotations, checked."""
     size = (video.width, video.height)
     return read_coco(workspace.annotations_file, workspace.skeleton, len(video), size)
-
-
-def settings(workspace: Workspace, told: Options, height: float | None = None) -> Options:
-    """The project's options and what is told now, with the height in metres."""
-    if height is not None and not 0.5 < height < 2.6:
-        raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
-    options = workspace.options(told, Options())
-    return options if height is None else with_height(options, height)
-
-
-def run(
-    workspace: Workspace,
-    options: Options,
-    progress: Progress,
-    partial: bool = False,
-    truth: Mapping[str, np.ndarray] | None = None,
-    printed: bool = False,
-) -> str:
-    """Everything after annotation; writes motion.npz and report.html.
-
-    `partial` goes on with what is annotated, `truth` is for the report, `printed` takes the forms
-    that the paper prints. The project remembers its options, without those forms, when all is
-    done: what is refused on the way leaves no trace.
-    """
-    started = time.perf_counter()
-    told, options = options, as_printed(options) if printed else options
-    annotations = annotated(workspace, partial)
-    asked = asked_for(workspace)
-    found = prepare_project(workspace, workspace.video(), annotations, options, progress)
-    preparation = replace(found.preparation, keyframes=asked)
-    motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
-    write_motion(workspace.motion_file, motion)
-    material = ReportMaterial(
-        video=preparation.video,
-        track=preparation.track,
-        pose_distances=preparation.pose_distances,
-        keyframes=preparation.keyframes,
-        annotations=annotations,
-        motion=motion,
-        seconds=workspace.stages.seconds,
-        truth=truth,
-        options=options,
-    )
-    write_report(workspace.report_file, material, progress)
-    workspace.remember(told, Options())
-    return "\n".join(
-        [
-            f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
-            f"{workspace.report_file}: open it in a browser.",
-            *found.contradictions(),
-            *_describe_doubt(motion),
-            *_other_choice(workspace, options, preparation.keyframes),
-            f"Took {time.perf_counter() - started:.0f} s.",
-        ]
-    )
-
-
-def _describe_doubt(motion: Motion) -> list[str]:
-    """How much of the motion is uncertain, and the worst stretches."""
-    stretches = uncertain_stretches(motion)
-    if not stretches:
-        return []
-    share = (
-        f"Arms, legs or head are uncertain in {uncertain_share(motion):.0%} of the frames. Worst:"
-    )
-    return [share, *(stretch.text for stretch in stretches)]
-
-
-def _other_choice(workspace: Workspace, options: Options, asked: Keyframes) -> list[str]:
-    """What a run by the printed forms says of keyframes that were not chosen by them."""
-    if options.keyframes.method != "paper" or asked.method == "paper":
-        return []
-    return [
-        "The keyframes of this project were not chosen by Eq. 2-4 as printed; for that: "
-        f"keyrecon keyframes {quoted(workspace.folder)} --method paper, and mark what it asks for."
-    ]
-
-
-def prepared(
-    workspace: Workspace,
-    options: Options,
-    progress: Progress,
-    marks: Annotations | None = None,
-) -> Preparation:
-    """The automatic part, with the keyframes that the person was asked to annotate."""
-    asked = asked_for(workspace)
-    found = prepare_project(workspace, workspace.video(), marks, options, progress)
-    return replace(found.preparation, keyframes=asked)
 
 
 def asked_for(workspace: Workspace) -> Keyframes:

@@ -15,7 +15,7 @@ import pytest
 from annotator import ask, open_project
 from annotator_edits import edit, submit
 
-from keyrecon.app import project
+from keyrecon.app import project, running
 from keyrecon.io.formats.coco import read_coco
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.workspace import Workspace
@@ -100,8 +100,8 @@ def test_it_can_be_run_again(folder):
     workspace = Workspace(folder)
     former = read_motion(workspace.motion_file)
     workspace.motion_file.unlink()
-    options = project.settings(workspace, Options())
-    project.run(workspace, options, silent, partial=True)
+    options = running.settings(workspace, Options())
+    running.run(workspace, options, silent, partial=True)
     motion = read_motion(workspace.motion_file)
     assert motion.points3d.shape == former.points3d.shape
     assert motion.units == former.units

@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from keyrecon import KeyreconError
-from keyrecon.app.project import settings
+from keyrecon.app.running import settings
 from keyrecon.io.option_tables import former_names
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.selection import KeyframeOptions

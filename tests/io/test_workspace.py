@@ -3,7 +3,7 @@ import os
 import pytest
 
 from keyrecon import KeyreconError
-from keyrecon.app.project import settings
+from keyrecon.app.running import settings
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
