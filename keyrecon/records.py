@@ -36,6 +36,8 @@ class CameraPath:
     """Homography from the pixels of frame t to those of the reference frame."""
     confidence: Float[np.ndarray, "T"]
     """Share of background features that agree with it, 0-1."""
+    cuts: tuple[int, ...] = ()
+    """Frames with which another shot begins; the path means nothing across them."""
 
 
 @dataclass(frozen=True, eq=False)

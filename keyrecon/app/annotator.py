@@ -154,9 +154,9 @@ def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
 
 
 def _contradictions(told: str) -> str:
-    """Of what a command tells, the clicks and marks that do not fit the rest: the page shows
+    """Of what a command tells, the cuts, clicks and marks that do not fit the rest: the page shows
     everything else in places of its own."""
-    named = re.compile(r"The [\w ]+ (clicked|marked) in frame \d+")
+    named = re.compile(r"The video cuts|The [\w ]+ (clicked|marked) in frame \d+")
     return "\n".join(line for line in told.splitlines() if named.match(line))
 
 

@@ -8,6 +8,7 @@ it is as sure of the player.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Pick, Preparation
+from keyrecon.records import Annotations, CameraPath, Pick, Preparation
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
 
@@ -43,7 +44,8 @@ class ProjectPreparation:
     def contradictions(self) -> list[str]:
         """A line for every click or mark that does not fit the rest."""
         track = self.preparation.track
-        lines = [
+        lines = describe_cuts(self.preparation.camera)
+        lines += [
             f"{_named(pick)} lies {distance_to_track(track, pick):.1f} body heights from where the "
             f"player's {pick.part} was found, and was left aside: without it the player is found "
             "as surely or more so. Click it anew."
@@ -63,6 +65,21 @@ class ProjectPreparation:
                 )
             ]
         return lines
+
+
+def describe_cuts(camera: CameraPath) -> list[str]:
+    """A line where the video holds several shots, which the rest takes for one."""
+    cuts, frames = camera.cuts, len(camera.confidence)
+    if not cuts:
+        return []
+    shots = list(pairwise([0, *cuts, frames]))
+    first, end = max(shots, key=lambda shot: shot[1] - shot[0])
+    listed = ", ".join(map(str, cuts[:8])) + (" ..." if len(cuts) > 8 else "")
+    return [
+        f"The video cuts to another shot at frame {listed}, and a project follows the player "
+        "through one: make one of a shot with keyrecon new VIDEO --project DIR --start FRAME --end "
+        f"FRAME. The longest has the frames {first} to {end - 1} of this project."
+    ]
 
 
 def _named(pick: Pick) -> str:

@@ -31,6 +31,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.static_overlay import StaticOverlay
+from keyrecon.tracking.shots import CutDetector
 
 Grey = UInt8[np.ndarray, "h w"]
 Matrix = Float[np.ndarray, "3 3"]
@@ -158,7 +159,8 @@ def estimate_camera_motion(
 ) -> CameraPath:
     """Homographies from every frame to the middle one, and their confidence.
 
-    Exactly the identity for a static camera. Confidence is low where the view was cut.
+    Exactly the identity for a static camera. Where the video cuts to another shot is told beside
+    it (`CameraPath.cuts`): one path can only follow one of them.
     """
     width = min(options.width, video.width)
     shape = (round(video.height * width / video.width), width)
@@ -166,19 +168,20 @@ def estimate_camera_motion(
     def pictures() -> Iterator[Grey]:
         return progress(read_grey(video, width), "Estimating the camera's motion", len(video))
 
-    tracker = _FeatureTracker(options)
-    path, confidence = _register_all(pictures(), tracker, max(1, len(video) // 64))
+    tracker, detector = _FeatureTracker(options), CutDetector()
+    path, confidence = _register_all(detector.watch(pictures()), tracker, max(1, len(video) // 64))
+    cuts = tuple(detector.cuts)
     if _is_static(path, shape, options):
-        return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
+        return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence, cuts)
     if tracker.overlay.share(np.concatenate([k.corners for k in tracker.keys])) > MAX_OVERLAY_SHARE:
         tracker = _FeatureTracker(options, tracker.overlay.mask())
         path, confidence = _register_all(pictures(), tracker)
         if _is_static(path, shape, options):
-            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
+            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence, cuts)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
     small = shrinking(width / video.width)
     full = np.linalg.inv(small) @ to_reference @ small
-    return CameraPath(full / full[:, 2:, 2:], confidence)
+    return CameraPath(full / full[:, 2:, 2:], confidence, cuts)
 
 
 def _register_all(
