@@ -10,6 +10,7 @@ from keyrecon.annotate.store.cells import (
     cells_from_annotations,
 )
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
+from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import write_durably
@@ -96,7 +97,15 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
     together = workspace.add_picks(picks)
     counts = {part: sum(p.part == part for p in together) for part in {p.part for p in together}}
     listed = ", ".join(f"{n} {part}" for part, n in sorted(counts.items()))
-    return f"{workspace.picks_file}: {listed}.\nNext: keyrecon keyframes {quoted(workspace.folder)}"
+    missing, folder = missing_parts(together), quoted(workspace.folder)
+    following = (
+        f"Still missing: {', '.join(missing)}. Add them with: keyrecon pick {folder} --frame N ..."
+        if missing
+        else f"Next: keyrecon keyframes {folder}"
+    )
+    return "\n".join(
+        [f"{workspace.picks_file}: {listed}.", *implausible_picks(together), following]
+    )
 
 
 def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:

@@ -156,11 +156,12 @@ export function viewInWords({ yaw, pitch }) {
 }
 
 // What the colours and the squares mean, and from where the body is seen.
+// In two corners: the left of the upper edge belongs to the page's buttons.
 function drawLegend(pen, [width, height], { view, ground }) {
   drawText(pen, viewInWords(view), [10, height - 12], "left");
   drawText(pen, ground, [10, height - 28], "left");
   for (const [n, side] of ["right", "left"].entries()) {
-    const y = height - 12 - 16 * n;
+    const y = 14 + 16 * n;
     drawText(pen, side, [width - 10, y], "right");
     pen.fillStyle = cssColor(side);
     drawEnd(pen, [width - 46, y], side, 4);

@@ -302,7 +302,7 @@ def test_a_new_project_begins_with_whole_bodies_and_no_colour(context, tmp_path,
         first = person.frame()
         assert "top of the skull" in person.text("#prompt-more").lower()
         person.mark_joints(partial(place_of, first))
-        person.await_text("#prompt-text", "The body is marked")
+        person.await_text("#prompt-text", "The body is marked")  # seen from the side: no question
         person.press("Enter")
         person.await_text("#bodies-text", "The body is marked")
         person.press("Enter")
@@ -367,6 +367,65 @@ def test_what_a_click_is_taken_for_is_asked_part_by_part_and_then_chosen(person)
     cut = "[...document.querySelectorAll('.parts kbd')].filter((key) =>"
     cut += " key.getBoundingClientRect().right > key.parentElement.getBoundingClientRect().right)"
     assert person.page.evaluate(f"{cut}.length") == 0
+
+
+def test_left_and_right_exchanged_on_the_first_body_are_put_right_by_one_answer(person, folder):
+    mirror = dict([*LSP14.mirrored, *(pair[::-1] for pair in LSP14.mirrored)])
+
+    def exchanged(joint):
+        index = LSP14.index(joint)
+        return POINTS2D[10, mirror.get(index, index)]
+
+    person.open(10)
+    person.mark_joints(exchanged)
+    person.await_text("#prompt-text", "Does the player face you here")
+    person.press("o" if "As it is marked, yes" in person.text("#prompt-more") else "Enter")
+    person.await_text("#notice-text", "Left and right of the body were exchanged")
+    person.await_saved()
+    assert np.abs(marks_on_file(folder).joints[0] - POINTS2D[10]).max() < 1.0
+    person.open(70)
+    person.mark_joints(partial(place_of, 70))
+    person.await_text("#prompt-text", "done")
+
+
+def turned_readings(annotations, frame, marks, nearer):
+    """Two readings of a chest, turned to the left and to the right, nearly as likely."""
+    trunk = {"right_shoulder": 1, "right_hip": 1, "left_shoulder": -1, "left_hip": -1}
+    flat = {"right_shoulder": (-0.1, 0.0), "left_shoulder": (0.1, 0.0)}
+    flat |= {"right_hip": (-0.07, 0.5), "left_hip": (0.07, 0.5)}
+
+    def reading(sign, cost):
+        points = {name: [x, y, -sign * trunk[name] * 0.1] for name, (x, y) in flat.items()}
+        return {
+            "nearer": {n: sign * s for n, s in trunk.items()},
+            "points3d": points,
+            "cost": cost,
+        }
+
+    likely = reading(1, 0.0)
+    limbs = {n: {"sign": s, "certainty": 0.1, "given": False} for n, s in trunk.items()}
+    return likely | {"limbs": limbs, "alternatives": [likely, reading(-1, 0.2)], "stretched": {}}
+
+
+def test_to_which_side_the_chest_is_turned_is_asked_once_where_it_is_undecided(context, folder):
+    with serving(folder, Assistant(pose=turned_readings)) as server:
+        person = Person(context, server.credentials.address)
+        person.open(70)
+        person.mark_joints(partial(place_of, 70))
+        person.await_text("#prompt-text", "To which side of the picture is the chest turned")
+        person.press("o")
+        person.await_saved()
+        person.await_text("#prompt-text", "done|Next|All keyframes")
+        given = server.ask("state")["nearer"]["70"]
+        assert given["right_shoulder"] == given["right_hip"] == -given["left_hip"]
+        (right,) = [
+            pose["nearer"]
+            for pose in turned_readings(None, 70, {}, {})["alternatives"]
+            if pose["points3d"]["left_shoulder"][2] > 0  # the left shoulder is behind
+        ]
+        assert given == right
+        context.close()
+    assert person.complaints == []
 
 
 class MarksOnly(ProjectCache):

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as workflow from "../../../keyrecon/annotate/page/state/workflow.js";
+import { facingOfMarks, undecidedTurn } from "../../../keyrecon/annotate/page/state/facing.js";
 import { FIGURE, jointWords } from "../../../keyrecon/annotate/page/state/joint_words.js";
 import { KEYS, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
 
@@ -125,4 +126,28 @@ test("a height is metres or centimetres, and nothing else", () => {
   assert.deepEqual(workflow.heightIn("").wrong, false);
   for (const text of ["18", "0", "-1.8", "six feet", "1.8.0", "300", "1e3"])
     assert.equal(workflow.heightIn(text).wrong, true, text);
+});
+
+const FRONT = { left_shoulder: [60, 20, 2], right_shoulder: [40, 20, 2], left_hip: [55, 60, 2], right_hip: [45, 60, 2] };
+
+test("marks tell front from back by left and right alone, and nothing from the side", () => {
+  assert.equal(facingOfMarks(FRONT), 1);
+  const exchanged = { left_shoulder: FRONT.right_shoulder, right_shoulder: FRONT.left_shoulder, left_hip: FRONT.right_hip, right_hip: FRONT.left_hip };
+  assert.equal(facingOfMarks(exchanged), -1);
+  const side = { ...FRONT, left_shoulder: [51, 20, 2], right_shoulder: [49, 20, 2], left_hip: [50, 60, 2], right_hip: [50, 60, 2] };
+  assert.equal(facingOfMarks(side), 0);
+  assert.equal(facingOfMarks({ ...FRONT, left_hip: undefined }), 0);
+});
+
+test("the turn of the chest is asked for where both sides are likely, not where one is", () => {
+  const chest = (z, cost) => ({
+    cost,
+    nearer: {},
+    points3d: { left_shoulder: [0.05, 0, -z], right_shoulder: [-0.05, 0, z], left_hip: [0.05, 0.5, -z], right_hip: [-0.05, 0.5, z] },
+  });
+  const sides = undecidedTurn([chest(0.15, 0), chest(-0.15, 0.5)]);
+  assert.deepEqual([sides.left, sides.right].map(({ cost }) => cost).sort(), [0, 0.5]);
+  assert.equal(undecidedTurn([chest(0.15, 0), chest(-0.15, 5)]), null);
+  assert.equal(undecidedTurn([chest(0.01, 0), chest(-0.01, 0)]), null);
+  assert.equal(undecidedTurn(undefined), null);
 });

@@ -8,6 +8,7 @@ import {
   setOwnKeyframe,
   swapSides,
 } from "./edits.js";
+import { TRUNK, facingOfMarks, undecidedTurn } from "./facing.js";
 import {
   nextOpen,
   nextStep,
@@ -102,6 +103,8 @@ export function createActions(model, { middle, opened }) {
 
   const next = () =>
     nextStep({
+      facing: facing(),
+      turn: turn(),
       project: model.project,
       half: model.keyframe()?.half,
       marks: model.marks(),
@@ -111,7 +114,38 @@ export function createActions(model, { middle, opened }) {
       joint: ui.joint,
     });
 
+  // Asked once in a project, of the first whole body: whether left and right are the player's own.
+  const answered = `facing ${model.project.id}`;
+  function facing() {
+    const first = Object.keys(model.state.marks).every((frame) => Number(frame) === ui.frame);
+    if (!first || localStorage.getItem(answered)) return 0;
+    return facingOfMarks(model.marks());
+  }
+  function answerFacing(towards) {
+    const wrong = facing() !== (towards ? 1 : -1);
+    localStorage.setItem(answered, "yes");
+    if (wrong) {
+      swap(model.project.mirror);
+      model.notify("Left and right of the body were exchanged; Undo takes that back.");
+    }
+    model.redraw();
+  }
+
+  // Asked as long as nobody has said anything of depth: to which side the chest is turned.
+  function turn() {
+    const given = Object.values(model.state.nearer).some((limbs) => Object.keys(limbs).length);
+    return given ? null : undecidedTurn(model.poses.current()?.alternatives);
+  }
+  function answerTurn(side) {
+    const { nearer } = turn()?.[side] ?? {};
+    if (!ready() || !nearer) return;
+    const trunk = Object.entries(nearer).filter(([name]) => TRUNK.includes(name));
+    model.edit(setNearer(model.state, ui.frame, Object.fromEntries(trunk)));
+  }
+
   const steps = {
+    facing: () => answerFacing(true),
+    turn: () => answerTurn("left"),
     accept,
     depth: () => confirmDepths(),
     next: navigation.nextKeyframe,
@@ -125,9 +159,16 @@ export function createActions(model, { middle, opened }) {
     return steps[next().do]();
   }
 
+  // The other answer to a question that has two.
+  const others = { facing: () => answerFacing(false), turn: () => answerTurn("right") };
+  function secondary() {
+    return others[next().do]?.();
+  }
+
   return {
     ...placing,
     ...navigation,
+    secondary,
     visibility,
     clear,
     swap,

@@ -28,8 +28,9 @@ export function placedLimbs(limbs, marks) {
   return limbs.filter(({ name, parent }) => placed(name) && placed(parent));
 }
 
-// {do: "accept" | "place" | "depth" | "next", ...}: the one next step on this keyframe.
-export function nextStep({ project, half, marks, nearer, suggestion, pose, joint }) {
+// {do: "accept" | "place" | "facing" | "turn" | "depth" | "next", ...}: the one next step on this
+// keyframe. `facing` and `turn` tell what the person is asked of them, if anything.
+export function nextStep({ project, half, marks, nearer, suggestion, pose, joint, facing, turn }) {
   const joints = requiredJoints(project, half),
     suggested = Object.keys(suggestedJoints(joints, marks, suggestion));
   const missing = unmarked(joints, marks);
@@ -40,9 +41,11 @@ export function nextStep({ project, half, marks, nearer, suggestion, pose, joint
       joint: missing.includes(joint) ? joint : missing[0],
       left: missing.length,
     };
+  if (facing) return { do: "facing", facing };
   const open = placedLimbs(project.limbs, marks).filter(
     ({ name }) => pose?.limbs?.[name] && !nearer[name],
   );
+  if (open.length && turn) return { do: "turn" };
   if (open.length) return { do: "depth", limbs: open.map(({ name }) => name) };
   return { do: "next" };
 }

@@ -12,6 +12,7 @@ export const KEYS = {
   ],
   keyframes: [
     [["Enter"], "do what the bar over the picture offers", "primary"],
+    [["o"], "the other answer, where the bar asks one of two", "secondary"],
     [["a", "d"], "previous, next keyframe", "keyframe"],
     [["n"], "next keyframe that is not done", "open"],
     [["w", "s"], "previous, next joint", "joint"],
@@ -140,6 +141,7 @@ export function keyframeCommands(model, { actions, viewer, lists }) {
   const middle = () => [byId("picture").clientWidth / 2, byId("picture").clientHeight / 2];
   return {
     primary: () => actions.primary(),
+    secondary: () => actions.secondary(),
     put: () => actions.placeFloating(),
     visibility: () => actions.visibility(),
     clear: () => actions.clear(),

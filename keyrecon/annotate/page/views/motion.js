@@ -98,7 +98,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     if (!ground || !around.length) return null;
     const { level, unit, units } = ground,
       mean = (axis) => around.reduce((sum, point) => sum + point[axis], 0) / around.length,
-      square = units === "m" ? `${Math.round(unit * 25)} cm` : "a quarter of the body's height";
+      square = units === "m" ? `${Math.round(unit * 25)} cm` : "¼ body height";
     return { center: [mean(0), level - unit / 2, mean(2)], level, unit, ground: `ground, squares of ${square}` };
   }
 

@@ -53,6 +53,18 @@ const PROMPTS = {
     text: `Click ${named(model, joint)}`,
     more: `${sentence(jointWords(joint))}${counted(left, "joint")} to go. Shift-click if it is hidden, V if it cannot be placed.`,
   }),
+  facing: (model, { facing }) => ({
+    text: "Does the player face you here?",
+    more: `As it is marked, ${facing > 0 ? "yes" : "no: the back is to you"}. Left and right are the player's own, so this tells whether they are exchanged.`,
+    button: "Faces me",
+    other: "Turned away",
+  }),
+  turn: () => ({
+    text: "To which side of the picture is the chest turned?",
+    more: "The joints alone fit both; this is asked once.",
+    button: "Left",
+    other: "Right",
+  }),
   depth: (model, { limbs }) => ({
     text: "Which ends are nearer the camera?",
     more: leastCertain(model, limbs),
@@ -87,6 +99,7 @@ function tooLong(model) {
 
 export function createPrompt(model, actions) {
   byId("primary").addEventListener("click", actions.primary);
+  byId("secondary").addEventListener("click", actions.secondary);
 
   function words() {
     if (!model.keyframe())
@@ -107,7 +120,9 @@ export function createPrompt(model, actions) {
 
   return {
     draw() {
-      const { text, more, button } = words();
+      const { text, more, button, other } = words();
+      byId("secondary").hidden = !other;
+      setText(byId("secondary-text"), other ?? "");
       setText(byId("prompt-text"), text);
       setText(byId("prompt-more"), more);
       byId("primary").hidden = !button;
