@@ -82,7 +82,11 @@ class UncertainStretch:
     @property
     def text(self) -> str:
         """One line for a person."""
-        off = f", about {self.error:.0f} px" if np.isfinite(self.error) else ""
+        return self.in_words(f"{self.error:.0f} px")
+
+    def in_words(self, error: str) -> str:
+        """One line for a person, with the error in other units."""
+        off = f", about {error}" if np.isfinite(self.error) else ""
         one = self.first == self.last
         where = f"Frame {self.first}" if one else f"Frames {self.first}-{self.last}"
         return f"{where}: {self.what} uncertain{off}; marking frame {self.frame} would help most."

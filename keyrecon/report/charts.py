@@ -194,7 +194,7 @@ def source_chart(motion: Motion) -> go.Figure:
     )
 
 
-def confidence_chart(
+def doubt_chart(
     values: Float[np.ndarray, "T"], keyframes: Int[np.ndarray, "K"], title: str
 ) -> go.Figure:
     """One number of every frame that tells how good it is, with the annotated frames marked."""

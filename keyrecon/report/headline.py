@@ -1,44 +1,101 @@
-"""The head of the report: the figures that matter, and how to read them."""
+"""The head of the report, and how far to trust it: the figures that matter and how to read them."""
 
 import numpy as np
 
-from keyrecon.annotation_budget import annotation_cost
 from keyrecon.metrics import Scores, evaluate_motion
-from keyrecon.records import Motion
+from keyrecon.records import Annotations, Motion
 from keyrecon.report.markup import ReportMaterial, note, table, text
-from keyrecon.report.summary import missing_shares
+from keyrecon.report.summary import expected_length, missing_shares
+from keyrecon.uncertainty import uncertain_share
 
 
-def headline(material: ReportMaterial) -> str:
-    """The figures that matter, first."""
-    video, motion, keyframes = material.video, material.motion, material.keyframes
-    count = len(motion.points3d)
-    cost = annotation_cost(keyframes, count)
-    halves = f"{len(keyframes.upper.frames)} upper, {len(keyframes.lower.frames)} lower body"
+def opening(material: ReportMaterial) -> str:
+    """What was filmed, and in one line how much of it was marked and how sure the rest is."""
+    video, motion = material.video, material.motion
+    error = expected_length(motion)
+    sure = (
+        ""
+        if error is None
+        else f"; joints are expected to be {in_words(error, motion.units)} off on average"
+    )
+    return (
+        f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.path.name)}</h1>'
+        f'<p class="lead">{video.width} &times; {video.height} px, {motion.time[-1]:.1f} s, '
+        f"{len(motion.time):,} frames, {len(marked_frames(material.annotations))} of them marked "
+        f"by a person{sure}</p></header>"
+    )
+
+
+def figures(material: ReportMaterial) -> str:
+    """The figures that matter as cards, every measure where the truth is known, and conventions."""
+    motion, annotations = material.motion, material.annotations
+    count, marked = len(motion.points3d), marked_frames(annotations)
+    asked = len(material.keyframes.frames)
     scores = None if material.truth is None else evaluate_motion(motion, material.truth)
     cards = [
-        ("Frames", f"{count:,}", f"{motion.time[-1]:.1f} s at {motion.fps:.4g} per second"),
-        ("Keyframes", f"{len(keyframes.frames)}", halves),
-        ("Annotation cost", f"{cost:.2%}", "of the frames, half-body marks counted half"),
         (
-            "Coverage",
-            f"{min(keyframes.upper.coverage, keyframes.lower.coverage):.1%}",
-            f"upper {keyframes.upper.coverage:.1%}, lower {keyframes.lower.coverage:.1%}, "
-            f"asked for {keyframes.alpha:.0%}",
+            "Marked by a person",
+            f"{len(marked)}",
+            f"of {count:,} frames; {asked} keyframes were asked for",
         ),
-        *(_confidence_cards(motion) if scores is None else _score_cards(scores)),
+        (
+            "Marks",
+            f"{marked_share(annotations, count):.2%}",
+            "of the frames, where one half of the body counts half",
+        ),
+        *_error_cards(motion),
+        *([] if scores is None else _score_cards(scores)),
     ]
     tiles = "".join(
         f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
         for name, value, more in cards
     )
     return (
-        f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.path.name)}</h1>'
-        f'<p class="lead">{video.width} &times; {video.height} px, '
-        f"{motion.time[-1]:.1f} s</p></header>"
         f'<dl class="cards">{tiles}</dl>{_conventions(motion)}'
         f"{'' if scores is None else accuracy(scores)}"
     )
+
+
+def marked_frames(annotations: Annotations) -> list[int]:
+    """Frames with a mark of a person."""
+    marked = np.isfinite(annotations.joints).all(axis=2).any(axis=1)
+    return annotations.frames[marked].tolist()
+
+
+def marked_share(annotations: Annotations, count: int) -> float:
+    """Share of `count` frames that a person marked; one half of the body counts half."""
+    marked = np.isfinite(annotations.joints).all(axis=2)
+    lower = annotations.skeleton.is_lower
+    halves = marked[:, lower].any(axis=1).sum() + marked[:, ~lower].any(axis=1).sum()
+    return float(halves / 2 / count)
+
+
+def in_words(length: float, units: str) -> str:
+    """A length in the motion's unit as a person says it: centimetres, or a share of the height."""
+    return f"{100 * length:.1f} cm" if units == "m" else f"{length:.1%} of the height"
+
+
+def _error_cards(motion: Motion) -> list[tuple[str, str, str]]:
+    missing = float(missing_shares(motion).mean())
+    found = ("Found in the picture", f"{1 - missing:.1%}", "of joints; the rest is filled in")
+    error = expected_length(motion)
+    if error is None:
+        return [found]
+    value, _, of = in_words(error, motion.units).partition(" of ")
+    return [
+        (
+            "Expected error",
+            value,
+            f"{'of the height, ' if of else ''}mean of all joints across the picture; depth is "
+            "less sure",
+        ),
+        (
+            "Uncertain",
+            f"{uncertain_share(motion):.0%}",
+            "of the frames have arms, legs or head that may be off",
+        ),
+        found,
+    ]
 
 
 def _score_cards(scores: Scores) -> list[tuple[str, str, str]]:
@@ -67,19 +124,6 @@ def accuracy(scores: Scores) -> str:
     return "<h3>Accuracy against the known truth</h3>" + table(
         ("measure", "value", "meaning"), rows, "Accuracy", "texts"
     )
-
-
-def _confidence_cards(motion: Motion) -> list[tuple[str, str, str]]:
-    sure = float((motion.confidence >= 0.5).mean())
-    missing = float(missing_shares(motion).mean())
-    return [
-        (
-            "Confidence",
-            f"{float(np.nanmean(motion.confidence)):.2f}",
-            f"mean over joints and frames; {sure:.0%} at 0.5 or more",
-        ),
-        ("Found in the picture", f"{1 - missing:.1%}", "of joints; the rest is filled in"),
-    ]
 
 
 def _conventions(motion: Motion) -> str:

@@ -13,16 +13,23 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
+from keyrecon.annotation_budget import annotation_cost
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import stature
 from keyrecon.progress import Progress, silent
 from keyrecon.report import charts, sections, tables
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
-from keyrecon.report.headline import headline
+from keyrecon.report.headline import figures, opening
+from keyrecon.report.instants import key_instants
 from keyrecon.report.markup import ReportMaterial, data_block, note, pack, section, text, to_json
 from keyrecon.report.pictures import Pictures, cut_pictures
 from keyrecon.report.scripts import bundle_scripts
-from keyrecon.report.summary import center_on_root, error_per_frame, scale_truth
+from keyrecon.report.summary import (
+    center_on_root,
+    error_per_frame,
+    expected_lengths,
+    scale_truth,
+)
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -36,7 +43,12 @@ VIEW_COUNT = 12
 def write_report(path: Path, material: ReportMaterial, progress: Progress = silent) -> None:
     """Write the report to one HTML file; a minute of video makes it about 10 MB."""
     pictures = cut_pictures(
-        material.video, material.track, material.annotations, material.motion, progress=progress
+        material.video,
+        material.track,
+        material.annotations,
+        material.motion,
+        progress=progress,
+        instants=[instant.frame for instant in key_instants(material.motion)],
     )
     write_durably(path, build_page(material, pictures))
 
@@ -44,7 +56,7 @@ def write_report(path: Path, material: ReportMaterial, progress: Progress = sile
 def build_page(material: ReportMaterial, pictures: Pictures) -> str:
     """The whole page as text."""
     title = text(material.video.path.name)
-    navigation = _navigation(material.motion.expected_error is not None)
+    navigation = _navigation(material, pictures)
     style = (files("keyrecon.report") / "report.css").read_text("utf-8")
     scripts = (get_plotlyjs(), bundle_scripts(*SCRIPTS))
     return (
@@ -59,31 +71,48 @@ def build_page(material: ReportMaterial, pictures: Pictures) -> str:
 
 
 def _body(material: ReportMaterial, pictures: Pictures) -> str:
+    """What a reader came for, then how far to trust it, then how it was made."""
     strip = list(pictures.strip)
     chosen = strip[:: max(1, round(len(strip) / VIEW_COUNT))]
     return "".join(
         (
-            headline(material),
-            _confidence_over_time(material),
-            sections.doubts(material),
-            sections.story(pictures, material.motion.time),
-            sections.keyframe_pictures(material, pictures),
-            _occurrence(material),
-            sections.matrices(material),
-            _joint_curves(material),
+            opening(material),
             _figure_player(pictures, material.truth is not None),
-            sections.reference_views(material, chosen),
-            tables.body_tables(material),
-            _sources(material),
-            _angles(material),
+            sections.instants(material, pictures),
+            sections.story(pictures, material.motion.time),
             section(
-                "making",
-                "How it was made",
-                tables.stage_times(material.seconds),
-                tables.option_table(material.options),
-                note(f"keyrecon {text(__version__)}"),
+                "accuracy", "How far to trust it", figures(material), _doubt_over_time(material)
             ),
+            sections.doubts(material),
+            _angles(material),
+            _joint_curves(material),
+            sections.reference_views(material, chosen),
+            _making(material, pictures),
         )
+    )
+
+
+def _trust(material: ReportMaterial) -> str:
+    shown = (figures(material), _doubt_over_time(material))
+    return section("accuracy", "How far to trust it", *shown)
+
+
+def _making(material: ReportMaterial, pictures: Pictures) -> str:
+    return section(
+        "making",
+        "How it was made",
+        sections.keyframe_pictures(material, pictures),
+        _occurrence(material),
+        sections.matrices(material),
+        _sources(material),
+        tables.body_tables(material),
+        section(
+            "stages",
+            "Stages and options",
+            tables.stage_times(material.seconds),
+            tables.option_table(material.options),
+            note(f"keyrecon {text(__version__)}"),
+        ),
     )
 
 
@@ -93,15 +122,18 @@ def _chart(name: str, figure: go.Figure) -> str:
     return f'<div class="chart" data-chart="{name}" style="min-height:{height}px"></div>{block}'
 
 
-def _confidence_over_time(material: ReportMaterial) -> str:
-    """The error of every frame where the truth is known, else how sure the method was."""
+def _doubt_over_time(material: ReportMaterial) -> str:
+    """The error of every frame where the truth is known, else the expected one."""
     motion, truth = material.motion, material.true_joints
-    if truth is None:
-        values, title = motion.confidence.mean(axis=1), "Mean confidence of all joints, 0 to 1"
+    unit, size = ("cm", 100) if motion.units == "m" else ("% of the height", 100)
+    expected = expected_lengths(motion)
+    if truth is not None:
+        values, title = size * error_per_frame(motion, truth), f"Mean error of all joints, {unit}"
+    elif expected is not None:
+        values, title = size * expected.mean(axis=1), f"Expected error across the picture, {unit}"
     else:
-        unit = "m" if motion.units == "m" else "body heights"
-        values, title = error_per_frame(motion, truth), f"Mean error of all joints, {unit}"
-    return _chart("confidence", charts.confidence_chart(values, motion.keyframes, title))
+        return ""
+    return _chart("doubt", charts.doubt_chart(values, motion.keyframes, title))
 
 
 def _occurrence(material: ReportMaterial) -> str:
@@ -111,9 +143,21 @@ def _occurrence(material: ReportMaterial) -> str:
         note(
             "Keyframes are ordered so that similar poses lie side by side: opposite strokes show "
             "as peaks and troughs. Diamonds are the keyframes themselves, rings are frames "
-            "farther than β from every keyframe. Press a chart to go to a frame."
+            "farther than β from every keyframe. Press a chart to go to a frame. "
+            f"{_coverage(material)}"
         ),
         _chart("occurrence", charts.keyframe_chart(material.keyframes, material.pose_distances)),
+    )
+
+
+def _coverage(material: ReportMaterial) -> str:
+    keyframes = material.keyframes
+    cost = annotation_cost(keyframes, len(material.motion.time))
+    return (
+        f"Asked for were {len(keyframes.upper.frames)} upper and {len(keyframes.lower.frames)} "
+        f"lower bodies ({cost:.2%} of the frames, a half body counted half), which stand for "
+        f"{keyframes.upper.coverage:.1%} and {keyframes.lower.coverage:.1%} of the frames; "
+        f"{keyframes.alpha:.0%} were asked for."
     )
 
 
@@ -149,16 +193,18 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
     )
     return section(
         "figure",
-        "The motion in 3D",
-        note(
-            "Drag to turn, arrow keys while it has the focus, Ctrl and wheel to zoom. The body is "
-            "held at its root; the grid lies at the lower foot."
-        ),
-        f'<div class="player"><div class="plate"><canvas id="figure-canvas" tabindex="0" '
-        'aria-label="Turnable 3D figure"></canvas></div>'
+        "The motion",
+        f'<div class="player">'
         f'<video id="clip" src="{pictures.clip}" muted playsinline preload="auto" '
-        'aria-label="The player with the reconstructed pose"></video></div>'
+        'aria-label="The player with the reconstructed pose"></video>'
+        '<div class="plate"><canvas id="figure-canvas" tabindex="0" '
+        'aria-label="Turnable 3D figure"></canvas></div></div>'
         f'<div class="views-bar">{views}{truth_switch}</div>',
+        note(
+            "Play it at the foot of the page. Drag the figure to turn it, arrow keys while it has "
+            "the focus, Ctrl and wheel to zoom. The body is held at its root; the grid lies at the "
+            "lower foot."
+        ),
     )
 
 
@@ -188,20 +234,17 @@ def _angles(material: ReportMaterial) -> str:
     )
 
 
-def _navigation(has_doubts: bool) -> str:
+def _navigation(material: ReportMaterial, pictures: Pictures) -> str:
     links = (
-        *([("doubts", "Doubts")] if has_doubts else []),
+        ("figure", "Motion"),
+        *([("instants", "Key instants")] if pictures.instants else []),
         ("video", "Video"),
-        ("keyframes", "Keyframes"),
-        ("occurrence", "Occurrence"),
-        ("distances", "Distances"),
-        ("curves", "Curves"),
-        ("figure", "3D"),
-        ("views", "Views"),
-        ("body", "Body"),
-        ("sources", "Sources"),
+        ("accuracy", "Trust"),
+        *([("doubts", "Doubts")] if material.motion.expected_error is not None else []),
         ("angles", "Angles"),
-        ("making", "Making"),
+        ("curves", "Curves"),
+        ("views", "Views"),
+        ("making", "How it was made"),
     )
     items = "".join(f'<a href="#{name}">{label}</a>' for name, label in links)
     return f'<nav aria-label="Sections"><div>{items}</div></nav>'

@@ -7,7 +7,7 @@ keeps the player's size; crops with the pose on them become a small video that p
 
 import base64
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Track
 from keyrecon.report.drawing import draw_pose
 
-STILL, CLIP = 420, 336
+SIDE = 420
 """Side of the square stills and of the small video, px."""
 JPEG_QUALITY = 80
 CLIP_QUALITY = 27
@@ -74,7 +74,9 @@ class Pictures:
     """What was cut from the video; pictures as data URIs."""
 
     strip: dict[int, str]
-    """Frame number to still with the refined pose."""
+    """Frame number to still with the refined pose, evenly through the video."""
+    instants: dict[int, str]
+    """The same at the frames that were asked for."""
     keyframes: dict[int, str]
     """Frame number to still with the marks of a person."""
     clip: str
@@ -98,6 +100,7 @@ def cut_pictures(
     motion: Motion,
     strip: int = 24,
     progress: Progress = silent,
+    instants: Sequence[int] = (),
 ) -> Pictures:
     """Read the video once and cut everything that the report shows of it."""
     windows = follow_player(track, motion.fps)
@@ -112,15 +115,17 @@ def cut_pictures(
             if frame in annotations.frames:
                 row = int(np.searchsorted(annotations.frames, frame))
                 marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
-            if frame in even:
-                stills[frame] = jpeg_uri(_posed_crop(windows, frame, picture, motion, STILL))
-            yield _posed_crop(windows, frame, picture, motion, CLIP)
+            crop = _posed_crop(windows, frame, picture, motion, SIDE)
+            if frame in even or frame in instants:
+                stills[frame] = jpeg_uri(crop)
+            yield crop
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         write_video(path, crops(), motion.fps, CLIP_QUALITY)
         clip = _data_uri("video/mp4", path.read_bytes())
-    return Pictures(stills, marked, clip)
+    shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
+    return Pictures(shown[0], shown[1], marked, clip)
 
 
 def png_uri(picture: UInt8[np.ndarray, "h w"]) -> str:
@@ -147,11 +152,11 @@ def _marked_still(
     """Marks as a person made them; joints placed though hidden are rings."""
     frame = int(annotations.frames[row])
     return draw_pose(
-        windows.cut(frame, picture, STILL),
-        windows.to_crop(frame, annotations.joints[row], STILL),
+        windows.cut(frame, picture, SIDE),
+        windows.to_crop(frame, annotations.joints[row], SIDE),
         annotations.skeleton,
         source=np.where(annotations.visible[row], 0, 2),
-        height=STILL / ROOM,
+        height=SIDE / ROOM,
     )
 
 

@@ -69,6 +69,20 @@ def bone_lengths(
     return np.linalg.norm(points3d[:, child] - points3d[:, parent], axis=-1)
 
 
+def expected_length(motion: Motion) -> float | None:
+    """Mean expected error of all joints across the picture, in units of the motion; None where it
+    is not known."""
+    errors = expected_lengths(motion)
+    return None if errors is None else float(np.nanmean(errors))
+
+
+def expected_lengths(motion: Motion) -> Float[np.ndarray, "T J"] | None:
+    """Expected errors across the picture in units of the motion."""
+    if motion.expected_error is None:
+        return None
+    return motion.expected_error / motion.scale[:, None]
+
+
 def hinges(skeleton: Skeleton) -> list[int]:
     """Joints that bend between two bones of one limb: elbows and knees, left before right."""
     children = [skeleton.parents.count(joint) for joint in range(len(skeleton.names))]

@@ -15,6 +15,7 @@ from report_material import make_material, renamed_video, walk
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
 from keyrecon.report import summary
+from keyrecon.report.headline import in_words, marked_share
 from keyrecon.report.markup import pack
 from keyrecon.report.page import build_page, write_report
 from keyrecon.report.pictures import Windows, cut_pictures
@@ -46,7 +47,9 @@ def material(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pictures(material):
-    return cut_pictures(material.video, material.track, material.annotations, material.motion, 6)
+    return cut_pictures(
+        material.video, material.track, material.annotations, material.motion, 6, instants=[17]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -98,10 +101,56 @@ def test_pictures_are_cut_for_the_strip_and_for_every_keyframe(material, picture
     assert pictures.clip.startswith("data:video/mp4;base64,")
 
 
-def test_without_truth_the_report_tells_confidence_and_no_accuracy(material, pictures, page):
-    blind = build_page(replace(material, truth=None), pictures)
+def test_without_truth_the_report_tells_the_expected_error_and_no_accuracy(
+    material, pictures, page
+):
+    errors = np.full(material.motion.confidence.shape, 0.03 * 90)  # 3 cm at 90 px per metre
+    motion = replace(material.motion, expected_error=errors)
+    blind = build_page(replace(material, truth=None, motion=motion), pictures)
     assert "PA-MPJPE" in page and "PA-MPJPE" not in blind
-    assert "Confidence" in blind and 'id="show-truth"' not in blind
+    assert 'id="show-truth"' not in blind
+    assert "expected to be 3.0 cm off on average" in blind
+    assert "<dt>Expected error</dt><dd>3.0 cm<small>" in blind
+    assert "Confidence" not in blind
+
+
+def test_without_a_height_errors_are_shares_of_it(material, pictures):
+    errors = np.full(material.motion.confidence.shape, 0.03 * 90)
+    motion = replace(material.motion, expected_error=errors, units="body heights")
+    assert "expected to be 3.0% of the height off" in build_page(
+        replace(material, truth=None, motion=motion), pictures
+    )
+
+
+def test_a_reader_meets_the_motion_first_and_how_it_was_made_last(page):
+    ids = References(page).ids
+    order = ["clip", "video", "accuracy", "angles", "making", "keyframes", "distances"]
+    assert sorted(order, key=ids.index) == order
+
+
+def test_frames_that_were_marked_are_counted_and_not_those_asked_for(material, pictures):
+    marks = material.annotations
+    joints = marks.joints.copy()
+    joints[0] = np.nan  # asked for, and nothing marked
+    fewer = replace(material, annotations=replace(marks, joints=joints))
+    written = build_page(fewer, pictures)
+    count = len(marks.frames) - 1
+    assert f"<h2>{count} marked frames</h2>" in written
+    assert f"<dt>Marked by a person</dt><dd>{count}<small>of 40 frames" in written
+
+
+def test_marks_of_one_half_of_the_body_count_half(material):
+    joints = np.full((2, 14, 2), np.nan)
+    joints[0] = 1.0
+    joints[1, LSP14.index("neck")] = 1.0
+    marks = replace(
+        material.annotations,
+        frames=np.array([3, 7]),
+        joints=joints,
+        visible=np.isfinite(joints[..., 0]),
+        nearer=np.zeros((2, 13), dtype=int),
+    )
+    assert marked_share(marks, 100) == pytest.approx(0.015)
 
 
 def test_the_file_is_written_whole(material, tmp_path):
@@ -295,7 +344,9 @@ def test_the_report_tells_where_it_is_least_sure_and_each_line_goes_there(materi
     doubtful = replace(material, motion=replace(motion, expected_error=errors))
     (stretch,) = uncertain_stretches(doubtful.motion)
     written = build_page(doubtful, pictures)
-    assert f'class="goes" data-frame="{stretch.frame}">{stretch.text}<' in written
+    line = stretch.in_words(in_words(stretch.error / 90, "m"))
+    assert "cm; marking frame" in line
+    assert f'class="goes" data-frame="{stretch.frame}">{line}<' in written
     assert 'href="#doubts"' in written
     former = build_page(replace(material, motion=replace(motion, expected_error=None)), pictures)
     assert 'id="doubts"' not in former
