@@ -1,0 +1,1 @@
+"""Where the camera stands, where the ground is, and the motion in the world."""
