@@ -36,6 +36,7 @@ _PUBLIC = {
     "open_video": "keyrecon.io.video",
     "prepare": "keyrecon.pipeline",
     "reconstruct": "keyrecon.library",
+    "calibrate_court": "keyrecon.world.calibration",
     "Options": "keyrecon.pipeline",
     "Pick": "keyrecon.records",
     "Annotations": "keyrecon.records",

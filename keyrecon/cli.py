@@ -46,6 +46,7 @@ COMMANDS = {
     "export": Command("keyrecon.commands", "exports", "export"),
     "evaluate": Command("keyrecon.commands", "projects", "evaluate"),
     "synth": Command("keyrecon.commands", "captures", "synth"),
+    "court": Command("keyrecon.commands", "court", "court"),
     "relink": Command("keyrecon.commands", "projects", "relink"),
     "depths": Command("keyrecon.commands", "captures", "depths"),
     "golf": Command("keyrecon.app", "golf_commands", "golf"),

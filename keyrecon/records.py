@@ -41,45 +41,6 @@ class CameraPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
-    """Where every frame was taken from: x ~ K (R X + t), X in metres on the court.
-
-    World axes as in `keyrecon.world.court`; R and t in OpenCV's convention. NaN where not found.
-    """
-
-    K: Float[np.ndarray, "T 3 3"]
-    R: Float[np.ndarray, "T 3 3"]
-    t: Float[np.ndarray, "T 3"]
-    found: Bool[np.ndarray, "T"]
-    """Whether the court's lines lie where this camera puts them."""
-    sd_centre: Float[np.ndarray, "T 3"]
-    """Standard deviation of the camera's place, metres."""
-    sd_focal: Float[np.ndarray, "T"]
-    """Standard deviation of the focal length, px."""
-
-    @property
-    def centre(self) -> Float[np.ndarray, "T 3"]:
-        """Place of the camera, metres."""
-        return -np.einsum("tji,tj->ti", self.R, self.t)
-
-    @property
-    def focal(self) -> Float[np.ndarray, "T"]:
-        """px"""
-        return self.K[:, 0, 0]
-
-
-@dataclass(frozen=True)
-class CourtClick:
-    """A named point of the court that a person clicked."""
-
-    name: str
-    """See `keyrecon.world.court.POINTS`."""
-    frame: int
-    x: float
-    y: float
-
-
-@dataclass(frozen=True, eq=False)
 class Track:
     """Where the player is in every frame, px."""
 

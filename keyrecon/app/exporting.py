@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from keyrecon.app.court import export_calibration
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.export import check_suffix, cut_motion, export_motion
@@ -17,7 +18,7 @@ from keyrecon.progress import Progress
 from keyrecon.records import Motion
 from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
 
-OVERLAY = ".mp4"
+OVERLAY, CALIBRATION = ".mp4", ".toml"
 WITH_VIDEO = (OVERLAY, ".json")
 """Suffixes of files that need the video: its pictures, or their size."""
 
@@ -36,7 +37,7 @@ def export(
     if not files:
         raise KeyreconError("No file was named; give one or more, such as motion.bvh motion.trc.")
     for file in files:
-        check_suffix(file, (OVERLAY,))
+        check_suffix(file, (OVERLAY, CALIBRATION))
         _check_place(file, workspace)
     check_overlay(overlay)
     if overlay != OverlayOptions() and not any(f.suffix.lower() == OVERLAY for f in files):
@@ -44,11 +45,17 @@ def export(
             "--view, --skeleton, --slowmo and --size are for the overlay video; name an .mp4 file, "
             "or leave them out."
         )
+    cameras = [file for file in files if file.suffix.lower() == CALIBRATION]
+    done = [export_calibration(workspace, file) for file in cameras]
+    if len(cameras) == len(files):
+        return done
     motion = load_motion(workspace.folder)
     first, last = chosen_frames(frames, len(motion.time))
     cut = cut_motion(motion, first, last)
-    lines = []
+    lines = done
     for file in files:
+        if file in cameras:
+            continue
         if file.suffix.lower() == OVERLAY:
             shown = None if frames is None else (first, last)
             write_overlay(file, workspace.video(), motion, progress, overlay, shown)

@@ -19,7 +19,8 @@ def export(
 ) -> None:
     """Write the motion in other formats, told by suffix.
 
-    .bvh .trc .c3d .csv .nc .npz .glb, .json (COCO keypoints of every frame), .mp4 (overlay).
+    .bvh .trc .c3d .csv .nc .npz .glb, .json (COCO keypoints of every frame), .mp4 (overlay),
+    .toml (the camera of keyrecon court, as Pose2Sim reads it).
 
     Args:
         project: Project folder.

@@ -94,6 +94,11 @@ class Workspace:
         return self.folder / "motion.npz"
 
     @property
+    def camera_file(self) -> Path:
+        """camera.npz"""
+        return self.folder / "camera.npz"
+
+    @property
     def report_file(self) -> Path:
         """report.html"""
         return self.folder / "report.html"

@@ -17,7 +17,7 @@ from keyrecon.io.frame_reader import read_grey, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Camera, CameraPath, CourtClick
+from keyrecon.records import CameraPath
 from keyrecon.world.clicked_points import (
     FEWEST,
     TOLERANCE,
@@ -46,6 +46,7 @@ from keyrecon.world.court_tracking import (
 from keyrecon.world.joint_fit import JointFit, fit_views
 from keyrecon.world.line_fit import FIXED_CENTRE, LOOSE, evaluate, fit_lines
 from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.records import Camera, CourtClick
 
 MEASURED_WIDTH = 1280
 """Width of the pictures in which lines are measured, px."""
@@ -124,7 +125,9 @@ def calibrate_court(
     if pictures.still:
         views = check_still(greys, joint.cameras[0], court)
     else:
-        views = track_court(greys, pictures.path, dict(zip(frames, joint.cameras, strict=True)), court)
+        views = track_court(
+            greys, pictures.path, dict(zip(frames, joint.cameras, strict=True)), court
+        )
     return _camera(views, joint, 1 / small[0, 0])
 
 
@@ -148,9 +151,7 @@ def _shrunk(clicks: Sequence[CourtClick], small: Float[np.ndarray, "3 3"]) -> li
     ]
 
 
-def _find_court(
-    pictures: _Pictures, court: CourtModel, clicks: Sequence[CourtClick]
-) -> CourtView:
+def _find_court(pictures: _Pictures, court: CourtModel, clicks: Sequence[CourtClick]) -> CourtView:
     """The court in one frame: from clicks where there are enough, else from its lines alone."""
     if len(clicks) >= FEWEST:
         return _view_from_clicks(pictures, court, clicks)

@@ -14,9 +14,9 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from keyrecon.errors import KeyreconError
-from keyrecon.records import CourtClick
 from keyrecon.world.court import POINTS
 from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.records import CourtClick
 
 FEWEST = 4
 """Clicks that tell a camera."""

@@ -6,7 +6,6 @@ model's lines is seen where the model has them, against what a wrong camera reac
 best camera that puts the court elsewhere.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -122,8 +121,6 @@ def from_near_half(camera: Pinhole) -> Pinhole:
 def click_error(camera: Pinhole, clicks: ClickedPixels) -> Float[np.ndarray, "n"]:
     """How far each click lies from its point, px; their names may be those from the other half."""
     half_turn = np.diag([-1.0, -1.0, 1.0])
-    turned = replace(
-        camera, rotation=camera.rotation @ half_turn, centre=half_turn @ camera.centre
-    )
+    turned = replace(camera, rotation=camera.rotation @ half_turn, centre=half_turn @ camera.centre)
     here, there = (point_errors(c, clicks.names, clicks.pixels) for c in (camera, turned))
     return here if here.max() <= there.max() else there

@@ -154,7 +154,7 @@ def _ordered(
     turn = turn - edge[..., 1] * np.roll(edge, -1, axis=1)[..., 0]
     convex = (turn > 0).all(axis=1) | (turn < 0).all(axis=1)
     quads, turn = quads[convex], turn[convex]
-    # Counter-clockwise from above is clockwise in the picture's numbers only if y pointed up.
+    # Seen from above they run counter-clockwise; in pixels, where y points down, the turn is less.
     flipped = turn[:, 0] > 0
     quads[flipped] = quads[flipped][:, [1, 0, 3, 2]]
     return quads

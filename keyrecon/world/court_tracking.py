@@ -3,8 +3,8 @@
 Between two frames a camera that turns and zooms maps the background by a homography
 (`CameraPath`); the camera of the last frame carried along by it is off by a pixel or so, and one or
 two steps on the distances across the lines bring it back. Where that motion and one that goes on
-as before disagree, the one under which more lines lie on lines is believed. What the lines leave open, in a close view
-of a single one, stays as foretold.
+as before disagree, the one under which more lines lie on lines is believed. What the lines leave
+open, in a close view of a single one, stays as foretold.
 """
 
 from collections.abc import Iterable, Mapping
@@ -136,9 +136,7 @@ def _going_on(before: Pinhole, last: Pinhole) -> Pinhole:
     return replace(last, focal=last.focal**2 / before.focal, rotation=turn @ last.rotation)
 
 
-def check_still(
-    greys: Iterable[Grey], camera: Pinhole, court: CourtModel
-) -> TrackedViews:
+def check_still(greys: Iterable[Grey], camera: Pinhole, court: CourtModel) -> TrackedViews:
     """The one camera of a clip that stands still, and the frames in which its lines are seen."""
     found = [is_seen(evaluate(grey, camera, court, SPACING)) for grey in greys]
     return TrackedViews((camera,) * len(found), np.array(found))

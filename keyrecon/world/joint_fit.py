@@ -23,7 +23,7 @@ PAINTED = 0.01
 """Metres by which lines are painted beside their place (our estimate: courts are measured with a
 tape; rendered ones have none)."""
 SHARED = 2.0
-"""Neighbouring samples that count as one: they lie 6 px apart, and blur reaches about twice that."""
+"""Neighbouring samples that count as one: they lie 6 px apart, blur reaches twice that."""
 MIN_NOISE = 0.25
 """px: distances across a line are not known better than this."""
 ROUNDS = 2

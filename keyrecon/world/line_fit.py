@@ -24,7 +24,7 @@ HIT, BY_CHANCE = 0.8, 0.3
 """Share of the samples of a right camera that hit, and of a wrong one. On six rendered and three
 real clips the right one had .74 to .98, the best wrong ones .25 to .5 of samples on no line."""
 MOST_OF_LINE, FEWEST_SAMPLES = 0.5, 8
-"""A line is seen where at least so much of it hits, and so many samples of it are in the picture."""
+"""A line is seen where at least so much of it hits, and so many samples of it are seen."""
 FIXED_CENTRE = np.array([False, False, False, True, True, True, True])
 """Which steps of `Pinhole.moved` are free for a camera that turns and zooms in a known place."""
 ALL_FREE = np.ones(7, dtype=bool)
@@ -130,5 +130,3 @@ def solve_robustly(
         right = (rows * weight[:, None]).T @ offsets - gone / spread**2
         change = np.linalg.solve(normal, right)
     return change
-
-

@@ -83,10 +83,28 @@ def measure_offsets(
     """Look for each stripe up to `search` px to both sides."""
     if not len(samples.points):
         return LineOffsets(np.zeros(0), np.zeros(0, dtype=bool))
+    reach = int(np.ceil(search))
+    contrast = _contrast(grey, samples, reach)
+    offsets = np.arange(-reach, reach + 1)
+    best = (contrast * (1 - NEARNESS * np.abs(offsets) / (reach + 1))).argmax(axis=1)
+    rows = np.arange(len(best))
+    at = np.clip(best, 1, 2 * reach - 1)
+    before, here, after = (contrast[rows, at + k] for k in (-1, 0, 1))
+    bend = before - 2 * here + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.where(bend < 0, 0.5 * (before - after) / bend, 0.0)
+    seen = (here > MIN_CONTRAST) & (best == at) & (np.abs(shift) <= 1)
+    return LineOffsets(offsets[at] + np.clip(shift, -1, 1), seen)
+
+
+def _contrast(
+    grey: UInt8[np.ndarray, "h w"], samples: LineSamples, reach: int
+) -> Float[np.ndarray, "M places"]:
+    """How much brighter a stripe of the width it must have is than both its sides, at every pixel
+    up to `reach` along the normals."""
     half = np.maximum(samples.width, MIN_WIDTH) / 2
     flank = np.maximum(half, 2.0)
     gap = 0.6 + 0.1 * samples.width
-    reach = int(np.ceil(search))
     far = reach + int(np.ceil((half + gap + flank).max())) + 2
     steps = np.arange(-far, far + 1)
     grid = samples.pixels[:, None] + steps[:, None] * samples.normals[:, None]
@@ -108,14 +126,4 @@ def measure_offsets(
     inner = (up_to(half) - up_to(-half)) / (2 * half)[:, None]
     right = (up_to(half + gap + flank) - up_to(half + gap)) / flank[:, None]
     left = (up_to(-half - gap) - up_to(-half - gap - flank)) / flank[:, None]
-    contrast = inner - np.maximum(left, right)
-    offsets = np.arange(-reach, reach + 1)
-    best = (contrast * (1 - NEARNESS * np.abs(offsets) / (reach + 1))).argmax(axis=1)
-    rows = np.arange(len(best))
-    at = np.clip(best, 1, 2 * reach - 1)
-    before, here, after = (contrast[rows, at + k] for k in (-1, 0, 1))
-    bend = before - 2 * here + after
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = np.where(bend < 0, 0.5 * (before - after) / bend, 0.0)
-    seen = (here > MIN_CONTRAST) & (best == at) & (np.abs(shift) <= 1)
-    return LineOffsets(offsets[at] + np.clip(shift, -1, 1), seen)
+    return inner - np.maximum(left, right)

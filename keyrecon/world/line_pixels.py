@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 WIDTHS = (4, 10)
 """How far away both sides of a line are looked at, px of a picture 960 wide: a line must be
-narrower than that. A broadcast's lines are 2 to 6 px wide, a baseline before the camera's feet 10."""
+narrower than that. A broadcast's lines are 2 to 6 px wide, a baseline at the camera's feet 10."""
 MIN_CONTRAST = 9.0
 """Grey levels by which a line is brighter than both sides, at least."""
 NOISE_FACTOR = 4.0
@@ -78,7 +78,8 @@ def find_line_pixels(grey: UInt8[np.ndarray, "h w"]) -> LinePixels:
     soft = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.7)
     contrast = np.zeros_like(soft)
     for width in WIDTHS:
-        np.maximum(contrast, _ridge(soft, max(2, round(width * grey.shape[1] / 960))), contrast)
+        ridge = _ridge(soft, max(2, round(width * grey.shape[1] / 960)))
+        contrast = np.maximum(contrast, ridge)
     noise = 1.48 * float(np.median(np.abs(cv2.Laplacian(soft, cv2.CV_32F)))) / 4
     bright = contrast > max(MIN_CONTRAST, NOISE_FACTOR * noise)
     angle, coherent = _directions(soft)
@@ -121,7 +122,7 @@ def _near(
     """Where a line of each direction is close by, one bit per direction."""
     bins = np.floor(angle / np.pi * DIRECTIONS).astype(int)
     # A direction near the border of two bins is seen in both.
-    other = np.floor((angle / np.pi * DIRECTIONS - 0.5)).astype(int)
+    other = np.floor(angle / np.pi * DIRECTIONS - 0.5).astype(int)
     other = np.where(other == bins, bins + 1, other) % DIRECTIONS
     reach = max(1, round(NEAR_LINE * shape[1] / 960))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
@@ -131,7 +132,7 @@ def _near(
         mine = (bins == k) | (other == k)
         one = np.zeros(shape, np.uint8)
         one[y[mine], x[mine]] = 1
-        near |= cv2.dilate(one, disc) << k
+        near |= cv2.dilate(one, disc) * np.uint8(1 << k)
     return near
 
 
@@ -195,7 +196,7 @@ def _fit(
         return None, taken
     along = pixels.points[taken] @ (normal[1], -normal[0])
     ends = np.percentile(along, (2, 98))[:, None] * np.array([normal[1], -normal[0]])
-    return ImageLine(normal, rho, ends + rho * normal, int(len(np.unique(np.rint(along))))), taken
+    return ImageLine(normal, rho, ends + rho * normal, len(np.unique(np.rint(along)))), taken
 
 
 def _belongs(

@@ -47,9 +47,7 @@ class Pinhole:
     def resized(self, scale: float) -> "Pinhole":
         """The camera of the same picture made `scale` times as large."""
         shift = (scale - 1) / 2
-        return replace(
-            self, focal=self.focal * scale, principal=self.principal * scale + shift
-        )
+        return replace(self, focal=self.focal * scale, principal=self.principal * scale + shift)
 
 
 NEAREST = 0.1

@@ -1,0 +1,92 @@
+"""`keyrecon court`: the camera of every frame from the tennis court in the picture."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
+from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
+from keyrecon.progress import Progress
+from keyrecon.report.court_drawing import draw_court, write_court_picture
+from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.world.calibration import CalibrationOptions, calibrate_court
+from keyrecon.world.court import tennis_court
+from keyrecon.world.records import Camera, CourtClick
+
+
+def court_click(text: str) -> CourtClick:
+    """Parse NAME:FRAME:X,Y."""
+    try:
+        name, frame, place = (part.strip() for part in text.split(":"))
+        x, y = (float(part) for part in place.split(","))
+        return CourtClick(name, int(frame), x, y)
+    except ValueError as fault:
+        raise KeyreconError(
+            f"--point needs NAME:FRAME:X,Y, such as near-left:0:212.5,640; got '{text}'."
+        ) from fault
+
+
+def calibrate(
+    workspace: Workspace,
+    clicks: Sequence[CourtClick],
+    options: CalibrationOptions,
+    progress: Progress,
+) -> str:
+    """Find the court, write camera.npz and court.jpg; returns the text to show."""
+    video = workspace.video()
+    keep = workspace.stages.keep
+    motion = workspace.options(Options(), Options()).camera
+    path = keep("camera", estimate_camera_motion, video, options=motion, progress=progress)
+    camera = keep(
+        "court", calibrate_court, video, path, tuple(clicks), options=options, progress=progress
+    )
+    write_camera(workspace.camera_file, camera)
+    seen = np.flatnonzero(camera.found)
+    frame = int(seen[len(seen) // 2])
+    drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
+    picture = workspace.folder / "court.jpg"
+    write_court_picture(picture, drawn)
+    return "\n".join(
+        [
+            *describe_camera(camera),
+            f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
+            f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
+            f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
+        ]
+    )
+
+
+def export_calibration(workspace: Workspace, file: Path) -> str:
+    """Write the camera as Pose2Sim reads it; returns the line to show."""
+    if not workspace.camera_file.is_file():
+        raise KeyreconError(
+            f"{workspace.folder} has no camera yet; run: keyrecon court {quoted(workspace.folder)}"
+        )
+    video = workspace.video()
+    camera = read_camera(workspace.camera_file)
+    return f"Wrote {file}{write_calibration(file, camera, (video.width, video.height), file.stem)}."
+
+
+def describe_camera(camera: Camera) -> list[str]:
+    """Where the camera stands, how surely, and in which frames it was found."""
+    seen = np.flatnonzero(camera.found)
+    x, y, z = camera.centre[seen].mean(axis=0)
+    sd = np.nanmax(camera.sd_centre, axis=0)
+    focal, share = camera.focal[seen], float(np.nanmax(camera.sd_focal / camera.focal))
+    side = "right" if x > 0 else "left"
+    lengths = f"{focal.min():.0f}" if np.ptp(focal) < 1 else f"{focal.min():.0f}-{focal.max():.0f}"
+    lines = [
+        f"Court found in {camera.found.mean():.1%} of {len(camera.found)} frames. The camera "
+        f"stands {-y:.1f} m from the net, {abs(x):.1f} m to the {side} of its middle and {z:.1f} m "
+        f"high (standard deviations {sd[1]:.2f}, {sd[0]:.2f} and {sd[2]:.2f} m); focal length "
+        f"{lengths} px within {share:.1%}."
+    ]
+    if not camera.found.all():
+        lost = np.flatnonzero(np.diff(np.concatenate([[True], camera.found, [True]]).astype(int)))
+        stretches = [f"{a}-{b - 1}" for a, b in zip(lost[::2], lost[1::2], strict=True)]
+        more = f" and {len(stretches) - 6} more" if len(stretches) > 6 else ""
+        lines.append(f"No court seen in frames {', '.join(stretches[:6])}{more}.")
+    return lines

@@ -1,0 +1,33 @@
+"""The command that calibrates the camera on a tennis court."""
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from keyrecon.app.console import show
+from keyrecon.app.court import calibrate, court_click
+from keyrecon.io.workspace import Workspace
+from keyrecon.world.calibration import CalibrationOptions
+
+
+def court(
+    project: Positional[Path],
+    point: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME:FRAME:X,Y")] = (),
+    force: bool = False,
+    options: OmitArgPrefixes[Annotated[CalibrationOptions, arg(name="")]] = CalibrationOptions(),
+) -> None:
+    """Find the tennis court in the picture, and with it the camera of every frame.
+
+    Writes camera.npz, and court.jpg with the court's lines drawn on a frame. Where the lines alone
+    do not tell, click four points of the court or more, for example:
+
+        keyrecon court rally --point near-left:0:212,640 --point net-middle:0:655,301 ...
+
+    Args:
+        project: Project folder.
+        point: A point of the court by name, the frame, and where it is in the picture.
+        force: Look for the court again.
+    """
+    clicks = [court_click(text) for text in point]
+    print(calibrate(Workspace(project, force), clicks, options, show))

@@ -1,0 +1,91 @@
+"""camera.npz: the camera of every frame; and a calibration file as Pose2Sim reads it.
+
+Pose2Sim's TOML (https://perfanalytics.github.io/pose2sim, `Calib_scene.toml`) has a table per
+camera: size, matrix, distortions, rotation (a rotation vector from world to camera) and translation
+(metres), Z up. It holds cameras that stand still; of one that moves it can hold one frame.
+"""
+
+import io
+import zipfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from keyrecon import __version__
+from keyrecon.errors import KeyreconError, explain
+from keyrecon.io.durable import write_durably
+from keyrecon.world.records import Camera
+
+ARRAYS = {
+    "K": (3, 3),
+    "R": (3, 3),
+    "t": (3,),
+    "found": (),
+    "sd_centre": (3,),
+    "sd_focal": (),
+}
+"""Arrays of a `Camera` and their shape in one frame."""
+
+
+def write_camera(path: Path, camera: Camera) -> None:
+    """Write camera.npz; names and axes as in `Camera`."""
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        **{name: getattr(camera, name) for name in ARRAYS},
+        keyrecon_version=np.array(__version__),
+    )
+    write_durably(path, buffer.getvalue())
+
+
+def read_camera(path: Path) -> Camera:
+    """Read what `write_camera` wrote; raises KeyreconError for any other file."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            data = {name: stored[name] for name in ARRAYS}
+        frames = len(data["found"])
+        for name, shape in ARRAYS.items():
+            if data[name].shape != (frames, *shape):
+                raise ValueError(f"{name} has shape {data[name].shape}")
+        return Camera(**{**data, "found": data["found"].astype(bool)})
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
+        raise KeyreconError(
+            f"{path} is not a camera ({explain(fault)}); make it with keyrecon court."
+        ) from fault
+
+
+def write_calibration(path: Path, camera: Camera, size: tuple[int, int], name: str) -> str:
+    """Write a calibration TOML of one camera; returns what was done to it.
+
+    Of a camera that moves, that of the middle one of the frames in which it was found.
+    """
+    seen = np.flatnonzero(camera.found)
+    frame = int(seen[len(seen) // 2])
+    turn = cv2.Rodrigues(camera.R[frame])[0].ravel()
+    moves = bool(np.ptp(camera.R[seen], axis=0).max() > 0 or np.ptp(camera.focal[seen]) > 0)
+    of_frame = f"of frame {frame}: the camera moves" if moves else "the camera stands still"
+
+    def row(values: np.ndarray) -> str:
+        return "[ " + ", ".join(f"{v:.10g}" for v in np.atleast_1d(values)) + "]"
+
+    matrix = ", ".join(row(values) for values in camera.K[frame])
+    lines = [
+        f"# keyrecon {__version__}, {of_frame}.",
+        "# World: origin on the ground at the middle of the net, x along it, y up the court, z up.",
+        "[cam_01]",
+        f'name = "{name}"',
+        f"size = {row(np.array(size, dtype=float))}",
+        f"matrix = [ {matrix}]",
+        "distortions = [ 0.0, 0.0, 0.0, 0.0]",
+        f"rotation = {row(turn)}",
+        f"translation = {row(camera.t[frame])}",
+        "fisheye = false",
+        "",
+        "[metadata]",
+        "adjusted = false",
+        "error = 0.0",
+        "",
+    ]
+    write_durably(path, "\n".join(lines).encode())
+    return f"; {of_frame}" if moves else ""
