@@ -14,7 +14,7 @@ from keyrecon.report.court_drawing import draw_court, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.court import tennis_court
-from keyrecon.world.records import Camera, CourtClick
+from keyrecon.world.records import CourtCamera, CourtClick
 
 
 def court_click(text: str) -> CourtClick:
@@ -70,7 +70,7 @@ def export_calibration(workspace: Workspace, file: Path) -> str:
     return f"Wrote {file}{write_calibration(file, camera, (video.width, video.height), file.stem)}."
 
 
-def describe_camera(camera: Camera) -> list[str]:
+def describe_camera(camera: CourtCamera) -> list[str]:
     """Where the camera stands, how surely, and in which frames it was found."""
     seen = np.flatnonzero(camera.found)
     x, y, z = camera.centre[seen].mean(axis=0)

@@ -18,7 +18,7 @@ QUALITY = 92
 
 def draw_court(
     picture: UInt8[np.ndarray, "h w 3"],
-    camera: Camera,
+    camera: CourtCamera,
     frame: int,
     court: CourtModel | None = None,
 ) -> UInt8[np.ndarray, "h w 3"]:

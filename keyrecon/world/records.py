@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class CourtCamera:
     """Where every frame was taken from: x ~ K (R X + t), X in metres on the court.
 
     R and t in OpenCV's convention. NaN where the camera was not found.

@@ -25,11 +25,11 @@ ARRAYS = {
     "sd_centre": (3,),
     "sd_focal": (),
 }
-"""Arrays of a `Camera` and their shape in one frame."""
+"""Arrays of a `CourtCamera` and their shape in one frame."""
 
 
-def write_camera(path: Path, camera: Camera) -> None:
-    """Write camera.npz; names and axes as in `Camera`."""
+def write_camera(path: Path, camera: CourtCamera) -> None:
+    """Write camera.npz; names and axes as in `CourtCamera`."""
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -39,7 +39,7 @@ def write_camera(path: Path, camera: Camera) -> None:
     write_durably(path, buffer.getvalue())
 
 
-def read_camera(path: Path) -> Camera:
+def read_camera(path: Path) -> CourtCamera:
     """Read what `write_camera` wrote; raises KeyreconError for any other file."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
@@ -48,14 +48,14 @@ def read_camera(path: Path) -> Camera:
         for name, shape in ARRAYS.items():
             if data[name].shape != (frames, *shape):
                 raise ValueError(f"{name} has shape {data[name].shape}")
-        return Camera(**{**data, "found": data["found"].astype(bool)})
+        return CourtCamera(**{**data, "found": data["found"].astype(bool)})
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
         raise KeyreconError(
             f"{path} is not a camera ({explain(fault)}); make it with keyrecon court."
         ) from fault
 
 
-def write_calibration(path: Path, camera: Camera, size: tuple[int, int], name: str) -> str:
+def write_calibration(path: Path, camera: CourtCamera, size: tuple[int, int], name: str) -> str:
     """Write a calibration TOML of one camera; returns what was done to it.
 
     Of a camera that moves, that of the middle one of the frames in which it was found.
