@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from keyrecon.io.durable import write_durably
 from keyrecon.world.court import CourtModel, tennis_court
-from keyrecon.world.records import Camera
+from keyrecon.world.records import CourtCamera
 
 GROUND, NET = (255, 40, 120), (0, 220, 255)
 """Colours of the lines on the ground and of the net's tape: neither is found on courts."""

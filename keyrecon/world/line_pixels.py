@@ -132,7 +132,8 @@ def _near(
         mine = (bins == k) | (other == k)
         one = np.zeros(shape, np.uint8)
         one[y[mine], x[mine]] = 1
-        near = near | cv2.dilate(one, disc) * np.uint8(1 << k)
+        grown = cv2.dilate(one, disc).astype(np.uint8)
+        near |= grown * np.uint8(1 << k)
     return near
 
 

@@ -6,16 +6,15 @@ camera: size, matrix, distortions, rotation (a rotation vector from world to cam
 """
 
 import io
-import zipfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from keyrecon import __version__
-from keyrecon.errors import KeyreconError, explain
 from keyrecon.io.durable import write_durably
-from keyrecon.world.records import Camera
+from keyrecon.reading import read_arrays, reading
+from keyrecon.world.records import CourtCamera
 
 ARRAYS = {
     "K": (3, 3),
@@ -41,18 +40,17 @@ def write_camera(path: Path, camera: CourtCamera) -> None:
 
 def read_camera(path: Path) -> CourtCamera:
     """Read what `write_camera` wrote; raises KeyreconError for any other file."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            data = {name: stored[name] for name in ARRAYS}
+    with reading(path, "a camera", "make it with keyrecon court"):
+        data = read_arrays(path)
         frames = len(data["found"])
         for name, shape in ARRAYS.items():
             if data[name].shape != (frames, *shape):
                 raise ValueError(f"{name} has shape {data[name].shape}")
-        return CourtCamera(**{**data, "found": data["found"].astype(bool)})
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as fault:
-        raise KeyreconError(
-            f"{path} is not a camera ({explain(fault)}); make it with keyrecon court."
-        ) from fault
+        found = data["found"].astype(bool)
+        numbers = {name: data[name].astype(np.float64) for name in ARRAYS if name != "found"}
+        if not all(np.isfinite(values[found]).all() for values in numbers.values()):
+            raise ValueError("a camera that was found has numbers missing")
+        return CourtCamera(found=found, **numbers)
 
 
 def write_calibration(path: Path, camera: CourtCamera, size: tuple[int, int], name: str) -> str:
