@@ -13,9 +13,12 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from small_motion import make_motion
 
 import keyrecon as package
 from keyrecon import cli
+from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.video import open_video
 
 
 @pytest.fixture
@@ -236,6 +239,29 @@ def test_a_motion_that_is_not_there(keyrecon, project, tmp_path):
     assert one_line(code, err, "keyrecon run")
     code, _, err = keyrecon("evaluate", project, "--truth", tmp_path / "truth.npz")
     assert one_line(code, err, "keyrecon run")
+
+
+def test_an_overlay_takes_a_range_views_slow_motion_and_limbs(keyrecon, project, tmp_path):
+    write_motion(project / "motion.npz", make_motion(20))
+    words = [
+        "--frames",
+        "2-5",
+        "--view",
+        "camera",
+        "right",
+        "--slowmo",
+        "2",
+        "--skeleton",
+        "upper",
+        "--size",
+        "96",
+    ]
+    code, out, _ = keyrecon("export", project, tmp_path / "a.mp4", *words)
+    assert (code, out) == (0, f"Wrote {tmp_path / 'a.mp4'}.\n")
+    made = open_video(tmp_path / "a.mp4")
+    assert (len(made), made.height) == (4, 96)
+    code, _, err = keyrecon("export", project, tmp_path / "a.fbx")
+    assert one_line(code, err, "Blender")
 
 
 def test_the_package_runs_as_a_module():

@@ -33,7 +33,8 @@ STANCE_SECONDS = 1.0
 """Time over which the lower ankle tells the floor. On five rendered sequences (serves, volleys,
 strokes; cameras that look down by 6 to 32 degrees) the lower ankle's height over the floor is
 wrong by 1.3-2.7 cm with .5 s, 2.3-3.8 with 1, 3.0-6.3 with 2 and 4.1-13.2 with one floor for all
-(root mean square); with .5 s jumps lose 5 to 10 cm of their height, with 1 s 0 to 4."""
+(root mean square about the mean); with .5 s jumps lose 5 to 10 cm of their height, with 1 s 0 to
+4. `benchmarks/floor.py` measures it."""
 LEAN = np.radians(10)
 """Median lean of the legs up to which the camera is taken to be level. Rendered, cameras that look
 down by 3 to 10 degrees gave 1 to 7, one by 32 degrees 21 (the lifting has flattened the rest);
