@@ -13,6 +13,10 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import replacing, write_durably
 
 
+THREADS = 4
+"""Of the encoder, whatever the machine: where they share a picture, other threads are other bits."""
+
+
 def write_video(
     path: Path, frames: Iterable[UInt8[np.ndarray, "h w 3"]], fps: float, crf: int = 23
 ) -> int:
@@ -36,6 +40,7 @@ def write_video(
                 parameters = "mbtree=0"
                 stream.options = {"crf": str(crf), "preset": "veryfast", "x264-params": parameters}
                 stream.thread_type = "AUTO"
+                stream.codec_context.thread_count = THREADS
             frame = av.VideoFrame.from_ndarray(
                 np.ascontiguousarray(picture[:height, :width]), format="rgb24"
             )

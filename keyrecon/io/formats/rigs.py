@@ -150,7 +150,7 @@ def find_joints(
             joints = np.stack([_place(figure, names, point) for point in points], axis=1)
             return joints, _toes(figure, names, rig)
     raise KeyreconError(
-        f"No known rig has joints called {', '.join(list(names)[:12])} ...; "
+        f"No known rig has joints called {', '.join(name[:40] for name in list(names)[:12])} ...; "
         "rename the joints as in the CMU, MotionBuilder or DAZ skeletons "
         "(RightUpLeg, RightLeg, RightFoot, ...)."
     )
