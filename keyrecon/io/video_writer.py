@@ -12,9 +12,8 @@ from jaxtyping import UInt8
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import replacing, write_durably
 
-
 THREADS = 4
-"""Of the encoder, whatever the machine: where they share a picture, other threads are other bits."""
+"""Of the encoder on any machine: another number of threads would write other bits."""
 
 
 def write_video(
