@@ -350,3 +350,25 @@ def test_public_names_are_there_for_programs_and_for_type_checkers():
         alias.asname for node in checked.body if hasattr(node, "names") for alias in node.names
     ]
     assert sorted([*imported, "__version__"]) == sorted(package.__all__)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "{p}", "--height", "1.8", "--depths", "{p}/bad.npz"),
+        ("run", "{p}", "--lift.height", "inf"),
+        ("run", "{p}", "--propagate.rounds", "-3"),
+        ("keyframes", "{p}", "--budget", "nan"),
+        ("keyframes", "{p}", "--budget", "0.2"),
+        ("keyframes", "{p}", "--camera.width", "1000000000"),
+        ("import", "{p}", "{p}/bad.npz"),
+        ("relink", "{p}", "{p}/bad.npz"),
+    ],
+)
+def test_a_refused_command_leaves_the_project_as_it_was(project, keyrecon, words):
+    (project / "bad.npz").write_bytes(b"PK\x03\x04" + b"\xff" * 300)
+    before = {p: p.read_bytes() for p in project.rglob("*") if p.is_file()}
+    code, _, err = keyrecon(*(word.format(p=project) for word in words))
+    assert one_line(code, err)
+    after = {p: p.read_bytes() for p in project.rglob("*") if p.is_file() and p.suffix != ".lock"}
+    assert {p: d for p, d in after.items() if "cache" not in p.parts} == before
