@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from keyrecon.records import Annotations as Annotations
     from keyrecon.records import Motion as Motion
     from keyrecon.records import Pick as Pick
+    from keyrecon.world.calibration import calibrate_court as calibrate_court
 
     __version__: str
 
