@@ -227,7 +227,7 @@ def read_skeleton(path: Path) -> Skeleton:
     with reading(path, "a skeleton file", remedy):
         data = parse_json(read_text(path))
         rows = [(j["name"], j["parent"], real(j["length"] or 0)) for j in data["joints"]]
-        if strange := [n for n, _, _ in rows if not isinstance(n, str) or not n.strip()]:
+        if strange := [name for name, _, _ in rows if not isinstance(name, str)]:
             raise ValueError(f"{strange[0]!r} is not the name of a joint")
         return check_skeleton(_skeleton_from_rows(rows, data["lower"]))
 
@@ -235,6 +235,12 @@ def read_skeleton(path: Path) -> Skeleton:
 def check_skeleton(skeleton: Skeleton) -> Skeleton:
     """The skeleton; ValueError where it is not one tree of joints of a body."""
     names, count = skeleton.names, len(skeleton.names)
+    if strange := [name for name in names if not isinstance(name, str) or not name.strip()]:
+        raise ValueError(f"{strange[0]!r} is not the name of a joint")
+    if not len(skeleton.parents) == len(skeleton.proportions) == count:
+        raise ValueError("each joint needs a parent and a length")
+    if not {j for pair in skeleton.mirrored for j in pair} <= {*range(count)}:
+        raise ValueError("a mirrored joint is not there")
     if len(set(names)) < count:
         raise ValueError(f"the joint {max(names, key=names.count)} is there twice")
     if not all(-1 <= parent < count for parent in skeleton.parents):

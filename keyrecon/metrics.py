@@ -199,6 +199,8 @@ def read_truth(path: Path) -> dict[str, np.ndarray]:
     with reading(path, "a truth.npz", "render or export it again"):
         for name in ("points3d", "points2d", "fps"):
             check_numbers(name, truth[name])
+        if truth["joint_names"].dtype.kind != "U" or truth["joint_names"].ndim != 1:
+            raise ValueError("joint_names is no list of names")
         if truth["fps"].size != 1 or not truth["fps"].item() > 0 or not len(truth["points3d"]):
             raise ValueError("it has no frames, or they have no rate")
     return truth
