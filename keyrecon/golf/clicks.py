@@ -185,7 +185,8 @@ def check_joints(clicks: GolfClicks, origin: str) -> None:
     known = {*LSP14.names, "root"}
     if strange := sorted(set(clicks.joints) - known):
         raise KeyreconError(
-            f"{origin} clicks '{strange[0]}', which is no joint; use {', '.join(sorted(known))}."
+            f"{origin} clicks '{strange[0][:40]}', which is no joint; use "
+            f"{', '.join(sorted(known))}."
         )
     given = set(clicks.joints) | (
         {"root"} if {"right_hip", "left_hip"} <= set(clicks.joints) else set()

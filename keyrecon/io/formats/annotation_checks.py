@@ -65,8 +65,8 @@ class MarkSheet:
         known = canonical_name(name)
         if known not in self.skeleton.names:
             raise KeyreconError(
-                f"{self.path}, frame {frame}: the joint '{name}' is not in the skeleton, which "
-                f"has {', '.join(self.skeleton.names)}; rename it or leave it out."
+                f"{self.path}, frame {frame}: the joint '{name[:40]}' is not in the skeleton, "
+                f"which has {', '.join(self.skeleton.names)}; rename it or leave it out."
             )
         return self.skeleton.names.index(known)
 
@@ -86,8 +86,8 @@ def frame_of_picture(name: str, path: Path) -> int:
     number = re.search(r"(\d+)$", stem)
     if not number:
         raise KeyreconError(
-            f"{path}: the picture '{name}' does not say which frame it shows; its name must end "
-            "in the frame number, as in frame_000123.png."
+            f"{path}: the picture '{name[:60]}' does not say which frame it shows; its name must "
+            "end in the frame number, as in frame_000123.png."
         )
     return int(number[1])
 
