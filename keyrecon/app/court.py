@@ -7,14 +7,23 @@ import numpy as np
 
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
+from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
+from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_court, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.court import tennis_court
-from keyrecon.world.records import CourtCamera, CourtClick
+from keyrecon.world.placement import place_motion, run_length
+from keyrecon.world.records import CourtCamera, CourtClick, WorldMotion
+
+MAX_MISFIT = 0.2
+"""Share by which the player's size by the court may differ from the height that was given: rendered
+sequences are off by 2 to 9 %, a court taken for another by a third and more."""
+STATURES = (1.1, 2.3)
+"""Heights that players have, metres."""
 
 
 def court_click(text: str) -> CourtClick:
@@ -49,14 +58,66 @@ def calibrate(
     drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
     picture = workspace.folder / "court.jpg"
     write_court_picture(picture, drawn)
+    placed = []
+    if workspace.motion_file.is_file():
+        placed = write_placed_motion(workspace, read_motion(workspace.motion_file))
     return "\n".join(
         [
             *describe_camera(camera),
             f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
+            *placed,
         ]
     )
+
+
+def write_placed_motion(workspace: Workspace, motion: Motion) -> list[str]:
+    """Write motion.npz, with the motion on the court where that is known; lines to show.
+
+    What the motion is without a court is written the same in any case.
+    """
+    if not workspace.camera_file.is_file():
+        write_motion(workspace.motion_file, motion)
+        return []
+    camera, world = read_camera(workspace.camera_file), None
+    if len(camera.found) == len(motion.time):
+        world = place_motion(motion, camera)
+    doubt = _doubt(world, motion, camera)
+    if world is None or doubt:
+        write_motion(workspace.motion_file, motion)
+        return [f"No way on the court: {doubt}"]
+    write_motion(workspace.motion_file, motion, (world, camera))
+    return describe_way(world, motion)
+
+
+def _doubt(world: WorldMotion | None, motion: Motion, camera: CourtCamera) -> str:
+    """Why a motion is not put on the court; empty where it is."""
+    if len(camera.found) != len(motion.time):
+        return (
+            f"camera.npz was made for {len(camera.found)} frames and the motion has "
+            f"{len(motion.time)}; run keyrecon court again."
+        )
+    if world is None:
+        return "in no frame with the court was a foot seen to stand on the ground."
+    low, high = (1 - MAX_MISFIT, 1 + MAX_MISFIT) if motion.units == "m" else STATURES
+    if not low < world.height_ratio < high:
+        return (
+            f"by the court the player would be {world.height_ratio:.2f} "
+            f"{'times the height given' if motion.units == 'm' else 'm tall'}; look at court.jpg, "
+            "and at the height."
+        )
+    return ""
+
+
+def describe_way(world: WorldMotion, motion: Motion) -> list[str]:
+    """How far and how fast the player went."""
+    length, speed = run_length(world, motion)
+    height = f" The player is {world.height_ratio:.2f} m tall by the court."
+    return [
+        f"On the court: {length:.1f} m run, top speed {speed:.1f} m/s."
+        + (height if motion.units != "m" else "")
+    ]
 
 
 def export_calibration(workspace: Workspace, file: Path) -> str:

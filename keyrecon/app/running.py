@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from keyrecon.app.court import write_placed_motion
 from keyrecon.app.preparing import prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
-from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
@@ -49,7 +49,7 @@ def run(
     found = prepare_project(workspace, workspace.video(), annotations, options, progress)
     preparation = replace(found.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
-    write_motion(workspace.motion_file, motion)
+    placed = write_placed_motion(workspace, motion)
     material = ReportMaterial(
         video=preparation.video,
         track=preparation.track,
@@ -67,6 +67,7 @@ def run(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
+            *placed,
             *found.contradictions(),
             *_describe_doubt(motion),
             *_other_choice(workspace, options, preparation.keyframes),

@@ -49,3 +49,18 @@ class CourtClick:
     frame: int
     x: float
     y: float
+
+
+@dataclass(frozen=True, eq=False)
+class WorldMotion:
+    """A motion on the court, metres; NaN in frames whose camera was not found."""
+
+    points: Float[np.ndarray, "T J 3"]
+    """Joints."""
+    root: Float[np.ndarray, "T 3"]
+    """Middle of the hips."""
+    contact: Bool[np.ndarray, "T 2"]
+    """Whether the right foot, and the left, stands on the ground."""
+    height_ratio: float
+    """Size of the player by the court over that of the motion; for a motion in body heights the
+    player's height in metres."""

@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from keyrecon.body import Skeleton, check_skeleton
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.records import SOURCES, Motion
+from keyrecon.world.records import CourtCamera, WorldMotion
 
 ARRAYS = {
     "points3d": "TJ3",
@@ -30,8 +32,13 @@ OPTIONAL = {"expected_error": "TJ"}
 """Arrays that files of former versions and of golf fits lack."""
 
 
-def write_motion(path: Path, motion: Motion) -> None:
-    """Write motion.npz; axes and units as in `records.Motion`, names as listed in the README."""
+def write_motion(
+    path: Path, motion: Motion, world: tuple[WorldMotion, CourtCamera] | None = None
+) -> None:
+    """Write motion.npz; axes and units as in `records.Motion`, names as listed in the README.
+
+    `world` is the motion on the court and the camera that put it there, where they are known.
+    """
     skeleton = motion.skeleton
     buffer = io.BytesIO()
     np.savez_compressed(
@@ -46,8 +53,20 @@ def write_motion(path: Path, motion: Motion) -> None:
         fps=np.array(motion.fps),
         units=np.array(motion.units),
         keyrecon_version=np.array(__version__),
+        **({} if world is None else _on_court(*world)),
     )
     write_durably(path, buffer.getvalue())
+
+
+def _on_court(motion: WorldMotion, camera: CourtCamera) -> dict[str, Any]:
+    return {
+        "points3d_world": motion.points,
+        "root_world": motion.root,
+        "contact": motion.contact,
+        "camera_K": camera.K,
+        "camera_R": camera.R,
+        "camera_t": camera.t,
+    }
 
 
 def _known(motion: Motion) -> list[str]:

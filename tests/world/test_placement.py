@@ -1,0 +1,88 @@
+"""A motion is put on the court by its standing feet."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from court_walker import STATURE, court_camera, lifted, walk
+from painted_court import camera_at
+
+from keyrecon.body import LSP14
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.world.placement import place_motion, run_length
+
+PINHOLE = camera_at((2, -20, 3), (0, -9, 0.8), 1.6)
+FEET = [LSP14.index("right_ankle"), LSP14.index("left_ankle")]
+
+
+@pytest.fixture(scope="module")
+def walked():
+    points, contact = walk()
+    motion = lifted(points, PINHOLE)
+    return points, contact, motion, place_motion(motion, court_camera(PINHOLE, len(points)))
+
+
+def test_a_walk_is_where_it_was(walked):
+    points, _, _, world = walked
+    hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    assert np.median(np.linalg.norm(world.root - hips, axis=1)) < 0.05
+    assert np.median(np.linalg.norm(world.points - points, axis=2)) < 0.06
+
+
+def test_the_foot_that_stands_is_found(walked):
+    _, contact, _, world = walked
+    assert (world.contact & ~contact).mean() < 0.12  # around the change of feet both are at rest
+    assert (world.contact & contact).sum() > 0.9 * contact.sum()
+
+
+def test_a_standing_foot_stays_on_the_ground(walked):
+    _, contact, _, world = walked
+    feet = world.points[:, FEET]
+    inner = contact & np.roll(contact, 5, axis=0) & np.roll(contact, -5, axis=0)
+    moved = np.linalg.norm(np.diff(feet, axis=0), axis=2)[inner[1:] & inner[:-1]]
+    assert np.median(moved) < 0.002
+    assert np.abs(feet[inner][:, 2] - 0.0486 * STATURE).max() < 0.06
+
+
+def test_the_court_tells_the_height_of_a_player_without_one():
+    points, _ = walk()
+    world = place_motion(
+        lifted(points, PINHOLE, "body heights"), court_camera(PINHOLE, len(points))
+    )
+    assert abs(world.height_ratio - STATURE) < 0.06
+
+
+def test_the_way_is_as_long_as_it_was(walked):
+    points, _, motion, world = walked
+    ground = points.mean(axis=1)[:, :2]
+    true = np.linalg.norm(ground[-1] - ground[0])
+    length, speed = run_length(world, motion)
+    assert true * 0.9 < length < true * 1.2
+    assert speed < 2.5
+
+
+def test_frames_without_the_court_have_no_place(walked):
+    _, _, motion, _ = walked
+    camera = court_camera(PINHOLE, len(motion.time))
+    lost = camera.found.copy()
+    lost[40:60] = False
+    blank = {n: getattr(camera, n).copy() for n in ("K", "R", "t")}
+    for values in blank.values():
+        values[40:60] = np.nan
+    world = place_motion(motion, replace(camera, found=lost, **blank))
+    assert np.isnan(world.points[40:60]).all()
+    assert np.isfinite(world.points[~np.isin(np.arange(len(lost)), np.arange(40, 60))]).all()
+    assert not world.contact[40:60].any()
+
+
+def test_a_motion_on_the_court_is_the_same_without_it(walked, tmp_path):
+    _, _, motion, world = walked
+    write_motion(tmp_path / "plain.npz", motion)
+    camera = court_camera(PINHOLE, len(motion.time))
+    write_motion(tmp_path / "court.npz", motion, (world, camera))
+    with np.load(tmp_path / "plain.npz") as plain, np.load(tmp_path / "court.npz") as placed:
+        for name in plain.files:
+            assert np.array_equal(plain[name], placed[name]), name
+        assert placed["points3d_world"].shape == motion.points3d.shape
+        assert placed["contact"].shape == (len(motion.time), 2)
+    assert read_motion(tmp_path / "court.npz").units == "m"
