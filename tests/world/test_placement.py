@@ -32,7 +32,7 @@ def test_a_walk_is_where_it_was(walked):
 def test_the_foot_that_stands_is_found(walked):
     _, contact, _, world = walked
     assert (world.contact & ~contact).mean() < 0.12  # around the change of feet both are at rest
-    assert (world.contact & contact).sum() > 0.9 * contact.sum()
+    assert (world.contact & contact).sum() > 0.85 * contact.sum()
 
 
 def test_a_standing_foot_stays_on_the_ground(walked):

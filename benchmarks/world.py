@@ -1,0 +1,287 @@
+"""The camera from the court, and the motion on it, against rendered truth; pictures of real clips.
+
+    python benchmarks/world.py [--work DIR] [--only NAME ...] [--half develop|report] [--rendered]
+
+Rendered, 6 s each, views of which the court is to be found without a click:
+
+    found     share of the frames whose camera was found
+    reproj.   points of the court in the picture, median distance from where they are, px
+    centre    camera's place, off by so many % of its distance from the baseline; in standard
+              deviations that were told
+    focal     off by %
+    root      root where a foot stands, off by so many cm, median
+    slip      speed of feet that stand, cm/s, median
+    contact   F1 of standing feet; truth: ankle within 3 cm of its rest and slower than .3 m/s
+    W-MPJPE   joints in the world, mm
+
+The motion is the true one with 2 px and 4 cm of slow noise, as a lifting would have it: this measures
+the court alone. `ms` are milliseconds a frame of following the court, without reading the video.
+
+Real clips: share of the frames found, the camera's place, and how much of the model's lines is seen;
+every tenth frame is drawn into DIR/CLIP.png, to be looked at. Golf clips must have no court.
+"""
+
+import argparse
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from real import DEVELOP, VIDEOS
+from scipy.ndimage import gaussian_filter1d
+
+from keyrecon.app.console import show
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.io.frame_reader import read_grey
+from keyrecon.io.video import Video, open_video
+from keyrecon.numerics.geometry import look_at
+from keyrecon.records import CameraPath, Motion
+from keyrecon.report.court_drawing import draw_court
+from keyrecon.synthetic.cameras import UP, CameraMove
+from keyrecon.synthetic.motion import MotionOptions, play_tennis
+from keyrecon.synthetic.sequence import SceneOptions, film_stage, set_stage
+from keyrecon.synthetic.sequence import draw_court as paint_court
+from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.world.calibration import CalibrationOptions, calibrate_court
+from keyrecon.world.court import CourtOptions, tennis_court
+from keyrecon.world.court_tracking import SPACING, check_still
+from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.placement import place_motion
+from keyrecon.world.records import CourtCamera
+
+FPS, SECONDS, SIZE = 50.0, 6.0, (1280, 720)
+NET = -11.885
+TO_COURT = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""Axes of rendered worlds (y up, net at negative z) to those of the court."""
+TO_MIDDLES = CalibrationOptions(CourtOptions(0.0, 0.0))
+"""Rendered lines are measured to their middles."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A camera at a rendered court; axes of the rendered world, metres."""
+
+    name: str
+    centre: tuple[float, float, float]
+    target: tuple[float, float, float]
+    focal: float
+    """In widths of the picture."""
+    seed: int
+    pan: float = 0.0
+    """Degrees to both sides."""
+    zoom: float = 0.0
+    """Share by which the focal length grows and falls."""
+
+
+SETTINGS = (
+    Setting("broadcast", (0.6, 9.0, 21.0), (0.0, 0.0, -8.5), 1.45, 31),
+    Setting("broadcast-pan", (-0.5, 14.0, 30.0), (0.0, 0.0, -8.0), 1.9, 32, 4.0, 0.06),
+    Setting("phone-fence", (2.6, 3.0, 6.5), (-0.4, 0.3, -7.0), 0.85, 33),
+    Setting("behind-baseline", (-0.8, 1.4, 6.6), (0.2, 0.9, -8.0), 1.0, 34),
+    Setting("side-half", (15.0, 4.0, -3.0), (0.0, 0.2, -5.5), 0.9, 35),
+    Setting("corner-pan", (8.0, 3.2, 6.0), (-0.6, 0.3, -5.0), 0.95, 36, 5.0, 0.05),
+)
+
+
+def render(setting: Setting, work: Path) -> Path:
+    """The folder of the rendered sequence; rendered if it is not there."""
+    folder = work / setting.name
+    if (folder / "truth.npz").is_file():
+        return folder
+    points = play_tennis(MotionOptions(SECONDS, FPS, seed=setting.seed))
+    stage = set_stage(points, FPS, SceneOptions(setting.seed))
+    frames = len(points)
+    phase = np.sin(2 * np.pi * np.arange(frames) / frames)
+    centre, target = np.array(setting.centre), np.array(setting.target)
+    rotations = []
+    for turn in np.radians(setting.pan) * phase:
+        c, s = np.cos(turn), np.sin(turn)
+        way = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ (target - centre)
+        rotations.append(look_at(centre, centre + way, UP))
+    focal = setting.focal * SIZE[0] * (1 + setting.zoom * np.cos(3 * phase))
+    move = CameraMove(centre, np.array(rotations), focal, SIZE)
+    background = paint_court(points, move, stage.look, setting.seed)
+    stage = replace(stage, move=move, background=background)
+    film_stage(stage, FPS, SceneOptions(setting.seed, workers=1), folder, show)
+    return folder
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The camera and the joints in the court's axes."""
+
+    cameras: list[Pinhole]
+    points: np.ndarray
+    points2d: np.ndarray
+
+    @classmethod
+    def read(cls, file: Path) -> "Truth":
+        """From a rendered sequence's truth.npz."""
+        stored = np.load(file)
+        shift = np.array([0, NET, 0])
+        centre = TO_COURT @ stored["center"] + shift
+        cameras = [
+            Pinhole(float(f), stored["principal"], r @ TO_COURT.T, centre)
+            for f, r in zip(stored["focal"], stored["rotation"], strict=True)
+        ]
+        world = np.einsum("tji,tnj->tni", stored["rotation"], stored["points3d"])
+        world = (world + stored["center"]) @ TO_COURT.T + shift
+        return cls(cameras, world, stored["points2d"])
+
+
+def lift_truth(truth: Truth, seed: int) -> Motion:
+    """The true motion as a lifting would have it: orthographic about the sight, with slow noise."""
+    rng = np.random.default_rng(seed)
+    count, joints = truth.points.shape[:2]
+
+    def noise(spread: float, axes: int) -> np.ndarray:
+        slow = gaussian_filter1d(rng.standard_normal((count, joints, axes)), 8.0, axis=0)
+        return spread * slow / slow.std()
+
+    hips = truth.points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    pose, scale = np.empty_like(truth.points), np.empty(count)
+    for t, camera in enumerate(truth.cameras):
+        ray = camera.rotation @ (hips[t] - camera.centre)
+        far = float(np.linalg.norm(ray))
+        ray = ray / far
+        right = np.cross([0.0, 1.0, 0.0], ray)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(ray, right), ray])
+        pose[t] = (truth.points[t] - hips[t]) @ camera.rotation.T @ axes.T
+        scale[t] = camera.focal / far
+    pixels = truth.points2d + noise(2.0, 2)
+    return Motion(
+        LSP14, pose + noise(0.04, 3), pixels, pixels, np.ones((count, joints)),
+        np.zeros((count, joints), dtype=np.int64), scale, FPS, np.arange(count) / FPS, "m",
+        np.array([0]),
+    )  # fmt: skip
+
+
+def measure(setting: Setting, work: Path) -> str:
+    """One row of the table."""
+    folder = render(setting, work)
+    video, truth = open_video(folder / "video.mp4"), Truth.read(folder / "truth.npz")
+    path = estimate_camera_motion(video)
+    began = time.process_time()
+    try:
+        camera = calibrate_court(video, path, (), TO_MIDDLES)
+    except KeyreconError as fault:
+        return f"{setting.name:<18}{fault}"
+    seconds = time.process_time() - began
+    seen = np.flatnonzero(camera.found)
+    grid = np.meshgrid(np.linspace(-5.4, 5.4, 9), np.linspace(-11.8, 11.8, 17))
+    court = np.column_stack([grid[0].ravel(), grid[1].ravel(), np.zeros(grid[0].size)])
+    off: list[float] = []
+    for t in seen[::5]:
+        there = truth.cameras[t].project(court)
+        inside = ((there > 0) & (there < SIZE)).all(axis=1)
+        off += np.linalg.norm(camera.project(t, court) - there, axis=1)[inside].tolist()
+    true = truth.cameras[0].centre
+    turned = np.sign(true[1]) * np.sign(camera.centre[seen[0]][1])
+    away = camera.centre[seen[0]] - true * [turned, turned, 1]
+    distance = float(np.linalg.norm(true - [0, NET, 0]))
+    deviations = float(np.abs(away / camera.sd_centre[seen[0]]).max())
+    focal = np.median([camera.focal[t] / truth.cameras[t].focal - 1 for t in seen])
+    return (
+        f"{setting.name:<18}{camera.found.mean():7.1%}{np.median(off):9.2f}"
+        f"{np.linalg.norm(away) / distance:8.2%} ({deviations:.1f} sd){focal:+8.2%}"
+        f"{_place(truth, camera, setting.seed)}{seconds:7.1f}"
+    )
+
+
+def _place(truth: Truth, camera: CourtCamera, seed: int) -> str:
+    """Root, slip, contact and joints in the world."""
+    motion = lift_truth(truth, seed)
+    world = place_motion(motion, camera)
+    if world is None:
+        return "  no foot stands"
+    hips, ankles = (
+        [LSP14.index(f"{side}_{part}") for side in ("right", "left")] for part in ("hip", "ankle")
+    )
+    root, feet = truth.points[:, hips].mean(axis=1), truth.points[:, ankles]
+    speed = np.linalg.norm(np.gradient(feet, axis=0), axis=2) * FPS
+    stands = (feet[..., 2] < np.percentile(feet[..., 2], 5) + 0.03) & (speed < 0.3)
+    error = np.linalg.norm(world.root - root, axis=1)
+    steps = np.linalg.norm(np.diff(world.points[:, ankles, :2], axis=0), axis=2) * FPS
+    both = world.contact[1:] & world.contact[:-1]
+    hit = (world.contact & stands).sum()
+    f1 = 2 * hit / (world.contact.sum() + stands.sum())
+    joints = np.nanmean(np.linalg.norm(world.points - truth.points, axis=2))
+    return (
+        f"{np.nanmedian(error[world.contact.any(axis=1)]) * 100:7.1f}"
+        f"{np.nanmedian(steps[both]) * 100:7.1f}{f1:9.2f}{joints * 1000:9.0f}"
+    )
+
+
+def look(name: str, work: Path) -> str:
+    """One real clip: a row, and every tenth frame drawn."""
+    video = open_video(VIDEOS / f"{name}.mp4")
+    path: CameraPath = estimate_camera_motion(video)
+    try:
+        camera = calibrate_court(video, path)
+    except KeyreconError as fault:
+        return f"{name:<26}{str(fault)[:70]}"
+    seen = np.flatnonzero(camera.found)
+    draw(video, camera, work / f"{name}.png")
+    x, y, z = camera.centre[seen[0]]
+    sd = camera.sd_centre[seen[0]]
+    still = bool((path.to_reference == np.eye(3)).all())
+    speed = _pace(video, camera) if still else ""
+    return (
+        f"{name:<26}{camera.found.mean():7.1%}  x {x:6.2f} ({sd[0]:.2f})  y {y:7.2f} ({sd[1]:.2f})"
+        f"  z {z:6.2f} ({sd[2]:.2f})  focal {camera.focal[seen].min():.0f}-"
+        f"{camera.focal[seen].max():.0f} px{speed}"
+    )
+
+
+def _pace(video: Video, camera: CourtCamera) -> str:
+    """Milliseconds a frame of looking at the lines of a still camera."""
+    greys = [grey for _, grey in zip(range(20), read_grey(video, 1280), strict=False)]
+    t = int(np.flatnonzero(camera.found)[0])
+    pinhole = Pinhole(camera.focal[t], camera.K[t, :2, 2], camera.R[t], camera.centre[t])
+    pinhole = pinhole.resized(greys[0].shape[1] / video.width)
+    began = time.process_time()
+    check_still(greys, pinhole, tennis_court())
+    return f"  {(time.process_time() - began) / len(greys) * 1000:.1f} ms a frame ({SPACING:g} px)"
+
+
+def draw(video: Video, camera: CourtCamera, file: Path) -> None:
+    """Every tenth frame with the model's lines, on one sheet."""
+    tiles = []
+    for t in range(0, len(video), 10):
+        drawn = draw_court(video.frame(t), camera, t)
+        tiles.append(cv2.resize(drawn, (960, round(960 * video.height / video.width))))
+    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % 3)
+    rows = [np.hstack(tiles[i : i + 3]) for i in range(0, len(tiles), 3)]
+    cv2.imwrite(str(file), np.vstack(rows)[..., ::-1])
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--work", type=Path, default=Path("bench"))
+    parser.add_argument("--only", nargs="*", default=[])
+    parser.add_argument("--half", choices=("develop", "report"), default="develop")
+    parser.add_argument("--rendered", action="store_true", help="leave out the real clips")
+    told = parser.parse_args()
+    work = told.work / "world"
+    work.mkdir(parents=True, exist_ok=True)
+    rendered = [s for s in SETTINGS if not told.only or s.name in told.only]
+    if rendered:
+        print(
+            f"{'rendered':<18}{'found':>7}{'reproj.':>9}{'centre':>17}{'focal':>8}"
+            f"{'root':>7}{'slip':>7}{'contact':>9}{'W-MPJPE':>9}{'s':>7}"
+        )
+    for setting in rendered:
+        print(measure(setting, work), flush=True)
+    names = sorted(p.stem for p in VIDEOS.glob("*.mp4"))
+    names = [n for n in names if (n in DEVELOP) == (told.half == "develop")]
+    for name in [] if told.rendered else names:
+        if not told.only or name in told.only:
+            print(look(name, work), flush=True)
+
+
+if __name__ == "__main__":
+    main()
