@@ -14,11 +14,13 @@ Rendered, 6 s each, views of which the court is to be found without a click:
     contact   F1 of standing feet; truth: ankle within 3 cm of its rest and slower than .3 m/s
     W-MPJPE   joints in the world, mm
 
-The motion is the true one with 2 px and 4 cm of slow noise, as a lifting would have it: this measures
-the court alone. `ms` are milliseconds a frame of following the court, without reading the video.
+    s         seconds of processor time for the calibration, reading the video twice included
 
-Real clips: share of the frames found, the camera's place, and how much of the model's lines is seen;
-every tenth frame is drawn into DIR/CLIP.png, to be looked at. Golf clips must have no court.
+The motion is the true one with 2 px and 4 cm of slow noise, as a lifting would have it: this
+measures the court alone.
+
+Real clips: share of the frames found, the camera's place with its standard deviations; every tenth
+frame is drawn into DIR/world/CLIP.png, to be looked at. Golf clips must have no court.
 """
 
 import argparse
