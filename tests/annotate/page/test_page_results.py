@@ -155,6 +155,7 @@ def test_video_and_files_of_a_part_of_the_clip_without_a_command_line(folder, vi
         person.await_text("#export-range", "0.40 s")
         person.page.check("#overlay-choices [value=above]")
         person.page.select_option("[aria-label=Speed]", "4")
+        person.await_text("#overlay-said", "Frames 90 to 99; plays for 1.6 s")
         person.page.click("#export-overlay")
         person.await_text("#export-list", "rally_90-99_camera_above_slow4.mp4")
         with person.page.expect_download() as saved:

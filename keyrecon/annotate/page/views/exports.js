@@ -74,7 +74,7 @@ export function createExports(model, shell) {
   byId("export-range").append("Frames ", range[0], " to ", range[1], " ", said);
   const views = VIEWS.map(([value]) => make("input", { type: "checkbox", value, checked: value === "camera" })),
     [skeleton, speed, size] = [choice(SKELETONS, "Figure"), choice(SPEEDS, "Speed"), choice(SIZES, "Height, px")];
-  for (const box of views) box.addEventListener("change", model.redraw);
+  for (const field of [...views, speed]) field.addEventListener("change", model.redraw);
   byId("overlay-choices").append(
     make("b", {}, "Views, side by side"),
     make("div", {}, ...VIEWS.map(([, text], n) => make("label", {}, views[n], text))),
@@ -137,6 +137,12 @@ export function createExports(model, shell) {
       seconds = whole && ((whole.last ?? last) - (whole.first ?? 0) + 1) / model.project.fps;
     setText(said, whole ? `${seconds.toFixed(2)} s` : `two frames from 0 to ${last}, the first first`);
     toggle(said, "wrong", !whole);
+    setText(
+      byId("overlay-said"),
+      whole
+        ? `Frames ${whole.first ?? 0} to ${whole.last ?? last}; plays for ${(seconds * Number(speed.value)).toFixed(1)} s.`
+        : "",
+    );
     byId("export-motion").disabled = !ready() || !chosen().length || !whole;
     byId("export-overlay").disabled = !ready() || !chosenViews().length || !whole;
     setText(byId("files-count"), files.length ? String(files.length) : "");
