@@ -78,6 +78,8 @@ class PoseHypotheses:
     """Row of the annotated frame that it comes from, or that is most similar."""
     prior_cost: Float[np.ndarray, "T S"]
     """Cost before edges are considered; infinite where there is no hypothesis."""
+    unlikeness: Float[np.ndarray, "T S 2 J"]
+    """How unlike marks joints look (`JointAppearance`); 0 where pictures were not looked at."""
 
 
 def join_hypotheses(*parts: PoseHypotheses) -> PoseHypotheses:
@@ -125,6 +127,7 @@ def fit_hypotheses(
         unexplained.reshape(shape[0], -1, *unexplained.shape[1:]),
         start.template.reshape(shape),
         np.zeros((shape[0], len(joints) // shape[0])),
+        np.zeros((shape[0], len(joints) // shape[0], 2, joints.shape[1])),
     )
 
 

@@ -11,7 +11,7 @@ First, exchanges that are themselves against the laws of motion are undone, so t
 threads without a name. Then a chain of two states (the one thread is left, or the other) with these
 prices is solved for the whole clip: marks fix the state, so that what a crossing leaves open is
 decided by the next mark; in between, the annotated poses that are most like a frame say which is
-which. The probability that the chain gives to its states is small where nothing decides.
+which, and so does what the joints of either side look like on the marked frames. The probability that the chain gives to its states is small where nothing decides.
 
 Marked joints that optical flow follows were tried as further evidence. A leg that passes the other
 hands its flow over, so that one mistake counts in every frame that follows: 3.3 % of the limbs of a
@@ -44,6 +44,8 @@ TEMPLATE_RATE = 8.0
 pose has the legs the right way in 45 of 46 frames marked by eye. Half and twice this gave 2.4 and
 2.9 % with a third of the marks. A rate by how often the marks themselves agree with those most like
 them was tried: no fewer exchanges."""
+APPEARANCE_RATE = 720.0
+"""What the looks of joints tell within a second, nats per unit of likeness."""
 DISTINCTION = 0.1
 """Difference in distance at which a joint belongs to the one side for certain, player heights."""
 MIN_THREAD_SECONDS = 0.1
@@ -58,21 +60,27 @@ REVERSE = np.array([1.0, -1.0])
 """Place and velocity as seen backwards in time."""
 
 
-@dataclass(frozen=True, eq=False)
-class SideEvidence:
-    """Joints whose side is told by something else than where they were before."""
+def template_gain(
+    half: BodyHalf,
+    joints: Complex[np.ndarray, "T J"],
+    poses: Complex[np.ndarray, "T S J"],
+    fps: float,
+) -> Float[np.ndarray, "T"]:
+    """What similar annotated poses, fitted to each frame, say for the sides as they are and against
+    the exchanged, nats."""
+    own = np.concatenate(half.sides)
+    direct = np.abs(joints[:, None, own] - poses[..., own])
+    crossed = np.abs(joints[:, None, half.mirror[own]] - poses[..., own])
+    gain = np.clip((crossed - direct) / DISTINCTION, -1, 1)
+    return TEMPLATE_RATE / fps * gain.mean(axis=(1, 2))
 
-    joints: Complex[np.ndarray, "T S J"]
-    weight: Float[np.ndarray, "T S J"]
-    """What each joint counts for in a frame, nats; 0 where it is not known."""
 
-
-def template_evidence(
-    half: BodyHalf, poses: Complex[np.ndarray, "T S J"], fps: float
-) -> SideEvidence:
-    """What similar annotated poses tell, after they have been fitted to each frame."""
-    count = poses.shape[1] * 2 * len(half.sides[0])
-    return SideEvidence(poses, np.full(poses.shape, TEMPLATE_RATE / fps / count))
+def appearance_gain(
+    half: BodyHalf, unlikeness: Float[np.ndarray, "T 2 J"], fps: float
+) -> Float[np.ndarray, "T"]:
+    """What joints that look like marks of their own side, or of the other, say likewise."""
+    own = np.concatenate(half.sides)
+    return APPEARANCE_RATE / fps * (unlikeness[:, 1, own] - unlikeness[:, 0, own]).mean(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,18 +109,20 @@ class LimbIdentity:
 def identify_limbs(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
-    evidence: SideEvidence,
+    gain: Float[np.ndarray, "T"],
     marked: Int[np.ndarray, "K"],
     fps: float,
 ) -> LimbIdentity:
-    """Where the sides of one half of the body are exchanged; in `marked` frames they are right."""
+    """Where the sides of one half of the body are exchanged; in `marked` frames they are right.
+
+    `gain` is what is known for the sides as they are and against the exchanged, nats.
+    """
     sides = [list(side) for side in half.sides]
     pair = np.stack([joints[:, side] for side in sides], axis=1)
     spread = ACCELERATION_SPREAD * 2.0 ** half.depth[sides[0]] * (50 / fps) ** 2
     crossed, price = untangle_threads(pair, spread, round(MIN_THREAD_SECONDS * fps))
     frames = np.arange(len(pair))
-    gain = _side_gain(half, joints, evidence)
-    gain[marked] = MARK_COST
+    gain = np.where(np.isin(frames, marked), MARK_COST, gain)
     cost = np.zeros((len(pair), 2))
     cost[frames, crossed.astype(int)] = np.maximum(-gain, 0)
     cost[frames, 1 - crossed] = np.maximum(gain, 0)
@@ -205,15 +215,3 @@ def _filter_motion(
         states.append(state)
         covariances.append(covariance)
     return np.stack(states), np.stack(covariances)
-
-
-def _side_gain(
-    half: BodyHalf, joints: Complex[np.ndarray, "T J"], evidence: SideEvidence
-) -> Float[np.ndarray, "T"]:
-    """What the evidence says for the sides as they are and against the exchanged, nats."""
-    own = np.concatenate(half.sides)
-    told, weight = evidence.joints[..., own], evidence.weight[..., own]
-    direct = np.abs(joints[:, None, own] - told)
-    crossed = np.abs(joints[:, None, half.mirror[own]] - told)
-    gain = weight * np.clip((crossed - direct) / DISTINCTION, -1, 1)
-    return np.where(weight > 0, gain, 0).sum(axis=(1, 2))

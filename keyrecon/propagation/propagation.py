@@ -24,6 +24,7 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
+from keyrecon.propagation.appearance import PlayerFeatures, describe_player, learn_appearance
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
@@ -40,8 +41,9 @@ from keyrecon.propagation.hypotheses import (
     track_from_keyframes,
 )
 from keyrecon.propagation.limb_identity import (
+    appearance_gain,
     identify_limbs,
-    template_evidence,
+    template_gain,
 )
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
@@ -105,6 +107,8 @@ class HalfStart:
     """Pose distance of every frame to the annotated ones, player heights."""
     fixed: Complex[np.ndarray, "T G"]
     """Joints that the other half has estimated."""
+    features: PlayerFeatures
+    """What the player looks like in every frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +182,7 @@ def _propagate_fused(
     track, edges, fps = preparation.track, preparation.contours.edges, preparation.video.fps
     body_frame = stabilise_player(track, preparation.camera, fps)
     index = index_elements(edges, body_frame)
+    features = describe_player(preparation.video, body_frame)
     count, frames = len(edges), np.arange(len(edges))
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
@@ -194,7 +199,7 @@ def _propagate_fused(
         distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
-        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed)
+        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed, features)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -212,17 +217,21 @@ def propagate_half(
     rounds: int,
 ) -> PropagatedHalf:
     """Joints of one half in all frames from `similar` templates each: hypotheses, choice, fit."""
+    half, poses = templates.half, templates.poses
     fitted = fit_similar(templates, index, start.distance, start.shift, similar)
     nearest = fitted.template[:, 0]
     with ThreadPoolExecutor(1) as beside:
         tracked = beside.submit(track_from_keyframes, templates, index, nearest, fps)
         limbs = propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)
     hypotheses = join_hypotheses(fitted, limbs, tracked.result())
-    limbs_chosen = choose_limbs(templates, hypotheses, fps)
-    limbs_chosen.joints[:, templates.half.fixed] = start.fixed
-    half, marked = templates.half, templates.poses.frames
-    told = template_evidence(half, fitted.joints, fps)
-    identity = identify_limbs(half, limbs_chosen.joints, told, marked, fps)
+    appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
+    unlikeness = appearance.unlikeness(hypotheses.joints)
+    limbs_chosen = choose_limbs(templates, replace(hypotheses, unlikeness=unlikeness), fps)
+    limbs_chosen.joints[:, half.fixed] = start.fixed
+    gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
+    unlikeness = appearance.unlikeness(limbs_chosen.joints[:, None])[:, 0]
+    gain += appearance_gain(half, unlikeness, fps)
+    identity = identify_limbs(half, limbs_chosen.joints, gain, poses.frames, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints)

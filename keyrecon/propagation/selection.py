@@ -3,7 +3,8 @@
 A side (arm or leg) may take a hypothesis's joints of the same side or of the other, since
 silhouettes do not tell left from right. What counts most is how much of the frame's edges both
 sides and the trunk leave unexplained, so that the sides do not both take the same limb. Besides, a
-step costs its length, and a hypothesis its residual and its prior cost. Annotated frames admit the
+step costs its length, and a hypothesis its residual, its prior cost, and how unlike marks its
+joints look. Annotated frames admit the
 annotation alone.
 
 The weights were tried at half and twice their values on rendered strokes and serves; none of
@@ -38,6 +39,8 @@ one clip."""
 UNEXPLAINED_WEIGHT = 48.0
 """Cost of leaving all of the frame's elements unexplained. Halved or doubled, others with it: at
 most 0.4 points, 0.3 mm on one clip."""
+APPEARANCE_WEIGHT = 4.0
+"""Cost of a joint that looks like no mark of it at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +102,12 @@ def _limb_states(
     sides = [members] if np.array_equal(members, mirrored) else [members, mirrored]
     costs: list[Float[np.ndarray, "T P"]] = []
     foot_cost = None if templates.feet is None else foot_costs(templates.feet, hypotheses.joints)
-    for side in sides:
+    for number, side in enumerate(sides):
         bones = np.isin(half.bones[:, 1], side)
         residual = hypotheses.residual[:, :, bones].mean(axis=2) if bones.any() else 0.0
-        swap_cost = SIDE_SWAP_COST * len(costs)
-        costs.append(hypotheses.prior_cost + RESIDUAL_WEIGHT * residual + swap_cost)
+        unlike = APPEARANCE_WEIGHT * hypotheses.unlikeness[:, :, number, side].sum(axis=2)
+        costs.append(hypotheses.prior_cost + RESIDUAL_WEIGHT * residual + unlike)
+        costs[-1] += SIDE_SWAP_COST * number
         if foot_cost is not None:
             costs[-1] += FOOT_WEIGHT * foot_cost[:, :, side].sum(axis=2)
     states = np.concatenate(costs, axis=1)

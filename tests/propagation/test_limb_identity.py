@@ -6,10 +6,9 @@ import pytest
 from keyrecon.body import LSP14
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import (
-    SideEvidence,
     exchange_price,
     identify_limbs,
-    template_evidence,
+    template_gain,
 )
 
 LEGS = split_body(LSP14)[0]
@@ -39,12 +38,11 @@ def exchange(joints, frames):
     return result
 
 
-def silence(joints):
-    return SideEvidence(joints[:, None], np.zeros((len(joints), 1, joints.shape[1])))
-
-
-def identify(joints, marked, evidence=None):
-    return identify_limbs(LEGS, joints, evidence or silence(joints), np.array(marked), FPS)
+def identify(joints, marked, gain=None):
+    silent = np.zeros(len(joints))
+    return identify_limbs(
+        LEGS, joints, silent if gain is None else gain, np.array(marked), FPS
+    )
 
 
 TIME = np.linspace(-1, 1, 41)
@@ -110,8 +108,9 @@ def test_similar_poses_tell_sides_after_limbs_were_in_one_place():
     together = legs(0 * TIME, 0 * TIME)
     together[:10] = CROSSING[0]
     together[30:] = CROSSING[0]
-    told = template_evidence(LEGS, np.repeat(CROSSING[:1, None], len(together), axis=0), FPS)
-    found = identify(exchange(together, list(range(30, 41))), [0], told)
+    wrong = exchange(together, list(range(30, 41)))
+    told = template_gain(LEGS, wrong, np.repeat(CROSSING[:1, None], len(together), axis=0), FPS)
+    found = identify(wrong, [0], told)
     assert found.exchanged[31:].all()
     assert not found.exchanged[:10].any()
 
