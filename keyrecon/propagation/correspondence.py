@@ -357,13 +357,26 @@ def joint_confidence(
     index: ElementIndex,
     chosen: Complex[np.ndarray, "T J"],
     joints: Complex[np.ndarray, "T J"],
+    side_probability: Float[np.ndarray, "T"] | None = None,
 ) -> Float[np.ndarray, "T J"]:
     """Confidence 0-1: share of the outline matched around a joint, less where the `chosen`
-    hypothesis lay elsewhere."""
+    hypothesis lay elsewhere, and where it is uncertain which side is which."""
     frames = np.arange(len(joints))
     fits = TemplateFits(frames, np.full(len(frames), templates.average), joints)
     score = 1 - score_bones(templates, index, fits)
     ends = np.zeros((len(templates.half.bones), joints.shape[1]))
     ends[np.arange(len(ends))[:, None], templates.half.bones] = 1
     around = score @ ends / np.maximum(ends.sum(axis=0), 1)
-    return around * np.exp(-0.5 * (np.abs(joints - chosen) / HYPOTHESIS_SPREAD) ** 2)
+    moved = np.abs(joints - chosen) / HYPOTHESIS_SPREAD
+    if side_probability is not None:
+        around = around * side_confidence(templates.half, joints, side_probability)
+    return around * np.exp(-0.5 * moved**2)
+
+
+def side_confidence(
+    half: BodyHalf, joints: Complex[np.ndarray, "T J"], probability: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "T J"]:
+    """How sure the `probability` of left and right lets joints be, 0-1: limbs that are together are
+    there either way."""
+    apart = np.abs(joints - joints[:, half.mirror]) / HYPOTHESIS_SPREAD
+    return 1 - (1 - probability[:, None]) * (1 - np.exp(-0.5 * apart**2))

@@ -232,16 +232,6 @@ def order_feet(
     return np.where((direct <= crossed)[:, None], feet, feet[:, ::-1])
 
 
-def foot_costs(
-    feet: FootEvidence, joints: Complex[np.ndarray, "T S J"]
-) -> Float[np.ndarray, "T S J"]:
-    """How far each leg ends from the nearer tracked foot, 0-1; 0 for other joints."""
-    cost = np.zeros(joints.shape)
-    distance = np.abs(joints[:, :, feet.ends, None] - feet.points[:, None, None])
-    cost[:, :, feet.ends] = np.minimum(distance.min(axis=3) / FOOT_MATCH_DISTANCE, 1)
-    return cost
-
-
 @dataclass(frozen=True, eq=False)
 class EdgeTemplates:
     """Templates of one half of the body: one per annotated frame, the average outline last."""

@@ -11,7 +11,8 @@ First, exchanges that are themselves against the laws of motion are undone, so t
 threads without a name. Then a chain of two states (the one thread is left, or the other) with these
 prices is solved for the whole clip: marks fix the state, so that what a crossing leaves open is
 decided by the next mark; in between, the annotated poses that are most like a frame say which is
-which, and so does what the joints of either side look like on the marked frames. The probability that the chain gives to its states is small where nothing decides.
+which, and so does what the joints of either side look like on the marked frames. The probability
+that the chain gives to its states is small where nothing decides.
 
 Marked joints that optical flow follows were tried as further evidence. A leg that passes the other
 hands its flow over, so that one mistake counts in every frame that follows: 3.3 % of the limbs of a
@@ -26,7 +27,6 @@ from jaxtyping import Bool, Complex, Float, Int, Shaped
 
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.registration import HYPOTHESIS_SPREAD
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
 
 PLACE_SPREAD = 0.03
@@ -45,7 +45,9 @@ pose has the legs the right way in 45 of 46 frames marked by eye. Half and twice
 2.9 % with a third of the marks. A rate by how often the marks themselves agree with those most like
 them was tried: no fewer exchanges."""
 APPEARANCE_RATE = 720.0
-"""What the looks of joints tell within a second, nats per unit of likeness."""
+"""What the looks of joints tell within a second, nats per unit of likeness. On five real clips with
+three choices of marks each 3.2 % of the limbs were exchanged without it, 1.7 % with half of this and
+with twice this, 1.5 % with this; arms above all, of which motion tells little in a stroke."""
 DISTINCTION = 0.1
 """Difference in distance at which a joint belongs to the one side for certain, player heights."""
 MIN_THREAD_SECONDS = 0.1
@@ -97,13 +99,6 @@ class LimbIdentity:
         mirror = np.arange(values.shape[1])
         mirror[np.concatenate(half.sides)] = half.mirror[np.concatenate(half.sides)]
         return np.where(self.exchanged[:, None], values[:, mirror], values)
-
-    def confidence(
-        self, half: BodyHalf, joints: Complex[np.ndarray, "T J"]
-    ) -> Float[np.ndarray, "T J"]:
-        """How sure the sides let joints be, 0-1: limbs that are together are there either way."""
-        apart = np.abs(joints - joints[:, half.mirror]) / HYPOTHESIS_SPREAD
-        return 1 - (1 - self.probability[:, None]) * (1 - np.exp(-0.5 * apart**2))
 
 
 def identify_limbs(

@@ -182,8 +182,8 @@ def _propagate_fused(
     track, edges, fps = preparation.track, preparation.contours.edges, preparation.video.fps
     body_frame = stabilise_player(track, preparation.camera, fps)
     index = index_elements(edges, body_frame)
-    features = describe_player(preparation.video, body_frame)
     count, frames = len(edges), np.arange(len(edges))
+    features = describe_player(preparation.video, body_frame)
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
@@ -199,7 +199,8 @@ def _propagate_fused(
         distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
-        start = HalfStart(at[:, None] - at[poses.frames], distance, fixed, features)
+        shift = at[:, None] - at[poses.frames]
+        start = HalfStart(shift, distance, fixed, features)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -229,13 +230,11 @@ def propagate_half(
     limbs_chosen = choose_limbs(templates, replace(hypotheses, unlikeness=unlikeness), fps)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
-    unlikeness = appearance.unlikeness(limbs_chosen.joints[:, None])[:, 0]
-    gain += appearance_gain(half, unlikeness, fps)
+    gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
     identity = identify_limbs(half, limbs_chosen.joints, gain, poses.frames, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
-    confidence = joint_confidence(templates, index, chosen.joints, joints)
-    confidence *= identity.confidence(half, joints)
+    confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
 
 

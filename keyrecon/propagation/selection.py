@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.viterbi import find_cheapest_path
-from keyrecon.propagation.edge_template import EdgeTemplates, foot_costs
+from keyrecon.propagation.edge_template import FOOT_MATCH_DISTANCE, EdgeTemplates, FootEvidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import PoseHypotheses
 
@@ -40,7 +40,9 @@ UNEXPLAINED_WEIGHT = 48.0
 """Cost of leaving all of the frame's elements unexplained. Halved or doubled, others with it: at
 most 0.4 points, 0.3 mm on one clip."""
 APPEARANCE_WEIGHT = 4.0
-"""Cost of a joint that looks like no mark of it at all."""
+"""Cost of a joint that looks like no mark of it at all. On five real clips with three choices of
+marks each this had .5 points of PCK more than without, .7 with sides told by looks too; twice as
+much had .2 points less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,8 @@ class LimbStates:
 
     joints: Complex[np.ndarray, "T S J"]
     cost: Float[np.ndarray, "T S"]
+    unlikeness: Float[np.ndarray, "T S 2 J"]
+    """How unlike marks each joint looks: those of its own side, then of the other."""
     spread: Float[np.ndarray, "J"]
     """Of a joint's step from one frame to the next, player heights."""
 
@@ -65,6 +69,8 @@ class ChosenLimbs:
     joints: Complex[np.ndarray, "T J"]
     template: Int[np.ndarray, "T J"]
     """Row of the annotated frame that each joint comes from."""
+    unlikeness: Float[np.ndarray, "T 2 J"]
+    """How unlike marks each joint looks: those of its own side, then of the other."""
 
 
 def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
@@ -72,6 +78,7 @@ def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
     half, frames = templates.half, np.arange(len(hypotheses.template))
     joints = hypotheses.joints[:, 0].copy()
     template = np.broadcast_to(hypotheses.template[:, :1], joints.shape).copy()
+    unlikeness = hypotheses.unlikeness[:, 0].copy()
     groups = [half.middle, *half.sides]
     states = [_limb_states(templates, hypotheses, group, fps) for group in groups]
     paths = [choose_one(states[0]) if half.middle else _best_trunk(hypotheses, half)]
@@ -79,9 +86,10 @@ def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
     paths += choose_two(one, other, _unexplained_costs(templates, hypotheses, paths[0]))
     for group, state, path in zip(groups, states, paths, strict=True):
         joints[:, group] = state.joints[frames, path]
+        unlikeness[..., group] = state.unlikeness[frames, path]
         row = hypotheses.template[frames, path % hypotheses.prior_cost.shape[1]]
         template[:, group] = row[:, None]
-    return ChosenLimbs(joints, template)
+    return ChosenLimbs(joints, template, unlikeness)
 
 
 def _best_trunk(hypotheses: PoseHypotheses, half: BodyHalf) -> Int[np.ndarray, "T"]:
@@ -100,8 +108,15 @@ def _limb_states(
     half, poses, members = templates.half, templates.poses, np.array(group, int)
     mirrored = half.mirror[members]
     sides = [members] if np.array_equal(members, mirrored) else [members, mirrored]
+    unlikeness = np.concatenate(
+        [
+            hypotheses.unlikeness[:, :, ::order, side]
+            for order, side in zip((1, -1), sides, strict=False)
+        ],
+        axis=1,
+    )
     costs: list[Float[np.ndarray, "T P"]] = []
-    foot_cost = None if templates.feet is None else foot_costs(templates.feet, hypotheses.joints)
+    foot_cost = None if templates.feet is None else _foot_costs(templates.feet, hypotheses.joints)
     for number, side in enumerate(sides):
         bones = np.isin(half.bones[:, 1], side)
         residual = hypotheses.residual[:, :, bones].mean(axis=2) if bones.any() else 0.0
@@ -116,7 +131,17 @@ def _limb_states(
     joints = np.concatenate([hypotheses.joints[:, :, side] for side in sides], axis=1)
     joints[poses.frames] = poses.joints[:, None, members]
     depth = np.clip(half.depth[members] - 1, 0, None)
-    return LimbStates(joints, states, STEP_SPEED / fps * 2.0**depth)
+    return LimbStates(joints, states, unlikeness, STEP_SPEED / fps * 2.0**depth)
+
+
+def _foot_costs(
+    feet: FootEvidence, joints: Complex[np.ndarray, "T S J"]
+) -> Float[np.ndarray, "T S J"]:
+    """How far each leg ends from the nearer tracked foot, 0-1; 0 for other joints."""
+    cost = np.zeros(joints.shape)
+    distance = np.abs(joints[:, :, feet.ends, None] - feet.points[:, None, None])
+    cost[:, :, feet.ends] = np.minimum(distance.min(axis=3) / FOOT_MATCH_DISTANCE, 1)
+    return cost
 
 
 def _unexplained_costs(

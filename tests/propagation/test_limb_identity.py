@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
+from keyrecon.propagation.correspondence import side_confidence
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import (
     exchange_price,
@@ -40,9 +41,7 @@ def exchange(joints, frames):
 
 def identify(joints, marked, gain=None):
     silent = np.zeros(len(joints))
-    return identify_limbs(
-        LEGS, joints, silent if gain is None else gain, np.array(marked), FPS
-    )
+    return identify_limbs(LEGS, joints, silent if gain is None else gain, np.array(marked), FPS)
 
 
 TIME = np.linspace(-1, 1, 41)
@@ -99,7 +98,7 @@ def test_sides_are_uncertain_where_nothing_decides():
     found = identify(together, [0])
     assert found.probability[:9].min() > 0.95
     assert found.probability[31:].max() < 0.7
-    away = found.confidence(LEGS, together)
+    away = side_confidence(LEGS, together, found.probability)
     assert away[35, ONE[-1]] < 0.8
     assert away[20, ONE[-1]] == pytest.approx(1.0)
 

@@ -287,6 +287,8 @@ def _choose_each(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
         )
         chosen.append(choose_limbs(single, one, fps))
     return ChosenLimbs(
-        np.concatenate([one.joints for one in chosen]),
-        np.concatenate([one.template for one in chosen]),
+        *(
+            np.concatenate([getattr(one, field.name) for one in chosen])
+            for field in fields(ChosenLimbs)
+        )
     )
