@@ -24,6 +24,8 @@ from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.edge_template import AnnotatedPoses
 from keyrecon.propagation.half_body import BodyHalf
 
+RATE = 30.0
+"""Frames described in a second: reading, not looking, is what takes time."""
 PLAYER_HEIGHT = 96
 """Height of the player in the described pictures, px."""
 REACH = 80
@@ -50,14 +52,15 @@ FRAMES_AT_A_TIME = 64
 
 @dataclass(frozen=True, eq=False)
 class PlayerFeatures:
-    """Colour and gradients in every frame, in player coordinates."""
+    """Colour and gradients in some frames, in player coordinates."""
 
-    cells: UInt8[np.ndarray, "T N N C"]
+    frames: Int[np.ndarray, "D"]
+    cells: UInt8[np.ndarray, "D N N C"]
 
     def around(
         self, frames: Int[np.ndarray, "P"], places: Complex[np.ndarray, "P"]
     ) -> Float32[np.ndarray, "P D"]:
-        """The cells around places, those beyond the picture as at its edge."""
+        """The cells around places in described frames, those beyond the picture as at its edge."""
         last = self.cells.shape[1] - 1
         offsets = SPACING * (np.arange(CELLS) - CELLS // 2)
         column, row = (
@@ -66,18 +69,24 @@ class PlayerFeatures:
         )
         rows = np.clip(row[:, None, None] + offsets[:, None], 0, last)
         columns = np.clip(column[:, None, None] + offsets, 0, last)
-        cells = self.cells[frames[:, None, None], rows, columns]
+        described = np.searchsorted(self.frames, frames)
+        cells = self.cells[described[:, None, None], rows, columns]
         return cells.reshape(len(places), -1).astype(np.float32)
 
 
-def describe_player(video: Video, body_frame: BodyFrame) -> PlayerFeatures:
-    """Features of all frames of a video."""
+def describe_player(
+    video: Video, body_frame: BodyFrame, needed: Int[np.ndarray, "k"]
+) -> PlayerFeatures:
+    """Features of the `needed` frames, and of `RATE` frames a second."""
+    stride = max(1, round(video.fps / RATE))
+    frames = np.union1d(np.arange(0, len(video), stride), needed)
     tall = float(np.median(body_frame.height))
     width = min(video.width, max(16, round(video.width * PLAYER_HEIGHT / tall)))
     shrink = width / video.width
 
     def cut_out() -> Iterator[UInt8[np.ndarray, "s s 3"]]:
-        for frame, picture in enumerate(read_small(video, width)):
+        pictures = read_small(video, width, set(frames.tolist()))
+        for frame, picture in zip(frames, pictures, strict=True):
             grow = PLAYER_HEIGHT / (body_frame.height[frame] * shrink)
             middle = shrink * (body_frame.origin[frame] + 0.5 + 0.5j) - (0.5 + 0.5j)
             x, y = REACH - 0.5 - grow * middle.real, REACH - 0.5 - grow * middle.imag
@@ -88,7 +97,7 @@ def describe_player(video: Video, body_frame: BodyFrame) -> PlayerFeatures:
                 borderMode=cv2.BORDER_REPLICATE,
             )
 
-    return PlayerFeatures(np.stack(list(side_by_side(_describe, cut_out()))))
+    return PlayerFeatures(frames, np.stack(list(side_by_side(_describe, cut_out()))))
 
 
 def _describe(picture: UInt8[np.ndarray, "s s 3"]) -> UInt8[np.ndarray, "n n C"]:
@@ -128,19 +137,21 @@ class JointAppearance:
 
     def unlikeness(self, joints: Complex[np.ndarray, "T S J"]) -> Float32[np.ndarray, "T S 2 J"]:
         """How unlike their most similar mark joints look, 0-2: the mark of the joint itself, then
-        of its mirror image; 0 for joints of the other half of the body."""
-        count, width = joints.shape[:2]
-        result = np.zeros((count, width, 2, joints.shape[2]), np.float32)
-        for first in range(0, count, FRAMES_AT_A_TIME):
-            block = joints[first : first + FRAMES_AT_A_TIME]
-            frames = np.repeat(np.arange(first, first + len(block)), width)
+        of its mirror image; 0 for joints of the other half of the body.
+
+        Described frames count for those around them, which have 0.
+        """
+        width, share = joints.shape[1], len(joints) / len(self.features.frames)
+        result = np.zeros((*joints.shape[:2], 2, joints.shape[2]), np.float32)
+        for first in range(0, len(self.features.frames), FRAMES_AT_A_TIME):
+            frames = self.features.frames[first : first + FRAMES_AT_A_TIME]
+            repeated = np.repeat(frames, width)
             for joint in self.half.free.tolist():
-                described = self.describe(frames, block[..., joint].ravel())
+                described = self.describe(repeated, joints[frames, :, joint].ravel())
                 for side, marked in enumerate((joint, self.half.mirror[joint])):
                     if len(self.marks[marked]):
                         alike = (described @ self.marks[marked].T).max(axis=1)
-                        rows = slice(first, first + len(block))
-                        result[rows, :, side, joint] = 1 - alike.reshape(len(block), width)
+                        result[frames, :, side, joint] = share * (1 - alike.reshape(-1, width))
         return result
 
 
@@ -149,7 +160,8 @@ def learn_appearance(
 ) -> JointAppearance:
     """From annotated poses; `joints` are about where the body is in every frame."""
     random = np.random.default_rng(0)
-    frames, which = (random.integers(0, count, SAMPLES) for count in joints.shape)
+    frames = random.choice(features.frames, SAMPLES)
+    which = random.integers(0, joints.shape[1], SAMPLES)
     beside = random.normal(0, SAMPLE_SPREAD, (2, SAMPLES))
     sampled = features.around(frames, joints[frames, which] + beside[0] + 1j * beside[1])
     mean = sampled.mean(axis=0)

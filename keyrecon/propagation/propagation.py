@@ -183,7 +183,7 @@ def _propagate_fused(
     body_frame = stabilise_player(track, preparation.camera, fps)
     index = index_elements(edges, body_frame)
     count, frames = len(edges), np.arange(len(edges))
-    features = describe_player(preparation.video, body_frame)
+    features = describe_player(preparation.video, body_frame, annotations.frames)
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)

@@ -30,10 +30,20 @@ class Drawn(Video):
         super().__init__(Path("none.mp4"), wide, high, stamps, stamps / 25, 25.0, 0, False)
         object.__setattr__(self, "drawn", drawn)
 
+    def chosen_frames(self, numbers, last):
+        """Some of them."""
+        yield from (p for n, p in enumerate(self.frames(0, last + 1)) if n in numbers)
+
     def frames(self, start=0, stop=None, width=None):
         """Reduced to a width."""
         for picture in self.drawn[start:stop]:
             yield picture if width is None else reduce_picture(picture, width)
+
+
+def replace_fps(video, fps):
+    """The same pictures, faster."""
+    object.__setattr__(video, "fps", fps)
+    return video
 
 
 def walk(at):
@@ -62,7 +72,7 @@ def draw(joints, colors=(PINK, BLACK)):
 def appearance():
     marked = np.array([0, FRAMES - 1])
     poses = AnnotatedPoses(LEGS, marked, JOINTS[marked], np.ones((2, len(LEGS.joints)), bool))
-    return learn_appearance(describe_player(draw(JOINTS), BODY), poses, JOINTS)
+    return learn_appearance(describe_player(draw(JOINTS), BODY, marked), poses, JOINTS)
 
 
 def test_a_joint_looks_like_its_mark_where_it_is_and_unlike_beside(appearance):
@@ -87,6 +97,12 @@ def test_the_size_of_the_player_does_not_matter(appearance):
     larger = BodyFrame(1.5 * (BODY.origin + 0.5 + 0.5j) - (0.5 + 0.5j), 1.5 * BODY.height)
     size = (round(1.5 * SIZE[0]), round(1.5 * SIZE[1]))
     video = Drawn([cv2.resize(p, size, interpolation=cv2.INTER_LINEAR) for p in draw(JOINTS).drawn])
-    found = describe_player(video, larger).cells
+    found = describe_player(video, larger, np.array([0])).cells
     apart = np.abs(found.astype(int) - appearance.features.cells)
     assert np.median(apart) <= 4
+
+
+def test_of_a_fast_camera_no_more_frames_are_described_than_of_a_slow_one():
+    every = Drawn(draw(JOINTS).drawn)
+    fast = replace_fps(every, 120.0)
+    np.testing.assert_array_equal(describe_player(fast, BODY, np.array([5])).frames, [0, 4, 5, 8])
