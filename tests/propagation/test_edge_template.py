@@ -125,9 +125,12 @@ def test_sides_are_chosen_for_continuity():
     cost = np.zeros((21, 2))
     cost[0] = [0, 5]
     spread = np.array([0.2])
+    unlikeness = np.zeros((21, 2, 2, 1))
     clash = 9 * np.tile(np.eye(2), (21, 1, 1))
     a, b = choose_two(
-        LimbStates(joints, cost, spread), LimbStates(joints, cost[:, ::-1].copy(), spread), clash
+        LimbStates(joints, cost, unlikeness, spread),
+        LimbStates(joints, cost[:, ::-1].copy(), unlikeness, spread),
+        clash,
     )
     np.testing.assert_array_equal(a, swapped)
     np.testing.assert_array_equal(b, ~swapped)
