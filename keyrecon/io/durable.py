@@ -96,10 +96,10 @@ def clear_leftovers(folder: Path) -> None:
 def _is_gone(writer: str) -> bool:
     """Whether a process of this machine wrote a file and has ended since."""
     machine, _, process = writer.rpartition("-")
-    if machine != _MACHINE or not process.isdecimal():
+    if os.name != "posix" or machine != _MACHINE or not process.isdecimal():
         return False
     try:
-        os.kill(int(process), 0)  # signal 0 only asks
+        os.kill(int(process), 0)  # signal 0 only asks (elsewhere it would be sent)
     except ProcessLookupError:
         return True
     except (OSError, OverflowError):
