@@ -227,7 +227,7 @@ def test_gaps_in_markers_are_filled_along_the_path():
 
 
 def test_a_file_that_is_no_c3d_is_refused(tmp_path):
-    pytest.importorskip("ezc3d")
+    pytest.importorskip("c3d")
     (tmp_path / "a.c3d").write_bytes(b"hello" * 200)
     with pytest.raises(KeyreconError, match="is not a whole C3D file"):
         read_capture(tmp_path / "a.c3d")
