@@ -138,6 +138,25 @@ def test_choices_for_the_overlay_without_an_overlay_are_told(project):
         export(project, [project.folder.parent / "a.bvh"], silent, None, OverlayOptions(slowmo=2.0))
 
 
+def test_a_motion_on_the_court_is_exported_where_it_stands(project):
+    folder, motion = project.folder.parent, read_motion(project.motion_file)
+    with np.load(project.motion_file) as stored:
+        data = dict(stored)
+    x, y, z = motion.points3d.transpose(2, 0, 1)
+    court = np.stack([x + 3, z - 20, 1.2 - y], axis=2)
+    np.savez(project.motion_file, **data, points3d_world=court)
+    told = export(project, [folder / "a.trc"], silent, "5-9")
+    assert "on the court: origin on the ground at the middle of the net" in told[0]
+    row = (folder / "a.trc").read_text().splitlines()[6].split("\t")
+    neck = 2 + 3 * motion.skeleton.index("neck")
+    x, y, z = court[5, motion.skeleton.index("neck")]
+    assert [float(n) for n in row[neck : neck + 3]] == pytest.approx([x, z, -y], abs=1e-5)
+    court[7] = np.nan  # the camera was lost for a frame
+    np.savez(project.motion_file, **data, points3d_world=court)
+    assert "feet on the floor at 0" in export(project, [folder / "a.trc"], silent, "5-9")[0]
+    assert "on the court" in export(project, [folder / "a.trc"], silent, "10-19")[0]
+
+
 def test_a_line_says_what_was_done_to_each_file(project):
     folder = project.folder.parent
     told = export(project, [folder / "a.bvh", folder / "a.csv"], silent)

@@ -17,7 +17,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import stand_on_floor
+from keyrecon.io.formats.conventions import World, stand_on_floor
 from keyrecon.io.formats.humanoid import Humanoid, Turns, make_humanoid
 from keyrecon.records import Motion
 
@@ -28,16 +28,16 @@ LOCK = np.radians(75)
 """Middle angle from which on another order is looked for."""
 
 
-def write_bvh(path: Path, motion: Motion) -> str:
+def write_bvh(path: Path, motion: Motion, world: World = None) -> str:
     """Write the motion at a constant rate; returns what was done, for which BVH has no place.
 
     Raises KeyreconError for a skeleton without the limbs, hips and neck of a person.
     """
-    standing = stand_on_floor(motion)
+    standing = stand_on_floor(motion, world=world)
     figure = make_humanoid(standing)
     write_durably(path, _format(figure, standing.fps))
     placed = f"Y up; {standing.placing}; {standing.timing}"
-    return placed + figure.differences(motion.units)
+    return placed + figure.differences(standing.units)
 
 
 def _format(figure: Humanoid, fps: float) -> str:

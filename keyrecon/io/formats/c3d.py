@@ -37,7 +37,7 @@ from scipy.interpolate import PchipInterpolator
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import stand_on_floor
+from keyrecon.io.formats.conventions import World, stand_on_floor
 from keyrecon.io.formats.rigs import MAX_RATE, MIN_RATE
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.reading import reading
@@ -230,7 +230,7 @@ def _hinge(upper: Points, side: Points, marker: Points, lower: Points) -> tuple[
     return marker, frame @ (local / np.linalg.norm(local))
 
 
-def write_c3d(path: Path, motion: Motion) -> str:
+def write_c3d(path: Path, motion: Motion, world: World = None) -> str:
     """Write joints with Z up, x right, y away from the camera; returns what was done to them.
 
     The same stands in the parameter KEYRECON:NOTES. Raises KeyreconError
@@ -242,8 +242,8 @@ def write_c3d(path: Path, motion: Motion) -> str:
         raise KeyreconError(
             "Writing C3D needs the c3d package; install it with: pip install 'keyrecon[c3d]'"
         ) from fault
-    standing = stand_on_floor(motion)
-    millimetres = motion.units == "m"
+    standing = stand_on_floor(motion, world=world)
+    millimetres = standing.units == "m"
     # The column behind x, y, z is the residual: 0, measured by one camera group.
     rows = np.zeros((*standing.points.shape[:2], 5), dtype=np.float32)
     rows[..., :3] = standing.points[..., [0, 2, 1]] * np.array([1, -1, 1])

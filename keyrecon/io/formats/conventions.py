@@ -12,9 +12,12 @@ is nor where the ground lies, so three things are estimated, and every file or t
   second around each frame: most of a second one foot stands, also of one with a jump in it. It
   follows the player, because a step away from a camera that looks down shows as a rise.
 - Over what. The middle of the hips is over the origin in the first frame.
+
+Where a court's lines have told where the player stands (`points3d_world` of motion.npz), nothing is
+estimated: the origin is on the ground at the middle of the net, x along the net to the right.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -39,6 +42,14 @@ LEAN = np.radians(10)
 """Median lean of the legs up to which the camera is taken to be level. Rendered, cameras that look
 down by 3 to 10 degrees gave 1 to 7, one by 32 degrees 21 (the lifting has flattened the rest);
 real swings and rallies by a level camera gave -1 to 6."""
+
+
+World = Float[np.ndarray, "T J 3"] | None
+"""Joints on the court, metres; None where there is none, NaN in frames where it was not found."""
+ON_COURT = (
+    "on the court: origin on the ground at the middle of the net, x along the net to the right, "
+    "feet where the court's lines put them"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +90,13 @@ def is_uneven(motion: Motion) -> bool:
     return bool(np.abs(motion.time - even).max() > UNEVEN / motion.fps)
 
 
-def stand_on_floor(motion: Motion, even_times: bool = True) -> StandingMotion:
+def stand_on_floor(motion: Motion, even_times: bool = True, world: World = None) -> StandingMotion:
     """The motion with Y up, feet on the floor, and the first frame over the origin.
 
     With `even_times`, frames that are unevenly spaced are replaced by as many at even times.
-    Raises KeyreconError where joints are missing.
+    `world` are the joints on the court (metres, x along the net, y away from the camera, z up),
+    which are taken as they are if all of them are known. Raises KeyreconError where joints are
+    missing.
     """
     missing = np.argwhere(~np.isfinite(motion.points3d).all(axis=2))
     if len(missing):
@@ -92,10 +105,15 @@ def stand_on_floor(motion: Motion, even_times: bool = True) -> StandingMotion:
             f"Frame {frame} has no {motion.skeleton.names[joint]}; this format needs every joint, "
             "use .csv or .npz."
         )
-    size, lean = stature(motion), camera_pitch(motion)
-    points = y_up(motion.points3d) @ Rotation.from_euler("x", -lean).as_matrix().T
-    points[..., 1] -= _floor(points, motion, size)[:, None]
-    points[..., [0, 2]] -= _middle(points, motion.skeleton)[0, [0, 2]]
+    units, size, lean = motion.units, stature(motion), camera_pitch(motion)
+    on_court = world is not None and bool(np.isfinite(world).all())
+    if world is not None and on_court:
+        points = world[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
+        units, size = "m", stature(replace(motion, points3d=points))
+    else:
+        points = y_up(motion.points3d) @ Rotation.from_euler("x", -lean).as_matrix().T
+        points[..., 1] -= _floor(points, motion, size)[:, None]
+        points[..., [0, 2]] -= _middle(points, motion.skeleton)[0, [0, 2]]
     time, fps = motion.time - motion.time[0], motion.fps
     if not is_uneven(motion):
         time = np.arange(len(time)) / fps
@@ -108,9 +126,9 @@ def stand_on_floor(motion: Motion, even_times: bool = True) -> StandingMotion:
         points=points,
         time=time,
         fps=fps,
-        units=motion.units,
+        units=units,
         stature=size,
-        placing=_describe_placing(lean),
+        placing=ON_COURT if on_court else _describe_placing(lean),
         timing=describe_times(motion, even_times),
     )
 

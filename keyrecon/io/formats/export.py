@@ -8,7 +8,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.bvh_motion import write_bvh
 from keyrecon.io.formats.c3d import write_c3d
 from keyrecon.io.formats.coco import write_coco_motion
-from keyrecon.io.formats.conventions import describe_times
+from keyrecon.io.formats.conventions import World, describe_times
 from keyrecon.io.formats.csv_table import write_csv
 from keyrecon.io.formats.glb import write_glb
 from keyrecon.io.formats.motion_file import ARRAYS, OPTIONAL, write_motion
@@ -16,19 +16,14 @@ from keyrecon.io.formats.netcdf import write_netcdf
 from keyrecon.io.formats.trc import write_trc
 from keyrecon.records import Motion
 
-WRITERS: dict[str, Callable[[Path, Motion], str]] = {
+WRITERS: dict[str, Callable[[Path, Motion, World], str]] = {
     ".bvh": write_bvh,
     ".c3d": write_c3d,
     ".glb": write_glb,
-    ".nc": write_netcdf,
 }
-NUMBERED_WRITERS: dict[str, Callable[[Path, Motion, int], str]] = {
-    ".csv": write_csv,
-    ".trc": write_trc,
-}
-"""What writes the numbers of the video's frames besides. .npz and .json (COCO) are apart."""
+"""What writes a motion that stands on its floor; .trc numbers the video's frames besides."""
 
-SUFFIXES = (*WRITERS, *NUMBERED_WRITERS, ".npz", ".json")
+SUFFIXES = (*WRITERS, ".trc", ".csv", ".nc", ".npz", ".json")
 ELSEWHERE = {
     ".fbx": "write .glb or .bvh, open it in Blender (File > Import) and save it there "
     "(File > Export > FBX)",
@@ -50,20 +45,28 @@ def check_suffix(path: Path, more: tuple[str, ...] = ()) -> None:
 
 
 def export_motion(
-    path: Path, motion: Motion, size: tuple[int, int] | None = None, first_frame: int = 0
+    path: Path,
+    motion: Motion,
+    size: tuple[int, int] | None = None,
+    first_frame: int = 0,
+    world: World = None,
 ) -> str:
     """Write `motion` in the format of the path's suffix; returns what was done to it.
 
-    `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with.
-    Raises KeyreconError for a suffix that is not known, an optional library that is not
-    installed, or a motion that the format cannot hold.
+    `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with;
+    `world` are its joints on the court. Raises KeyreconError for a suffix that is not known, an
+    optional library that is not installed, or a motion that the format cannot hold.
     """
     check_suffix(path)
     suffix = path.suffix.lower()
     if suffix in WRITERS:
-        return WRITERS[suffix](path, motion)
-    if suffix in NUMBERED_WRITERS:
-        return NUMBERED_WRITERS[suffix](path, motion, first_frame)
+        return WRITERS[suffix](path, motion, world)
+    if suffix == ".trc":
+        return write_trc(path, motion, world, first_frame)
+    if suffix == ".csv":
+        return write_csv(path, motion, first_frame)
+    if suffix == ".nc":
+        return write_netcdf(path, motion)
     if suffix == ".npz":
         write_motion(path, motion)
         return f"camera axes; {describe_times(motion)}"

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from keyrecon import __version__
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.body_mesh import MeshPart, body_parts, capsule, rest_places
-from keyrecon.io.formats.conventions import StandingMotion, stand_on_floor
+from keyrecon.io.formats.conventions import StandingMotion, World, stand_on_floor
 from keyrecon.io.formats.humanoid import make_humanoid, missing_joints
 from keyrecon.records import Motion
 
@@ -84,12 +84,12 @@ class _Figure:
     """The joint that each vertex of a part follows."""
 
 
-def write_glb(path: Path, motion: Motion) -> str:
+def write_glb(path: Path, motion: Motion, world: World = None) -> str:
     """Write an animated figure; returns what was done, as the scene's extras say too.
 
     Raises KeyreconError where a joint is missing.
     """
-    standing = stand_on_floor(motion, even_times=False)
+    standing = stand_on_floor(motion, even_times=False, world=world)
     person = not missing_joints(motion.skeleton.names)
     figure = _person(standing) if person else _sticks(standing)
     buffer = _Buffer()
@@ -97,7 +97,7 @@ def write_glb(path: Path, motion: Motion) -> str:
     mesh, materials = _mesh(buffer, figure)
     nodes.append({"name": "Body", "mesh": 0, "skin": 0})
     told = {
-        "units": motion.units,
+        "units": standing.units,
         "axes": "Y up, x to the right of the picture, z towards the camera",
         "placing": standing.placing,
         "times": standing.timing,

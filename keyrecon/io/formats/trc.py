@@ -5,20 +5,20 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import stand_on_floor
+from keyrecon.io.formats.conventions import World, stand_on_floor
 from keyrecon.records import Motion
 
 
-def write_trc(path: Path, motion: Motion, first_frame: int = 0) -> str:
+def write_trc(path: Path, motion: Motion, world: World = None, first_frame: int = 0) -> str:
     """Write joints with Y up (x right, z towards the camera), in metres or body heights.
 
     Returns what was done to them. The format has no comments: the same stands behind the file's
     name in the first line, which readers take as a whole. `first_frame` is the video's frame that
     comes first.
     """
-    standing = stand_on_floor(motion)
+    standing = stand_on_floor(motion, world=world)
     frames, joints = standing.points.shape[:2]
-    rate, units = f"{standing.fps:.10g}", motion.units.replace(" ", "_")
+    rate, units = f"{standing.fps:.10g}", standing.units.replace(" ", "_")
     numbers = range(1, joints + 1)
     done = f"Y up; {standing.placing}; {standing.timing}"
     lines = [
