@@ -15,18 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from keyrecon.app.golf_recipe import find_swing
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.click_checks import check_direction, check_pose
+from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
-from keyrecon.golf.observation import observe_swing
-from keyrecon.golf.plausibility import SwingDoubt, find_doubts
+from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations
-from keyrecon.golf.swing_fit import (
-    GolfOptions,
-    finish_fit,
-    fit_guided,
-    fit_observations,
-)
+from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
@@ -35,10 +30,8 @@ from keyrecon.io.held_video import hold_frames
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import Workspace
-from keyrecon.numerics.geometry import warp_points
 from keyrecon.pipeline import Keep, call_stage
 from keyrecon.progress import Progress, silent
-from keyrecon.records import CameraPath
 from keyrecon.report.golf_page import write_golf_report
 from keyrecon.report.golf_pictures import write_golf_overlay
 from keyrecon.tracking.camera_motion import estimate_camera_motion
@@ -48,9 +41,6 @@ OVERLAY_FILE = "overlay.mp4"
 SHORTEST_SWING = 0.7
 """Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take
 0.93 (21 + 7 frames at 30 a second: 0.7 + 0.23; Novosel & Garrity, Tour Tempo, 2004)."""
-LARGEST_SHIFT = 0.04
-"""Share of the picture's width by which a standing camera may seem to move: a player who fills
-the picture and a hand on the tripod move it by half of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +49,10 @@ class GolfFit:
 
     fitted: FittedSwing
     observations: Observations
+    doubts: tuple[SwingDoubt, ...] = ()
+    """What speaks against it."""
+    notes: tuple[str, ...] = ()
+    """What was found of the film."""
 
 
 def fit_file(
@@ -90,7 +84,8 @@ def fit_file(
     return "\n".join(
         [
             describe_tempo(fit.fitted, video.fps),
-            *describe_doubts(find_doubts(fit.fitted, fit.observations)),
+            *(f"Note: {note}." for note in fit.notes),
+            *describe_doubts(fit.doubts),
             f"{folder}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
             f"{spent:.0f} s ({spent / len(video):.2f} s per frame).",
         ]
@@ -107,59 +102,11 @@ def fit_video(
 ) -> GolfFit:
     """Observe a swing, fit the model to it, and detect the club again where the fit expects it.
 
-    Raises KeyreconError where the camera moves, or no player or no swing is observed.
+    Raises KeyreconError where no player or no swing is observed.
     """
-    require_still_camera(keep("camera", estimate_camera_motion, video, progress=progress), video)
-    observations = keep(
-        "observe",
-        observe_swing,
-        video,
-        clicked_pose(clicks),
-        model.keys,
-        options=options.observation,
-        progress=progress,
-    )
-    check_direction(observations, clicked_pose(clicks), model, "The clicks")
-    return fit_observed(video, observations, model, options, keep, progress)
-
-
-def fit_observed(
-    video: Video,
-    observations: Observations,
-    model: MotionModel,
-    options: GolfOptions = GolfOptions(),
-    keep: Keep = call_stage,
-    progress: Progress = silent,
-) -> GolfFit:
-    """The same from observations."""
-    fitted = keep(
-        "fit", fit_observations, observations, video, model, options=options, progress=progress
-    )
-    return refine_fit(GolfFit(fitted, observations), video, model, options, keep)
-
-
-def refine_fit(
-    first: GolfFit,
-    video: Video,
-    model: MotionModel,
-    options: GolfOptions = GolfOptions(),
-    keep: Keep = call_stage,
-) -> GolfFit:
-    """Rounds of guided club detection and fitting after a first fit."""
-    fitted, observations = first.fitted, first.observations
-    for number in range(options.guided_rounds if options.method == "swing" else 0):
-        guided = keep(
-            f"guided_{number + 1}",
-            fit_guided,
-            first.observations,
-            fitted,
-            video,
-            model,
-            options=options,
-        )
-        fitted, observations = guided.fitted, guided.update(first.observations)
-    fitted = keep("result", finish_fit, observations, fitted, video, options=options.events)
-    return GolfFit(fitted, observations)
+    camera = keep("camera", estimate_camera_motion, video, progress=progress)
+    found = find_swing(video, camera, clicked_pose(clicks), model, options, keep, progress)
+    return GolfFit(found.fitted, found.observations, found.doubts, found.notes)
 
 
 def check_length(video: Video, slow_motion: float) -> None:
@@ -170,19 +117,6 @@ def check_length(video: Video, slow_motion: float) -> None:
         raise KeyreconError(
             f"{video.path} lasts {seconds:.2f} s{told}, but from the upswing to the hit alone a "
             f"swing takes {SHORTEST_SWING:g} s or more; use the whole clip, and see to --slowmo."
-        )
-
-
-def require_still_camera(camera: CameraPath, video: Video) -> None:
-    """Raises KeyreconError where the camera moves: the model stands in one place before it."""
-    corners = np.array([(0.0, 0.0), (video.width, 0.0), (0.0, video.height)])
-    warped = warp_points(camera.to_reference[:, None], corners[None])
-    moved = np.linalg.norm(warped - corners, axis=2)
-    usual = float(np.percentile(moved.max(axis=1), 90))
-    if usual > LARGEST_SHIFT * video.width:
-        raise KeyreconError(
-            f"The camera moves: the scene shifts by {usual:.0f} px and more. A golf fit needs a "
-            "camera that stands still; film from a tripod or stabilise the video first."
         )
 
 

@@ -2,20 +2,31 @@
 
 One pass separates the player from the scene, one over the full pictures detects line segments that
 may be the club's shaft, and one over reduced pictures, all at once in memory, tracks joints and
-matches points of the player's surface. The club tells when the swing passes its key postures.
+matches points of the player's surface. Masks and segments together tell where the swing is
+(`fit.swing_search`), and the club of each swing that it may be when it passes its key postures.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
+from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import ClickedPose
+from keyrecon.golf.fit.handedness import mirror_evidence, mirror_initial, mirror_pixels
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
+from keyrecon.golf.fit.swing_search import (
+    SearchLimits,
+    SwingEvidence,
+    SwingHypothesis,
+    search_swing,
+)
 from keyrecon.golf.observe.appearance_tracker import AppearanceOptions
 from keyrecon.golf.observe.club import Club, ClubOptions, track_club
+from keyrecon.golf.observe.film import Film, frame_step
 from keyrecon.golf.observe.foreground import (
     Foreground,
     ForegroundOptions,
@@ -31,8 +42,13 @@ from keyrecon.golf.observe.line_segments import (
 )
 from keyrecon.golf.observe.point_matches import MatchOptions, match_points
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses, ShaftOptions, propose_shafts
-from keyrecon.golf.observe.swing_events import TimingOptions, find_key_frames, interpolate_times
-from keyrecon.golf.records import Matches, Observations
+from keyrecon.golf.observe.swing_events import (
+    TimingOptions,
+    interpolate_times,
+    refine_key_frames,
+)
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, Matches, MotionModel, Observations
 from keyrecon.io.frame_reader import read_small, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
@@ -55,6 +71,11 @@ MASK_STEP = 0.03
 """Distance between samples of the mask, player heights: a forearm's width."""
 
 
+ACTIVE_PART, ACTIVE_FRAMES = 0.2, 16
+"""Share of the frames in which a player is said to be active, and how many of them are asked for
+what stays in place."""
+
+
 @dataclass(frozen=True)
 class ObservationOptions:
     """How a video of a swing is observed."""
@@ -75,61 +96,193 @@ class ObservationOptions:
     """Points of the surface."""
 
 
+@dataclass(frozen=True, eq=False)
+class SwingCandidate:
+    """A swing that may be in a film: its club and its key postures."""
+
+    club: Float[np.ndarray, "T 2 2"]
+    club_along: Float[np.ndarray, "T 2"]
+    keys: Float[np.ndarray, "4"]
+    phase: Float[np.ndarray, "T"]
+    cost: float
+    """How badly the search found it to explain the film."""
+
+    def of(self, observations: Observations) -> Observations:
+        """The observations if this is the swing."""
+        return replace(
+            observations, club=self.club, club_along=self.club_along, keys=self.keys,
+            phase=self.phase,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedFilm:
+    """What is observed in a film, and the swings that it may show."""
+
+    film: Film
+    """The frames that were observed."""
+    slow_motion: float
+    """By how much the film is slowed down beyond what was told."""
+    observations: Observations
+    """Those of the likeliest swing."""
+    candidates: tuple[SwingCandidate, ...]
+    """The likeliest first."""
+
+
 def observe_swing(
     video: Video,
+    film: Film,
     pose: ClickedPose,
-    key_times: Float[np.ndarray, "4"],
+    model: MotionModel,
     options: ObservationOptions = ObservationOptions(),
     progress: Progress = silent,
-) -> Observations:
-    """Observations of all frames; `key_times` are the normalised times of the key postures.
+) -> ObservedFilm:
+    """Observations of the frames of a film of a video, and the swings in it.
 
-    Raises KeyreconError where the clicks lie on no player or no swing is observed.
+    `pose` is that of the file's frame. Raises KeyreconError where the clicks lie on no player or
+    no swing is observed.
     """
-    foreground = separate_player(video, pose, options.foreground, progress)
-    club = observe_club(video, foreground, pose.shoulders, options, progress)
-    keys = find_key_frames(club, foreground.height, video.fps, options.timing)
+    whole, placed = film.open(video), place_in_film(pose, film)
+    foreground = separate_player(whole, placed, options.foreground, progress)
+    players = np.stack([foreground.frame(t).player() for t in range(len(whole))])
+    shafts = detect_shafts(whole, foreground, players, placed.shoulders, options, progress)
+    evidence = SwingEvidence(players, foreground.shrink, foreground.height, tuple(shafts), film.fps)
+    found = _search(evidence, placed, model, whole.width)
+    slow_motion = find_slow_motion(found[0].keys, film.fps)
+    chosen = np.arange(0, len(whole), frame_step(film.fps * slow_motion))
+    film = film.take(chosen, slow_motion)
+    kept = _Kept(
+        replace(foreground, likely=foreground.likely[chosen]), players[chosen],
+        [shafts[t] for t in chosen], place_in_film(pose, film), film,
+    )  # fmt: skip
+    candidates = tuple(_candidate(h, kept, chosen, model, options) for h in found)
+    observations = _observe(film.open(video), kept, candidates[0], options, progress)
+    return ObservedFilm(film, slow_motion, observations, candidates)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """What was observed in the frames that are fitted."""
+
+    foreground: Foreground
+    players: Bool[np.ndarray, "T h w"]
+    shafts: list[ShaftHypotheses]
+    pose: ClickedPose
+    film: Film
+
+
+def place_in_film(pose: ClickedPose, film: Film) -> ClickedPose:
+    """A clicked pose in the picture and by the frame numbers of a film."""
+    joints, camera = pose.joints, pose.camera
+    frame = round(float(film.place[joints.frame]))
+    return replace(
+        pose,
+        joints=replace(joints, frame=frame, places=joints.places + film.corner),
+        camera=replace(camera, principal=camera.principal + film.corner),
+        size=film.size,
+    )
+
+
+SLOW_DOWNSWING = 0.27
+"""Seconds that a downswing is thought to take where its length shows slow motion: between those of
+tour players and of others."""
+
+
+def find_slow_motion(keys: Float[np.ndarray, "4"], fps: float) -> float:
+    """By how much a film is slowed down in which a swing has these key postures; 1 if it is not."""
+    down = float(keys[2] - keys[1]) / fps
+    return down / SLOW_DOWNSWING if down > SearchLimits().downswing[1] else 1.0
+
+
+def _search(
+    evidence: SwingEvidence,
+    pose: ClickedPose,
+    model: MotionModel,
+    width: int,
+) -> list[SwingHypothesis]:
+    """Swings that a film may show, in the film's own picture; left-handers are mirrored."""
+    joints, camera = pose.joints, pose.camera
+    if pose.left_handed:
+        evidence = mirror_evidence(evidence, width)
+        joints = mirror_initial(joints, width)
+        camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
+    found = search_swing(evidence, joints, camera, model, size_body(pose.stature))
+    if not found:
+        raise KeyreconError(
+            f"There is no swing in this video: its {len(evidence.players)} frames are too few for "
+            "one. Give a video with a whole swing, from the address to the finish."
+        )
+    if pose.left_handed:
+        found = [replace(h, club=mirror_pixels(h.club, width)) for h in found]
+    return found
+
+
+def _candidate(
+    hypothesis: SwingHypothesis,
+    kept: _Kept,
+    chosen: Int[np.ndarray, "T"],
+    model: MotionModel,
+    options: ObservationOptions,
+) -> SwingCandidate:
+    """A hypothesis with the club that was detected where it has it, and key postures by that."""
+    foreground, fps = kept.foreground, kept.film.fps
+    step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
+    club = track_club(kept.shafts, foreground.height, fps, options.club, hypothesis.club[chosen])
+    shaft = _describe_club(club, foreground.height, kept.film.size)
+    keys = refine_key_frames(club, hypothesis.keys / step, foreground.height, fps, options.timing)
+    phase = interpolate_times(keys, model.keys, len(chosen))
+    return SwingCandidate(shaft.ends, shaft.along, keys, phase, hypothesis.cost)
+
+
+def _observe(
+    video: Video,
+    kept: _Kept,
+    candidate: SwingCandidate,
+    options: ObservationOptions,
+    progress: Progress,
+) -> Observations:
+    """Everything that does not depend on which swing it is, and the likeliest swing."""
+    foreground, pose, players = kept.foreground, kept.pose, list(kept.players)
     width = foreground.likely.shape[2]
     pictures = [to_lab(p) for p in progress(read_small(video, width), "Reading", len(video))]
     tracks = track_joints(pictures, foreground, pose, video.fps, options.appearance, progress)
-    players = [foreground.frame(t).player() for t in range(len(video))]
     whole = find_whole(players)
-    shaft = _describe_club(club, foreground.height, (video.width, video.height))
-    return Observations(
+    return candidate.of(Observations(
         camera=pose.camera,
         initial=pose.joints,
         height=pose.height,
         stature=pose.stature,
         joints=tracks.joints,
         spread=tracks.spread,
-        club=shaft.ends,
+        club=candidate.club,
         club_spread=np.full(len(video), CLUB_SPREAD * foreground.height),
-        club_along=shaft.along,
+        club_along=candidate.club_along,
         foreground=tuple(
-            _sample_mask(player & kept, foreground)
-            for player, kept in zip(players, whole, strict=True)
+            _sample_mask(player & there, foreground)
+            for player, there in zip(players, whole, strict=True)
         ),
         silhouette_distance=np.stack(
             [
-                _silhouette_distance(foreground.frame(t), player) * np.float32(kept)
-                for t, (player, kept) in enumerate(zip(players, whole, strict=True))
+                _silhouette_distance(foreground.frame(t), player) * np.float32(there)
+                for t, (player, there) in enumerate(zip(players, whole, strict=True))
             ]
         ),
         matches=_match_all([p[..., 0] for p in pictures], players, foreground, options.matches),
-        keys=keys,
-        phase=interpolate_times(keys, key_times, len(video)),
+        keys=candidate.keys,
+        phase=candidate.phase,
         left_handed=pose.left_handed,
-    )
+    ))  # fmt: skip
 
 
-def observe_club(
+def detect_shafts(
     video: Video,
     foreground: Foreground,
+    players: Bool[np.ndarray, "T h w"],
     shoulders: Float[np.ndarray, "2"],
     options: ObservationOptions = ObservationOptions(),
     progress: Progress = silent,
-) -> Club:
-    """The club in every frame of a video; `shoulders` is the middle between them, px."""
+) -> list[ShaftHypotheses]:
+    """What may be the club in every frame; `shoulders` is the middle between them, px."""
 
     def detect(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> LineSegments:
         frame, grey = numbered
@@ -138,7 +291,8 @@ def observe_club(
         )
 
     pictures = progress(enumerate(video.grey_frames()), "Detecting the club", len(video))
-    segments = drop_static_segments(list(side_by_side(detect, pictures)), foreground.height)
+    segments = list(side_by_side(detect, pictures))
+    segments = drop_static_segments(segments, foreground.height, most_active(players))
 
     def propose(numbered: tuple[int, LineSegments]) -> ShaftHypotheses:
         frame, of_frame = numbered
@@ -146,8 +300,15 @@ def observe_club(
             of_frame, foreground.frame(frame), shoulders, options.shaft_hypotheses
         )
 
-    shafts = list(side_by_side(propose, enumerate(segments)))
-    return track_club(shafts, foreground.height, video.fps, options.club)
+    return list(side_by_side(propose, enumerate(segments)))
+
+
+def most_active(players: Bool[np.ndarray, "T h w"]) -> Int[np.ndarray, "n"]:
+    """Some of the frames in which the player's outline moves most."""
+    moved = np.array([(a ^ b).mean() for a, b in pairwise(players)])
+    several = max(2, round(ACTIVE_PART * len(players)))
+    busiest = np.sort(np.argsort(-moved, kind="stable")[:several])
+    return busiest[np.unique(np.linspace(0, len(busiest) - 1, ACTIVE_FRAMES).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)

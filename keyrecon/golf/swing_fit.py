@@ -1,8 +1,11 @@
 """The stages of a golf fit: observe, fit, and detect the club again where the fit expects it.
 
-Observations come first (`observation`). A first fit of the motion model follows. Then, in
-rounds, the club is detected once more where the fitted swing expects it, the hands tell when the
-swing begins and ends better than club or fit do, and the model is fitted to both.
+Observations come first (`observation`): of the frames that are fitted (`observe.film`), with the
+swings that these may show. The motion model is fitted to the likeliest of them. Then, in rounds,
+the club is detected once more where the fitted swing expects it, the hands tell when the swing
+begins and ends better than club or fit do, and the model is fitted to both. A fit that does not
+explain its film (`plausibility`) gives way to the next candidate. At last the swing is given in
+every frame of the file, before the camera as it moved.
 """
 
 from dataclasses import dataclass, field, replace
@@ -13,16 +16,18 @@ from jaxtyping import Float
 
 from keyrecon.golf.fit.fitting import FitOptions, fit_swing, refit_swing
 from keyrecon.golf.fit.handedness import mirror_observations
+from keyrecon.golf.fit.in_file import observations_in_file, swing_in_file
 from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.observation import ObservationOptions
+from keyrecon.golf.observation import ObservationOptions, ObservedFilm
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.swing_events import (
     SwingEventOptions,
     detect_swing_events,
     interpolate_times,
 )
+from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
 from keyrecon.io.video import Video
@@ -43,6 +48,8 @@ class GolfOptions:
     """How the model is fitted to it."""
     windows: WindowOptions = field(default_factory=WindowOptions)
     """The paper's sliding windows, where they are asked for."""
+    candidates: Annotated[int, within(1, 10)] = 3
+    """Swings that are tried at most, while none explains the film."""
     guided_rounds: Annotated[int, within(0, 20)] = 2
     """How many times the club is detected again where the fitted swing expects it."""
     guided_detection: GuidedDetectionOptions = field(default_factory=GuidedDetectionOptions)
@@ -127,3 +134,56 @@ def finish_fit(
 ) -> FittedSwing:
     """The fitted swing with its beginning and end as the hands in the picture tell them."""
     return replace(fitted, keys=detect_swing_events(video, observations, fitted, options))
+
+
+@dataclass(frozen=True, eq=False)
+class FoundSwing:
+    """A swing found in a video, in every frame of its file."""
+
+    fitted: FittedSwing
+    observations: Observations
+    """As far as they belong to frames of the file."""
+    doubts: tuple[SwingDoubt, ...]
+    """What speaks against it."""
+    notes: tuple[str, ...]
+    """What was found of the film: slow motion, repeated frames, cuts."""
+
+
+def swing_found(
+    fitted: FittedSwing,
+    observations: Observations,
+    doubts: tuple[SwingDoubt, ...],
+    observed: ObservedFilm,
+    video: Video,
+    model: MotionModel,
+) -> FoundSwing:
+    """A fitted film as a swing in every frame of the file."""
+    film = observed.film
+    doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
+    notes = tuple(_describe_film(observed, len(video)))
+    if film.is_whole(video):
+        return FoundSwing(fitted, observations, doubts, notes)
+    return FoundSwing(
+        swing_in_file(fitted, observations, film, video, model),
+        observations_in_file(observations, film), doubts, notes,
+    )  # fmt: skip
+
+
+def _describe_film(observed: ObservedFilm, frames: int) -> list[str]:
+    """What a person should know of the film, in words."""
+    film, notes = observed.film, []
+    if film.repeated > LEAST_REPEATED:
+        notes.append(f"{film.repeated:.0%} of the frames repeat the one before")
+    if observed.slow_motion > 1:
+        notes.append(
+            f"the film seems slowed down {observed.slow_motion:.1f} times; give --slowmo if you "
+            "know better, since times and tempo in seconds depend on it"
+        )
+    first, last = film.shot
+    if (first, last) != (0, frames - 1):
+        notes.append(f"only frames {first} to {last} show the shot that was clicked")
+    return notes
+
+
+LEAST_REPEATED = 0.02
+"""Share of repeated frames that is worth a word."""

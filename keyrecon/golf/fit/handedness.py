@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import LSP14
+from keyrecon.golf.fit.swing_search import SwingEvidence
 from keyrecon.golf.prior.skeleton import NAMES
 from keyrecon.golf.records import (
     Camera,
@@ -85,3 +86,9 @@ def mirror_capsules(capsules: Capsules) -> Capsules:
         SEGMENT_MIRROR[capsules.segment], capsules.start * MIRROR_X, capsules.end * MIRROR_X,
         capsules.radii,
     )  # fmt: skip
+
+
+def mirror_evidence(evidence: SwingEvidence, width: int) -> SwingEvidence:
+    """What a mirrored film of some width would show."""
+    shafts = [replace(s, ends=mirror_pixels(s.ends, width)) for s in evidence.shafts]
+    return replace(evidence, players=evidence.players[:, :, ::-1], shafts=tuple(shafts))

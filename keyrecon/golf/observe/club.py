@@ -31,6 +31,12 @@ REWEIGHTINGS = 8
 ALONG_WEIGHT = 0.04
 """Weight of an end along the shaft against across, where it may not be the true end."""
 
+USUAL_TURN, USUAL_OFFSET = 40.0, 0.15
+"""Degrees by which a club is usually turned from where a hypothesis about the swing has it, and
+player heights that its hands are off: wrists are cocked early or late."""
+MOST_SURPRISE = 5.0
+"""Greatest cost of a shaft elsewhere: half a club that was detected well."""
+
 
 @dataclass(frozen=True)
 class ClubOptions:
@@ -76,12 +82,14 @@ def track_club(
     height: float,
     fps: float,
     options: ClubOptions = ClubOptions(),
+    expected: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> Club:
     """The club of every frame; `height` of the player in px, `fps` of the world.
 
-    Raises KeyreconError where hardly any shaft was detected.
+    `expected` is where a hypothesis about the swing has it. Raises KeyreconError where hardly any
+    shaft was detected.
     """
-    path = choose_shafts(shafts, height, fps, options)
+    path = choose_shafts(shafts, height, fps, options, expected)
     pairs = list(zip(shafts, path.tolist(), strict=True))
     taken = np.array([s.ends[k] if k >= 0 else NOWHERE for s, k in pairs])
     tip = np.array([k >= 0 and bool(s.tip[k]) for s, k in pairs])
@@ -190,6 +198,7 @@ def choose_shafts(
     height: float,
     fps: float,
     options: ClubOptions = ClubOptions(),
+    expected: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> Int[np.ndarray, "T"]:
     """Hypothesis taken in every frame, -1 where none."""
 
@@ -197,7 +206,26 @@ def choose_shafts(
         return _movement(shafts[before], shafts[t], height, (t - before) / fps, options)
 
     costs = [-options.gain * now.weight for now in shafts]
+    if expected is not None:
+        costs = [
+            cost + _surprise(now, where, height)
+            for cost, now, where in zip(costs, shafts, expected, strict=True)
+        ]
     return find_cheapest_path(costs, moving, max(1, round(options.gap * fps)), options.miss)
+
+
+def _surprise(
+    shafts: ShaftHypotheses,
+    expected: Float[np.ndarray, "2 2"],
+    height: float,
+) -> Float[np.ndarray, "n"]:
+    """What shafts pay for lying elsewhere than a hypothesis about the swing has the club."""
+    way, found = expected[1] - expected[0], shafts.ends[:, 1] - shafts.ends[:, 0]
+    cross = way[0] * found[:, 1] - way[1] * found[:, 0]
+    turn = np.arctan2(cross, found @ way) / np.radians(USUAL_TURN)
+    turn = turn * min(1.0, 4 * float(np.linalg.norm(way)) / height)
+    off = np.linalg.norm(shafts.ends[:, 0] - expected[0], axis=1) / (USUAL_OFFSET * height)
+    return np.minimum(0.5 * (turn**2 + off**2), MOST_SURPRISE)
 
 
 def _movement(

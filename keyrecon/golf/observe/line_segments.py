@@ -16,7 +16,7 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from scipy.spatial import cKDTree
 from skimage.transform import probabilistic_hough_line
 
@@ -50,6 +50,8 @@ END_PART = 10
 """The beginning and the end of a video are this part of it."""
 SAME_ENDS = 0.02
 """Distance between the ends of two segments that are one, player heights."""
+STATIC_SHARE = 0.3
+"""Share of the active frames in which a static segment is detected: players hide it at times."""
 COLLINEAR_OFFSET = 0.008
 """Distance from their common line at which two segments are one shaft, lengths of the segment."""
 
@@ -136,22 +138,40 @@ def _stand_alone(
     return np.maximum(one, other) < FREE_SHARE * along
 
 
-def drop_static_segments(segments: Sequence[LineSegments], height: float) -> list[LineSegments]:
+def drop_static_segments(
+    segments: Sequence[LineSegments], height: float, active: Int[np.ndarray, "n"] | None = None
+) -> list[LineSegments]:
     """Segments without those that are there both in the beginning and in the end.
 
-    A club that lies still at address is somewhere else at the finish; a rope is not.
+    A club that lies still at address is somewhere else at the finish; a rope is not. Nor does a
+    club stay in one place in frames in which the player is `active`, as edges behind him do.
     """
     part = max(1, len(segments) // END_PART)
-    known = [
-        cKDTree(np.concatenate([s.ends for s in few]).reshape(-1, 4))
-        for few in (segments[:part], segments[-part:])
-    ]
+    begun, ended = (_ends_tree(few) for few in (segments[:part], segments[-part:]))
+    during = [] if active is None else [_ends_tree([segments[t]]) for t in active.tolist()]
     kept = []
     for of_frame in segments:
-        apart = [tree.query(of_frame.ends.reshape(-1, 4))[0] for tree in known]
-        moving = np.max(apart, axis=0) > SAME_ENDS * height
-        kept.append(LineSegments(of_frame.ends[moving], of_frame.support[moving]))
+        flat = of_frame.ends.reshape(-1, 4)
+        near = np.array([_is_there(tree, flat, height) for tree in (begun, ended, *during)])
+        static = near[0] & near[1]
+        if during:
+            static |= near[2:].mean(axis=0) > STATIC_SHARE
+        kept.append(LineSegments(of_frame.ends[~static], of_frame.support[~static]))
     return kept
+
+
+def _ends_tree(segments: Sequence[LineSegments]) -> cKDTree:
+    return cKDTree(np.concatenate([s.ends for s in segments]).reshape(-1, 4))
+
+
+def _is_there(
+    tree: cKDTree, ends: Float[np.ndarray, "n 4"], height: float
+) -> Bool[np.ndarray, "n"]:
+    """Whether segments are among those of other frames."""
+    if not len(ends) or not tree.n:
+        return np.zeros(len(ends), bool)
+    there: Bool[np.ndarray, "n"] = tree.query(ends)[0] <= SAME_ENDS * height
+    return there
 
 
 def _foreground_along(

@@ -28,6 +28,9 @@ SHAFT_FOREGROUND = 0.3
 """Probability of foreground that continues a shaft to its head."""
 GAP_SAMPLES = 3
 """Places in a row that may be missing."""
+TOUCH = 0.03
+"""Farthest that the hand end is from the player's mask, player heights: half a fist. Without it
+path edges, rails and captions are clubs that nobody holds."""
 BEYOND_HANDS = (0.04, 0.16)
 """Stretch behind the end of a shaft that lies beyond the hands that hold it, player heights."""
 TIP_SHARE = 0.4
@@ -138,9 +141,10 @@ def _possible(
     shoulders: Float[np.ndarray, "2"],
     options: ShaftOptions,
 ) -> bool:
-    """Whether arms reach the hand end, and the club reaches its head, off the player."""
+    """Whether the player holds the hand end, and the club reaches its head, off the player."""
     height, shrink = player.foreground.height, player.foreground.shrink
-    free = player.outside(ends[1:])[0] > options.free * height * shrink
+    held, away = player.outside(ends)
+    free = away > options.free * height * shrink and held <= TOUCH * height * shrink
     near = np.linalg.norm(ends[0] - shoulders) < options.arms * height
     return bool(free and near and np.linalg.norm(ends[1] - ends[0]) < options.longest * height)
 

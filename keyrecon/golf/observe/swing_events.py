@@ -82,13 +82,70 @@ def find_key_frames(
     hit = _return_to_address(club.ends, ends[start], top, low, fps)
     resting = speed < options.rest * speed[top:].max()
     finish = _first_rest(resting, speed, round(hit), round(options.pause * fps))
-    return np.array([start, top, hit, finish], float)
+    return order_keys(np.array([start, top, hit, finish], float))
+
+
+def refine_key_frames(
+    club: Club,
+    keys: Float[np.ndarray, "4"],
+    height: float,
+    fps: float,
+    options: TimingOptions = TimingOptions(),
+) -> Float[np.ndarray, "4"]:
+    """Key postures by the club, near those of a hypothesis about the swing."""
+    ends = gaussian_filter1d(_fill(club.ends), options.smooth * fps, axis=0)
+    hands, last = ends[:, 0] / height, len(ends) - 1
+    top, hit = keys[1:3]
+    down = hit - top
+    early, late = (int(np.clip(round(hit - s * down), 0, last - 2)) for s in TOP_WINDOW)
+    late = max(late, early + 1)
+    top = early + _amid_valley(hands[early : late + 1, 1], options.valley)
+    low = int(np.clip(round(hit), 1, last - 1))
+    begin: float = _last_at_address(ends / height, int(top), low, options.address)
+    down = hit - top
+    begin = float(np.clip(begin, top - LONGEST_TEMPO * down, top - SHORTEST_TEMPO * down))
+    begin = max(0.0, begin)
+    back = _return_to_address(club.ends, ends[int(begin)], int(top), low, fps)
+    if abs(back - hit) <= HIT_SHARE * down + 1:
+        hit = back
+    speed = np.linalg.norm(np.gradient(ends, 1 / fps, axis=0), axis=2).sum(axis=1) / height
+    resting = speed < options.rest * speed[int(top) :].max()
+    rest = _first_rest(resting, speed, round(min(hit, last - 1)), round(options.pause * fps))
+    finish = float(np.clip(rest, hit + SHORTEST_FINISH * down, hit + LONGEST_FINISH * down))
+    return order_keys(np.array([begin, top, hit, finish], float))
+
+
+TOP_WINDOW = (1.7, 0.4)
+"""The top lies so many downswings before the hit, at most and at least, whatever was supposed."""
+HIT_SHARE = 0.35
+"""Share of the downswing by which the club may move the hit."""
+SHORTEST_TEMPO, LONGEST_TEMPO = 1.2, 6.0
+"""Upswing to downswing."""
+SHORTEST_FINISH, LONGEST_FINISH = 1.0, 5.0
+"""Follow-through to downswing."""
+
+
+def _amid_valley(y: Float[np.ndarray, "n"], valley: float) -> float:
+    """Middle of the time for which the hands are highest, around their highest frame."""
+    highest = int(y.argmin())
+    low = np.flatnonzero(y >= y[highest] + valley)
+    first = max((k for k in low if k < highest), default=-1) + 1
+    last = min((k for k in low if k > highest), default=len(y)) - 1
+    return (first + last) / 2
+
+
+def order_keys(keys: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
+    """Key postures a frame apart at least, around the top."""
+    start, top, hit, finish = keys
+    hit = max(hit, top + 1)
+    return np.array([min(start, top - 1), top, hit, max(finish, hit + 1)], float)
 
 
 def interpolate_times(
     keys: Float[np.ndarray, "4"], key_times: Float[np.ndarray, "4"], frames: int
 ) -> Float[np.ndarray, "T"]:
     """Normalised time of every frame; constant before the first and after the last key."""
+    keys = order_keys(keys)
     inside = np.clip(np.arange(frames), keys[0], keys[-1])
     return PchipInterpolator(keys, key_times)(inside)
 
@@ -242,7 +299,7 @@ def detect_swing_events(
     stopping = expected.max() * _resting_share(fitted, finish - step, finish, height, options)
     start = early.start + _last_rest(speeds[0], leaving)
     finish = late.start + _first_of_slowest(speeds[1], stopping)
-    return np.array([min(start, top - 1), top, hit, max(finish, hit + 1)], float)
+    return order_keys(np.array([start, top, hit, finish], float))
 
 
 def _last_rest(speed: Float[np.ndarray, "n"], limit: float) -> int:

@@ -1,0 +1,92 @@
+"""The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
+
+from keyrecon.golf.clicks import ClickedPose
+from keyrecon.golf.observation import observe_swing
+from keyrecon.golf.observe.film import choose_frames
+from keyrecon.golf.plausibility import SwingDoubt, find_doubts
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.swing_fit import (
+    FoundSwing,
+    GolfOptions,
+    finish_fit,
+    fit_guided,
+    fit_observations,
+    swing_found,
+)
+from keyrecon.io.video import Video
+from keyrecon.pipeline import Keep, call_stage
+from keyrecon.progress import Progress, silent
+from keyrecon.records import CameraPath
+
+
+def find_swing(
+    video: Video,
+    camera: CameraPath,
+    pose: ClickedPose,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+) -> FoundSwing:
+    """Observe a video and fit the swing that explains it best.
+
+    Raises KeyreconError where no player or no swing is observed.
+    """
+    film = keep("film", choose_frames, video, camera, pose.frame)
+    observed = keep(
+        "observe", observe_swing, video, film, pose, model, options=options.observation,
+        progress=progress,
+    )  # fmt: skip
+    shown = observed.film.open(video)
+    tried: list[tuple[FittedSwing, Observations, list[SwingDoubt]]] = []
+    for number, candidate in enumerate(observed.candidates[: options.candidates]):
+        observations = candidate.of(observed.observations)
+        fitted, observations = fit_candidate(
+            observations, shown, model, options, keep, progress, suffix=f"_{number + 1}"
+        )
+        doubts = find_doubts(fitted, observations)
+        tried.append((fitted, observations, doubts))
+        if not doubts or options.method == "windows":
+            break
+    fitted, observations, doubts = min(tried, key=lambda t: len(t[2]))
+    return keep("found", swing_found, fitted, observations, tuple(doubts), observed, video, model)
+
+
+def fit_candidate(
+    observations: Observations,
+    video: Video,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+    suffix: str = "",
+) -> tuple[FittedSwing, Observations]:
+    """The model fitted to the observations of one candidate, with guided club detection."""
+    fitted = keep(
+        f"fit{suffix}", fit_observations, observations, video, model, options=options,
+        progress=progress,
+    )  # fmt: skip
+    return refine_fit(fitted, observations, video, model, options, keep, suffix)
+
+
+def refine_fit(
+    fitted: FittedSwing,
+    first: Observations,
+    video: Video,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    keep: Keep = call_stage,
+    suffix: str = "",
+) -> tuple[FittedSwing, Observations]:
+    """Rounds of guided club detection and fitting after a fit to the `first` observations."""
+    observations = first
+    for number in range(options.guided_rounds if options.method == "swing" else 0):
+        guided = keep(
+            f"guided{suffix}_{number + 1}", fit_guided, first, fitted, video, model,
+            options=options,
+        )  # fmt: skip
+        fitted, observations = guided.fitted, guided.update(first)
+    fitted = keep(
+        f"result{suffix}", finish_fit, observations, fitted, video, options=options.events
+    )
+    return fitted, observations

@@ -1,0 +1,130 @@
+"""A swing that was fitted to a film, in every frame of the file and before the camera as it moved.
+
+The film (`observe.film`) lacks frames of the file and stands still. Phases and places between the
+fitted frames follow by interpolation; a frame that repeats another has its swing. The camera's
+homographies are those of a turn and a zoom, so they turn the fitted swing in camera axes and bring
+it closer or farther.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation, Slerp
+
+from keyrecon.golf.fit.residuals import project
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.film import Film
+from keyrecon.golf.records import (
+    Camera,
+    FittedSwing,
+    Matches,
+    MotionModel,
+    Observations,
+    RootPose,
+    SwingFit,
+    SwingState,
+)
+from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import warp_points
+
+
+def observations_in_file(observations: Observations, film: Film) -> Observations:
+    """What was observed, in the frames and pictures of the file; masks and matches stay away."""
+    back, nearest = np.linalg.inv(film.warps), np.rint(film.place).astype(int)
+    initial, camera = observations.initial, observations.camera
+    clicked = film.frame_in_file(initial.frame)
+    return replace(
+        observations,
+        camera=replace(camera, principal=camera.principal - film.corner),
+        initial=replace(initial, frame=clicked, places=initial.places - film.corner),
+        joints=_warp(back, observations.joints[nearest]),
+        spread=observations.spread[nearest],
+        club=_warp(back, observations.club[nearest]),
+        club_spread=observations.club_spread[nearest],
+        club_along=observations.club_along[nearest],
+        foreground=tuple(
+            warp_points(h, observations.foreground[k]) for h, k in zip(back, nearest, strict=True)
+        ),
+        silhouette_distance=np.zeros((0, 2, 2)),
+        matches=Matches(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros((0, 2))),
+        keys=film.keys_in_file(observations.keys),
+        phase=np.interp(film.place, np.arange(len(observations.phase)), observations.phase),
+    )
+
+
+def _warp(
+    homographies: Float[np.ndarray, "F 3 3"], points: Float[np.ndarray, "F n 2"]
+) -> Float[np.ndarray, "F n 2"]:
+    return warp_points(homographies[:, None], points)
+
+
+def swing_in_file(
+    fitted: FittedSwing, observations: Observations, film: Film, video: Video, model: MotionModel
+) -> FittedSwing:
+    """A fitted swing in every frame of the file."""
+    fit = SwingFit(model, fitted.body, _state_at(fitted.state, film.place))
+    real = observations_in_file(observations, film)
+    # Described before the camera of the film first, whose principal point the fit has.
+    described = describe_fit(fit, replace(real, camera=observations.camera), video.time)
+    described = replace(described, keys=film.keys_in_file(fitted.keys))
+    turned = _follow_camera(described, film, observations.camera, real.camera)
+    motion = replace(turned.motion, keyframes=np.array([real.initial.frame]))
+    return replace(turned, motion=motion)
+
+
+def _state_at(state: SwingState, place: Float[np.ndarray, "F"]) -> SwingState:
+    """A state between its frames."""
+    frames = np.arange(len(state.phase))
+    turns = Slerp(frames, Rotation.from_matrix(state.rotation))(place).as_matrix()
+    position = np.stack([np.interp(place, frames, c) for c in state.position.T], axis=1)
+    nearest = np.rint(place).astype(int)
+    each = state.frame_coefficients
+    return replace(
+        state,
+        phase=np.interp(place, frames, state.phase),
+        rotation=turns,
+        position=position,
+        frame_coefficients=None if each is None else each[nearest],
+    )
+
+
+def _follow_camera(
+    fitted: FittedSwing, film: Film, standing: Camera, moving: Camera
+) -> FittedSwing:
+    """The swing in the axes of the camera as it turned and zoomed."""
+    turn, zoom = _camera_turns(film, standing, moving)
+    pelvis = np.einsum("tij,tj->ti", turn, fitted.pose.origins[:, 0])
+    nearer = pelvis / zoom[:, None] - pelvis
+
+    def follow(points: np.ndarray) -> np.ndarray:
+        moved: np.ndarray = np.einsum("tij,tnj->tni", turn, points) + nearer[:, None]
+        return moved
+
+    pose = RootPose(follow(fitted.pose.origins), turn[:, None] @ fitted.pose.rotations)
+    joints, club = follow(fitted.motion.points3d), follow(fitted.club)
+    pixels, ends = (
+        project(p.reshape(-1, 3), moving)[0].reshape(*p.shape[:2], 2) for p in (joints, club)
+    )
+    scale = moving.focal / joints[..., 2].mean(axis=1)
+    motion = replace(fitted.motion, points3d=joints, points2d=pixels, scale=scale)
+    return replace(fitted, motion=motion, pose=pose, club=club, club2d=ends)
+
+
+def _camera_turns(
+    film: Film, standing: Camera, moving: Camera
+) -> tuple[Float[np.ndarray, "F 3 3"], Float[np.ndarray, "F"]]:
+    """Turn of every frame's camera from the film's, and its zoom."""
+    back = np.linalg.inv(film.warps)
+    back = back / back[:, 2:, 2:]
+    zoom = np.sqrt(np.abs(np.linalg.det(back[:, :2, :2])))
+    rays = np.linalg.inv(_matrix(moving)) @ back @ _matrix(standing)
+    rays[:, :2] /= zoom[:, None, None]
+    u, _, v = np.linalg.svd(rays)
+    turn = u @ v
+    return turn * np.sign(np.linalg.det(turn))[:, None, None], zoom
+
+
+def _matrix(camera: Camera) -> Float[np.ndarray, "3 3"]:
+    x, y = camera.principal
+    return np.array([[camera.focal, 0, x], [0, camera.focal, y], [0, 0, 1]])

@@ -1,0 +1,156 @@
+"""A video as a camera that stands still would have filmed it, without frames shown twice.
+
+Whoever compares pictures with one scene wants every pixel of the scene in one place. So each
+picture is warped by the camera's homography into the picture of one frame; what no picture shows at
+a place is taken from the others, which see it (a plate, the median of some). Frames are decoded
+once and held, warped when they are read.
+"""
+
+import hashlib
+from collections.abc import Container, Iterator
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from keyrecon.io.held_video import HeldVideo, hold_frames
+from keyrecon.io.video import Video
+
+PLATE_FRAMES = 15
+"""Frames whose median fills what another frame does not show."""
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyVideo(Video):
+    """Some frames of a video, all in the picture of one of them."""
+
+    source: HeldVideo
+    numbers: Int[np.ndarray, "T"]
+    """Frames of the source."""
+    warps: Float[np.ndarray, "T 3 3"] | None
+    """Homographies from the source's pixels to these; none where the camera stood still."""
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Tells this video from others: its file, its frames and its warps."""
+        digest = hashlib.sha256(self.source.fingerprint.encode() + self.numbers.tobytes())
+        if self.warps is not None:
+            digest.update(self.warps.tobytes())
+        return digest.hexdigest()[:32]
+
+    def frames(
+        self, start: int = 0, stop: int | None = None, width: int | None = None
+    ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        """Frames start..stop-1 in order; reduced to `width` if given."""
+        stop = len(self) if stop is None else min(stop, len(self))
+        yield from self._read(set(range(start, stop)), stop - 1, width)
+
+    def chosen_frames(self, numbers: Container[int], last: int) -> Iterator[np.ndarray]:
+        """The frames with these numbers up to `last`."""
+        yield from self._read(numbers, min(last, len(self) - 1), None)
+
+    def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
+        """The brightness of all frames in order."""
+        row = 0
+        for number, grey in enumerate(self.source.grey_frames()):
+            while row < len(self) and self.numbers[row] == number:
+                yield grey if self.warps is None else self._warp(row, grey, self._plates[1])
+                row += 1
+
+    def _read(
+        self, wanted: Container[int], last: int, width: int | None
+    ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        rows = [t for t in range(last + 1) if t in wanted]
+        chosen = set(self.numbers[rows].tolist())
+        if not chosen:
+            return
+        plain = self.warps is None
+        if plain and width:
+            pictures = (self.source.frame(int(self.numbers[t]), width) for t in rows)
+            yield from pictures
+            return
+        read = self.source.chosen_frames(chosen, max(chosen))
+        for row, picture in zip(rows, read, strict=True):
+            warped = picture if plain else self._warp(row, picture, self._plates[0])
+            if width and width != self.width:
+                size = (width, max(1, round(self.height * width / self.width)))
+                warped = cv2.resize(warped, size, interpolation=cv2.INTER_AREA)
+            yield warped
+
+    def _warp(self, row: int, picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
+        """A picture in the common one, the plate where it shows nothing."""
+        if self.warps is None:
+            return picture
+        return _fill(*_warped(picture, self.warps[row], (self.width, self.height)), plate)
+
+    @cached_property
+    def _plates(self) -> tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
+        """The scene that all frames together show, in colour and in brightness."""
+        rows = np.unique(np.linspace(0, len(self) - 1, PLATE_FRAMES).astype(int))
+        chosen = dict(zip(self.numbers[rows].tolist(), rows.tolist(), strict=True))
+        colour = self.source.chosen_frames(chosen, max(chosen))
+        grey = (g for t, g in enumerate(self.source.grey_frames()) if t in chosen)
+        both = [self._plate(pictures, chosen) for pictures in (colour, grey)]
+        return both[0], both[1]
+
+    def _plate(self, pictures: Iterator[np.ndarray], chosen: dict[int, int]) -> np.ndarray:
+        if self.warps is None:
+            raise ValueError("a camera that stands still needs no plate")
+        size = (self.width, self.height)
+        warped = [
+            _warped(picture, self.warps[row], size)
+            for picture, row in zip(pictures, chosen.values(), strict=True)
+        ]
+        stack = np.stack([picture for picture, _ in warped])
+        return _masked_median(stack, np.stack([seen for _, seen in warped]))
+
+
+def steady_video(
+    video: Video,
+    numbers: Int[np.ndarray, "T"],
+    time: Float[np.ndarray, "T"],
+    warps: Float[np.ndarray, "T 3 3"] | None,
+    size: tuple[int, int],
+) -> SteadyVideo:
+    """Some frames of a video at their times in the world, warped into pictures of some size."""
+    source = video if isinstance(video, HeldVideo) else hold_frames(video)
+    own = {field.name: getattr(video, field.name) for field in fields(Video)}
+    fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else video.fps
+    own |= {"width": size[0], "height": size[1], "stamps": video.stamps[numbers]}
+    own |= {"time": time, "fps": fps}
+    return SteadyVideo(**own, source=source, numbers=numbers, warps=warps)
+
+
+def _warped(
+    picture: np.ndarray, warp: Float[np.ndarray, "3 3"], size: tuple[int, int]
+) -> tuple[np.ndarray, Bool[np.ndarray, "h w"]]:
+    """A picture in the common one, and where it shows something."""
+    moved = cv2.warpPerspective(
+        picture, warp, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (np.array(picture.shape[1::-1]) - 1.0)
+    frame = cv2.perspectiveTransform(corners[None], warp)[0]
+    seen = np.zeros(size[::-1], np.uint8)
+    cv2.fillConvexPoly(seen, np.round(frame).astype(np.int32), 1)
+    return moved, seen > 0
+
+
+def _fill(picture: np.ndarray, seen: Bool[np.ndarray, "h w"], plate: np.ndarray) -> np.ndarray:
+    if not seen.all():
+        picture[~seen] = plate[~seen]
+    return picture
+
+
+def _masked_median(stack: np.ndarray, seen: Bool[np.ndarray, "n h w"]) -> np.ndarray:
+    """Median over the pictures that see a pixel; over all where none does."""
+    count = seen.sum(axis=0)
+    shaped = seen if stack.ndim == 3 else seen[..., None]
+    # Unseen values sort to the end; the middle of the first `count` is the median.
+    ordered = np.sort(np.where(shaped, stack.astype(np.int16), 256), axis=0)
+    middle = np.maximum(count - 1, 0) // 2
+    middle = middle if stack.ndim == 3 else np.repeat(middle[..., None], stack.shape[-1], axis=2)
+    median = np.take_along_axis(ordered, middle[None], axis=0)[0]
+    never = np.median(stack, axis=0)
+    return np.where(median > 255, never, median).astype(np.uint8)
