@@ -26,12 +26,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from keyrecon.app.golf import GolfFit, refine_fit
+from keyrecon.app.golf_recipe import refine_fit
 from keyrecon.app.golf_training import read_swings
 from keyrecon.body import LSP14
 from keyrecon.golf.clicks import ClickedPose, GolfClicks, clicked_pose
 from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
 from keyrecon.golf.observation import ObservationOptions, observe_swing
+from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.prior.captured_swing import change_swing
 from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
 from keyrecon.golf.prior.training import TrainOptions, collect_swings, learn_motion
@@ -48,6 +49,7 @@ from keyrecon.report.golf_pictures import draw_golfer
 from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 from keyrecon.synthetic.sequence import SceneOptions
+from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 MOCAP = Path(__file__).parent.parent.parent / "shared" / "data" / "mocap" / "golf"
 CLICKED = ("head_top", "right_knee", "left_knee", "right_ankle", "left_ankle")
@@ -139,7 +141,12 @@ def observe(video: Video, pose: ClickedPose, model: MotionModel, folder: Path) -
     file = folder / "observations.npz"
     if not file.is_file():
         began = time.perf_counter()
-        save_record(file, observe_swing(video, pose, model.keys, ObservationOptions()))
+        camera = estimate_camera_motion(video)
+        film = choose_frames(video, camera, pose.frame)
+        observed = observe_swing(video, film, pose, model, ObservationOptions())
+        if not observed.film.is_whole(video):
+            raise SystemExit(f"{folder.name}: frames were left out of a film that has no repeats.")
+        save_record(file, observed.observations)
         (folder / "seconds.txt").write_text(f"{time.perf_counter() - began:.1f}")
     return load_record(file)
 
@@ -221,8 +228,7 @@ def fit_all(scene: Scene, swings: tuple[Swing, ...], out: Path) -> Iterator[tupl
         fits[name] = fit_observations(observations, video, model, options)
         yield name, measure(fits[name], truth, scene.fps, time.perf_counter() - began)
     began, name = time.perf_counter(), "and guided detection"
-    refined = refine_fit(GolfFit(fits["everything"], observations), video, model)
-    fits[name], guided = refined.fitted, refined.observations
+    fits[name], guided = refine_fit(fits["everything"], observations, video, model)
     yield name, measure(fits[name], truth, scene.fps, time.perf_counter() - began)
     marked = replace(guided, marks=annotate(truth, SCENES.index(scene)))
     began, with_marks = time.perf_counter(), "and four keyframes"

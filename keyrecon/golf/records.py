@@ -119,6 +119,8 @@ class SwingState:
     """Origin of the swing axes in the camera's, metres."""
     frame_coefficients: Float[np.ndarray, "T C"] | None = None
     """Coefficients of every frame, where they are not common to all: the paper's windows."""
+    deviation: Float[np.ndarray, "T P 3"] | None = None
+    """Turn of each segment away from the model's, a rotation vector in its parent's axes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,12 @@ from typing import Annotated, Literal
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.golf.fit.fitting import FitOptions, fit_swing, refit_swing
+from keyrecon.golf.fit.fitting import (
+    FitOptions,
+    fit_swing,
+    follow_observations,
+    refit_swing,
+)
 from keyrecon.golf.fit.handedness import mirror_observations
 from keyrecon.golf.fit.in_file import observations_in_file, swing_in_file
 from keyrecon.golf.fit.initial_pose import initial_fit
@@ -95,13 +100,16 @@ def fit_observations(
         mirrored = mirror_observations(observations, video.width)
     initial = initial_fit(mirrored, model, size_body(observations.stature))
     if previous is not None:
-        fit = refit_swing(mirrored, initial, previous, video.fps, options.fit)
+        learnt = replace(previous, deviation=None)
+        fit = refit_swing(mirrored, initial, learnt, video.fps, options.fit)
     elif options.method == "swing":
         fit = fit_swing(mirrored, initial, video.fps, options.fit)
     else:
         fit = fit_sliding_windows(mirrored, initial, options.windows, progress)
     if options.method == "swing":
         fit = refit_proportions(fit, mirrored, initial, video.fps, options.fit, options.proportions)
+        if options.fit.follow:
+            fit = follow_observations(fit, mirrored, initial, video.fps, options.fit)
     return describe_fit(fit, observations, video.time)
 
 

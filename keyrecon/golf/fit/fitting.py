@@ -14,6 +14,7 @@ from typing import Annotated
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.golf.fit.deviation import follow_picture
 from keyrecon.golf.fit.parameterisation import (
     KnotSpacing,
     SplineBasis,
@@ -81,6 +82,8 @@ class FitOptions:
     """Observations."""
     priors: PriorOptions = field(default_factory=PriorOptions)
     """Regularisation."""
+    follow: bool = True
+    """Segments turn away from the motion model where the picture departs from it."""
     robust: Annotated[float, within(0.1, 60)] = 3.0
     """Standard deviations beyond which a joint or club end counts less."""
     time_knots: Annotated[float, within(0.005, 2)] = 0.1
@@ -140,6 +143,22 @@ def refit_swing(
     basis = swing_basis(len(previous.coefficients), len(initial.state.phase), _knots(fps, options))
     blocks = _weighted_blocks(observations, initial, fps, options)
     return _descend(initial, previous, blocks, [_Level(basis, 1.0)], fps, options)
+
+
+def follow_observations(
+    fit: SwingFit,
+    observations: Observations,
+    initial: SwingFit,
+    fps: float,
+    options: FitOptions = FitOptions(),
+) -> SwingFit:
+    """A fitted swing that follows the observations where they depart from the model."""
+    blocks = residual_blocks(observations, initial, options)
+    marks = partial(mark_residuals, observations, fit.body)
+    # A marked joint is worth as much as it is among the blocks of `_weighted_blocks`.
+    factor = max(1.0, fps / INDEPENDENT_PER_SECOND)
+    blocks = [*blocks, ResidualBlock(marks, factor * options.weights.marks, options.robust)]
+    return follow_picture(fit, blocks, fps)
 
 
 def _knots(fps: float, options: FitOptions) -> KnotSpacing:

@@ -79,13 +79,16 @@ def _state_at(state: SwingState, place: Float[np.ndarray, "F"]) -> SwingState:
     turns = Slerp(frames, Rotation.from_matrix(state.rotation))(place).as_matrix()
     position = np.stack([np.interp(place, frames, c) for c in state.position.T], axis=1)
     nearest = np.rint(place).astype(int)
-    each = state.frame_coefficients
+    each, own = state.frame_coefficients, state.deviation
+    low = np.minimum(place.astype(int), len(frames) - 2)
+    share = (place - low)[:, None, None]
     return replace(
         state,
         phase=np.interp(place, frames, state.phase),
         rotation=turns,
         position=position,
         frame_coefficients=None if each is None else each[nearest],
+        deviation=None if own is None else (1 - share) * own[low] + share * own[low + 1],
     )
 
 

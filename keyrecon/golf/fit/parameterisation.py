@@ -6,7 +6,7 @@ estimate, which keeps their number independent of the frame rate. `SplineBasis` 
 bases; with identities it is the paper's form.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -74,11 +74,11 @@ def constant_basis(n_coefficients: int, frames: int) -> SplineBasis:
 def swing_basis(n_coefficients: int, frames: int, spacing: KnotSpacing) -> SplineBasis:
     """Splines over a whole swing."""
     return SplineBasis(
-        n_coefficients, _splines(frames, spacing.phase), _splines(frames, spacing.root)
+        n_coefficients, spline_matrix(frames, spacing.phase), spline_matrix(frames, spacing.root)
     )
 
 
-def _splines(frames: int, spacing: float) -> Float[np.ndarray, "T B"]:
+def spline_matrix(frames: int, spacing: float) -> Float[np.ndarray, "T B"]:
     """Cubic B-splines with evenly spaced knots; a value per frame where frames are few."""
     pieces = max(1, round((frames - 1) / spacing))
     if pieces + 3 >= frames:
@@ -95,7 +95,8 @@ def move_state(state: SwingState, basis: SplineBasis, step: Float[np.ndarray, "S
     coefficients = state.coefficients.copy()
     coefficients[: basis.n_coefficients] += step[: basis.n_coefficients]
     turn = Rotation.from_rotvec(by_root[:, :3]).as_matrix()
-    return SwingState(
+    return replace(
+        state,
         coefficients=coefficients,
         phase=state.phase + basis.phase @ step[basis.phase_columns],
         rotation=turn @ state.rotation,

@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 from keyrecon.golf.fit.parameterisation import SplineBasis, move_state
 from keyrecon.golf.fit.regularisation import Rows
 from keyrecon.golf.prior.kinematics import PoseRates, place_body, pose_rates
-from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.motion_model import posture_at, turn_posture
 from keyrecon.golf.records import Body, MotionModel, Residuals, RootPose, SwingState
 from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 
@@ -87,6 +87,8 @@ def _linearise(problem: Problem, state: SwingState) -> LinearisedProblem:
     """Residuals are made anew at every state: which primitive a line of sight meets changes."""
     coefficients = state.coefficients[: problem.basis.n_coefficients]
     posture = posture_at(problem.model, state.phase, coefficients)
+    if state.deviation is not None:
+        posture = turn_posture(posture, state.deviation)
     pose = place_body(problem.body, posture, state)
     rates = pose_rates(problem.body, posture, state, pose)
     frames, unknowns = len(state.phase), rates.origins.shape[-1]
@@ -99,7 +101,7 @@ def _linearise(problem: Problem, state: SwingState) -> LinearisedProblem:
         rows = block.residuals(pose)
         robust = robust_weights(rows, block.robust)
         cost += block.weight * robust.cost
-        _add_rows(normal, slope, rows, chain_rule(rows, pose, rates), block.weight * robust.weights)
+        add_rows(normal, slope, rows, chain_rule(rows, pose, rates), block.weight * robust.weights)
     expected = problem.regulariser(state)
     matrix = expected.slopes.T @ expected.slopes
     gradient = expected.slopes.T @ expected.values
@@ -140,7 +142,7 @@ def robust_weights(rows: Residuals, robust: float) -> RobustWeights:
     return RobustWeights((1 / far**2)[rows.group], float((square / far).sum()))
 
 
-def _add_rows(
+def add_rows(
     normal: Float[np.ndarray, "T L L"],
     slope: Float[np.ndarray, "T L"],
     rows: Residuals,

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.golf.prior.motion_model import cross_matrix, posture_at, posture_by_frame
+from keyrecon.golf.prior.motion_model import (
+    cross_matrix,
+    posture_at,
+    posture_by_frame,
+    turn_posture,
+)
 from keyrecon.golf.prior.skeleton import CLUB, PARENTS, REST, SEGMENTS
 from keyrecon.golf.records import Body, Posture, RootPose, SwingFit, SwingState
 
@@ -39,6 +44,8 @@ def fitted_pose(fit: SwingFit) -> RootPose:
         posture = posture_at(fit.model, state.phase, state.coefficients)
     else:
         posture = posture_by_frame(fit.model, state.phase, state.frame_coefficients)
+    if state.deviation is not None:
+        posture = turn_posture(posture, state.deviation)
     return place_body(fit.body, posture, state)
 
 

@@ -7,7 +7,7 @@ derivative of the exponential map (its left Jacobian) turns rates of the vector 
 velocity.
 """
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -52,6 +52,12 @@ def posture_by_frame(
     """The same where every frame has other coefficients."""
     each = [posture_at(model, phase[t : t + 1], c) for t, c in enumerate(coefficients)]
     return Posture(*(np.concatenate([getattr(p, f.name) for p in each]) for f in fields(Posture)))
+
+
+def turn_posture(posture: Posture, turns: Float[np.ndarray, "T P 3"]) -> Posture:
+    """Postures whose segments turn further, by rotation vectors in their parents' axes."""
+    more = _rotations(turns)
+    return replace(posture, turns=more @ posture.turns, turn_rates=more @ posture.turn_rates)
 
 
 def _interpolate(
