@@ -48,10 +48,17 @@ LIMB_WIDTH, HAND_LENGTH = 0.032, 0.03
 """A forearm is thicker, and a hand reaches no farther from it, player heights."""
 NO_FRAME = (0, 0, 0, 0)
 """GrabCut reads its rectangle only where there is no mask."""
+OVERLAP = 0.04
+"""By how much the upper and the lower half overlap, player heights."""
+MIN_ROWS = 4
+"""Rows of a half, px."""
 GRABCUT_RIM = 2
 """Scenery around the reach that GrabCut is given, px."""
 ISLAND_GAP = 0.06
 """What is farther from the player than half of this does not belong to it, player heights."""
+ISLAND_SHARE, ISLAND_REACH = 0.1, 0.35
+"""What is as large as this share of the player, and no farther than this (player heights), belongs
+to it nevertheless: of clothes with the scene's colours only head and arms may be left."""
 SAFETY_RIM = 0.012
 """Width of the rim around the player that belongs to nobody, player heights."""
 SMALLEST_PLAYER, LARGEST_PLAYER = 0.01, 0.4
@@ -127,7 +134,14 @@ class FrameForeground:
         body = self.body().astype(np.uint8)
         _, labels = cv2.connectedComponents(cv2.dilate(body, self._disk(ISLAND_GAP)))
         counts = np.bincount(labels[body > 0], minlength=2)
-        return (body > 0) & (labels == counts.argmax())
+        largest = (body > 0) & (labels == counts.argmax())
+        large = np.flatnonzero(counts > ISLAND_SHARE * counts.max())
+        if len(large) < 2:
+            return largest
+        away = cv2.distanceTransform((~largest).astype(np.uint8), cv2.DIST_L2, 3)
+        near = ISLAND_REACH * self.height * self.shrink
+        parts = [k for k in large if away[(body > 0) & (labels == k)].min() < near]
+        return (body > 0) & np.isin(labels, parts)
 
     def _disk(self, size: float) -> UInt8[np.ndarray, "n n"]:
         """A disk of a diameter in player heights."""
@@ -150,28 +164,41 @@ class Foreground:
 
 
 @dataclass(frozen=True, eq=False)
+class _Half:
+    """Rows of a picture with colours of their own: black trousers on grass stand out, though there
+    are black trees higher up."""
+
+    rows: slice
+    models: tuple[np.ndarray, np.ndarray]
+    """GrabCut's colours of scene and player."""
+
+
+@dataclass(frozen=True, eq=False)
 class _Cutter:
     """Cuts the player out of single pictures by what was learnt in the clicked one."""
 
     pose: ClickedPose
     width: int
     """Of the pictures that are cut out, px."""
-    models: tuple[np.ndarray, np.ndarray]
-    """GrabCut's colours of scene and player."""
+    halves: tuple[_Half, ...]
+    """Above and below the root; they overlap."""
 
     def __call__(self, picture: UInt8[np.ndarray, "h w 3"]) -> Bool[np.ndarray, "h w"]:
         small = reduce_picture(picture, self.width)
         mask = np.zeros(small.shape[:2], np.uint8)
         x0, y0, x1, y1 = _reach(self.pose, self.width / self.pose.size[0])
         rim = GRABCUT_RIM
-        part = np.s_[max(0, y0 - rim) : y1 + rim, max(0, x0 - rim) : x1 + rim]
         trimap = np.full(mask.shape, cv2.GC_BGD, np.uint8)
         trimap[y0:y1, x0:x1] = cv2.GC_PR_FGD
-        trimap = np.ascontiguousarray(trimap[part])
-        scene, player = (m.copy() for m in self.models)
-        cropped = np.ascontiguousarray(small[part])
-        cv2.grabCut(cropped, trimap, NO_FRAME, scene, player, 1, cv2.GC_EVAL_FREEZE_MODEL)
-        mask[part] = trimap == cv2.GC_PR_FGD
+        for half in self.halves:
+            rows = slice(max(half.rows.start, y0 - rim, 0), min(half.rows.stop, y1 + rim))
+            part = rows, slice(max(0, x0 - rim), x1 + rim)
+            if rows.stop - rows.start < MIN_ROWS:
+                continue
+            labels, cropped = (np.ascontiguousarray(a[part]) for a in (trimap, small))
+            scene, player = (m.copy() for m in half.models)
+            cv2.grabCut(cropped, labels, NO_FRAME, scene, player, 1, cv2.GC_EVAL_FREEZE_MODEL)
+            mask[part] |= labels == cv2.GC_PR_FGD
         return cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_NEAREST) > 0
 
 
@@ -243,13 +270,25 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], pose: ClickedPose) -> _Cu
     shrink = picture.shape[1] / pose.size[0]
     width = max(16, round(pose.size[0] * min(shrink, CUT_HEIGHT / pose.height)))
     small = reduce_picture(picture, width)
-    scene, player = np.zeros((1, 65)), np.zeros((1, 65))
     trimap = _seed(small.shape[:2], pose)
-    cv2.setRNGSeed(0)  # its clusters begin at random; the same clicks give the same player
-    cv2.grabCut(small, trimap, NO_FRAME, scene, player, 5, cv2.GC_INIT_WITH_MASK)
-    cutter = _Cutter(pose, width, (scene, player))
+    shrink = width / pose.size[0]
+    root, overlap = (round(v * shrink) for v in (pose.place("root")[1], OVERLAP * pose.height))
+    middle = int(np.clip(root, MIN_ROWS, len(small) - MIN_ROWS))
+    both = slice(0, middle + overlap), slice(max(0, middle - overlap), len(small))
+    cutter = _Cutter(pose, width, tuple(_learn_half(small, trimap, rows) for rows in both))
     _check_player(cutter(small), pose)
     return cutter
+
+
+def _learn_half(
+    picture: UInt8[np.ndarray, "h w 3"], trimap: UInt8[np.ndarray, "h w"], rows: slice
+) -> _Half:
+    """Colours of the player and the scene in some rows."""
+    scene, player = np.zeros((1, 65)), np.zeros((1, 65))
+    cv2.setRNGSeed(0)  # its clusters begin at random; the same clicks give the same player
+    part, labels = picture[rows].copy(), trimap[rows].copy()
+    cv2.grabCut(part, labels, NO_FRAME, scene, player, 5, cv2.GC_INIT_WITH_MASK)
+    return _Half(rows, (scene, player))
 
 
 def _seed(shape: tuple[int, int], pose: ClickedPose) -> UInt8[np.ndarray, "h w"]:
