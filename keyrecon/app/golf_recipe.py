@@ -1,7 +1,8 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
+from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.observation import observe_swing
+from keyrecon.golf.observation import observe_swing, place_in_film
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations
@@ -37,6 +38,9 @@ def find_swing(
         "observe", observe_swing, video, film, pose, model, options=options.observation,
         progress=progress,
     )  # fmt: skip
+    check_direction(
+        observed.observations, place_in_film(pose, observed.film), model, "The clicks"
+    )
     shown = observed.film.open(video)
     tried: list[tuple[FittedSwing, Observations, list[SwingDoubt]]] = []
     for number, candidate in enumerate(observed.candidates[: options.candidates]):

@@ -146,7 +146,13 @@ def find_repeats(change: Float[np.ndarray, "F"]) -> Bool[np.ndarray, "F"]:
     before = np.array([w.max() for w in windows])
     after = np.array([change[t : t + NEXT + 1].max() for t in rank])
     around = np.minimum(before, after)
-    return (change < REPEATED * around) & (around > LEAST_CHANGE) & (rank > 0)
+    low = (change < REPEATED * around) & (around > LEAST_CHANGE) & (rank > 0)
+    # A pause is reached and left step by step, a repeated picture at once.
+    for run in np.split(rank, np.flatnonzero(np.diff(low)) + 1):
+        if low[run[0]]:
+            beside = change[max(run[0] - 1, 0)], change[min(run[-1] + 1, rank[-1])]
+            low[run] = change[run].max() < REPEATED * min(beside)
+    return low
 
 
 def _shot(whole: Float[np.ndarray, "F"], clicked: int) -> tuple[int, int]:

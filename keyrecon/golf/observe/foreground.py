@@ -276,7 +276,9 @@ def _learn_cutter(picture: UInt8[np.ndarray, "h w 3"], pose: ClickedPose) -> _Cu
     middle = int(np.clip(root, MIN_ROWS, len(small) - MIN_ROWS))
     both = slice(0, middle + overlap), slice(max(0, middle - overlap), len(small))
     cutter = _Cutter(pose, width, tuple(_learn_half(small, trimap, rows) for rows in both))
-    _check_player(cutter(small), pose)
+    # Half a picture is soon told apart from half a figure, of whatever scene: the whole is not.
+    whole = _Cutter(pose, width, (_learn_half(small, trimap, slice(0, len(small))),))
+    _check_player(whole(small), pose)
     return cutter
 
 
