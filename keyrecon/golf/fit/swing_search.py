@@ -114,9 +114,9 @@ def search_swing(
     """Swings that may be in a film, the likeliest first; none where it is too short for any."""
     placement = estimate_initial_pose(clicked, 0.0, camera, model, body)
     phases = _phases(model)
-    found: list[tuple[_Path, SwingHypothesis]] = []
+    found: list[tuple[SwingPath, SwingHypothesis]] = []
     for style in _styles(model):
-        drawn = _draw(model, body, style, phases, placement, camera)
+        drawn = draw_swing(model, body, style, phases, placement, camera)
         costs = frame_costs(evidence, drawn, camera)
         for path in best_paths(costs, model.keys, phases, evidence.fps, limits):
             club = drawn.club[_phase_rows(path.keys, phases, model.keys, len(costs))]
@@ -142,7 +142,7 @@ def _styles(model: MotionModel) -> list[Float[np.ndarray, "m"]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn:
+class DrawnSwing:
     """A style of the motion model at all phases."""
 
     capsules: Float[np.ndarray, "P Q 2 2"]
@@ -153,20 +153,21 @@ class _Drawn:
     """px"""
 
 
-def _draw(
+def draw_swing(
     model: MotionModel,
     body: Body,
     style: Float[np.ndarray, "m"],
     phases: Float[np.ndarray, "P"],
     placement: Placement,
     camera: Camera,
-) -> _Drawn:
+) -> DrawnSwing:
+    """A style of the motion model at some phases, as a camera sees it."""
     state = replace(repeat_pose(placement, phases), coefficients=style)
     pose = place_body(body, posture_at(model, phases, style), state)
     capsules = build_capsules(body)
     ends, scale = _project_axes(pose, capsules, camera)
     club = project(find_club(body, pose).reshape(-1, 3), camera)[0].reshape(-1, 2, 2)
-    return _Drawn(ends, capsules.radii * scale, club)
+    return DrawnSwing(ends, capsules.radii * scale, club)
 
 
 def _project_axes(
@@ -181,7 +182,7 @@ def _project_axes(
     return pixels, camera.focal / np.maximum(ends[..., 2], 0.1)
 
 
-def frame_costs(evidence: SwingEvidence, drawn: _Drawn, camera: Camera) -> Float[np.ndarray, "T P"]:
+def frame_costs(evidence: SwingEvidence, drawn: DrawnSwing, camera: Camera) -> Float[np.ndarray, "T P"]:
     """How badly each phase explains each frame."""
     silhouettes = _silhouette_costs(evidence, drawn)
     clubs = np.stack([_club_gains(s, drawn.club, evidence.height) for s in evidence.shafts])
@@ -190,7 +191,7 @@ def frame_costs(evidence: SwingEvidence, drawn: _Drawn, camera: Camera) -> Float
     return np.minimum(costs, least + WORST)
 
 
-def _silhouette_costs(evidence: SwingEvidence, drawn: _Drawn) -> Float[np.ndarray, "T P"]:
+def _silhouette_costs(evidence: SwingEvidence, drawn: DrawnSwing) -> Float[np.ndarray, "T P"]:
     """Weighted squared difference of masks and drawn silhouettes, per usual one of two phases."""
     factor = PLAYER_PIXELS / (evidence.height * evidence.shrink)
     h, w = evidence.players.shape[1:]
@@ -200,7 +201,7 @@ def _silhouette_costs(evidence: SwingEvidence, drawn: _Drawn) -> Float[np.ndarra
     masks = np.stack([_soften(cv2.resize(m.astype(np.float32), size, interpolation=cv2.INTER_AREA),
                               soft) for m in evidence.players])  # fmt: skip
     shapes = np.stack([
-        _soften(_silhouette(ends, radii, scale, size), soft)
+        _soften(silhouette(ends, radii, scale, size), soft)
         for ends, radii in zip(drawn.capsules, drawn.radii, strict=True)
     ])  # fmt: skip
     weight = shapes.std(axis=0)
@@ -228,7 +229,7 @@ def _soften(picture: np.ndarray, spread: float) -> Float[np.ndarray, "h w"]:
     return cv2.GaussianBlur(picture, (0, 0), spread)
 
 
-def _silhouette(
+def silhouette(
     ends: Float[np.ndarray, "Q 2 2"],
     radii: Float[np.ndarray, "Q 2"],
     scale: Float[np.ndarray, "2"],
@@ -273,7 +274,9 @@ def _club_gains(
 
 
 @dataclass(frozen=True, eq=False)
-class _Path:
+class SwingPath:
+    """A way through the table of costs."""
+
     keys: Float[np.ndarray, "4"]
     cost: float
 
@@ -284,7 +287,7 @@ def best_paths(
     phases: Float[np.ndarray, "P"],
     fps: float,
     limits: SearchLimits = SearchLimits(),
-) -> list[_Path]:
+) -> list[SwingPath]:
     """The likeliest swings through a table of costs, of different tops and hits, best first.
 
     Before the start the player is at address, after the finish at the finish; what a film ends
@@ -304,7 +307,7 @@ def best_paths(
             lengths[part, length] = _line_sums(costs, rows[part], rows[part + 1], length)
         return lengths[part, length]
 
-    found: list[_Path] = []
+    found: list[SwingPath] = []
     for down in downs:
         ups = _durations(limits.tempo[0] * down, limits.tempo[1] * down, frames)
         throughs = _durations(limits.follow[0] * down, limits.follow[1] * down, 10 * frames)
@@ -315,11 +318,11 @@ def best_paths(
         for top in _local_minima(total, max(1, down // 2)):
             hit = tops[top] + down
             keys = np.array([tops[top] - up_of[top], tops[top], hit, hit + through_of[top]], float)
-            found.append(_Path(keys, float(total[top])))
+            found.append(SwingPath(keys, float(total[top])))
     return [path for path, _ in _distinct([(p, None) for p in found], limits.most)]
 
 
-def _durations(shortest: float, longest: float, most: float) -> list[int]:
+def _durations(shortest: float, longest: float, most: float | int) -> list[int]:
     """Numbers of frames from a shortest to a longest duration."""
     low, high = max(1.0, shortest), min(longest, most)
     if high < low:

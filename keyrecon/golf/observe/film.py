@@ -40,7 +40,7 @@ LEAST_CHANGE = 4.0
 OFTEN_REPEATED = 0.08
 """Share of repeated frames from which on they are a conversion of the frame rate, and pictures are
 evenly spaced in the world; fewer are faults of a recording."""
-CUT = 45.0
+CUT = 25.0
 """Mean change of a whole picture at a cut, grey levels, and how much more than around it."""
 CUT_OUTSTANDS = 6.0
 MOST_FPS = 130.0
@@ -142,17 +142,18 @@ def _change(one: np.ndarray, other: np.ndarray) -> float:
 def find_repeats(change: Float[np.ndarray, "F"]) -> Bool[np.ndarray, "F"]:
     """Frames that show the picture of the one before, by how much each frame changes."""
     rank = np.arange(len(change))
-    windows = [change[max(0, t - NEXT) : t + 1] for t in rank]
-    before = np.array([w.max() for w in windows])
-    after = np.array([change[t : t + NEXT + 1].max() for t in rank])
+    # Before the first frame and after the last anything may have been.
+    known = np.concatenate([[np.inf], change[1:], [np.inf]])
+    before = np.array([known[max(0, t - NEXT) : t + 1].max() for t in rank])
+    after = np.array([known[t : t + NEXT + 1].max() for t in rank])
     around = np.minimum(before, after)
     low = (change < REPEATED * around) & (around > LEAST_CHANGE) & (rank > 0)
     # A pause is reached and left step by step, a repeated picture at once.
     for run in np.split(rank, np.flatnonzero(np.diff(low)) + 1):
         if low[run[0]]:
-            beside = change[max(run[0] - 1, 0)], change[min(run[-1] + 1, rank[-1])]
-            low[run] = change[run].max() < REPEATED * min(beside)
-    return low
+            beside = min(known[run[0] - 1], known[run[-1] + 1])
+            low[run] = beside > LEAST_CHANGE and change[run].max() < REPEATED * beside
+    return low & ~np.isinf(around)
 
 
 def _shot(whole: Float[np.ndarray, "F"], clicked: int) -> tuple[int, int]:
