@@ -38,9 +38,7 @@ def find_swing(
         "observe", observe_swing, video, film, pose, model, options=options.observation,
         progress=progress,
     )  # fmt: skip
-    check_direction(
-        observed.observations, place_in_film(pose, observed.film), model, "The clicks"
-    )
+    check_direction(observed.observations, place_in_film(pose, observed.film), model, "The clicks")
     shown = observed.film.open(video)
     tried: list[tuple[FittedSwing, Observations, list[SwingDoubt]]] = []
     for number, candidate in enumerate(observed.candidates[: options.candidates]):

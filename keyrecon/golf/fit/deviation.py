@@ -121,9 +121,7 @@ class _Problem:
         slopes = left_jacobian(state.deviation)
         for p in range(segments):
             rates[:, p, :, 3 * p : 3 * p + 3] = slopes[:, p]
-        return Posture(
-            turned.turns, turned.place, rates, np.zeros((frames, 3, 3 * segments))
-        )
+        return Posture(turned.turns, turned.place, rates, np.zeros((frames, 3, 3 * segments)))
 
     def linearise(self, knots: Float[np.ndarray, "B C"]) -> _Linearised:
         """Residuals at some knots; which primitive a line of sight meets changes."""
@@ -250,4 +248,3 @@ def _on_knots(
         both = spline[:, : count - lag] * spline[:, lag:]
         lags[lag, : count - lag] = (both.T @ flat).reshape(-1, channels, channels)
     return lags, spline.T @ slope
-

@@ -12,7 +12,9 @@ What a frame is compared by are differences that tell phases apart: pixels are w
 much the drawn phases differ there, so that legs and scenery say little and arms much.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -24,6 +26,10 @@ from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.golf.prior.kinematics import find_club, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.records import Body, Camera, Capsules, InitialJoints, MotionModel, RootPose
+
+Segment = Callable[[int, int], np.ndarray]
+"""(part of the swing, its length in frames) -> cost where it begins at each frame."""
+Of = TypeVar("Of")
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,7 @@ def search_swing(
     found: list[tuple[SwingPath, SwingHypothesis]] = []
     for style in _styles(model):
         drawn = draw_swing(model, body, style, phases, placement, camera)
-        costs = frame_costs(evidence, drawn, camera)
+        costs = frame_costs(evidence, drawn)
         for path in best_paths(costs, model.keys, phases, evidence.fps, limits):
             club = drawn.club[_phase_rows(path.keys, phases, model.keys, len(costs))]
             found.append((path, SwingHypothesis(path.keys, path.cost, placement, club)))
@@ -182,7 +188,9 @@ def _project_axes(
     return pixels, camera.focal / np.maximum(ends[..., 2], 0.1)
 
 
-def frame_costs(evidence: SwingEvidence, drawn: DrawnSwing, camera: Camera) -> Float[np.ndarray, "T P"]:
+def frame_costs(
+    evidence: SwingEvidence, drawn: DrawnSwing, camera: Camera
+) -> Float[np.ndarray, "T P"]:
     """How badly each phase explains each frame."""
     silhouettes = _silhouette_costs(evidence, drawn)
     clubs = np.stack([_club_gains(s, drawn.club, evidence.height) for s in evidence.shafts])
@@ -344,7 +352,10 @@ def _line_sums(
     return total
 
 
-def _best_before(address, segment, ups, tops):  # noqa: ANN001, ANN202
+def _best_before(
+    address: Float[np.ndarray, "n"], segment: Segment, ups: list[int], tops: Int[np.ndarray, "m"]
+) -> tuple[Float[np.ndarray, "m"], Int[np.ndarray, "m"]]:
+    """Least cost of all frames before each top, and how long the upswing is then."""
     total = np.full(len(tops), np.inf)
     chosen = np.zeros(len(tops), int)
     for up in ups:
@@ -357,7 +368,11 @@ def _best_before(address, segment, ups, tops):  # noqa: ANN001, ANN202
     return total, chosen
 
 
-def _best_after(finish, segment, throughs, hits):  # noqa: ANN001, ANN202
+def _best_after(
+    finish: Float[np.ndarray, "n"], segment: Segment, throughs: list[int],
+    hits: Int[np.ndarray, "m"],
+) -> tuple[Float[np.ndarray, "m"], Int[np.ndarray, "m"]]:  # fmt: skip
+    """Least cost of all frames from each hit on, and how long the follow-through is then."""
     total = np.full(len(hits), np.inf)
     chosen = np.zeros(len(hits), int)
     last = len(finish) - 1
@@ -389,9 +404,9 @@ def _phase_rows(
     return np.rint(np.interp(phase, phases, np.arange(len(phases)))).astype(int)
 
 
-def _distinct(found, most):  # noqa: ANN001, ANN202
+def _distinct(found: list[tuple[SwingPath, Of]], most: int) -> list[tuple[SwingPath, Of]]:
     """The best ones of which no two have about the same top and hit."""
-    kept: list = []
+    kept: list[tuple[SwingPath, Of]] = []
     for path, more in sorted(found, key=lambda f: f[0].cost):
         down = path.keys[2] - path.keys[1]
         if all(np.abs(path.keys[1:3] - p.keys[1:3]).max() > SAME * down for p, _ in kept):
