@@ -188,9 +188,7 @@ def _project_axes(
     return pixels, camera.focal / np.maximum(ends[..., 2], 0.1)
 
 
-def frame_costs(
-    evidence: SwingEvidence, drawn: DrawnSwing, camera: Camera
-) -> Float[np.ndarray, "T P"]:
+def frame_costs(evidence: SwingEvidence, drawn: DrawnSwing) -> Float[np.ndarray, "T P"]:
     """How badly each phase explains each frame."""
     silhouettes = _silhouette_costs(evidence, drawn)
     clubs = np.stack([_club_gains(s, drawn.club, evidence.height) for s in evidence.shafts])
