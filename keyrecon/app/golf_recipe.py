@@ -42,11 +42,11 @@ def find_swing(
     shown = observed.film.open(video)
     tried: list[tuple[FittedSwing, Observations, list[SwingDoubt]]] = []
     for number, candidate in enumerate(observed.candidates[: options.candidates]):
-        observations = candidate.of(observed.observations)
+        first = candidate.of(observed.observations)
         fitted, observations = fit_candidate(
-            observations, shown, model, options, keep, progress, suffix=f"_{number + 1}"
+            first, shown, model, options, keep, progress, suffix=f"_{number + 1}"
         )
-        doubts = find_doubts(fitted, observations)
+        doubts = find_doubts(fitted, first)
         tried.append((fitted, observations, doubts))
         if not doubts or options.method == "windows":
             break

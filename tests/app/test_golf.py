@@ -24,7 +24,7 @@ from keyrecon.metrics import read_truth
 from keyrecon.progress import silent
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 
-QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1)
+QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 
 
 @pytest.fixture(scope="module")
@@ -94,11 +94,11 @@ def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
 
 def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tmp_path):
     project = shutil.copytree(swing / "project", tmp_path / "p")
-    (result,) = (project / "cache").glob("result-*.npz")
+    (result,) = (project / "cache").glob("result_1-*.npz")
     result.unlink()
     (project / "motion.npz").unlink()
     before = {file: file.stat().st_mtime_ns for file in (project / "cache").iterdir()}
-    assert len(before) == 4  # camera, observe, fit, guided_1
+    assert len(before) == 6  # camera, film, observe, fit_1, guided_1_1, found
     fit(swing, project)
     assert result.is_file() and all(f.stat().st_mtime_ns == at for f, at in before.items())
     ours, theirs = (read_motion(f / "motion.npz") for f in (project, swing / "project"))
