@@ -20,6 +20,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate, estimate_body
 from keyrecon.annotate.assist.checks import Neighbours, find_neighbours
+from keyrecon.annotate.assist.flow_suggestion import nearest_marks, surer_by_flow
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, choose_sources, suggest_joints
 from keyrecon.annotate.assist.preview import Strip, cut_strip
 from keyrecon.errors import KeyreconError
@@ -125,11 +126,13 @@ class ProjectCache:
         sources = choose_sources(preparation, annotations, frame)
         if not len(sources.frames):
             return None
-        marks = _marks_of(annotations, frame)
-        key = _digest(sources.frames, sources.joints, marks)
+        marks, video = _marks_of(annotations, frame), preparation.video
+        near = nearest_marks(annotations, frame, video.fps)
+        key = _digest(sources.frames, sources.joints, marks, near.frames, near.joints)
         kept = self._suggestions.get(frame)
         if kept is None or kept[0] != key:
-            kept = key, suggest_joints(preparation, sources, frame, marks)
+            suggested = suggest_joints(preparation, sources, frame, marks)
+            kept = key, surer_by_flow(suggested, video, near, frame)
             self._suggestions[frame] = kept
         return kept[1]
 
