@@ -21,7 +21,7 @@ NET_MIDDLE, NET_POST, POST_BEYOND = 0.914, 1.07, 0.914
 TAPE_HEIGHT = 0.055
 """Height of the white band on top of the net: the rules have 5 to 6.35 cm."""
 SPACING = 0.1
-"""Metres between the points that stand for a line."""
+"""Metres between the points that stand for a line, as long as nobody says otherwise."""
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,18 @@ class CourtModel:
     """Metres."""
     empty: Float[np.ndarray, "E 2 3"]
     """Where a line would go on and does not: nothing is painted between these ends."""
+    spacing: float = SPACING
+    """Metres between the points that stand for a line."""
 
     @cached_property
     def points(self) -> Float[np.ndarray, "N 3"]:
         """Points all along the stripes, line after line."""
-        return np.concatenate([_along(a, b) for a, b in self.ends])
+        return np.concatenate([_along(a, b, self.spacing) for a, b in self.ends])
 
     @cached_property
     def line(self) -> Int[np.ndarray, "N"]:
         """Which stripe each point stands for."""
-        counts = [len(_along(a, b)) for a, b in self.ends]
+        counts = [len(_along(a, b, self.spacing)) for a, b in self.ends]
         return np.repeat(np.arange(len(counts)), counts)
 
     @cached_property
@@ -73,8 +75,10 @@ class CourtModel:
         return aside * self.width[self.line][:, None] / 2
 
 
-def _along(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 3"]:
-    count = max(2, round(float(np.linalg.norm(end - start)) / SPACING))
+def _along(
+    start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], spacing: float
+) -> Float[np.ndarray, "n 3"]:
+    count = max(2, round(float(np.linalg.norm(end - start)) / spacing))
     share = (np.arange(count) + 0.5) / count
     return start + share[:, None] * (end - start)
 

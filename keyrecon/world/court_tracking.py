@@ -22,8 +22,8 @@ SEARCHES = (6.0, 3.0)
 """px to both sides in which lines are looked for, first and second step."""
 AGAIN = 12.0
 """px, where the camera was lost."""
-SPACING = 14.0
-"""px between measured points: some 200 in a picture with a whole court."""
+SPACING, COARSE = 16.0, 0.2
+"""px, and metres, between measured points: some 200 in a picture with a whole court."""
 DRIFT = 2.0
 """px by which the camera's motion is off between two frames (Lucas-Kanade on pictures 480 wide)."""
 ZOOM_DRIFT = 0.004
@@ -73,6 +73,7 @@ def track_court(
     Frames in which the court was lost are held until it is found again, and followed back from
     there.
     """
+    court = replace(court, spacing=COARSE)
     cameras: list[Pinhole] = []
     found: list[bool] = []
     held: list[Grey] = []
@@ -138,6 +139,7 @@ def _going_on(before: Pinhole, last: Pinhole) -> Pinhole:
 
 def check_still(greys: Iterable[Grey], camera: Pinhole, court: CourtModel) -> TrackedViews:
     """The one camera of a clip that stands still, and the frames in which its lines are seen."""
+    court = replace(court, spacing=COARSE)
     found = [is_seen(evaluate(grey, camera, court, SPACING)) for grey in greys]
     return TrackedViews((camera,) * len(found), np.array(found))
 
@@ -163,7 +165,7 @@ def _correct(
     if max(_apart(guess, other, grey.shape) for other in guesses[1:]) > DRIFT:
         tried = [evaluate(grey, camera, court, 2 * SPACING) for camera in guesses]
         guess = max(tried, key=lambda fit: fit.evidence).camera
-    return fit_lines(grey, guess, court, searches, FIXED_CENTRE, spread, SPACING)
+    return fit_lines(grey, guess, court, searches, FIXED_CENTRE, spread, SPACING, False)
 
 
 def _apart(one: Pinhole, other: Pinhole, shape: tuple[int, ...]) -> float:

@@ -80,13 +80,15 @@ def fit_lines(
     free: Bool[np.ndarray, "7"] = ALL_FREE,
     spread: Float[np.ndarray, "7"] = LOOSE,
     spacing: float = SPACING,
+    measured_anew: bool = True,
 ) -> LineFit:
     """The camera near a first one that lays the model's lines on the picture's.
 
     `spread` says how far the camera may be from the first one, `spacing` how many px lie between
-    the points that are measured.
+    the points that are measured. Unless lines are measured anew at the end, the residuals are those
+    foretold by the last step.
     """
-    first = camera
+    first, fit = camera, None
     step = np.zeros(7)
     for search in searches:
         samples = choose_samples(camera, court, grey.shape[:2], spacing)
@@ -96,10 +98,15 @@ def fit_lines(
         chosen = np.flatnonzero(found.seen)
         rows = image_motion(camera, samples.points[chosen], samples.normals[chosen])[:, free]
         change = solve_robustly(rows, found.offset[chosen], spread[free], step[free])
+        residual = np.full(len(found.seen), np.nan)
+        residual[chosen] = found.offset[chosen] - rows @ change
         step = step.copy()
         step[free] += change
         camera = first.moved(step)
-    return evaluate(grey, camera, court, spacing)
+        fit = LineFit(camera, samples, residual)
+    if fit is None or measured_anew:
+        return evaluate(grey, camera, court, spacing)
+    return fit
 
 
 def evaluate(
