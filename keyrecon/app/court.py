@@ -12,11 +12,11 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
-from keyrecon.report.court_drawing import draw_court, write_court_picture
+from keyrecon.report.court_drawing import draw_court, draw_way, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.court import tennis_court
-from keyrecon.world.placement import place_motion, run_length
+from keyrecon.world.placement import place_motion, run_length, run_speed
 from keyrecon.world.records import CourtCamera, CourtClick, WorldMotion
 
 MAX_MISFIT = 0.2
@@ -88,7 +88,14 @@ def write_placed_motion(workspace: Workspace, motion: Motion) -> list[str]:
         write_motion(workspace.motion_file, motion)
         return [f"No way on the court: {doubt}"]
     write_motion(workspace.motion_file, motion, (world, camera))
-    return describe_way(world, motion)
+    length, speed = run_length(world, motion)
+    picture = workspace.folder / "way.jpg"
+    title = f"{length:.1f} m run, top speed {speed:.1f} m/s"
+    write_court_picture(picture, draw_way(world.root, run_speed(world, motion), title))
+    height = f" The player is {world.height_ratio:.2f} m tall by the court."
+    return [
+        f"On the court: {title}; {picture} shows the way." + (height if motion.units != "m" else "")
+    ]
 
 
 def _doubt(world: WorldMotion | None, motion: Motion, camera: CourtCamera) -> str:
@@ -108,16 +115,6 @@ def _doubt(world: WorldMotion | None, motion: Motion, camera: CourtCamera) -> st
             "and at the height."
         )
     return ""
-
-
-def describe_way(world: WorldMotion, motion: Motion) -> list[str]:
-    """How far and how fast the player went."""
-    length, speed = run_length(world, motion)
-    height = f" The player is {world.height_ratio:.2f} m tall by the court."
-    return [
-        f"On the court: {length:.1f} m run, top speed {speed:.1f} m/s."
-        + (height if motion.units != "m" else "")
-    ]
 
 
 def export_calibration(workspace: Workspace, file: Path) -> str:

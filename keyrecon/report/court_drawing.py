@@ -4,14 +4,17 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from keyrecon.io.durable import write_durably
-from keyrecon.world.court import CourtModel, tennis_court
+from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, CourtModel, tennis_court
 from keyrecon.world.records import CourtCamera
 
 GROUND, NET = (255, 40, 120), (0, 220, 255)
 """Colours of the lines on the ground and of the net's tape: neither is found on courts."""
+SURFACE, SURROUND = (52, 84, 138), (64, 106, 88)
+PER_METRE, BESIDE = 28, 4.5
+"""px per metre of the court from above, and metres shown beside it."""
 SUBPIXEL = 4
 QUALITY = 92
 
@@ -39,6 +42,43 @@ def draw_court(
         color = NET if court.ends[number, :, 2].any() else GROUND
         cv2.polylines(drawn, [way[:, None]], False, color, thick, cv2.LINE_AA, SUBPIXEL)
     return drawn
+
+
+def draw_way(
+    root: Float[np.ndarray, "T 3"], speed: Float[np.ndarray, "T"], title: str
+) -> UInt8[np.ndarray, "h w 3"]:
+    """The court from above, to scale, with the way of the root coloured by its speed.
+
+    The near half is below, as the camera sees it; frames without a place are left out.
+    """
+    court = tennis_court()
+    size = 2 * (np.array([HALF_DOUBLES, HALF_LENGTH]) + BESIDE)
+    picture = np.full((*np.ceil(size[::-1] * PER_METRE).astype(int), 3), SURROUND, np.uint8)
+
+    def pixel(place: Float[np.ndarray, "n 2"]) -> np.ndarray:
+        way = (place * [1, -1] + size / 2) * PER_METRE
+        return np.rint(way * 2**SUBPIXEL).astype(np.int32)
+
+    half = np.array([HALF_DOUBLES, HALF_LENGTH])
+    corners = pixel(np.array([-half, half])) >> SUBPIXEL
+    cv2.rectangle(picture, corners[0].tolist(), corners[1].tolist(), SURFACE, -1)
+    for ends in court.ends:
+        color = NET if ends[:, 2].any() else (245, 245, 245)
+        a, b = pixel(ends[:, :2]).tolist()
+        cv2.line(picture, a, b, color, 2, cv2.LINE_AA, SUBPIXEL)
+    top = max(float(np.nanmax(speed)), 1e-6)
+    share = np.nan_to_num(255 * speed / top).astype(np.uint8)
+    colors = cv2.applyColorMap(share[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1]
+    shown = np.isfinite(root).all(axis=1)
+    places = pixel(np.nan_to_num(root[:, :2]))
+    for t in np.flatnonzero(shown[1:] & shown[:-1]):
+        a, b, color = places[t].tolist(), places[t + 1].tolist(), colors[t].tolist()
+        cv2.line(picture, a, b, color, 3, cv2.LINE_AA, SUBPIXEL)
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    cv2.putText(picture, title, (16, 34), font, 0.75, (255, 255, 255), 2, cv2.LINE_AA)
+    words = f"from dark (0) to yellow ({top:.1f} m/s)"
+    cv2.putText(picture, words, (16, 62), font, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
+    return picture
 
 
 def write_court_picture(path: Path, picture: UInt8[np.ndarray, "h w 3"]) -> None:

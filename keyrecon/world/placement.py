@@ -43,8 +43,10 @@ ACCELERATION = 8.0
 SIZE = 0.12
 """Share by which the distance told by the player's size is off; it errs alike for long. Tried: .05
 gave 11.9 cm for 12.2, .4 12.3."""
-STEADY = 0.15
-"""Seconds over which the way is averaged before its length is taken."""
+STEADY = 0.25
+"""Seconds over which the way is averaged before its length is taken. On seven rendered sequences
+the length came out .86 to 1.22 times the true one, with .15 s .85 to 1.28, with .6 s .93 to 1.13 of
+a way that is half as long."""
 ROUNDS = 3
 """Least squares solved, with residuals of feet weighed anew after each."""
 
@@ -312,10 +314,10 @@ def _stance_rows(
     return made
 
 
-def run_length(world: WorldMotion, motion: Motion) -> tuple[float, float]:
-    """Metres that the root went over the ground, and its top speed, metres per second.
+def run_speed(world: WorldMotion, motion: Motion) -> Float[np.ndarray, "T"]:
+    """Speed of the root over the ground, metres per second; NaN where it is not known.
 
-    Of the way without what is faster than `STEADY` seconds: swaying is not running.
+    Of the way averaged over `STEADY` seconds: swaying is not running.
     """
     known = np.isfinite(world.root).all(axis=1)
     spread = STEADY * motion.fps
@@ -324,8 +326,18 @@ def run_length(world: WorldMotion, motion: Motion) -> tuple[float, float]:
     for axis in range(2):
         filled = np.where(known, world.root[:, axis], 0.0)
         way[:, axis] = gaussian_filter1d(filled, spread) / share
-    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)[known[1:] & known[:-1]]
-    seconds = np.diff(motion.time)[known[1:] & known[:-1]]
-    if not len(steps):
+    velocity = np.gradient(way, motion.time, axis=0)
+    return np.where(known, np.linalg.norm(velocity, axis=1), np.nan)
+
+
+def run_length(world: WorldMotion, motion: Motion) -> tuple[float, float]:
+    """Metres that the root went over the ground, and its top speed, metres per second.
+
+    The top speed is that which 1 % of the frames exceed.
+    """
+    speed = run_speed(world, motion)
+    known = np.isfinite(speed)
+    if not known.any():
         return 0.0, 0.0
-    return float(steps.sum()), float(np.percentile(steps / seconds, 99))
+    length = float((speed * np.gradient(motion.time))[known].sum())
+    return length, float(np.percentile(speed[known], 99))
