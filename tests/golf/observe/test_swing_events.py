@@ -61,3 +61,8 @@ def test_normalised_time_rises_through_the_key_postures_and_rests_outside():
     np.testing.assert_allclose(phase[TRUE], times, atol=1e-9)
     assert (np.diff(phase) >= 0).all()
     assert phase[0] == 0 and phase[-1] == 1
+
+
+def test_key_postures_out_of_order_are_put_around_the_top():
+    times = interpolate_times(np.array([52.0, 50.0, 50.0, 49.0]), np.array([0, 0.4, 0.7, 1.0]), 90)
+    assert (np.diff(times) >= 0).all() and times[0] == 0 and times[-1] == 1
