@@ -20,24 +20,27 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.golf.plausibility import SwingDoubt
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations, RecordedSwing
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
-from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Keep, call_stage
 from keyrecon.progress import Progress, silent
+from keyrecon.report.golf_measures import measure_swing, record_swing
 from keyrecon.report.golf_page import write_golf_report
 from keyrecon.report.golf_pictures import write_golf_overlay
+from keyrecon.report.golf_table import write_golf_table
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 CLICKS_FILE = "golf_clicks.json"
-OVERLAY_FILE = "overlay.mp4"
+OVERLAY_FILE, TABLE_FILE = "overlay.mp4", "golf.csv"
 SHORTEST_SWING = 0.7
 """Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take
 0.93 (21 + 7 frames at 30 a second: 0.7 + 0.23; Novosel & Garrity, Tour Tempo, 2004)."""
@@ -83,10 +86,10 @@ def fit_file(
     spent = time.perf_counter() - began
     return "\n".join(
         [
-            describe_tempo(fit.fitted, video.fps),
+            describe_tempo(record_swing(fit.fitted, fit.observations)),
             *(f"Note: {note}." for note in fit.notes),
             *describe_doubts(fit.doubts),
-            f"{folder}/motion.npz, overlay.mp4, report.html: {len(video)} frames, "
+            f"{folder}/motion.npz, golf.csv, overlay.mp4, report.html: {len(video)} frames, "
             f"{spent:.0f} s ({spent / len(video):.2f} s per frame).",
         ]
     )
@@ -174,28 +177,40 @@ def _keep_clicks(kept: Path, clicks_file: Path) -> None:
 def write_results(
     workspace: Workspace, video: Video, fit: GolfFit, model: MotionModel, progress: Progress
 ) -> None:
-    """Overlay and report, and last the motion, whose presence tells that all are written."""
+    """Overlay, report and table, and last the motion, whose presence tells that all are written."""
     folder = workspace.folder
+    reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
+    swing = record_swing(fit.fitted, fit.observations, reasons)
     write_golf_overlay(folder / OVERLAY_FILE, video, fit.fitted, fit.observations.camera, progress)
-    write_golf_report(workspace.report_file, fit.fitted, fit.observations, model, video)
-    write_motion(workspace.motion_file, fit.fitted.motion)
+    write_golf_report(
+        workspace.report_file, fit.fitted, fit.observations, model, video, reasons, progress
+    )
+    write_golf_table(folder / TABLE_FILE, swing)
+    write_swing(workspace.motion_file, swing)
 
 
 def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:
     """Whether the results of this very fit lie in the project already."""
-    files = (workspace.motion_file, workspace.report_file, workspace.folder / OVERLAY_FILE)
+    own = (workspace.folder / name for name in (OVERLAY_FILE, TABLE_FILE))
+    files = (workspace.motion_file, workspace.report_file, *own)
     return all(file.is_file() for file in files) and np.array_equal(
         read_motion(workspace.motion_file).points3d, fitted.motion.points3d
     )
 
 
-def describe_tempo(fitted: FittedSwing, fps: float) -> str:
-    """Key postures and tempo in words."""
-    start, top, hit, finish = fitted.keys
-    up, down = (top - start) / fps, (hit - top) / fps
+def describe_tempo(swing: RecordedSwing) -> str:
+    """Key postures and tempo in words; a fit without a downswing has no tempo."""
+    start, top, hit, finish = swing.keys
+    measures = measure_swing(swing)
+    up, down, tempo = (measures.key(name) for name in ("upswing", "downswing", "tempo"))
+    told = (
+        f"tempo {tempo.value:.1f} : 1 (give or take {tempo.doubt:.1f})"
+        if np.isfinite(tempo.value)
+        else "no tempo"
+    )
     return (
         f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}; "
-        f"{up:.2f} s up, {down:.2f} s down, tempo {up / down:.1f} : 1."
+        f"{up.value:.2f} s up, {down.value:.2f} s down, {told}."
     )
 
 

@@ -11,6 +11,7 @@ from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from keyrecon.app import golf as golf_job
+from keyrecon.app import golf_comparing
 from keyrecon.app import golf_training as mocap_swings
 from keyrecon.app.console import show
 from keyrecon.golf.fit.fitting import FitOptions
@@ -58,8 +59,9 @@ def fit(
 ) -> None:
     """Fit the swing prior to a video filmed by one camera that stands still.
 
-    Makes the project folder OUT and writes motion.npz, overlay.mp4 and report.html into it. An
-    interrupted fit goes on where it stopped, and `keyrecon export OUT` writes other formats.
+    Makes the project folder OUT and writes report.html, golf.csv, overlay.mp4 and motion.npz into
+    it. An interrupted fit goes on where it stopped, `keyrecon export OUT` writes other formats,
+    `keyrecon golf compare A B` sets two swings side by side.
 
     CLICKS is a small JSON file: six joints of the player in one frame, best at the address.
 
@@ -84,3 +86,17 @@ def fit(
     """
     options = GolfOptions(method, fit=FitOptions(components))
     print(golf_job.fit_file(video, clicks, out, prior, slowmo, force, options, show))
+
+
+@golf.command
+def compare(
+    first: Positional[Path], second: Positional[Path], out: Path = Path("compare.html")
+) -> None:
+    """Two fitted swings side by side, aligned at address, top, hit and finish.
+
+    Args:
+        first: Project folder of a golf fit.
+        second: Another one.
+        out: HTML file to write.
+    """
+    print(golf_comparing.compare(first, second, out, show))

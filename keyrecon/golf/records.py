@@ -9,7 +9,7 @@ left-handed player is mirrored on the way in and out.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from keyrecon.records import Motion
 
@@ -241,3 +241,23 @@ class FittedSwing:
     """The same in the picture, px."""
     keys: Float[np.ndarray, "4"]
     """Frames in which the fitted motion passes the key postures."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSwing:
+    """A fitted swing as motion.npz keeps it: all that measures, reports and comparisons need."""
+
+    motion: Motion
+    club: Float[np.ndarray, "T 2 3"]
+    """Grip and head in camera axes, metres."""
+    club2d: Float[np.ndarray, "T 2 2"]
+    """The same in the picture, px."""
+    club_seen: Bool[np.ndarray, "T"]
+    """Where the club was detected; elsewhere it is the model's."""
+    keys: Float[np.ndarray, "4"]
+    """Frames of the key postures."""
+    vertical: Float[np.ndarray, "3"]
+    """Unit vector up, camera axes."""
+    left_handed: bool
+    doubts: tuple[str, ...] = ()
+    """What speaks against the fit; its numbers are no measurements where anything does."""

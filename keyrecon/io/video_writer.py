@@ -17,12 +17,17 @@ THREADS = 4
 
 
 def write_video(
-    path: Path, frames: Iterable[UInt8[np.ndarray, "h w 3"]], fps: float, crf: int = 23
+    path: Path,
+    frames: Iterable[UInt8[np.ndarray, "h w 3"]],
+    fps: float,
+    crf: int = 23,
+    seek_every: int | None = None,
 ) -> int:
     """Encode RGB pictures of one size as they come (8 bit 4:2:0); returns how many there were.
 
     `crf` is x264's constant quality, 18 very good to 28 coarse. An odd last row or column is left
-    out, because 4:2:0 needs even sizes. The file appears when it is whole. Raises KeyreconError
+    out, because 4:2:0 needs even sizes. `seek_every` so many frames there is one that players can
+    jump to at once; by default one in 250. The file appears when it is whole. Raises KeyreconError
     when there are no frames, or where the file cannot be written.
     """
     import av
@@ -38,6 +43,8 @@ def write_video(
                 # x264's macroblock tree depends on where its memory lies: other bits in each run
                 parameters = "mbtree=0"
                 stream.options = {"crf": str(crf), "preset": "veryfast", "x264-params": parameters}
+                if seek_every:
+                    stream.options |= {"g": str(seek_every), "bf": "0"}
                 stream.thread_type = "AUTO"
                 stream.codec_context.thread_count = THREADS
             frame = av.VideoFrame.from_ndarray(

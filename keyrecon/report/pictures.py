@@ -123,9 +123,14 @@ def cut_pictures(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         write_video(path, crops(), motion.fps, CLIP_QUALITY)
-        clip = _data_uri("video/mp4", path.read_bytes())
+        clip = video_uri(path.read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
     return Pictures(shown[0], shown[1], marked, clip)
+
+
+def video_uri(content: bytes) -> str:
+    """An mp4 file as a data URI."""
+    return _data_uri("video/mp4", content)
 
 
 def png_uri(picture: UInt8[np.ndarray, "h w"]) -> str:

@@ -10,6 +10,7 @@ import pytest
 from keyrecon.app import golf as app
 from keyrecon.app.exporting import export
 from keyrecon.app.golf import fit_file
+from keyrecon.app.golf_comparing import compare
 from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.fit.fitting import FitOptions
@@ -17,6 +18,7 @@ from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.clicks import write_clicks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.swing_file import read_swing
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
@@ -84,12 +86,45 @@ def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
     folder = swing / "project"
     names = {file.name for file in folder.iterdir()}
     assert names >= {
-        "project.toml", "golf_clicks.json", "cache", "motion.npz", "overlay.mp4", "report.html",
+        "project.toml", "golf_clicks.json", "cache", "motion.npz", "golf.csv", "overlay.mp4",
+        "report.html",
     }  # fmt: skip
     workspace = Workspace(folder)
     assert workspace.options(GolfOptions(), GolfOptions()) == QUICK
     export(workspace, [folder / "swing.csv"], silent)
     assert len((folder / "swing.csv").read_text().splitlines()) > len(workspace.video())
+
+
+def test_motion_npz_tells_club_and_key_postures(swing, decoded_at_first):
+    kept = read_swing(swing / "project" / "motion.npz")
+    assert np.abs(kept.keys - read_truth(swing / "truth.npz")["keys"]).max() < 8
+    length = np.linalg.norm(kept.club[:, 1] - kept.club[:, 0], axis=1)
+    np.testing.assert_allclose(length, length[0], rtol=1e-6)
+    assert not kept.left_handed
+
+
+def test_two_fits_stand_side_by_side_on_a_page(swing, decoded_at_first, tmp_path, chromium):
+    """The page shows both swings in the same posture, and its script has nothing to complain of."""
+    project = swing / "project"
+    page, complaints = chromium.new_page(), []
+    page.on("pageerror", lambda fault: complaints.append(str(fault)))
+    compare(project, project, tmp_path / "two.html", silent)
+    for file, count in ((tmp_path / "two.html", 2), (project / "report.html", 1)):
+        page.goto(file.as_uri())
+        page.wait_for_function("document.querySelector('[data-now]').textContent")
+        page.click("[data-key='2']")
+        shown = page.eval_on_selector_all("[data-now]", "all => all.map(e => e.textContent)")
+        assert len(shown) == count
+        assert len(set(shown)) == 1
+        assert shown[0].endswith("hit")
+    page.close()
+    assert complaints == []
+
+
+def test_a_page_never_takes_the_place_of_a_report(swing, decoded_at_first):
+    project = swing / "project"
+    with pytest.raises(KeyreconError, match="belongs to the project"):
+        compare(project, project, project / "report.html", silent)
 
 
 def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tmp_path):

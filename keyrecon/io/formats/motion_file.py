@@ -1,6 +1,7 @@
 """motion.npz: everything that is known of a motion, as plain arrays without pickles."""
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,15 @@ OPTIONAL = {"expected_error": "TJ"}
 
 
 def write_motion(
-    path: Path, motion: Motion, world: tuple[WorldMotion, CourtCamera] | None = None
+    path: Path,
+    motion: Motion,
+    world: tuple[WorldMotion, CourtCamera] | None = None,
+    more: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write motion.npz; axes and units as in `records.Motion`, names as listed in the README.
 
-    `world` is the motion on the court and the camera that put it there, where they are known.
+    `world` is the motion on the court and the camera that put it there, where they are known;
+    `more` are further arrays for those who know of them; readers of motions leave them aside.
     """
     skeleton = motion.skeleton
     buffer = io.BytesIO()
@@ -54,6 +59,7 @@ def write_motion(
         units=np.array(motion.units),
         keyrecon_version=np.array(__version__),
         **({} if world is None else _on_court(*world)),
+        **(dict[str, Any](more or {})),
     )
     write_durably(path, buffer.getvalue())
 

@@ -1,0 +1,205 @@
+"""What is measured of a body that turns, bends and moves by known amounts, and how surely."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from golf_truth import observe
+from scipy.spatial.transform import Rotation
+
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.fit.residuals import build_capsules
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, FittedSwing, RootPose, SwingState
+from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.formats.swing_file import read_swing, write_swing
+from keyrecon.records import Motion
+from keyrecon.report.golf_charts import align_frames
+from keyrecon.report.golf_measures import KEY_ERRORS, measure_swing, record_swing
+from keyrecon.report.golf_table import write_golf_table
+
+FRAMES = 31
+
+
+def turning(shoulders, hips, aside=0.0):
+    """A player whose lines of shoulders and hips turn about the vertical; a camera `aside`."""
+    points = np.zeros((FRAMES, 14, 3))
+    for part, angles, y in (("shoulder", shoulders, -0.5), ("hip", hips, 0.0)):
+        across = 0.2 * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+        middle = np.array([0.0, y, 4.0])
+        points[:, LSP14.index(f"left_{part}")] = middle + across
+        points[:, LSP14.index(f"right_{part}")] = middle - across
+    for side, sign in (("left", 1), ("right", -1)):
+        points[:, LSP14.index(f"{side}_ankle")] = [0.2 * sign, 0.9, 4.0]
+    points[:, LSP14.index("neck")] = [0.0, -0.5, 4.0]
+    points[:, LSP14.index("head_top")] = [0.0, -0.8, 4.0]
+    points = points @ Rotation.from_euler("y", aside, degrees=True).as_matrix().T
+    body = size_body(1.8)
+    upright = np.tile(np.diag([1.0, -1, -1]), (FRAMES, 1, 1))
+    return FittedSwing(
+        motion=motion_of(points),
+        state=SwingState(np.zeros(4), np.zeros(FRAMES), upright, np.zeros((FRAMES, 3))),
+        body=body,
+        pose=RootPose(np.zeros((FRAMES, 16, 3)), np.tile(np.eye(3), (FRAMES, 16, 1, 1))),
+        capsules=build_capsules(body),
+        club=np.zeros((FRAMES, 2, 3)),
+        club2d=np.zeros((FRAMES, 2, 2)),
+        keys=np.array([0.0, 18.0, 24.0, 30.0]),
+    )
+
+
+def motion_of(points, fps=30.0):
+    flat = points[..., :2]
+    return Motion(
+        LSP14, points, flat, flat, np.ones((FRAMES, 14)), np.ones((FRAMES, 14), int),
+        np.ones(FRAMES), fps, np.arange(FRAMES) / fps, "m", np.array([0]),
+    )  # fmt: skip
+
+
+def seen(left_handed=False):
+    camera = Camera(800.0, np.array([320.0, 240.0]))
+    one = observe(np.ones((FRAMES, 14, 3)), np.ones((FRAMES, 2, 3)), camera, 0.0)
+    club = one.club.copy()
+    club[::3] = np.nan
+    return replace(one, club=club, left_handed=left_handed)
+
+
+def measured(fitted, left_handed=False):
+    return measure_swing(record_swing(fitted, seen(left_handed)))
+
+
+def still():
+    return turning(np.zeros(FRAMES), np.zeros(FRAMES))
+
+
+def moved(fitted, joints, by):
+    """The same body with some joints moved, from frame 1 on."""
+    points = fitted.motion.points3d.copy()
+    points[1:, [LSP14.index(joint) for joint in joints]] += by
+    return replace(fitted, motion=motion_of(points))
+
+
+def test_tempo_is_upswing_to_downswing():
+    measures = measured(still())
+    assert abs(measures.key("tempo").value - 3.0) < 1e-9
+    assert abs(measures.key("downswing").value - 0.2) < 1e-9
+
+
+def test_the_doubt_of_the_tempo_is_what_key_postures_may_be_off():
+    """Drawn a thousand times within their errors, tempos spread by the doubt."""
+    fitted = replace(still(), keys=np.array([0.0, 22.0, 29.0, 30.0]))
+    tempo = measured(fitted).key("tempo")
+    rng = np.random.default_rng(0)
+    frame = 1 / 30
+    off = rng.normal(0, KEY_ERRORS[:3], (1000, 3)) + rng.uniform(-0.5, 0.5, (1000, 3)) * frame
+    start, top, hit = (fitted.keys[:3] * frame + off).T
+    low, high = np.percentile((top - start) / (hit - top), [15.9, 84.1])
+    assert abs((high - low) / 2 / tempo.doubt - 1) < 0.15
+
+
+def test_a_frame_at_the_hit_is_four_tenths_of_tempo_at_thirty_frames_a_second():
+    tempos = [
+        measured(replace(still(), keys=np.array([0.0, 22.0, hit, 30.0]))).key("tempo").value
+        for hit in (29.0, 30.0)
+    ]
+    assert 0.35 < tempos[0] - tempos[1] < 0.45
+
+
+def test_a_swing_without_a_downswing_has_no_tempo():
+    tempo = measured(replace(still(), keys=np.array([0.0, 18.0, 18.0, 30.0]))).key("tempo")
+    assert np.isnan(tempo.value)
+    assert np.isnan(tempo.doubt)
+
+
+def test_what_changes_fast_at_a_key_posture_is_less_sure_there():
+    ramp = np.radians(np.interp(np.arange(FRAMES), [0, 18, 30], [0, 0, 200]))
+    measures = measured(turning(ramp, ramp))
+    hit, resting = (m.key("shoulder_turn", "Hit") for m in (measures, measured(still())))
+    apart = 200 / 0.4 * np.hypot(KEY_ERRORS[2], 1 / 30 / np.sqrt(12))  # degrees a second, seconds
+    assert abs(hit.doubt - np.hypot(resting.doubt, apart)) < 0.1 * hit.doubt
+
+
+def test_shoulders_that_turn_farther_than_hips_make_the_x_factor():
+    ramp = np.linspace(0, 1, FRAMES)
+    measures = measured(turning(np.radians(90) * ramp, np.radians(40) * ramp))
+    np.testing.assert_allclose(np.abs(measures.curve("shoulder_turn").values), 90 * ramp, atol=1e-6)
+    np.testing.assert_allclose(np.abs(measures.curve("x_factor").values), 50 * ramp, atol=1e-6)
+
+
+def test_a_left_hander_turns_away_from_the_target_too():
+    ramp = np.radians(90) * np.linspace(0, 1, FRAMES)
+    right = measured(turning(ramp, ramp))
+    left = measured(turning(-ramp, -ramp), left_handed=True)
+    turn = [m.curve("shoulder_turn").values for m in (left, right)]
+    np.testing.assert_allclose(*turn, atol=1e-6)
+
+
+def test_turns_do_not_depend_on_where_the_camera_stands():
+    angles = np.linspace(0, 1.5, FRAMES), np.linspace(0, 0.7, FRAMES)
+    before, beside = (measured(turning(*angles, aside)) for aside in (0, 70))
+    for one, other in zip(beside.curves, before.curves, strict=True):
+        np.testing.assert_allclose(one.values, other.values, atol=1e-6)
+
+
+def test_a_neck_towards_the_ball_bends_the_spine_ahead():
+    """This player faces the camera, so the ball lies towards it; the trunk is 0.5 long."""
+    fitted = moved(still(), ["neck"], [0.0, 0.0, -0.5])
+    spine = measured(fitted)
+    np.testing.assert_allclose(spine.curve("spine_ahead").values[1:], 45, atol=1e-6)
+    np.testing.assert_allclose(spine.curve("spine_aside").values, 0, atol=1e-6)
+
+
+def test_a_right_hander_who_faces_the_camera_sways_to_the_right_of_the_picture():
+    """Towards the target, which lies on the player's left; a left-hander's lies on the right."""
+    fitted = moved(still(), ["left_hip", "right_hip"], [0.1, -0.02, 0.0])
+    for left_handed, sign in ((False, 1), (True, -1)):
+        measures = measured(fitted, left_handed)
+        np.testing.assert_allclose(measures.curve("hip_sway").values[1:], sign * 10, atol=1e-6)
+        np.testing.assert_allclose(measures.curve("hip_lift").values[1:], 2, atol=1e-6)
+        assert measures.key("head_sway", "Top").value == 0
+
+
+def test_frames_without_a_club_lower_the_share_found():
+    assert abs(measured(still()).club_found - 20 / 31) < 1e-9
+
+
+def test_a_swing_survives_its_file(tmp_path):
+    swing = record_swing(still(), seen(left_handed=True), ("the top lies at the film's end",))
+    write_swing(tmp_path / "motion.npz", swing)
+    again = read_swing(tmp_path / "motion.npz")
+    assert again.left_handed
+    assert again.doubts == swing.doubts
+    for name in ("club", "club2d", "club_seen", "keys", "vertical"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(swing, name))
+    assert read_motion(tmp_path / "motion.npz").fps == 30.0
+
+
+def test_a_motion_that_is_no_swing_is_refused(tmp_path):
+    write_motion(tmp_path / "motion.npz", still().motion)
+    with pytest.raises(KeyreconError, match="is not the motion of a golf fit"):
+        read_swing(tmp_path / "motion.npz")
+
+
+def test_the_table_tells_every_number_with_its_doubt(tmp_path):
+    swing = record_swing(still(), seen(), ("the club was not seen",))
+    write_golf_table(tmp_path / "golf.csv", swing)
+    lines = (tmp_path / "golf.csv").read_text().splitlines()
+    assert "# DOUBTFUL, these are no measurements: the club was not seen" in lines
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    tempo = next(row for row in rows if row["measure"] == "tempo")
+    assert (tempo["value"], tempo["frame"]) == ("3.000", "")
+    assert float(tempo["doubt"]) > 0
+    frames = [row for row in rows if row["measure"] == "hip_turn" and not row["posture"]]
+    assert len(frames) == FRAMES
+    assert {"hands_x", "club_head_y", "spine_ahead", "head_lift"} <= {r["measure"] for r in rows}
+
+
+def test_the_second_swing_is_shown_in_the_posture_of_the_first():
+    first, second = (record_swing(still(), seen()) for _ in range(2))
+    second = replace(second, keys=np.array([4.0, 10.0, 16.0, 28.0]))
+    at = align_frames(first, second)
+    np.testing.assert_allclose(at[[4, 10, 16, 28]], first.keys)
+    np.testing.assert_allclose(at[7], 9)
+    assert (np.diff(at) > 0).all()
