@@ -74,12 +74,15 @@ class PlayerFeatures:
         return cells.reshape(len(places), -1).astype(np.float32)
 
 
+def regular_frames(video: Video) -> Int[np.ndarray, "k"]:
+    """`RATE` frames a second."""
+    return np.arange(0, len(video), max(1, round(video.fps / RATE)))
+
+
 def describe_player(
-    video: Video, body_frame: BodyFrame, needed: Int[np.ndarray, "k"]
+    video: Video, body_frame: BodyFrame, frames: Int[np.ndarray, "D"]
 ) -> PlayerFeatures:
-    """Features of the `needed` frames, and of `RATE` frames a second."""
-    stride = max(1, round(video.fps / RATE))
-    frames = np.union1d(np.arange(0, len(video), stride), needed)
+    """Features of some frames, in order."""
     tall = float(np.median(body_frame.height))
     width = min(video.width, max(16, round(video.width * PLAYER_HEIGHT / tall)))
     shrink = width / video.width
@@ -124,7 +127,7 @@ class JointAppearance:
     half: BodyHalf
     mean: Float32[np.ndarray, "D"]
     whitening: Float32[np.ndarray, "D C"]
-    marks: tuple[Float32[np.ndarray, "k C"], ...]
+    marks: tuple[Float32[np.ndarray, "_ C"], ...]
     """Descriptions of the marks of every joint."""
 
     def describe(

@@ -24,7 +24,12 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
-from keyrecon.propagation.appearance import PlayerFeatures, describe_player, learn_appearance
+from keyrecon.propagation.appearance import (
+    PlayerFeatures,
+    describe_player,
+    learn_appearance,
+    regular_frames,
+)
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
@@ -183,7 +188,8 @@ def _propagate_fused(
     body_frame = stabilise_player(track, preparation.camera, fps)
     index = index_elements(edges, body_frame)
     count, frames = len(edges), np.arange(len(edges))
-    features = describe_player(preparation.video, body_frame, annotations.frames)
+    looked_at = np.union1d(regular_frames(preparation.video), annotations.frames)
+    features = describe_player(preparation.video, body_frame, looked_at)
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
