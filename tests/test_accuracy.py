@@ -55,7 +55,14 @@ def test_carried_joints_lie_on_the_player(carried):
 
 
 def test_the_motion_with_depth_signs_is_near_the_truth(carried):
-    pa, n, acceleration = lift(carried, carried[1])
+    prepared, marks, _, truth = carried
+    known = truth["points2d"], truth["points3d"], truth["visible"]
+    scores = [lift(carried, marks)]
+    for seed in (1, 2):  # six marked bodies: other clicks on them move a score by a tenth
+        others = mark_from_truth(prepared.keyframes, *known, MarkOptions(1.0, seed=seed))
+        again = prepared, others, propagate_joints(prepared, others), truth
+        scores.append(lift(again, others))
+    pa, n, acceleration = np.mean(scores, axis=0)
     assert pa <= 65
     assert n <= 80
     assert acceleration <= 8

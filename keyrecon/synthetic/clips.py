@@ -32,7 +32,7 @@ Points = Float[np.ndarray, "_ 14 3"]
 class JoinOptions:
     """How clips become one motion."""
 
-    seconds: Annotated[float, within(0.5, 3600)] = 36.0
+    seconds: Annotated[float, within(0.1, 3600)] = 36.0
     """Length of the result; clips are repeated when they are too short."""
     fps: Annotated[float, within(5, 1000)] = 50.0
     """Frames per second of the result."""
