@@ -60,6 +60,7 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
+        contradictions=found.contradictions(),
     )
     write_report(workspace.report_file, material, progress)
     workspace.remember(told, Options())

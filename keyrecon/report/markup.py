@@ -34,6 +34,8 @@ class ReportMaterial:
     """Joints as they really were, frame for frame, as `metrics.read_truth` gives them."""
     options: object = None
     """The options record of the run, to be listed."""
+    contradictions: Sequence[str] = ()
+    """What of the video and of what a person told does not fit the rest, a line each."""
 
     @cached_property
     def true_joints(self) -> Truth | None:

@@ -77,12 +77,11 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
     return "".join(
         (
             opening(material),
+            sections.contradictions(material),
             _figure_player(pictures, material.truth is not None),
             sections.instants(material, pictures),
             sections.story(pictures, material.motion.time),
-            section(
-                "accuracy", "How far to trust it", figures(material), _doubt_over_time(material)
-            ),
+            _trust(material),
             sections.doubts(material),
             _angles(material),
             _joint_curves(material),

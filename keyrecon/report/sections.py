@@ -35,6 +35,17 @@ def story(pictures: Pictures, time: Float[np.ndarray, "T"]) -> str:
     return section("video", "Through the video", note(key), f'<div class="strip">{stills}</div>')
 
 
+def contradictions(material: ReportMaterial) -> str:
+    """What cannot be overlooked; empty where everything fits together."""
+    if not material.contradictions:
+        return ""
+    lines = "".join(f"<li>{text(line)}</li>" for line in material.contradictions)
+    return (
+        '<section class="warning" role="alert"><h2>Not everything fits together</h2>'
+        f"<ul>{lines}</ul></section>"
+    )
+
+
 def instants(material: ReportMaterial, pictures: Pictures) -> str:
     """Where a hand is fastest, with the angles there; empty where no hand ever is."""
     motion = material.motion

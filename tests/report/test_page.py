@@ -128,6 +128,14 @@ def test_a_reader_meets_the_motion_first_and_how_it_was_made_last(page):
     assert sorted(order, key=ids.index) == order
 
 
+def test_what_does_not_fit_together_is_told_before_anything_else(material, pictures, page):
+    assert "Not everything fits together" not in page
+    line = "The video cuts to another shot at frame 20 <b>"
+    warned = build_page(replace(material, contradictions=[line]), pictures)
+    assert "at frame 20 &lt;b&gt;" in warned
+    assert warned.index('class="warning"') < warned.index('id="clip"')
+
+
 def test_frames_that_were_marked_are_counted_and_not_those_asked_for(material, pictures):
     marks = material.annotations
     joints = marks.joints.copy()
