@@ -57,7 +57,7 @@ def fit(
     components: int = FitOptions().components,
     force: bool = False,
 ) -> None:
-    """Fit the swing prior to a video filmed by one camera that stands still.
+    """Fit the swing prior to a video of one swing, filmed from one place.
 
     Makes the project folder OUT and writes report.html, golf.csv, overlay.mp4 and motion.npz into
     it. An interrupted fit goes on where it stopped, `keyrecon export OUT` writes other formats,

@@ -215,7 +215,7 @@ def transfer_joints(
     joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
     source = np.zeros(shape, dtype=np.int64)
     bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
-    frames = progress(_grey_pictures(preparation), "propagating joints", shape[0])
+    frames = progress(_grey_pictures(preparation), "Propagating joints", shape[0])
     halves: tuple[tuple[HalfName, np.ndarray], ...] = (("upper", ~is_lower), ("lower", is_lower))
     for t, picture in enumerate(frames):
         for name, members in halves:

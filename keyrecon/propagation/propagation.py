@@ -193,7 +193,7 @@ def _propagate_fused(
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
-    for half in progress(halves, "propagating joints", len(halves)):
+    for half in progress(halves, "Propagating joints", len(halves)):
         fixed = joints[:, half.joints[half.fixed]]
         poses = gather_poses(annotations, body_frame, half, fixed)
         templates = make_edge_templates(edges, body_frame, poses, options.elements)

@@ -98,7 +98,7 @@ def track_club(
     if detected.sum() < FEWEST_SHAFTS:
         raise KeyreconError(
             f"A club was seen in only {detected.sum()} of {len(path)} frames; the video must show "
-            "a whole swing, sharp enough to see the shaft, with a camera that stands still."
+            "a whole swing, sharp enough to see the shaft."
         )
     ends = np.where(detected[:, None, None], _lengthen(taken, local.ends), local.ends)
     return Club(ends, detected, tip & detected)
