@@ -46,7 +46,8 @@ class LengthOptions:
     """Standard deviation of an annotated joint, in player heights."""
     track_noise: Annotated[float, within(0.0004, 0.2)] = 0.009
     """Standard deviation of a propagated joint of full confidence, in player heights; it grows
-    with the inverse root of the confidence."""
+    with the inverse root of the confidence. A quarter more or less: at most 1.2 mm with signs on
+    three of four clips, 3.9 on one. Errors of tracks last, so no video shows them as roughness."""
     correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which errors of propagated joints stay alike; they count once."""
 

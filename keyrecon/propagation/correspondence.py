@@ -39,8 +39,8 @@ PADDING_DISTANCE = 1e3
 CACHED_DISTANCES = 1 << 18
 """Distances in work at a time: they stay in the processor's cache."""
 SCORE_RADIUS = 0.06
-"""Distance at which an element counts as wrong, player heights. A quarter more or less: at most 0.3
-points, 0.7 mm on one clip."""
+"""Distance at which an element counts as wrong, player heights. A quarter more or less: at most 1.0
+mm on three of four clips, 4.1 on one, which other clicks on the same joints change as much."""
 HYPOTHESIS_SPREAD = 0.06
 """Distance at which a chosen hypothesis loses most of its pull, player heights. Halved or doubled,
 others with it: at most 0.1 points, 0.5 mm on one clip."""
