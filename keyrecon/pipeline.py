@@ -29,6 +29,7 @@ from keyrecon.keyframes.selection import (
 )
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.numerics.threads import one_order_of_sums
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, propagate_joints
 from keyrecon.records import (
@@ -82,7 +83,8 @@ def call_stage(
     **named: Inputs.kwargs,
 ) -> Result:
     """Call a stage; the simplest `Keep`."""
-    return stage(*inputs, **named)
+    with one_order_of_sums():
+        return stage(*inputs, **named)
 
 
 @dataclass(frozen=True)

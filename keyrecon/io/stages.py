@@ -20,6 +20,7 @@ import numpy as np
 from keyrecon.errors import KeyreconError
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.io.video import Video
+from keyrecon.numerics.threads import one_order_of_sums
 
 PACKAGE = Path(__file__).parent.parent
 SHARED_CODE = (
@@ -66,7 +67,8 @@ class StageStore:
         result = _NOTHING if self.force else _stored(path)
         if result is _NOTHING:
             started = time.perf_counter()
-            result = stage(*inputs, **named)
+            with one_order_of_sums():
+                result = stage(*inputs, **named)
             self.seconds[name] = time.perf_counter() - started
             save_record(path, result)
             self._forget(name, path)

@@ -1,0 +1,13 @@
+"""Linear algebra on one thread, so that sums are formed in one order on any machine.
+
+Libraries of linear algebra split products among the cores there are, and a sum in another order has
+other last bits; fits that go on from them end up elsewhere. Work is spread over cores by frames and
+blocks instead (`io.frame_reader`, `numerics.blocks`).
+"""
+
+from threadpoolctl import threadpool_limits
+
+
+def one_order_of_sums() -> threadpool_limits:
+    """A context in which linear algebra runs on one thread."""
+    return threadpool_limits(limits=1, user_api="blas")
