@@ -25,10 +25,7 @@ def compare(first: Path, second: Path, out: Path, progress: Progress = silent) -
                 f"{out} belongs to the project {workspace.folder}; name another file with --out."
             )
     (a, video_a), (b, video_b) = (_read(workspace) for workspace in workspaces)
-    titles = (
-        f"{first.resolve().name}: {video_a.path.name}",
-        f"{second.resolve().name}: {video_b.path.name}",
-    )
+    titles = _title(first, video_a), _title(second, video_b)
     write_comparison(out, (a, b), (video_a, video_b), titles, progress)
     doubtful = [str(w.folder) for w, s in zip(workspaces, (a, b), strict=True) if s.doubts]
     lines = [f"Wrote {out}."]
@@ -41,7 +38,7 @@ def compare(first: Path, second: Path, out: Path, progress: Progress = silent) -
 
 def _title(folder: Path, video: Video) -> str:
     """Folder and video: either alone may be the same for both."""
-    return f"{folder.resolve().name}, {video.path.name}"
+    return f"{folder.resolve().name}: {video.path.name}"
 
 
 def _read(workspace: Workspace) -> tuple[RecordedSwing, Video]:

@@ -82,6 +82,20 @@ def test_a_body_beside_the_figure_is_told_with_a_frame(played):
     assert 0 <= doubt.frame < FRAMES
 
 
+@pytest.mark.parametrize(("frames", "told"), [(2, False), (6, True)])
+def test_hands_that_leave_the_figure_are_told_unless_for_a_moment_only(played, frames, told):
+    fitted, observations = played
+    distance = np.zeros((FRAMES, 720 // SILHOUETTE_STEP, 1280 // SILHOUETTE_STEP))
+    first = round(float(fitted.keys[1]))
+    wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
+    for t in range(first, first + frames):
+        for x, y in (fitted.motion.points2d[t, wrists] / SILHOUETTE_STEP).astype(int):
+            distance[t, max(0, y - 8) : y + 8, max(0, x - 8) : x + 8] = 50.0
+    doubts = find_doubts(fitted, replace(observations, silhouette_distance=distance))
+    assert [doubt.frame for doubt in doubts] == ([first + frames // 2] if told else [])
+    assert all("both hands" in doubt.text for doubt in doubts)
+
+
 def test_clicks_that_the_fit_is_not_near_are_told(played):
     fitted, observations = played
     names = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
