@@ -109,7 +109,7 @@ def test_without_truth_the_report_tells_the_expected_error_and_no_accuracy(
     blind = build_page(replace(material, truth=None, motion=motion), pictures)
     assert "PA-MPJPE" in page and "PA-MPJPE" not in blind
     assert 'id="show-truth"' not in blind
-    assert "expected to be 3.0 cm off on average" in blind
+    assert "expected to be 3.0 cm off in the picture, more in depth" in blind
     assert "<dt>Expected error</dt><dd>3.0 cm<small>" in blind
     assert "Confidence" not in blind
 
