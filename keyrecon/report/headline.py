@@ -16,7 +16,8 @@ def opening(material: ReportMaterial) -> str:
     sure = (
         ""
         if error is None
-        else f"; joints are expected to be {in_words(error, motion.units)} off in the picture, more in depth"
+        else f"; joints are expected to be {in_words(error, motion.units)} off in the picture,"
+        " more in depth"
     )
     return (
         f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.path.name)}</h1>'
