@@ -6,7 +6,7 @@ place of what a person marked, nor an overlay in the place of the video it is dr
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,10 @@ import numpy as np
 from keyrecon.app.court import export_calibration
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.conventions import World
 from keyrecon.io.formats.export import check_suffix, cut_motion, export_motion
+from keyrecon.io.formats.motion_file import cut_further_arrays, read_further_arrays
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
-from keyrecon.reading import read_arrays, reading
 from keyrecon.records import Motion
 from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
 
@@ -56,8 +55,7 @@ def export(
     motion = load_motion(workspace.folder)
     first, last = chosen_frames(frames, len(motion.time))
     cut = cut_motion(motion, first, last)
-    world = _joints_on_court(workspace.motion_file, motion)
-    on_court = None if world is None else world[first : last + 1]
+    further = cut_further_arrays(read_further_arrays(workspace.motion_file), first, last)
     lines = done
     for file in files:
         if file in cameras:
@@ -67,7 +65,7 @@ def export(
             write_overlay(file, workspace.video(), motion, progress, overlay, shown)
             lines.append(f"Wrote {file}.")
         else:
-            lines.append(_write(file, cut, workspace, first, on_court))
+            lines.append(_write(file, cut, workspace, first, further))
     return lines
 
 
@@ -98,16 +96,13 @@ def _check_place(file: Path, workspace: Workspace) -> None:
         )
 
 
-def _joints_on_court(path: Path, motion: Motion) -> World:
-    """What motion.npz holds besides where the court's camera is known."""
-    with reading(path, "a motion", "make it with keyrecon run"):
-        points = read_arrays(path).get("points3d_world")
-        if points is not None and points.shape != motion.points3d.shape:
-            raise ValueError(f"points3d_world has shape {points.shape}")
-    return None if points is None else points.astype(np.float64)
-
-
-def _write(file: Path, motion: Motion, workspace: Workspace, first_frame: int, world: World) -> str:
+def _write(
+    file: Path,
+    motion: Motion,
+    workspace: Workspace,
+    first_frame: int,
+    further: Mapping[str, np.ndarray],
+) -> str:
     video = workspace.video() if file.suffix.lower() in WITH_VIDEO else None
     size = (video.width, video.height) if video else None
-    return f"Wrote {file}: {export_motion(file, motion, size, first_frame, world)}."
+    return f"Wrote {file}: {export_motion(file, motion, size, first_frame, further)}."

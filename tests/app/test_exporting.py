@@ -157,6 +157,32 @@ def test_a_motion_on_the_court_is_exported_where_it_stands(project):
     assert "on the court" in export(project, [folder / "a.trc"], silent, "10-19")[0]
 
 
+def test_a_motion_file_keeps_all_that_is_known_of_its_frames(project):
+    folder, count = project.folder.parent, 20
+    rng = np.random.default_rng(0)
+    per_frame = {
+        "points3d_world": (count, 14, 3), "root_world": (count, 3), "contact": (count, 2),
+        "camera_K": (count, 3, 3), "club3d": (count, 2, 3), "club_seen": (count,),
+    }  # fmt: skip
+    more = {name: rng.random(shape) for name, shape in per_frame.items()}
+    more |= {"vertical": np.array([0, -1.0, 0]), "key_postures": np.array([4, 6.5, 8, 30])}
+    more |= {"key_posture_names": np.array(["address", "top", "hit", "finish"])}
+    write_motion(project.motion_file, read_motion(project.motion_file), more=more)
+    export(project, [folder / "a.npz"], silent)
+    with np.load(project.motion_file) as whole, np.load(folder / "a.npz") as copy:
+        assert whole.files == copy.files
+        for name in whole.files:
+            np.testing.assert_array_equal(whole[name], copy[name])
+    export(project, [folder / "b.npz", folder / "b.csv"], silent, "5-11")
+    with np.load(folder / "b.npz") as part:
+        assert all(np.array_equal(part[name], more[name][5:12]) for name in per_frame)
+        assert part["key_postures"].tolist() == [-1, 1.5, 3, 25]
+        assert part["vertical"].tolist() == [0, -1, 0]
+    table = [row.split(",") for row in (folder / "b.csv").read_text().splitlines() if row[0] != "#"]
+    cell = table[3][table[0].index("neck_world_y")]
+    assert float(cell) == pytest.approx(more["points3d_world"][7, 12, 1], rel=1e-4)
+
+
 def test_a_line_says_what_was_done_to_each_file(project):
     folder = project.folder.parent
     told = export(project, [folder / "a.bvh", folder / "a.csv"], silent)

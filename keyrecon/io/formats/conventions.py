@@ -50,6 +50,8 @@ ON_COURT = (
     "on the court: origin on the ground at the middle of the net, x along the net to the right, "
     "feet where the court's lines put them"
 )
+WITH_WORLD = ", and the court's besides"
+"""Said of files that hold the motion in both axes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,15 +5,21 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.conventions import describe_times
+from keyrecon.io.formats.conventions import WITH_WORLD, World, describe_times
 from keyrecon.records import SOURCES, Motion
 
+COURT_AXES = (
+    "origin on the ground at the middle of the net, x along the net to the right, y up the court "
+    "away from the camera, z up"
+)
 
-def write_csv(path: Path, motion: Motion, first_frame: int = 0) -> str:
+
+def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = None) -> str:
     """Write a table that pandas reads with `read_csv(path, comment="#")`.
 
     Unknown numbers are empty. The comment lines on top say units, axes and times; returns the
-    latter two. `first_frame` is the video's frame that comes first.
+    latter two. `first_frame` is the video's frame that comes first; with `world`, the joints on
+    the court, every joint has three columns more.
     """
     names = motion.skeleton.names
     head = [
@@ -24,11 +30,15 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0) -> str:
         "# frame: the video's, from 0 in presentation order; time: seconds",
         f"# {describe_times(motion)}",
     ]
-    columns = ["x", "y", "z", "u", "v", "confidence", "source"]
+    columns = ["x", "y", "z", "u", "v", "confidence"]
+    known = [motion.points3d, motion.points2d, motion.confidence[..., None]]
+    if world is not None:
+        columns += ["world_x", "world_y", "world_z"]
+        known.append(world)
+        head.insert(2, "# world_x, world_y, world_z: m, on the court: " + COURT_AXES)
+    columns.append("source")
     head.append(",".join(["frame", "time", *(f"{n}_{c}" for n in names for c in columns)]))
-    numbers = np.concatenate(
-        [motion.points3d, motion.points2d, motion.confidence[..., None]], axis=2
-    )
+    numbers = np.concatenate(known, axis=2)
     rows = []
     for frame, (values, source) in enumerate(zip(numbers, motion.source, strict=True)):
         cells = [str(first_frame + frame), f"{motion.time[frame]:.6f}"]
@@ -37,4 +47,4 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0) -> str:
             cells.append(SOURCES[origin])
         rows.append(",".join(cells))
     write_durably(path, "\n".join(head + rows) + "\n")
-    return f"camera axes; {describe_times(motion)}"
+    return f"camera axes{WITH_WORLD if world is not None else ''}; {describe_times(motion)}"

@@ -1,14 +1,16 @@
 """A motion in other programs' formats, told by suffix. The overlay video is the report's work."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.bvh_motion import write_bvh
 from keyrecon.io.formats.c3d import write_c3d
 from keyrecon.io.formats.coco import write_coco_motion
-from keyrecon.io.formats.conventions import World, describe_times
+from keyrecon.io.formats.conventions import WITH_WORLD, World, describe_times
 from keyrecon.io.formats.csv_table import write_csv
 from keyrecon.io.formats.glb import write_glb
 from keyrecon.io.formats.motion_file import ARRAYS, OPTIONAL, write_motion
@@ -49,27 +51,30 @@ def export_motion(
     motion: Motion,
     size: tuple[int, int] | None = None,
     first_frame: int = 0,
-    world: World = None,
+    further: Mapping[str, np.ndarray] | None = None,
 ) -> str:
     """Write `motion` in the format of the path's suffix; returns what was done to it.
 
     `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with;
-    `world` are its joints on the court. Raises KeyreconError for a suffix that is not known, an
+    `further` is what motion.npz holds besides (`read_further_arrays`): .npz keeps all of it, the
+    others its joints on the court. Raises KeyreconError for a suffix that is not known, an
     optional library that is not installed, or a motion that the format cannot hold.
     """
     check_suffix(path)
     suffix = path.suffix.lower()
+    found = (further or {}).get("points3d_world")
+    world = None if found is None else found.astype(np.float64)
     if suffix in WRITERS:
         return WRITERS[suffix](path, motion, world)
     if suffix == ".trc":
         return write_trc(path, motion, world, first_frame)
     if suffix == ".csv":
-        return write_csv(path, motion, first_frame)
+        return write_csv(path, motion, first_frame, world)
     if suffix == ".nc":
         return write_netcdf(path, motion)
     if suffix == ".npz":
-        write_motion(path, motion)
-        return f"camera axes; {describe_times(motion)}"
+        write_motion(path, motion, more=further)
+        return f"camera axes{WITH_WORLD if world is not None else ''}; {describe_times(motion)}"
     if size is None:
         raise KeyreconError(
             f"{path}: COCO states the size of the pictures; export from the project whose "

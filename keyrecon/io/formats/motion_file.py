@@ -31,6 +31,15 @@ WITH_GAPS = ("points2d_propagated", "expected_error")
 UNITS = ("m", "body heights")
 OPTIONAL = {"expected_error": "TJ"}
 """Arrays that files of former versions and of golf fits lack."""
+ABOUT = (
+    *("source_names", "joint_names", "parents", "mirrored", "proportions", "lower"),
+    *("fps", "units", "keyrecon_version"),
+)
+"""What else every file holds."""
+FRAME_NUMBERS = ("key_postures",)
+"""Further arrays that hold numbers of frames."""
+NOT_BY_FRAME = ("key_posture_names", "vertical", "left_handed", "doubts")
+"""Further arrays that say one thing of the whole motion; all others have a row for every frame."""
 
 
 def write_motion(
@@ -92,6 +101,35 @@ def read_motion(path: Path) -> Motion:
             fps=float(data["fps"]),
             units=str(data["units"]),
         )
+
+
+def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
+    """What a file holds besides a `Motion`: the motion on the court, a swing's club and keys."""
+    with reading(path, "a motion", "make it with keyrecon run"):
+        data = read_arrays(path)
+        known = (*ARRAYS, *OPTIONAL, *ABOUT)
+        further = {name: values for name, values in data.items() if name not in known}
+        for name, values in further.items():
+            per_frame = name not in (*FRAME_NUMBERS, *NOT_BY_FRAME)
+            if per_frame and values.shape[:1] != data["time"].shape:
+                raise ValueError(f"{name} has shape {values.shape}")
+        world = further.get("points3d_world", data["points3d"])
+        if world.shape != data["points3d"].shape:
+            raise ValueError(f"points3d_world has shape {world.shape}")
+        return further
+
+
+def cut_further_arrays(
+    arrays: Mapping[str, np.ndarray], first: int, last: int
+) -> dict[str, np.ndarray]:
+    """The same of frames first..last; numbers of frames count from the new start."""
+    cut: dict[str, np.ndarray] = {}
+    for name, values in arrays.items():
+        if name in FRAME_NUMBERS:
+            cut[name] = values - first
+        else:
+            cut[name] = values if name in NOT_BY_FRAME else values[first : last + 1]
+    return cut
 
 
 def _skeleton(data: dict[str, np.ndarray]) -> Skeleton:
