@@ -2,7 +2,7 @@
 
 The project folder holds project.toml and cache/ like any other (`io.workspace`), and besides
 
-    golf_clicks.json   what a person clicked
+    golf_clicks.json   six joints of the address, clicked on the page or in a file
     motion.npz, overlay.mp4, report.html
 
 so that an interrupted fit goes on where it stopped, and one that is repeated is done at once.
@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.app.golf_recipe import find_swing
-from keyrecon.errors import KeyreconError
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError, quoted
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.golf.plausibility import SwingDoubt
@@ -30,7 +31,7 @@ from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, has_fingerprint, open_video
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.pipeline import Keep, call_stage
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_measures import measure_swing, record_swing
@@ -60,7 +61,7 @@ class GolfFit:
 
 def fit_file(
     video_file: Path,
-    clicks_file: Path,
+    clicks_file: Path | None,
     folder: Path,
     prior: Path = BUILT_IN_SWING_PRIOR,
     slow_motion: float = 1.0,
@@ -68,19 +69,37 @@ def fit_file(
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
 ) -> str:
-    """Fit a swing in a project folder; returns what to print. `force` makes every stage again."""
-    began = time.perf_counter()
-    clicks, model = read_clicks(clicks_file), read_motion_model(prior)
+    """Fit a swing in a project folder; returns what to print. `force` makes every stage again.
+
+    Without a file of clicks those are taken that the project has.
+    """
+    model = read_motion_model(prior)
     video = open_video(video_file, slow_motion=slow_motion)
-    check_clicks(clicks, len(video), (video.width, video.height))
-    check_pose(clicked_pose(clicks), model, str(clicks_file))
-    check_length(video, slow_motion)
+    if clicks_file is not None:
+        check_evidence(read_clicks(clicks_file), video, model, slow_motion, str(clicks_file))
+    else:
+        check_length(video, slow_motion)
     check_options(options)
     workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
-    options = workspace.options(options, GolfOptions())
-    video = hold_frames(workspace.video())
+    return fit_project(workspace, model, options, progress)
+
+
+def fit_project(
+    workspace: Workspace,
+    model: MotionModel,
+    options: GolfOptions = GolfOptions(),
+    progress: Progress = silent,
+) -> str:
+    """Fit a swing in a project that has its clicks; returns what to print."""
+    began = time.perf_counter()
+    video, folder = workspace.video(), workspace.folder
+    clicks = kept_clicks(workspace)
+    slow_motion = workspace.project["video"].get("slow_motion", 1.0)
+    check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
+    options = workspace.options(options, GolfOptions(), GOLF)
+    video = hold_frames(video)
     fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress)
-    workspace.remember(options, GolfOptions())
+    workspace.remember(options, GolfOptions(), GOLF)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
     spent = time.perf_counter() - began
@@ -88,11 +107,31 @@ def fit_file(
         [
             describe_tempo(record_swing(fit.fitted, fit.observations)),
             *(f"Note: {note}." for note in fit.notes),
-            *describe_doubts(fit.doubts),
+            *describe_doubts(fit.doubts, folder),
             f"{folder}/motion.npz, golf.csv, overlay.mp4, report.html: {len(video)} frames, "
             f"{spent:.0f} s ({spent / len(video):.2f} s per frame).",
         ]
     )
+
+
+def kept_clicks(workspace: Workspace) -> GolfClicks:
+    """The project's clicks; KeyreconError tells where to click while there are none."""
+    if not workspace.golf_clicks_file.is_file():
+        folder = quoted(workspace.folder)
+        raise KeyreconError(
+            f"{workspace.folder} has no clicks yet. Click six joints of the address on the page of "
+            f"keyrecon annotate {folder}, and fit the swing there; or give --clicks FILE."
+        )
+    return read_clicks(workspace.golf_clicks_file)
+
+
+def check_evidence(
+    clicks: GolfClicks, video: Video, model: MotionModel, slow_motion: float, origin: str
+) -> None:
+    """Raises KeyreconError where clicks and video cannot be those of a swing."""
+    check_clicks(clicks, len(video), (video.width, video.height))
+    check_pose(clicked_pose(clicks), model, origin)
+    check_length(video, slow_motion)
 
 
 def fit_video(
@@ -124,7 +163,11 @@ def check_length(video: Video, slow_motion: float) -> None:
 
 
 def open_golf_project(
-    folder: Path, video: Video, clicks_file: Path, slow_motion: float = 1.0, force: bool = False
+    folder: Path,
+    video: Video,
+    clicks_file: Path | None,
+    slow_motion: float = 1.0,
+    force: bool = False,
 ) -> Workspace:
     """The project of a video in a folder, made if need be, with a copy of the clicks.
 
@@ -135,26 +178,29 @@ def open_golf_project(
         _require_same_video(workspace, video, slow_motion)
         if not (folder / workspace.project["video"]["path"]).is_file():
             workspace.relink(video.path)
-        _keep_clicks(folder / CLICKS_FILE, clicks_file)
+        if clicks_file is not None:
+            keep_clicks(workspace, clicks_file.read_bytes())
         return workspace
     make_folder(folder)
-    _keep_clicks(folder / CLICKS_FILE, clicks_file)
+    if clicks_file is not None:
+        write_durably(folder / CLICKS_FILE, clicks_file.read_bytes())
     trim = {"slow_motion": None if slow_motion == 1 else slow_motion}
-    Workspace.create(folder, video, video.path, trim)
+    Workspace.create(folder, video, video.path, trim, GOLF)
     return Workspace(folder, force)
 
 
 def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) -> None:
-    """Raises KeyreconError where a project is not that of a golf fit of this video."""
+    """Raises KeyreconError where a project is not one of this video with the usual joints."""
     folder, kept = workspace.folder, workspace.project["video"]
     if not has_fingerprint(video.path, kept["fingerprint"]):
         raise KeyreconError(
             f"{folder} is the project of another video ({Path(kept['path']).name}); name another "
             "folder for this one with --out."
         )
-    if not (folder / CLICKS_FILE).is_file():
+    if workspace.skeleton.names != LSP14.names:
         raise KeyreconError(
-            f"{folder} is a project with keyframes, not a golf fit; name another folder with --out."
+            f"{folder} is a project with a skeleton of its own, which a swing does not have; name "
+            "another folder with --out."
         )
     earlier = kept.get("slow_motion", 1.0)
     if slow_motion not in (1.0, earlier):
@@ -164,14 +210,13 @@ def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) 
         )
 
 
-def _keep_clicks(kept: Path, clicks_file: Path) -> None:
-    """Copy the clicks; other ones that were there stay beside them."""
-    content = clicks_file.read_bytes()
-    before = kept.read_bytes() if kept.is_file() else content
-    if before != content:
-        number = len(list(kept.parent.glob(f"{kept.stem}.old-*{kept.suffix}"))) + 1
-        write_durably(kept.with_name(f"{kept.stem}.old-{number}{kept.suffix}"), before)
-    write_durably(kept, content)
+def keep_clicks(workspace: Workspace, content: bytes) -> None:
+    """Write the clicks into the project; other ones that were there stay beside them."""
+    file = workspace.golf_clicks_file
+    with workspace.exclusive():
+        if file.is_file() and file.read_bytes() != content:
+            workspace.put_aside(file)
+        write_durably(file, content)
 
 
 def write_results(
@@ -214,13 +259,12 @@ def describe_tempo(swing: RecordedSwing) -> str:
     )
 
 
-def describe_doubts(doubts: Sequence[SwingDoubt]) -> list[str]:
+def describe_doubts(doubts: Sequence[SwingDoubt], folder: Path) -> list[str]:
     """The warning of a fit that does not explain its video; no line where it does."""
     if not doubts:
         return []
     reasons = "; ".join(f"{doubt.text} (frame {doubt.frame})" for doubt in doubts)
     return [
-        f"WARNING: this fit is doubtful: {reasons}. Do not use its angles. Look at the overlay; "
-        "where the body is off, mark whole bodies on four frames or so (keyrecon new, annotate) "
-        "and use keyrecon run --prior golf."
+        f"WARNING: this fit is doubtful: {reasons}. Do not use its angles. On the page of keyrecon "
+        f"annotate {quoted(folder)}, mark joints, club or key postures there, and fit again."
     ]

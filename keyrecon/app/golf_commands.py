@@ -49,7 +49,7 @@ def train_(
 @golf.command
 def fit(
     video: Positional[Path],
-    clicks: Path,
+    clicks: Path | None = None,
     out: Path = Path("swing"),
     prior: Path = BUILT_IN_SWING_PRIOR,
     slowmo: float = 1.0,
@@ -63,7 +63,9 @@ def fit(
     it. An interrupted fit goes on where it stopped, `keyrecon export OUT` writes other formats,
     `keyrecon golf compare A B` sets two swings side by side.
 
-    CLICKS is a small JSON file: six joints of the player in one frame, best at the address.
+    Without CLICKS those count that were made on the page, `keyrecon annotate OUT`: there a fit is
+    also looked at, put right and made again. CLICKS is a small JSON file: six joints of the player
+    in one frame, best at the address.
 
         {"keyrecon_golf_clicks": 1, "frame": 0, "size": [1280, 720],
          "stature": 1.80, "left_handed": false,
@@ -76,7 +78,7 @@ def fit(
 
     Args:
         video: A whole swing, from the address to the finish.
-        clicks: JSON file with a few joints clicked in one frame.
+        clicks: JSON file with a few joints clicked in one frame; without it those of the project.
         out: Project folder; made if need be.
         prior: A swing prior of `keyrecon golf train`.
         slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).

@@ -31,15 +31,18 @@ def start(
     trim: tuple[int, int | None] = (0, None),
     slow_motion: float = 1.0,
     skeleton: Path | None = None,
+    golf: bool = False,
 ) -> str:
     """Make a project folder for a video; `trim` is the first frame and the one after the last."""
     first, end = trim
+    if golf and skeleton is not None:
+        raise KeyreconError("A golf swing has its own skeleton; leave --skeleton or --golf out.")
     opened = open_video(video, first, end, slow_motion)
     if skeleton is not None:
         read_skeleton(skeleton)
     told: dict[str, float | None] = {"start": first or None, "end": end}
     told["slow_motion"] = None if slow_motion == 1 else slow_motion
-    Workspace.create(folder, opened, video, told)
+    Workspace.create(folder, opened, video, told, "golf" if golf else None)
     if skeleton is not None:
         write_durably(folder / "skeleton.json", skeleton.read_bytes())
     text = (
@@ -48,6 +51,11 @@ def start(
     )
     if opened.variable_rate:
         text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
+    if golf:
+        return (
+            f"{text}\nNext: keyrecon annotate {quoted(folder)} to click six joints on a page, and "
+            "fit the swing there."
+        )
     return (
         f"{text}\nNext: keyrecon annotate {quoted(folder)} to mark one whole body on a page, or "
         f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon "

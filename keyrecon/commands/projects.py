@@ -39,6 +39,7 @@ def new(
     end: int | None = None,
     slowmo: float = 1.0,
     skeleton: Path | None = None,
+    golf: bool = False,
 ) -> None:
     """Start a project for a video.
 
@@ -51,10 +52,11 @@ def new(
         end: Frame after the last one to use.
         slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
         skeleton: A JSON file with joints and bones of your own.
+        golf: The video shows a golf swing, which the page asks six clicks for.
     """
     from keyrecon.app.project import start as start_project
 
-    print(start_project(video, project, (start, end), slowmo, skeleton))
+    print(start_project(video, project, (start, end), slowmo, skeleton, golf))
 
 
 def pick(

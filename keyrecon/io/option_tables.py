@@ -44,6 +44,15 @@ FORMER_NAMES = {
     "lift.depth_signs.alike": "lift.depth_signs.exemplar_spread",
     "lift.depth_signs.jerk": "lift.depth_signs.acceleration",
     "lift.depth_signs.reach": "lift.depth_signs.max_jump_cost",
+    "method": "golf.method",
+    "observation": "golf.observation",
+    "fit": "golf.fit",
+    "windows": "golf.windows",
+    "candidates": "golf.candidates",
+    "guided_rounds": "golf.guided_rounds",
+    "guided_detection": "golf.guided_detection",
+    "events": "golf.events",
+    "proportions": "golf.proportions",
 }
 """Options that older project files set under another name, in the order in which they are read."""
 NUMBERS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}

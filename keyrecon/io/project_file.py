@@ -1,6 +1,7 @@
 """project.toml: the video, and the options that a person set.
 
     version = 1
+    kind = "golf"                 # where the project is one of a golf swing
 
     [video]
     path = "../rally.mp4"
@@ -36,6 +37,8 @@ VIDEO_FIELDS = {
     "slow_motion": (int, float),
 }
 """What project.toml tells of the video; the first two must be there."""
+KINDS = ("golf",)
+"""What a project can be of, besides the general one that has no kind."""
 OPTIONS_COMMENT = "Options that differ from the defaults."
 REMEDY = "mend it, or make the project anew in another folder"
 Project = dict[str, Any]
@@ -57,6 +60,8 @@ def _checked(project: Project, path: Path) -> Project:
     if version is True or version != VERSION:
         raise ValueError(f"version cannot be {version!r}")
     _check_video(project["video"])
+    if project.get("kind", KINDS[0]) not in KINDS:
+        raise ValueError(f"kind cannot be {project['kind']!r}")
     if not isinstance(options := project.get("options", {}), dict):
         raise TypeError(f"options must be a table; found {options!r}")
     return project
@@ -74,11 +79,14 @@ def _check_video(told: Any) -> None:
         raise ValueError(f"video.slow_motion cannot be {told['slow_motion']!r}")
 
 
-def new_project(path: Path, video: Mapping[str, str | float | None]) -> str:
+def new_project(
+    path: Path, video: Mapping[str, str | float | None], kind: str | None = None
+) -> str:
     """The text of a new project's file; raises KeyreconError for a name that is no text."""
     import tomlkit
 
-    project = {"version": VERSION, "video": {n: v for n, v in video.items() if v is not None}}
+    project: Project = {"version": VERSION} | ({"kind": kind} if kind else {})
+    project["video"] = {n: v for n, v in video.items() if v is not None}
     document = tomlkit.document()
     document.add(tomlkit.comment("A keyrecon project."))
     for name, value in project.items():

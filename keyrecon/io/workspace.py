@@ -5,6 +5,8 @@
     keyframes.json     frames to annotate, with a picture of each in keyframes/
     annotations.json   what a person marked
     skeleton.json      joints and bones, where they are not the default ones
+    golf_clicks.json   of a golf swing: six joints of the address
+    golf_marks.json    of a golf swing: what a person put right in a fit
     motion.npz, report.html
     exports/           files for other programs that the page wrote
     cache/             results of the stages; safe to delete
@@ -16,6 +18,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
@@ -25,6 +28,7 @@ from keyrecon.io.option_tables import (
     Record,
     changed_options,
     check_options,
+    flat_options,
     nested_tables,
     with_changes,
     with_current_names,
@@ -42,9 +46,13 @@ from keyrecon.records import Pick
 
 OWN_NAMES = (
     *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
-    *("annotate.sqlite", "motion.npz", "report.html"),
+    *("annotate.sqlite", "motion.npz", "report.html", "golf_clicks.json", "golf_marks.json"),
 )
 """Files that a project has or may come to have."""
+GOLF = "golf"
+"""The kind of project that a golf swing is, and the section of its options."""
+SECTIONS = (GOLF,)
+"""Tables of options beside those of the pipeline."""
 
 
 class Workspace:
@@ -104,6 +112,21 @@ class Workspace:
         return self.folder / "report.html"
 
     @property
+    def golf_clicks_file(self) -> Path:
+        """golf_clicks.json"""
+        return self.folder / "golf_clicks.json"
+
+    @property
+    def golf_marks_file(self) -> Path:
+        """golf_marks.json"""
+        return self.folder / "golf_marks.json"
+
+    @property
+    def is_golf(self) -> bool:
+        """Whether the project is one of a golf swing: begun as one, or with clicks for a fit."""
+        return self.project.get("kind") == GOLF or self.golf_clicks_file.is_file()
+
+    @property
     def exports(self) -> Path:
         """Folder for files that the page writes for other programs."""
         return self.folder / "exports"
@@ -125,13 +148,15 @@ class Workspace:
         return self.folder / "keyframes"
 
     @classmethod
-    def create(cls, folder: Path, video: Video, video_file: Path, trim: dict) -> "Workspace":
+    def create(
+        cls, folder: Path, video: Video, video_file: Path, trim: dict, kind: str | None = None
+    ) -> "Workspace":
         """Start a project; never touches one that exists."""
         file = folder / "project.toml"
         if file.exists():
             raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
         told = {"path": _relative(video_file, folder), "fingerprint": video.fingerprint, **trim}
-        text = new_project(file, told)
+        text = new_project(file, told, kind)
         make_folder(folder)
         write_durably(file, text)
         return cls(folder)
@@ -243,24 +268,43 @@ class Workspace:
         number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
         write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
 
-    def options(self, given: Record, defaults: Record) -> Record:
-        """Options that this project has set, and on top of them what `given` sets otherwise."""
+    def options(self, given: Record, defaults: Record, section: str | None = None) -> Record:
+        """Options that this project has set, and on top of them what `given` sets otherwise.
+
+        `section` names the table of options that are not those of the pipeline.
+        """
         check_options(given)
-        kept = with_changes(defaults, with_current_names(self.project.get("options", {})))
+        told = with_current_names(self.project.get("options", {}))
+        if isinstance(told, dict):
+            told = told.get(section, {}) if section else _without_sections(told)
+        kept = with_changes(defaults, told)
         return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
-    def remember(self, options: Record, defaults: Record) -> None:
+    def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:
         """Keep the options that differ from the defaults; what else the file holds stays.
 
         Raises KeyreconError, and writes nothing, for values that an option cannot have.
         """
         check_options(options)
-        changed = changed_options(options, defaults)
+        told = flat_options(with_current_names(self.project.get("options", {})))
+        changed = changed_options(options, defaults, f"{section}." if section else "")
+        others = {name: value for name, value in told.items() if _section_of(name) != section}
+        changed = others | changed
         if with_options(self.project_file, changed) == read_text(self.project_file):
             return
         with self.exclusive():
             write_durably(self.project_file, with_options(self.project_file, changed))
         self.project = read_project(self.project_file)
+
+
+def _section_of(name: str) -> str | None:
+    """The table that an option is in, by its dotted name; None for those of the pipeline."""
+    first = name.partition(".")[0]
+    return first if first in SECTIONS else None
+
+
+def _without_sections(told: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in told.items() if name not in SECTIONS}
 
 
 def _relative(path: Path, folder: Path) -> str:

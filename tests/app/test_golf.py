@@ -12,6 +12,7 @@ from keyrecon.app.exporting import export
 from keyrecon.app.golf import fit_file
 from keyrecon.app.golf_comparing import compare
 from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
+from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.swing_fit import GolfOptions
@@ -21,8 +22,10 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.workspace import GOLF, Workspace
+from keyrecon.lifting.lifting import LiftOptions
 from keyrecon.metrics import read_truth
+from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 
@@ -90,7 +93,7 @@ def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
         "report.html",
     }  # fmt: skip
     workspace = Workspace(folder)
-    assert workspace.options(GolfOptions(), GolfOptions()) == QUICK
+    assert workspace.options(GolfOptions(), GolfOptions(), GOLF) == QUICK
     export(workspace, [folder / "swing.csv"], silent)
     assert len((folder / "swing.csv").read_text().splitlines()) > len(workspace.video())
 
@@ -149,12 +152,54 @@ def test_a_project_of_another_video_is_left_alone(swing, decoded_at_first, tmp_p
         fit_file(other, swing / "clicks.json", swing / "project", options=QUICK)
 
 
-def test_a_project_with_keyframes_is_left_alone(swing, tmp_path):
+def test_a_project_with_keyframes_takes_a_fit_too_and_keeps_the_options_of_both(
+    swing, decoded_at_first, tmp_path
+):
     video = open_video(swing / "video.mp4")
-    Workspace.create(tmp_path, video, Path(swing / "video.mp4"), {})
-    with pytest.raises(KeyreconError, match="a project with keyframes"):
-        fit(swing, tmp_path)
-    assert not (tmp_path / "golf_clicks.json").exists()
+    workspace = Workspace.create(tmp_path / "p", video, Path(swing / "video.mp4"), {})
+    assert not workspace.is_golf
+    height = Options(lift=LiftOptions(height=1.7))
+    workspace.remember(height, Options())
+    shutil.copytree(swing / "project" / "cache", tmp_path / "p" / "cache")
+    fit(swing, tmp_path / "p")
+    workspace = Workspace(tmp_path / "p")
+    assert workspace.is_golf
+    assert workspace.options(GolfOptions(), GolfOptions(), GOLF) == QUICK
+    assert workspace.options(Options(), Options()) == height
+
+
+def test_options_of_a_former_golf_project_are_still_known(swing, tmp_path):
+    video = open_video(swing / "video.mp4")
+    workspace = Workspace.create(tmp_path / "p", video, Path(swing / "video.mp4"), {})
+    with workspace.project_file.open("a") as file:
+        file.write(
+            "[options]\nfit.components = 4\nfit.steps = 3\nguided_rounds = 1\ncandidates = 1\n"
+        )
+    workspace = Workspace(tmp_path / "p")
+    assert workspace.options(GolfOptions(), GolfOptions(), GOLF) == QUICK
+    assert workspace.options(Options(), Options()) == Options()
+    workspace.remember(GolfOptions(candidates=2), GolfOptions(), GOLF)
+    assert "golf.candidates = 2" in workspace.project_file.read_text()
+    assert "fit." not in workspace.project_file.read_text()
+
+
+def test_without_clicks_a_project_is_made_and_it_says_where_to_click(swing, tmp_path):
+    with pytest.raises(KeyreconError, match="Click six joints of the address on the page"):
+        fit_file(swing / "video.mp4", None, tmp_path / "p", options=QUICK)
+    assert Workspace(tmp_path / "p").is_golf
+
+
+def test_a_fit_without_a_file_takes_the_clicks_of_its_project(swing, decoded_at_first):
+    told = fit_file(swing / "video.mp4", None, swing / "project", options=QUICK)
+    assert told.split("\n")[0] == decoded_at_first[0].split("\n")[0]
+
+
+def test_a_new_golf_project_tells_of_its_page(swing, tmp_path):
+    told = start(swing / "video.mp4", tmp_path / "p", golf=True)
+    assert "keyrecon annotate" in told
+    assert Workspace(tmp_path / "p").is_golf
+    with pytest.raises(KeyreconError, match="its own skeleton"):
+        start(swing / "video.mp4", tmp_path / "q", skeleton=tmp_path / "s.json", golf=True)
 
 
 def test_another_slow_motion_needs_another_folder(swing, decoded_at_first):
