@@ -7,7 +7,9 @@ import numpy as np
 
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
+from keyrecon.io.formats.court_points import merge_clicks
 from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
@@ -15,6 +17,7 @@ from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_court, draw_way, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
+from keyrecon.world.clicked_points import ContradictoryClicks, check_click
 from keyrecon.world.court import tennis_court
 from keyrecon.world.placement import place_motion, run_length, run_speed
 from keyrecon.world.records import CourtCamera, CourtClick, WorldMotion
@@ -43,15 +46,27 @@ def calibrate(
     clicks: Sequence[CourtClick],
     options: CalibrationOptions,
     progress: Progress,
+    forget: Sequence[str] = (),
 ) -> str:
-    """Find the court, write camera.npz and court.jpg; returns the text to show."""
+    """Find the court, write camera.npz and court.jpg; returns the text to show.
+
+    The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
+    clicks are taken out first. New clicks that contradict the rest are not kept.
+    """
     video = workspace.video()
-    keep = workspace.stages.keep
-    motion = workspace.options(Options(), Options()).camera
-    path = keep("camera", estimate_camera_motion, video, options=motion, progress=progress)
-    camera = keep(
-        "court", calibrate_court, video, path, tuple(clicks), options=options, progress=progress
-    )
+    dropped = _forgotten(workspace.court_clicks(), forget)
+    kept = [click for click in workspace.court_clicks() if click not in dropped]
+    for click in clicks:
+        check_click(click, len(video), (video.width, video.height))
+    together = merge_clicks(kept, clicks)
+    try:
+        camera = _find_camera(workspace, video, together, options, progress)
+    except ContradictoryClicks as fault:
+        raise KeyreconError(f"{fault}{_whose(clicks, kept)}") from fault
+    except KeyreconError as fault:
+        workspace.change_court_clicks(clicks, dropped)
+        raise KeyreconError(f"{fault}{_how_many(together)}") from fault
+    workspace.change_court_clicks(clicks, dropped)
     write_camera(workspace.camera_file, camera)
     seen = np.flatnonzero(camera.found)
     frame = int(seen[len(seen) // 2])
@@ -67,9 +82,48 @@ def calibrate(
             f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
+            *([f"By {len(together)} clicked points; they are kept."] if together else []),
             *placed,
         ]
     )
+
+
+def _find_camera(
+    workspace: Workspace,
+    video: Video,
+    clicks: tuple[CourtClick, ...],
+    options: CalibrationOptions,
+    progress: Progress,
+) -> CourtCamera:
+    keep = workspace.stages.keep
+    motion = workspace.options(Options(), Options()).camera
+    path = keep("camera", estimate_camera_motion, video, options=motion, progress=progress)
+    return keep("court", calibrate_court, video, path, clicks, options=options, progress=progress)
+
+
+def _forgotten(kept: Sequence[CourtClick], names: Sequence[str]) -> list[CourtClick]:
+    """Clicks that are named by their points, or "all" of them."""
+    known = {click.name for click in kept}
+    if unknown := sorted(set(names) - known - {"all"}):
+        there = f"it has {', '.join(sorted(known))}" if known else "it has none"
+        raise KeyreconError(f"The project has no click on {unknown[0]} to forget; {there}.")
+    return [click for click in kept if "all" in names or click.name in names]
+
+
+def _whose(new: Sequence[CourtClick], kept: Sequence[CourtClick]) -> str:
+    """What becomes of clicks that contradict one another."""
+    if not kept:
+        return ""
+    old = ", ".join(click.name for click in kept)
+    return (
+        f"{' The new clicks were not kept.' if new else ''} Clicks of former calls: {old}; "
+        "--forget NAME takes one out, --forget all starts anew."
+    )
+
+
+def _how_many(clicks: Sequence[CourtClick]) -> str:
+    names = ", ".join(click.name for click in clicks)
+    return f" Clicked so far, and kept: {names}." if clicks else ""
 
 
 def write_placed_motion(workspace: Workspace, motion: Motion) -> list[str]:

@@ -7,6 +7,8 @@
     skeleton.json      joints and bones, where they are not the default ones
     golf_clicks.json   of a golf swing: six joints of the address
     golf_marks.json    of a golf swing: what a person put right in a fit
+    court_points.json  points of the court that a person clicked
+    camera.npz         the camera of every frame, where the court was found
     motion.npz, report.html
     exports/           files for other programs that the page wrote
     cache/             results of the stages; safe to delete
@@ -23,6 +25,11 @@ from typing import Any
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import clear_leftovers, hold_lock, make_folder, write_durably
+from keyrecon.io.formats.court_points import (
+    merge_clicks,
+    read_court_points,
+    write_court_points,
+)
 from keyrecon.io.formats.picks import read_picks, write_picks
 from keyrecon.io.option_tables import (
     Record,
@@ -43,10 +50,12 @@ from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
+from keyrecon.world.records import CourtClick
 
 OWN_NAMES = (
     *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
     *("annotate.sqlite", "motion.npz", "report.html", "golf_clicks.json", "golf_marks.json"),
+    *("camera.npz", "court_points.json"),
 )
 """Files that a project has or may come to have."""
 GOLF = "golf"
@@ -105,6 +114,11 @@ class Workspace:
     def camera_file(self) -> Path:
         """camera.npz"""
         return self.folder / "camera.npz"
+
+    @property
+    def court_points_file(self) -> Path:
+        """court_points.json"""
+        return self.folder / "court_points.json"
 
     @property
     def report_file(self) -> Path:
@@ -231,6 +245,21 @@ class Workspace:
             together = tuple(dict.fromkeys((*old, *picks)))
             write_picks(self.picks_file, together)
         return together
+
+    def court_clicks(self) -> tuple[CourtClick, ...]:
+        """Points of the court that a person clicked, in one order."""
+        file = self.court_points_file
+        return read_court_points(file) if file.is_file() else ()
+
+    def change_court_clicks(
+        self, added: Sequence[CourtClick] = (), dropped: Sequence[CourtClick] = ()
+    ) -> None:
+        """Keep clicks on the court; one of the same point in the same frame is replaced."""
+        with self.exclusive():
+            old = self.court_clicks()
+            new = merge_clicks([click for click in old if click not in dropped], added)
+            if new != old:
+                write_court_points(self.court_points_file, new)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:

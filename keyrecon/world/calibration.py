@@ -21,8 +21,10 @@ from keyrecon.records import CameraPath
 from keyrecon.world.clicked_points import (
     FEWEST,
     TOLERANCE,
+    ContradictoryClicks,
     camera_from_points,
     check_click,
+    click_blame,
 )
 from keyrecon.world.court import CourtModel, CourtOptions, tennis_court
 from keyrecon.world.court_finding import (
@@ -153,8 +155,22 @@ def _shrunk(clicks: Sequence[CourtClick], small: Float[np.ndarray, "3 3"]) -> li
 
 def _find_court(pictures: _Pictures, court: CourtModel, clicks: Sequence[CourtClick]) -> CourtView:
     """The court in one frame: from clicks where there are enough, else from its lines alone."""
+    view = _clicked_or_found(pictures, court, clicks)
+    if view.doubt and clicks and (fault := _against_lines(pictures, court, clicks)):
+        raise fault
+    return view
+
+
+def _clicked_or_found(
+    pictures: _Pictures, court: CourtModel, clicks: Sequence[CourtClick]
+) -> CourtView:
     if len(clicks) >= FEWEST:
-        return _view_from_clicks(pictures, court, clicks)
+        try:
+            return _view_from_clicks(pictures, court, clicks)
+        except ContradictoryClicks as fault:
+            if len(clicks) > FEWEST:
+                raise
+            raise (_against_lines(pictures, court, clicks) or fault) from fault
     tried: list[CourtView] = []
     for frame in _likely_frames(pictures, clicks):
         clicked = _clicked(pictures, clicks, frame) if clicks else None
@@ -211,6 +227,22 @@ def _view_from_clicks(
         f"The clicked points put the court where only {plain.support:.0%} of its lines are seen; "
         "check the names of the points, or click more of them.",
     )
+
+
+def _against_lines(
+    pictures: _Pictures, court: CourtModel, clicks: Sequence[CourtClick]
+) -> ContradictoryClicks | None:
+    """The one click that contradicts a court found from its lines alone, where there is one."""
+    frame = clicks[0].frame
+    view = find_in_picture(pictures.at(frame), court, frame)
+    if view.fit is None or view.doubt:
+        return None
+    clicked = _clicked(pictures, clicks, frame)
+    away = click_error(view.camera, clicked) / pictures.at(frame).shape[1]
+    wrong = int(away.argmax())
+    if away[wrong] <= TOLERANCE or (np.delete(away, wrong) > TOLERANCE).any():
+        return None
+    return ContradictoryClicks(click_blame(clicked.names[wrong], away[wrong]))
 
 
 def _fit_together(

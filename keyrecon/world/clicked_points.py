@@ -32,6 +32,10 @@ USUAL_FOCAL, FOCAL_SPREAD = 1.5, 1.2
 where four points leave the focal length open."""
 
 
+class ContradictoryClicks(KeyreconError):
+    """No camera sees the clicked points where they were clicked."""
+
+
 def check_click(click: CourtClick, frames: int, size: tuple[int, int]) -> None:
     """Raise KeyreconError for a click on no point, no frame or beside the picture."""
     if click.name not in POINTS:
@@ -56,14 +60,14 @@ def camera_from_points(
 ) -> Pinhole:
     """The camera that sees named points at these pixels; they are all in one picture.
 
-    Raises KeyreconError where no camera can see them so, and names the click that does not fit
-    the others where that can be told.
+    Raises ContradictoryClicks where no camera can see them so, which names the click that does not
+    fit the others where that can be told.
     """
     camera, error = _fit(names, pixels, shape)
     limit = TOLERANCE * shape[1]
     if camera is not None and error.max() <= limit:
         return camera
-    raise KeyreconError(_contradiction(names, pixels, shape))
+    raise ContradictoryClicks(_contradiction(names, pixels, shape))
 
 
 def point_errors(
@@ -97,11 +101,7 @@ def _contradiction(
                 blame.append((float(error.max()), k, float(away)))
         if blame:
             _, k, away = min(blame)
-            where = f"{pixels[k][0]:.0f},{pixels[k][1]:.0f}"
-            return (
-                f"The click on {names[k]} ({where}) contradicts the others: they put it "
-                f"{_far(away, shape)} away. Click it again, or leave it out."
-            )
+            return click_blame(names[k], away / shape[1])
         return "The clicks contradict one another, more than one of them; click them again."
     return (
         f"The {len(names)} clicks ({', '.join(names)}) contradict one another; check their names, "
@@ -109,8 +109,13 @@ def _contradiction(
     )
 
 
-def _far(pixels: float, shape: tuple[int, int]) -> str:
-    return f"{pixels:.0f} px" if pixels < 2 * shape[1] else "far outside the picture"
+def click_blame(name: str, away: float) -> str:
+    """What is said of a click that lies so many widths of the picture beside its point."""
+    far = f"{away:.1%} of the picture's width away" if away < 1 else "far outside the picture"
+    return (
+        f"The click on {name} contradicts the others and the lines: they put it {far}. Click it "
+        "again, or leave it out."
+    )
 
 
 def _other_side(name: str) -> str:

@@ -5,14 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from court_walker import court_camera, lifted, walk
-from painted_court import camera_at
+from painted_court import camera_at, paint
 
-from keyrecon.app.court import court_click, describe_camera, write_placed_motion
+from keyrecon.app.court import calibrate, court_click, describe_camera, write_placed_motion
+from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
+from keyrecon.progress import silent
+from keyrecon.world.calibration import CalibrationOptions
+from keyrecon.world.court import POINTS
+from keyrecon.world.records import CourtClick
 
 PINHOLE = camera_at((2, -20, 3), (0, -9, 0.8), 1.6)
+BROADCAST = camera_at((0.4, -32, 9), (0, -2, 0), 1.5)
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +81,49 @@ def test_a_point_is_named_framed_and_placed():
     assert (click.name, click.frame, click.x, click.y) == ("near-left", 12, 40.5, 300.0)
     with pytest.raises(KeyreconError, match="NAME:FRAME:X,Y"):
         court_click("near-left:40,300")
+
+
+@pytest.fixture
+def filmed(tmp_path):
+    """A project of a short film of a court, by a camera that stands still."""
+    pictures = [np.repeat(paint(BROADCAST, seed=t)[..., None], 3, axis=2) for t in range(4)]
+    write_video(tmp_path / "v.mp4", pictures, 25.0)
+    start(tmp_path / "v.mp4", tmp_path / "p")
+    return tmp_path / "p"
+
+
+def clicks_on(*names, aside=0.0):
+    """Clicks on points of the court in frame 1; the last one lies `aside` px beside its point."""
+    pixels = BROADCAST.project(np.array([POINTS[name] for name in names]))
+    pixels[-1, 0] += aside
+    return [CourtClick(n, 1, float(x), float(y)) for n, (x, y) in zip(names, pixels, strict=True)]
+
+
+def calibrated(folder, *clicks, forget=()):
+    return calibrate(Workspace(folder), clicks, CalibrationOptions(), silent, forget)
+
+
+def test_points_that_were_clicked_are_kept_and_used_again(filmed):
+    calibrated(filmed, *clicks_on("near-left", "near-right"))
+    first = clicks_on("near-left", "near-right")
+    assert Workspace(filmed).court_clicks() == tuple(first)
+    assert "By 4 clicked points" in calibrated(filmed, *clicks_on("net-middle", "far-left"))
+    assert "By 4 clicked points" in calibrated(filmed)
+    again = calibrated(filmed, *clicks_on("far-left", aside=0.5), forget=["near-left"])
+    assert "By 3 clicked points" in again
+    assert "By" not in calibrated(filmed, forget=["all"])
+    with pytest.raises(KeyreconError, match="no click on near-left to forget; it has none"):
+        calibrated(filmed, forget=["near-left"])
+
+
+def test_a_click_that_contradicts_the_lines_is_named_and_not_kept(filmed):
+    good = clicks_on("near-left", "near-right", "net-middle")
+    wrong = clicks_on("near-service", aside=60.0)
+    for before in ([], good):
+        with pytest.raises(KeyreconError, match="The click on near-service contradicts"):
+            calibrated(filmed, *before, *wrong)
+        assert Workspace(filmed).court_clicks() == ()
+    calibrated(filmed, *good)
+    with pytest.raises(KeyreconError, match="Clicks of former calls: near-left, near-right, net-m"):
+        calibrated(filmed, *wrong)
+    assert len(Workspace(filmed).court_clicks()) == 3

@@ -27,7 +27,7 @@ def test_four_points_are_enough():
 def test_the_click_that_contradicts_the_others_is_named():
     pixels = clicked(NAMES)
     pixels[2] += (45, -8)
-    with pytest.raises(KeyreconError, match=r"far-right-service \(.*contradicts the others"):
+    with pytest.raises(KeyreconError, match="far-right-service contradicts the others"):
         camera_from_points(NAMES, pixels, SHAPE)
 
 

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from painted_court import camera_at, court_error, paint
+from painted_court import badminton_court, camera_at, court_error, paint
 
 from keyrecon.world.court import tennis_court
 from keyrecon.world.court_finding import find_in_picture
@@ -39,6 +39,16 @@ def test_straight_lines_in_all_directions_are_no_court():
         a, b = (tuple(int(v) for v in rng.uniform((0, 0), (640, 360))) for _ in range(2))
         cv2.line(picture, a, b, 210, 3, cv2.LINE_AA)
     assert find_in_picture(picture, tennis_court()).doubt
+
+
+def test_lines_of_another_sport_are_no_tennis_court():
+    size = (960, 540)
+    corner = camera_at((4.7, -10.7, 3.5), (-0.5, -2, 0), 1.4, size)
+    broadcast = camera_at((0.3, -22.7, 8), (0, -1, 0), 1.5, size)
+    painted = [paint(camera, size, court=badminton_court()) for camera in (corner, broadcast)]
+    doubts = [find_in_picture(picture, tennis_court()).doubt for picture in painted]
+    assert "no net is where its net would be" in doubts[0]
+    assert "No tennis court" in doubts[1]
 
 
 def test_one_line_is_no_court():
