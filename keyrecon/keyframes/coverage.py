@@ -8,6 +8,7 @@ gaps that its frames fall in, and all candidates are measured by a few array ope
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -28,18 +29,22 @@ def uncovered_cost(
     for the time that they take, and a gap is bridged that is no longer than `reach` in that time
     either.
     """
+    if elapsed is None:
+        return partial(_open_frames, n_frames, reach)
+    return partial(_open_time, n_frames, reach, elapsed)
 
-    def count(left: Gaps, right: Gaps) -> Gaps:
-        bridged = (left >= 0) & (right < n_frames) & (right - left <= reach)
-        return (right - left - 1) * ~bridged
 
-    def measure(left: Gaps, right: Gaps) -> Gaps:
-        assert elapsed is not None
-        inside = elapsed[right] - elapsed[left + 1]
-        short = (right - left <= reach) & (inside <= (reach - 1) * TIME_UNIT)
-        return inside * ~((left >= 0) & (right < n_frames) & short)
+def _open_frames(n_frames: int, reach: int, left: Gaps, right: Gaps) -> Gaps:
+    bridged = (left >= 0) & (right < n_frames) & (right - left <= reach)
+    return (right - left - 1) * ~bridged
 
-    return count if elapsed is None else measure
+
+def _open_time(
+    n_frames: int, reach: int, elapsed: Int[np.ndarray, "ends"], left: Gaps, right: Gaps
+) -> Gaps:
+    inside = elapsed[right] - elapsed[left + 1]
+    short = (right - left <= reach) & (inside <= (reach - 1) * TIME_UNIT)
+    return inside * ~((left >= 0) & (right < n_frames) & short)
 
 
 TIME_UNIT = 100

@@ -7,6 +7,8 @@ objective is submodular (a gain never grows as the set does), hence lazy evaluat
 finds the very same keyframes as trying all candidates each time.
 """
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Bool, Int
 
@@ -48,12 +50,12 @@ def choose_as_printed(
 
 def printed_cost(n_frames: int) -> GapCost:
     """Eq. 2 in closed form, up to a constant."""
+    return partial(_printed_gap, n_frames)
 
-    def cost(left: Gaps, right: Gaps) -> Gaps:
-        length = right - left
-        return length * (length - (left < 0) - (right == n_frames))
 
-    return cost
+def _printed_gap(n_frames: int, left: Gaps, right: Gaps) -> Gaps:
+    length = right - left
+    return length * (length - (left < 0) - (right == n_frames))
 
 
 def _lazily_best(
