@@ -31,13 +31,21 @@ from keyrecon.app.golf_training import read_swings
 from keyrecon.body import LSP14
 from keyrecon.golf.clicks import ClickedPose, GolfClicks, clicked_pose
 from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
-from keyrecon.golf.observation import ObservationOptions, observe_swing
+from keyrecon.golf.observation import observe_swing, place_in_film
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.prior.captured_swing import change_swing
 from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
 from keyrecon.golf.prior.training import TrainOptions, collect_swings, learn_motion
 from keyrecon.golf.prior.variation import tilt_arms
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations, Swing, SwingMarks
+from keyrecon.golf.records import (
+    NO_MARKS,
+    FittedSwing,
+    MotionModel,
+    Observations,
+    Swing,
+    SwingMarks,
+)
+from keyrecon.golf.scene import observe_scene
 from keyrecon.golf.swing_fit import GolfOptions, fit_observations
 from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
 from keyrecon.io.frame_reader import reduce_picture
@@ -123,7 +131,7 @@ def annotate(truth: dict[str, np.ndarray], seed: int) -> SwingMarks:
     frames = np.unique(np.round(truth["keys"]).astype(int))
     rng = np.random.default_rng([seed, 78])
     joints = truth["points2d"][frames]
-    return SwingMarks(frames, joints + rng.normal(0, 2.0, joints.shape))
+    return SwingMarks.of_joints(frames, joints + rng.normal(0, 2.0, joints.shape))
 
 
 def learn_without(player: int, swings: tuple[Swing, ...], out: Path) -> MotionModel:
@@ -143,7 +151,8 @@ def observe(video: Video, pose: ClickedPose, model: MotionModel, folder: Path) -
         began = time.perf_counter()
         camera = estimate_camera_motion(video)
         film = choose_frames(video, camera, pose.frame)
-        observed = observe_swing(video, film, pose, model, ObservationOptions())
+        scene = observe_scene(video, film, place_in_film(pose, film))
+        observed = observe_swing(video, film, scene, pose, NO_MARKS, model)
         if not observed.film.is_whole(video):
             raise SystemExit(f"{folder.name}: frames were left out of a film that has no repeats.")
         save_record(file, observed.observations)

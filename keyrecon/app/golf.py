@@ -3,6 +3,7 @@
 The project folder holds project.toml and cache/ like any other (`io.workspace`), and besides
 
     golf_clicks.json   six joints of the address, clicked on the page or in a file
+    golf_marks.json    corrections, if any (`io.formats.golf_marks`); they hold
     motion.npz, overlay.mp4, report.html
 
 so that an interrupted fit goes on where it stopped, and one that is repeated is done at once.
@@ -21,10 +22,18 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
 from keyrecon.golf.plausibility import SwingDoubt
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations, RecordedSwing
+from keyrecon.golf.records import (
+    NO_MARKS,
+    FittedSwing,
+    MotionModel,
+    Observations,
+    RecordedSwing,
+    SwingMarks,
+)
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.clicks import read_clicks
+from keyrecon.io.formats.golf_marks import MARKS_FILE, read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
@@ -98,7 +107,8 @@ def fit_project(
     check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
     options = workspace.options(options, GolfOptions(), GOLF)
     video = hold_frames(video)
-    fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress)
+    marks = read_golf_marks(folder / MARKS_FILE, len(video), (video.width, video.height))
+    fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress, marks)
     workspace.remember(options, GolfOptions(), GOLF)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
@@ -141,13 +151,14 @@ def fit_video(
     options: GolfOptions = GolfOptions(),
     keep: Keep = call_stage,
     progress: Progress = silent,
+    marks: SwingMarks = NO_MARKS,
 ) -> GolfFit:
-    """Observe a swing, fit the model to it, and detect the club again where the fit expects it.
+    """Observe a swing, fit the model to it, and hold what a person marked.
 
     Raises KeyreconError where no player or no swing is observed.
     """
     camera = keep("camera", estimate_camera_motion, video, progress=progress)
-    found = find_swing(video, camera, clicked_pose(clicks), model, options, keep, progress)
+    found = find_swing(video, camera, clicked_pose(clicks), model, options, keep, progress, marks)
     return GolfFit(found.fitted, found.observations, found.doubts, found.notes)
 
 

@@ -5,9 +5,9 @@ the options records of the stages, for programs, with the evidence for each valu
 """
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
 from keyrecon.app import golf as golf_job
@@ -51,7 +51,7 @@ def fit(
     video: Positional[Path],
     clicks: Path | None = None,
     out: Path = Path("swing"),
-    prior: Path = BUILT_IN_SWING_PRIOR,
+    prior: Annotated[Path, arg(help_behavior_hint="(default: built-in)")] = BUILT_IN_SWING_PRIOR,
     slowmo: float = 1.0,
     method: Literal["swing", "windows"] = "swing",
     components: int = FitOptions().components,

@@ -5,7 +5,8 @@ from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observation import observe_swing, place_in_film
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations
+from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
+from keyrecon.golf.scene import observe_scene
 from keyrecon.golf.swing_fit import (
     FoundSwing,
     GolfOptions,
@@ -28,15 +29,20 @@ def find_swing(
     options: GolfOptions = GolfOptions(),
     keep: Keep = call_stage,
     progress: Progress = silent,
+    marks: SwingMarks = NO_MARKS,
 ) -> FoundSwing:
-    """Observe a video and fit the swing that explains it best.
+    """Observe a video and fit the swing that explains it best, and holds what a person marked.
 
     Raises KeyreconError where no player or no swing is observed.
     """
     film = keep("film", choose_frames, video, camera, pose.frame)
+    scene = keep(
+        "scene", observe_scene, video, film, place_in_film(pose, film),
+        options=options.observation.scene, progress=progress,
+    )  # fmt: skip
     observed = keep(
-        "observe", observe_swing, video, film, pose, model, options=options.observation,
-        progress=progress,
+        "observe", observe_swing, video, film, scene, pose, marks, model,
+        options=options.observation, progress=progress,
     )  # fmt: skip
     check_direction(observed.observations, place_in_film(pose, observed.film), model, "The clicks")
     shown = observed.film.open(video)
@@ -51,7 +57,9 @@ def find_swing(
         if not doubts or options.method == "windows":
             break
     fitted, observations, doubts = min(tried, key=lambda t: len(t[2]))
-    return keep("found", swing_found, fitted, observations, tuple(doubts), observed, video, model)
+    return keep(
+        "found", swing_found, fitted, observations, tuple(doubts), observed, marks, video, model
+    )
 
 
 def fit_candidate(

@@ -1,14 +1,13 @@
 """Everything that is observed of a swing before the motion model is fitted to it.
 
-One pass separates the player from the scene, one over the full pictures detects line segments that
-may be the club's shaft, and one over reduced pictures, all at once in memory, tracks joints and
-matches points of the player's surface. Masks and segments together tell where the swing is
-(`fit.swing_search`), and the club of each swing that it may be when it passes its key postures.
+The player's masks and what may be his club (`scene`) together tell where the swing is
+(`fit.swing_search`), and the club of each swing that it may be when it passes its key postures. One
+pass over reduced pictures, all at once in memory, tracks joints and matches points of the player's
+surface. What a person marked holds throughout (`marks`).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -16,39 +15,37 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.fit.handedness import mirror_evidence, mirror_initial, mirror_pixels
+from keyrecon.golf.fit.handedness import (
+    mirror_evidence,
+    mirror_initial,
+    mirror_marks,
+    mirror_pixels,
+)
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
-from keyrecon.golf.fit.swing_search import (
-    SearchLimits,
-    SwingEvidence,
-    SwingHypothesis,
-    search_swing,
+from keyrecon.golf.fit.swing_path import SearchLimits
+from keyrecon.golf.fit.swing_search import SwingEvidence, SwingHypothesis, search_swing
+from keyrecon.golf.marks import (
+    correct_tracks,
+    hold_keys,
+    hold_observations,
+    hold_shafts,
+    place_marks,
 )
 from keyrecon.golf.observe.appearance_tracker import AppearanceOptions
 from keyrecon.golf.observe.club import Club, ClubOptions, track_club
 from keyrecon.golf.observe.film import Film, frame_step
-from keyrecon.golf.observe.foreground import (
-    Foreground,
-    ForegroundOptions,
-    FrameForeground,
-    separate_player,
-)
+from keyrecon.golf.observe.foreground import Foreground, FrameForeground
 from keyrecon.golf.observe.joint_tracks import track_joints
-from keyrecon.golf.observe.line_segments import (
-    LineSegmentOptions,
-    LineSegments,
-    detect_line_segments,
-    drop_static_segments,
-)
 from keyrecon.golf.observe.point_matches import MatchOptions, match_points
-from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses, ShaftOptions, propose_shafts
+from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.golf.observe.swing_events import (
     TimingOptions,
     interpolate_times,
     refine_key_frames,
 )
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, Matches, MotionModel, Observations
+from keyrecon.golf.records import Camera, Matches, MotionModel, Observations, SwingMarks
+from keyrecon.golf.scene import SwingScene, SwingSceneOptions
 from keyrecon.io.frame_reader import read_small, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
@@ -71,21 +68,12 @@ MASK_STEP = 0.03
 """Distance between samples of the mask, player heights: a forearm's width."""
 
 
-ACTIVE_PART, ACTIVE_FRAMES = 0.2, 16
-"""Share of the frames in which a player is said to be active, and how many of them are asked for
-what stays in place."""
-
-
 @dataclass(frozen=True)
 class ObservationOptions:
     """How a video of a swing is observed."""
 
-    foreground: ForegroundOptions = field(default_factory=ForegroundOptions)
-    """The player against the scene."""
-    line_segments: LineSegmentOptions = field(default_factory=LineSegmentOptions)
-    """Parts of the shaft."""
-    shaft_hypotheses: ShaftOptions = field(default_factory=ShaftOptions)
-    """What may be the club."""
+    scene: SwingSceneOptions = field(default_factory=SwingSceneOptions)
+    """The player, and what may be his club."""
     club: ClubOptions = field(default_factory=ClubOptions)
     """How the club moves."""
     timing: TimingOptions = field(default_factory=TimingOptions)
@@ -109,10 +97,10 @@ class SwingCandidate:
 
     def of(self, observations: Observations) -> Observations:
         """The observations if this is the swing."""
-        return replace(
+        return hold_observations(replace(
             observations, club=self.club, club_along=self.club_along, keys=self.keys,
             phase=self.phase,
-        )  # fmt: skip
+        ))  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,28 +120,29 @@ class ObservedFilm:
 def observe_swing(
     video: Video,
     film: Film,
+    scene: SwingScene,
     pose: ClickedPose,
+    marks: SwingMarks,
     model: MotionModel,
     options: ObservationOptions = ObservationOptions(),
     progress: Progress = silent,
 ) -> ObservedFilm:
     """Observations of the frames of a film of a video, and the swings in it.
 
-    `pose` is that of the file's frame. Raises KeyreconError where the clicks lie on no player or
-    no swing is observed.
+    `scene` is what the film shows, `pose` and `marks` are those of the file's frames. Raises
+    KeyreconError where no swing is observed.
     """
     whole, placed = film.open(video), place_in_film(pose, film)
-    foreground = separate_player(whole, placed, options.foreground, progress)
-    players = np.stack([foreground.frame(t).player() for t in range(len(whole))])
-    shafts = detect_shafts(whole, foreground, players, placed.shoulders, options, progress)
-    evidence = SwingEvidence(players, foreground.shrink, foreground.height, tuple(shafts), film.fps)
-    found = _search(evidence, placed, model, whole.width)
+    players, height = scene.players, scene.foreground.height
+    evidence = SwingEvidence(players, scene.foreground.shrink, height, scene.shafts, film.fps)
+    found = _search(evidence, placed, place_marks(marks, film), model, whole.width)
     slow_motion = find_slow_motion(found[0].keys, film.fps)
     chosen = np.arange(0, len(whole), frame_step(film.fps * slow_motion))
     film = film.take(chosen, slow_motion)
+    own = place_marks(marks, film)
     kept = _Kept(
-        replace(foreground, likely=foreground.likely[chosen]), players[chosen],
-        [shafts[t] for t in chosen], place_in_film(pose, film), film,
+        replace(scene.foreground, likely=scene.foreground.likely[chosen]), players[chosen],
+        hold_shafts([scene.shafts[t] for t in chosen], own), place_in_film(pose, film), own, film,
     )  # fmt: skip
     candidates = tuple(_candidate(h, kept, chosen, model, options) for h in found)
     observations = _observe(film.open(video), kept, candidates[0], options, progress)
@@ -168,6 +157,7 @@ class _Kept:
     players: Bool[np.ndarray, "T h w"]
     shafts: list[ShaftHypotheses]
     pose: ClickedPose
+    marks: SwingMarks
     film: Film
 
 
@@ -197,6 +187,7 @@ def find_slow_motion(keys: Float[np.ndarray, "4"], fps: float) -> float:
 def _search(
     evidence: SwingEvidence,
     pose: ClickedPose,
+    marks: SwingMarks,
     model: MotionModel,
     width: int,
 ) -> list[SwingHypothesis]:
@@ -204,9 +195,16 @@ def _search(
     joints, camera = pose.joints, pose.camera
     if pose.left_handed:
         evidence = mirror_evidence(evidence, width)
-        joints = mirror_initial(joints, width)
+        joints, marks = mirror_initial(joints, width), mirror_marks(marks, width)
         camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
-    found = search_swing(evidence, joints, camera, model, size_body(pose.stature))
+    body = size_body(pose.stature)
+    found = search_swing(evidence, joints, camera, model, body, marks=marks)
+    if not found and np.isfinite(marks.keys).any():
+        raise KeyreconError(
+            "No swing of a pace that golfers have passes start, top, hit and finish where they "
+            f"were marked (frames {', '.join(f'{k:.0f}' for k in marks.keys if np.isfinite(k))} of "
+            "the fitted ones); correct these marks, or take some back."
+        )
     if not found:
         raise KeyreconError(
             f"There is no swing in this video: its {len(evidence.players)} frames are too few for "
@@ -230,6 +228,7 @@ def _candidate(
     club = track_club(kept.shafts, foreground.height, fps, options.club, hypothesis.club[chosen])
     shaft = _describe_club(club, foreground.height, kept.film.size)
     keys = refine_key_frames(club, hypothesis.keys / step, foreground.height, fps, options.timing)
+    keys = hold_keys(keys, kept.marks)
     phase = interpolate_times(keys, model.keys, len(chosen))
     return SwingCandidate(shaft.ends, shaft.along, keys, phase, hypothesis.cost)
 
@@ -252,7 +251,7 @@ def _observe(
         initial=pose.joints,
         height=pose.height,
         stature=pose.stature,
-        joints=tracks.joints,
+        joints=correct_tracks(tracks.joints, kept.marks, pose.frame),
         spread=tracks.spread,
         club=candidate.club,
         club_spread=np.full(len(video), CLUB_SPREAD * foreground.height),
@@ -271,44 +270,8 @@ def _observe(
         keys=candidate.keys,
         phase=candidate.phase,
         left_handed=pose.left_handed,
+        marks=kept.marks,
     ))  # fmt: skip
-
-
-def detect_shafts(
-    video: Video,
-    foreground: Foreground,
-    players: Bool[np.ndarray, "T h w"],
-    shoulders: Float[np.ndarray, "2"],
-    options: ObservationOptions = ObservationOptions(),
-    progress: Progress = silent,
-) -> list[ShaftHypotheses]:
-    """What may be the club in every frame; `shoulders` is the middle between them, px."""
-
-    def detect(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> LineSegments:
-        frame, grey = numbered
-        return detect_line_segments(
-            np.ascontiguousarray(grey), foreground.frame(frame), options.line_segments
-        )
-
-    pictures = progress(enumerate(video.grey_frames()), "Detecting the club", len(video))
-    segments = list(side_by_side(detect, pictures))
-    segments = drop_static_segments(segments, foreground.height, most_active(players))
-
-    def propose(numbered: tuple[int, LineSegments]) -> ShaftHypotheses:
-        frame, of_frame = numbered
-        return propose_shafts(
-            of_frame, foreground.frame(frame), shoulders, options.shaft_hypotheses
-        )
-
-    return list(side_by_side(propose, enumerate(segments)))
-
-
-def most_active(players: Bool[np.ndarray, "T h w"]) -> Int[np.ndarray, "n"]:
-    """Some of the frames in which the player's outline moves most."""
-    moved = np.array([(a ^ b).mean() for a, b in pairwise(players)])
-    several = max(2, round(ACTIVE_PART * len(players)))
-    busiest = np.sort(np.argsort(-moved, kind="stable")[:several])
-    return busiest[np.unique(np.linspace(0, len(busiest) - 1, ACTIVE_FRAMES).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)

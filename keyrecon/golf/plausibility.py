@@ -35,6 +35,9 @@ LEAST_CLUB_AGREED, LEAST_CLUB_SEEN = 0.8, 0.25
 right fits of five real swings, and share of these frames that have one, .58 to .92, at least."""
 FARTHEST_CLICK = 0.1
 """Mean distance of fitted joints from those that a person placed, body heights, at most."""
+FARTHEST_MARK = 0.1
+"""Distance of a marked joint from the fit that was drawn to it, body heights, at most: beyond it
+the mark is of another posture, or the fit of another swing."""
 EDGE = 1.0
 """Frames from either end of the film within which a key posture was not found but cut off."""
 
@@ -59,6 +62,7 @@ def find_doubts(fitted: FittedSwing, observations: Observations) -> list[SwingDo
         *_doubt_figure(fitted, observations),
         *_doubt_club(fitted, observations),
         *_doubt_clicks(fitted, observations),
+        *_doubt_marks(fitted, observations),
     ]
 
 
@@ -169,3 +173,15 @@ def _doubt_clicks(fitted: FittedSwing, observations: Observations) -> list[Swing
         f"the clicked joints are {far.mean():.0%} of the body height away, {worst} {far.max():.0%}"
     )
     return [SwingDoubt(text, initial.frame)]
+
+
+def _doubt_marks(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """No mark is far from where the fit would have the joint."""
+    marks = observations.marks
+    off = np.linalg.norm(fitted.motion.points2d[marks.frames] - marks.joints, axis=2)
+    far = np.nan_to_num(off / observations.height)
+    if not far.size or far.max() <= FARTHEST_MARK:
+        return []
+    row, joint = np.unravel_index(far.argmax(), far.shape)
+    frame, name = int(marks.frames[row]), LSP14.names[joint]
+    return [SwingDoubt(f"{name} was marked {far.max():.0%} of the body height away", frame)]

@@ -165,11 +165,32 @@ class Matches:
 
 @dataclass(frozen=True, eq=False)
 class SwingMarks:
-    """Joints that a person marked in some frames."""
+    """What a person marked: joints and shaft in some frames, and when key postures are."""
 
     frames: Int[np.ndarray, "K"]
+    """Ascending."""
     joints: Float[np.ndarray, "K 14 2"]
     """px; NaN where not marked; in the order of LSP14."""
+    shafts: Float[np.ndarray, "K 2 2"]
+    """Between the hands, and at the club's head, px; NaN where not marked."""
+    keys: Float[np.ndarray, "4"]
+    """Frames of start, top, hit and finish; NaN where not marked."""
+
+    @classmethod
+    def of_joints(
+        cls, frames: Int[np.ndarray, "K"], joints: Float[np.ndarray, "K 14 2"]
+    ) -> "SwingMarks":
+        """Joints alone."""
+        return cls(frames, joints, np.full((len(frames), 2, 2), np.nan), np.full(4, np.nan))
+
+    @property
+    def any(self) -> bool:
+        """Whether anything was marked."""
+        return len(self.frames) > 0 or bool(np.isfinite(self.keys).any())
+
+
+NO_MARKS = SwingMarks.of_joints(np.zeros(0, np.int64), np.zeros((0, 14, 2)))
+"""Nothing was marked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +224,8 @@ class Observations:
     phase: Float[np.ndarray, "T"]
     """First guess of the normalised time."""
     left_handed: bool
-    marks: SwingMarks | None = None
-    """Annotated keyframes, where a person made some."""
+    marks: SwingMarks = NO_MARKS
+    """What a person marked besides the initial joints."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from keyrecon.golf.fit.in_file import observations_in_file, swing_in_file
 from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.marks import hold_joints, hold_keys, hold_observations
 from keyrecon.golf.observation import ObservationOptions, ObservedFilm
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.swing_events import (
@@ -34,7 +35,7 @@ from keyrecon.golf.observe.swing_events import (
 )
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingState
+from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingMarks, SwingState
 from keyrecon.io.video import Video
 from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
 from keyrecon.progress import Progress, silent
@@ -77,10 +78,10 @@ class GuidedFit:
 
     def update(self, observations: Observations) -> Observations:
         """The observations of this round."""
-        return replace(
+        return hold_observations(replace(
             observations, club=self.club, club_along=self.club_along, keys=self.keys,
             phase=self.phase,
-        )  # fmt: skip
+        ))  # fmt: skip
 
 
 def fit_observations(
@@ -128,8 +129,9 @@ def fit_guided(
     guided = detect_club_guided(observations, video, fitted, options.guided_detection)
     keys = detect_swing_events(video, guided, fitted, options.events)
     keys[1:3] = observations.keys[1:3]
+    keys = hold_keys(keys, observations.marks)
     phase = interpolate_times(keys, model.keys, len(video))
-    guided = replace(guided, keys=keys, phase=phase)
+    guided = hold_observations(replace(guided, keys=keys, phase=phase))
     fitted = fit_observations(guided, video, model, options, fitted.state)
     return GuidedFit(guided.club, guided.club_along, keys, phase, fitted)
 
@@ -141,7 +143,8 @@ def finish_fit(
     options: SwingEventOptions = SwingEventOptions(),
 ) -> FittedSwing:
     """The fitted swing with its beginning and end as the hands in the picture tell them."""
-    return replace(fitted, keys=detect_swing_events(video, observations, fitted, options))
+    keys = detect_swing_events(video, observations, fitted, options)
+    return replace(fitted, keys=hold_keys(keys, observations.marks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,19 +165,20 @@ def swing_found(
     observations: Observations,
     doubts: tuple[SwingDoubt, ...],
     observed: ObservedFilm,
+    marks: SwingMarks,
     video: Video,
     model: MotionModel,
 ) -> FoundSwing:
-    """A fitted film as a swing in every frame of the file."""
+    """A fitted film as a swing in every frame of the file, with the file's `marks` held."""
     film = observed.film
     doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
     notes = tuple(_describe_film(observed, len(video)))
-    if film.is_whole(video):
-        return FoundSwing(fitted, observations, doubts, notes)
-    return FoundSwing(
-        swing_in_file(fitted, observations, film, video, model),
-        observations_in_file(observations, film), doubts, notes,
-    )  # fmt: skip
+    if not film.is_whole(video):
+        fitted = swing_in_file(fitted, observations, film, video, model)
+        observations = replace(observations_in_file(observations, film), marks=marks)
+    fitted = hold_joints(fitted, marks, observations.camera.focal)
+    fitted = replace(fitted, keys=hold_keys(fitted.keys, marks))
+    return FoundSwing(fitted, observations, doubts, notes)
 
 
 def _describe_film(observed: ObservedFilm, frames: int) -> list[str]:

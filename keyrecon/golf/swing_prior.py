@@ -121,7 +121,7 @@ def _observations(
         keys=np.zeros(4),
         phase=np.zeros(frames),
         left_handed=options.left_handed,
-        marks=SwingMarks(annotations.frames, annotations.joints),
+        marks=SwingMarks.of_joints(annotations.frames, annotations.joints),
     )
 
 

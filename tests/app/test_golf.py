@@ -13,10 +13,13 @@ from keyrecon.app.golf import fit_file
 from keyrecon.app.golf_comparing import compare
 from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
 from keyrecon.app.project import start
+from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.fit.fitting import FitOptions
+from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.clicks import write_clicks
+from keyrecon.io.formats.golf_marks import MARKS_FILE, write_golf_marks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
@@ -27,6 +30,7 @@ from keyrecon.lifting.lifting import LiftOptions
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
+from keyrecon.records import SOURCES
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 
 QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
@@ -136,7 +140,7 @@ def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tm
     result.unlink()
     (project / "motion.npz").unlink()
     before = {file: file.stat().st_mtime_ns for file in (project / "cache").iterdir()}
-    assert len(before) == 6  # camera, film, observe, fit_1, guided_1_1, found
+    assert len(before) == 7  # camera, film, scene, observe, fit_1, guided_1_1, found
     fit(swing, project)
     assert result.is_file() and all(f.stat().st_mtime_ns == at for f, at in before.items())
     ours, theirs = (read_motion(f / "motion.npz") for f in (project, swing / "project"))
@@ -200,6 +204,38 @@ def test_a_new_golf_project_tells_of_its_page(swing, tmp_path):
     assert Workspace(tmp_path / "p").is_golf
     with pytest.raises(KeyreconError, match="its own skeleton"):
         start(swing / "video.mp4", tmp_path / "q", skeleton=tmp_path / "s.json", golf=True)
+
+
+def test_what_a_person_marked_holds(swing, decoded_at_first, tmp_path):
+    """Joints to 5 px though they are marked 17 px off, instants exactly, others in order."""
+    project = shutil.copytree(swing / "project", tmp_path / "p")
+    video, truth = open_video(swing / "video.mp4"), read_truth(swing / "truth.npz")
+    top = round(float(truth["keys"][1])) + 2
+    frames = np.array([top - 6, top, top + 4])
+    joints = np.full((3, 14, 2), np.nan)
+    for name in ("left_wrist", "left_elbow", "right_knee"):
+        joints[:, LSP14.index(name)] = truth["points2d"][frames, LSP14.index(name)] + (15, -9)
+    shafts = np.full((3, 2, 2), np.nan)
+    shafts[2] = truth["club2d"][frames[2]]
+    marks = SwingMarks(frames, joints, shafts, np.array([np.nan, top, np.nan, np.nan]))
+    write_golf_marks(project / MARKS_FILE, marks, (video.width, video.height))
+    text = fit(swing, project)
+    assert f"top {top}, hit" in text
+    kept = read_swing(project / "motion.npz")
+    away = np.linalg.norm(kept.motion.points2d[frames] - joints, axis=2)
+    assert np.nanmax(away) < 5
+    assert (np.diff(kept.keys) > 0).all() and kept.keys[1] == top
+    marked = np.isfinite(joints[..., 0])
+    assert (kept.motion.source[frames][marked] == SOURCES.index("annotated")).all()
+    way, theirs = (ends[1] - ends[0] for ends in (kept.club2d[frames[2]], shafts[2]))
+    assert way @ theirs > np.cos(np.radians(8)) * np.linalg.norm(way) * np.linalg.norm(theirs)
+
+
+def test_marks_of_another_video_are_refused(swing, decoded_at_first, tmp_path):
+    project = shutil.copytree(swing / "project", tmp_path / "p")
+    write_golf_marks(project / MARKS_FILE, NO_MARKS, (64, 48))
+    with pytest.raises(KeyreconError, match="marks were made on pictures of 64 x 48"):
+        fit(swing, project)
 
 
 def test_another_slow_motion_needs_another_folder(swing, decoded_at_first):

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from keyrecon.golf.fit.deviation import follow_picture
 from keyrecon.golf.fit.parameterisation import (
@@ -31,12 +31,14 @@ from keyrecon.golf.fit.regularisation import (
     stack_rows,
 )
 from keyrecon.golf.fit.residuals import (
+    MODEL_ERROR,
     build_capsules,
     club_residuals,
     foreground_residuals,
     joint_residuals,
     mark_residuals,
     match_residuals,
+    shaft_mark_residuals,
     silhouette_residuals,
 )
 from keyrecon.golf.fit.solver import (
@@ -102,6 +104,9 @@ ROBUST_FOREGROUND, ROBUST_SILHOUETTE, ROBUST_MATCH = 0.06, 12.0, 3.0
 """Residuals beyond which a line of sight (m: the radius of a thigh), a limb off the mask (px) and a
 match (px: the accuracy of Lucas-Kanade on cloth) count less. Chosen on rendered swings; see
 benchmarks/golf.py."""
+HELD = 100.0
+"""Standard deviations beyond which a mark counts less where the fit follows the picture: no mark is
+an outlier, however far the model was from it."""
 FIRST_COMPONENTS = 6
 """Coefficients that move before all do, the largest styles first. Chosen on rendered swings; see
 benchmarks/golf.py."""
@@ -129,7 +134,7 @@ def fit_swing(
     ]
     blocks = _weighted_blocks(observations, initial, fps, options)
     state = replace(initial.state, coefficients=np.zeros(number))
-    return _descend(initial, state, blocks, levels, fps, options)
+    return _descend(initial, state, blocks, levels, observations, fps, options)
 
 
 def refit_swing(
@@ -142,7 +147,7 @@ def refit_swing(
     """The same, going on from the state that was fitted before there were more observations."""
     basis = swing_basis(len(previous.coefficients), len(initial.state.phase), _knots(fps, options))
     blocks = _weighted_blocks(observations, initial, fps, options)
-    return _descend(initial, previous, blocks, [_Level(basis, 1.0)], fps, options)
+    return _descend(initial, previous, blocks, [_Level(basis, 1.0)], observations, fps, options)
 
 
 def follow_observations(
@@ -153,12 +158,13 @@ def follow_observations(
     options: FitOptions = FitOptions(),
 ) -> SwingFit:
     """A fitted swing that follows the observations where they depart from the model."""
-    blocks = residual_blocks(observations, initial, options)
-    marks = partial(mark_residuals, observations, fit.body)
-    # A marked joint is worth as much as it is among the blocks of `_weighted_blocks`.
+    # A mark is worth as much as it is among the blocks of `_weighted_blocks`.
     factor = max(1.0, fps / INDEPENDENT_PER_SECOND)
-    blocks = [*blocks, ResidualBlock(marks, factor * options.weights.marks, options.robust)]
-    return follow_picture(fit, blocks, fps)
+    marks = [
+        replace(block, weight=factor * block.weight)
+        for block in mark_blocks(observations, fit.body, options, HELD, 0.0)
+    ]
+    return follow_picture(fit, [*residual_blocks(observations, initial, options), *marks], fps)
 
 
 def _knots(fps: float, options: FitOptions) -> KnotSpacing:
@@ -171,10 +177,8 @@ def _weighted_blocks(
     """All types of observations, frames counted as far as they are independent."""
     blocks = residual_blocks(observations, initial, options)
     share = min(1.0, INDEPENDENT_PER_SECOND / fps)
-    marks = partial(mark_residuals, observations, initial.body)
-    return [replace(block, weight=block.weight * share) for block in blocks] + [
-        ResidualBlock(marks, options.weights.marks, options.robust)
-    ]
+    marks = mark_blocks(observations, initial.body, options, options.robust)
+    return [*(replace(block, weight=block.weight * share) for block in blocks), *marks]
 
 
 def _descend(
@@ -182,13 +186,16 @@ def _descend(
     state: SwingState,
     blocks: Sequence[ResidualBlock],
     levels: Sequence[_Level],
+    observations: Observations,
     fps: float,
     options: FitOptions,
 ) -> SwingFit:
     """Solve level by level from a state; phases are guessed by the initial one."""
     model, body = initial.model, initial.body
+    keys = observations.marks.keys
+    marked = np.rint(keys[np.isfinite(keys)]).astype(int)
     for level in levels:
-        regulariser = _whole_swing(level.basis, initial.state.phase, options.priors, fps)
+        regulariser = _whole_swing(level.basis, initial.state.phase, options.priors, fps, marked)
         wide = [replace(block, robust=level.robust * block.robust) for block in blocks]
         problem = Problem(model, body, level.basis, wide, regulariser)
         state = solve(problem, state, options.steps)
@@ -220,6 +227,19 @@ def point_blocks(
     return [block for block in blocks if block.weight]
 
 
+def mark_blocks(
+    observations: Observations,
+    body: Body,
+    options: FitOptions,
+    robust: float,
+    model_error: float = MODEL_ERROR,
+) -> list[ResidualBlock]:
+    """What a person marked, in standard deviations."""
+    joints = partial(mark_residuals, observations, body, model_error=model_error)
+    shafts = partial(shaft_mark_residuals, observations, body)
+    return [ResidualBlock(marks, options.weights.marks, robust) for marks in (joints, shafts)]
+
+
 def surface_blocks(
     observations: Observations, body: Body, options: FitOptions
 ) -> list[ResidualBlock]:
@@ -243,16 +263,20 @@ def _make_commensurate(block: ResidualBlock, reference: float, initial: SwingFit
 
 
 def _whole_swing(
-    basis: SplineBasis, guess: Float[np.ndarray, "T"], options: PriorOptions, fps: float
+    basis: SplineBasis,
+    guess: Float[np.ndarray, "T"],
+    options: PriorOptions,
+    fps: float,
+    marked: Int[np.ndarray, "n"],
 ) -> Regulariser:
-    """What is expected of a whole swing."""
+    """What is expected of a whole swing, with key postures `marked` in some frames."""
 
     def expect(state: SwingState) -> Rows:
         mean = np.zeros(basis.n_coefficients)
         return stack_rows(
             [
                 coefficient_rows(state, basis, mean, options.coefficients),
-                phase_rows(state, basis, guess, options, fps),
+                phase_rows(state, basis, guess, options, fps, marked),
                 root_rows(state, basis, options, fps),
                 level_rows(state, basis, options),
             ]

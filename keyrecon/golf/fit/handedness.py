@@ -50,9 +50,7 @@ def mirror_initial(joints: InitialJoints, width: int) -> InitialJoints:
 
 def mirror_observations(observations: Observations, width: int) -> Observations:
     """What would have been observed of the mirrored player in pictures of some width."""
-    camera, matches, marks = observations.camera, observations.matches, observations.marks
-    if marks is not None:
-        marks = SwingMarks(marks.frames, mirror_pixels(marks.joints[:, LSP14.mirror], width))
+    camera, matches = observations.camera, observations.matches
     return replace(
         observations,
         camera=Camera(camera.focal, mirror_pixels(camera.principal, width)),
@@ -65,8 +63,16 @@ def mirror_observations(observations: Observations, width: int) -> Observations:
         matches=Matches(
             matches.frame, mirror_pixels(matches.start, width), mirror_pixels(matches.end, width)
         ),
-        marks=marks,
+        marks=mirror_marks(observations.marks, width),
     )
+
+
+def mirror_marks(marks: SwingMarks, width: int) -> SwingMarks:
+    """What would have been marked of the mirrored player."""
+    return replace(
+        marks, joints=mirror_pixels(marks.joints[:, LSP14.mirror], width),
+        shafts=mirror_pixels(marks.shafts, width),
+    )  # fmt: skip
 
 
 def mirror_pose(pose: RootPose) -> RootPose:

@@ -52,7 +52,7 @@ def refit_proportions(
     options: ProportionOptions,
 ) -> SwingFit:
     """A fitted swing with the proportions that its marks tell, and the fit with them, in turns."""
-    if observations.marks is None:
+    if not np.isfinite(observations.marks.joints).any():
         return fit
     average = fit.body
     for _ in range(options.rounds):

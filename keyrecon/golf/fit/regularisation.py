@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
@@ -43,6 +43,9 @@ class PriorOptions:
     """Radians by which the camera looks up or down."""
 
 
+NOWHERE = np.zeros(0, np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Residuals in standard deviations, and their slopes by the unknowns."""
@@ -67,17 +70,19 @@ def phase_rows(
     guess: Float[np.ndarray, "T"],
     options: PriorOptions,
     fps: float,
+    marked: Int[np.ndarray, "n"] = NOWHERE,
 ) -> Rows:
     """The phase close to its guess, and at its pace, whatever the frame rate.
 
-    A guess that comes too early is wrong by the pace of the swing at that time.
+    A guess that comes too early is wrong by the pace of the swing at that time; that of frames in
+    which a person marked a key posture is right.
     """
     frames = len(guess)
     pace = gaussian_filter1d(np.gradient(guess) * fps, options.timing * fps)
     rest = np.where(np.arange(frames) > guess.argmax(), options.relax, options.rest)
     near = np.diag(1 / ((rest + options.timing * pace) * np.sqrt(fps)))
     bend = np.diff(np.eye(frames), n=2, axis=0) * fps**2 / (options.pace * np.sqrt(fps))
-    rows = np.concatenate([near, bend])
+    rows = np.concatenate([near, bend, np.eye(frames)[marked] / options.rest])
     return Rows(rows @ (state.phase - guess), _on_phase(basis, rows))
 
 

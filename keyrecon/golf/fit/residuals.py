@@ -20,12 +20,11 @@ of the body outside of the mask, pulls by the mask's distance transform. Matched
 frames move with the surface that the first one lies on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.body import LSP14
 from keyrecon.golf.prior.kinematics import find_club, find_joints
 from keyrecon.golf.prior.skeleton import CLUB, LENGTHS, NAMES, REST
 from keyrecon.golf.records import (
@@ -35,7 +34,6 @@ from keyrecon.golf.records import (
     Observations,
     Residuals,
     RootPose,
-    SwingMarks,
 )
 from keyrecon.numerics.geometry import unit_vectors
 
@@ -116,16 +114,19 @@ def joint_residuals(observations: Observations, body: Body, pose: RootPose) -> R
                      frame, body.joint_segment[joint])  # fmt: skip
 
 
-def mark_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
-    """Projected joints minus those that a person marked, in standard deviations."""
+def mark_residuals(
+    observations: Observations, body: Body, pose: RootPose, model_error: float = MODEL_ERROR
+) -> Residuals:
+    """Projected joints minus those that a person marked, in standard deviations.
+
+    `model_error` in metres stands against explaining the marks away; without it they hold.
+    """
     marks = observations.marks
-    if marks is None:
-        marks = SwingMarks(np.zeros(0, np.int64), np.zeros((0, len(LSP14.names), 2)))
     row, joint = np.nonzero(np.isfinite(marks.joints).all(axis=2))
     frame = marks.frames[row]
     points = find_joints(body, pose)[frame, joint]
     pixels, slope = project(points, observations.camera)
-    spread = _total_spread(np.full(len(row), MARK_SPREAD), slope)
+    spread = _total_spread(np.full(len(row), MARK_SPREAD), slope, model_error)
     values = (pixels - marks.joints[row, joint]) / spread[:, None]
     return pair_rows(values, slope / spread[:, None, None], points,
                      frame, body.joint_segment[joint])  # fmt: skip
@@ -148,11 +149,20 @@ def club_residuals(observations: Observations, body: Body, pose: RootPose) -> Re
                      np.full(len(points), CLUB))  # fmt: skip
 
 
+def shaft_mark_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
+    """The same of the club in the frames in which a person marked its shaft."""
+    club = np.full_like(observations.club, np.nan)
+    club[observations.marks.frames] = observations.marks.shafts
+    return club_residuals(replace(observations, club=club), body, pose)
+
+
 def _total_spread(
-    tracked: Float[np.ndarray, "n"], slope: Float[np.ndarray, "n 2 3"]
+    tracked: Float[np.ndarray, "n"],
+    slope: Float[np.ndarray, "n 2 3"],
+    model_error: float = MODEL_ERROR,
 ) -> Float[np.ndarray, "n"]:
     """Standard deviation of tracker and model together, px."""
-    return np.hypot(tracked, MODEL_ERROR * slope[:, 0, 0])
+    return np.hypot(tracked, model_error * slope[:, 0, 0])
 
 
 def project(

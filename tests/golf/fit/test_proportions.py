@@ -30,7 +30,7 @@ def posed():
     posture = posture_at(model, state.phase, state.coefficients)
     joints = find_joints(theirs := scale_body(body, FACTORS), place_body(theirs, posture, state))
     pixels = project(joints[FRAMES].reshape(-1, 3), CAMERA)[0].reshape(4, 14, 2)
-    return body, place_body(body, posture, state), SwingMarks(FRAMES, pixels)
+    return body, place_body(body, posture, state), SwingMarks.of_joints(FRAMES, pixels)
 
 
 def lengths(body):

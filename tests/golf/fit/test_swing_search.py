@@ -1,24 +1,20 @@
 """The swing is found wherever it is in a film."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.initial_pose import LEVEL, Placement, repeat_pose
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.fit.swing_search import (
-    SearchLimits,
-    SwingEvidence,
-    best_paths,
-    draw_swing,
-    search_swing,
-    silhouette,
-)
+from keyrecon.golf.fit.swing_path import SearchLimits, best_paths
+from keyrecon.golf.fit.swing_search import SwingEvidence, draw_swing, search_swing, silhouette
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, InitialJoints
+from keyrecon.golf.records import NO_MARKS, Camera, InitialJoints, SwingMarks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 
 MODEL = read_motion_model(BUILT_IN_SWING_PRIOR)
@@ -86,3 +82,25 @@ def test_no_path_is_faster_or_slower_than_golfers_are():
 def test_a_film_that_is_too_short_has_no_swing():
     costs = np.zeros((6, 93))
     assert best_paths(costs, MODEL.keys, np.linspace(0, 1, 93), 30.0) == []
+
+
+def test_a_marked_key_posture_tells_the_swing_from_a_practice_swing():
+    practice = np.interp(np.arange(60), [5, 29, 37, 51], MODEL.keys)
+    shown = film(np.array([70.0, 94.0, 102.0, 116.0]), 130, waggle=practice)
+    nothing = np.full(4, np.nan)
+    for k, frame in ((1, 29.0), (2, 37.0), (1, 94.0), (2, 102.0)):
+        keys = nothing.copy()
+        keys[k] = frame
+        marks = replace(NO_MARKS, keys=keys)
+        for found in search_swing(shown, clicks(), CAMERA, MODEL, BODY, marks=marks):
+            assert found.keys[k] == frame
+
+
+def test_marked_joints_tell_the_swing_from_a_practice_swing():
+    practice = np.interp(np.arange(60), [5, 29, 37, 51], MODEL.keys)
+    shown = film(np.array([70.0, 94.0, 102.0, 116.0]), 130, waggle=practice)
+    # In frame 29 the body is marked as at address: whatever it shows was no top.
+    drawn = draw_swing(MODEL, BODY, np.zeros(2), np.zeros(1), PLACE, CAMERA)
+    marks = SwingMarks.of_joints(np.array([29]), drawn.joints)
+    found = search_swing(shown, clicks(), CAMERA, MODEL, BODY, marks=marks)[0]
+    assert found.keys[1] == pytest.approx(94, abs=3)

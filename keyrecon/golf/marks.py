@@ -1,0 +1,148 @@
+"""What a person marks in a swing, and how it is held.
+
+A mark is worth more than anything observed: the search passes the marked key postures, the club of
+a marked frame is the marked one, tracks of joints run through the marks, and the fit is drawn to
+them (`fit.fitting`). What limbs of fixed length leave between the fit and a mark, `hold_joints`
+closes at last, fading over the frames around, so that a marked joint is where it was marked.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.linalg import solve
+
+from keyrecon.golf.observe.film import Film
+from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
+from keyrecon.golf.records import FittedSwing, Observations, SwingMarks
+from keyrecon.numerics.geometry import warp_points
+from keyrecon.records import SOURCES
+
+SHAFT_SPREAD = 3.0
+"""Standard deviation of a marked end of the shaft, px: as that of a marked joint."""
+SURE_WEIGHT = 2.0
+"""Weight of a marked shaft among those detected, player heights: more than any club is long."""
+FADING = 0.15
+"""Seconds over which a mark's correction fades: half a downswing."""
+SAME_MOMENT = 1e-6
+"""Keeps marks in neighbouring frames apart in the equations."""
+
+
+def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
+    """Marks of a file's frames in the picture and by the frame numbers of a film.
+
+    What lies outside of the film's shot stays away; of two marked frames that are one there, the
+    later one counts.
+    """
+    first, last = film.shot
+    inside = (marks.frames >= first) & (marks.frames <= last)
+    frames = marks.frames[inside]
+    own = np.rint(film.place[frames]).astype(int)
+    _, latest = np.unique(own[::-1], return_index=True)
+    rows = len(own) - 1 - latest
+    warps = film.warps[frames[rows]][:, None]
+    keys = np.clip(np.nan_to_num(marks.keys), 0, len(film.place) - 1)
+    places = np.interp(keys, np.arange(len(film.place)), film.place)
+    return SwingMarks(
+        own[rows], warp_points(warps, marks.joints[inside][rows]),
+        warp_points(warps, marks.shafts[inside][rows]),
+        np.where(np.isfinite(marks.keys), places, np.nan),
+    )  # fmt: skip
+
+
+def hold_keys(keys: Float[np.ndarray, "4"], marks: SwingMarks) -> Float[np.ndarray, "4"]:
+    """Key postures of which the marked ones are where they were marked, the others in order."""
+    marked = np.isfinite(marks.keys)
+    held = np.where(marked, marks.keys, keys)
+    for k in np.flatnonzero(~marked).tolist():
+        before, after = np.flatnonzero(marked[:k]), np.flatnonzero(marked[k:])
+        low = held[before[-1]] + k - before[-1] if len(before) else -np.inf
+        high = held[k + after[0]] - after[0] if len(after) else np.inf
+        held[k] = np.clip(held[k], low, high)
+    return held
+
+
+def hold_shafts(shafts: list[ShaftHypotheses], marks: SwingMarks) -> list[ShaftHypotheses]:
+    """What may be the club: in a frame with a marked shaft nothing else."""
+    held = list(shafts)
+    for t, ends in zip(marks.frames.tolist(), marks.shafts, strict=True):
+        if np.isfinite(ends).all():
+            held[t] = ShaftHypotheses(ends[None], np.array([SURE_WEIGHT]), np.array([True]))
+    return held
+
+
+def hold_observations(observations: Observations) -> Observations:
+    """The observations with the club and the key postures where they were marked."""
+    marks = observations.marks
+    rows = np.flatnonzero(np.isfinite(marks.shafts).all(axis=(1, 2)))
+    frames = marks.frames[rows]
+    club, spread, along = (
+        part.copy()
+        for part in (observations.club, observations.club_spread, observations.club_along)
+    )
+    club[frames], spread[frames], along[frames] = marks.shafts[rows], SHAFT_SPREAD, SHAFT_SPREAD
+    return replace(
+        observations, club=club, club_spread=spread, club_along=along,
+        keys=hold_keys(observations.keys, marks),
+    )  # fmt: skip
+
+
+def correct_tracks(
+    joints: Float[np.ndarray, "T 14 2"], marks: SwingMarks, clicked: int
+) -> Float[np.ndarray, "T 14 2"]:
+    """Tracks through the marks: a tracker drifts evenly from the click to a mark, and on from it.
+
+    Where a track was given up before a mark, it stays as it was.
+    """
+    held, every = joints.copy(), np.arange(len(joints))
+    for j in range(joints.shape[1]):
+        drift = marks.joints[:, j] - joints[marks.frames, j]
+        known = np.isfinite(drift).all(axis=1) & (marks.frames != clicked)
+        frames = np.append(marks.frames[known], clicked)
+        order = np.argsort(frames)
+        off = np.append(drift[known], np.zeros((1, 2)), axis=0)[order]
+        held[:, j] += np.stack([np.interp(every, frames[order], c) for c in off.T], axis=1)
+    return held
+
+
+def hold_joints(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedSwing:
+    """The swing with its marked joints where they were marked, in the file's frames and px.
+
+    A joint moves across its line of sight, around the marks as a random function of time that is
+    once differentiable (a Gaussian process; Matern 3/2) most probably would.
+    """
+    if not len(marks.frames):
+        return fitted
+    motion = fitted.motion
+    flat, space = motion.points2d.copy(), motion.points3d.copy()
+    confidence, source = motion.confidence.copy(), motion.source.copy()
+    for j in range(flat.shape[1]):
+        rows = np.flatnonzero(np.isfinite(marks.joints[:, j]).all(axis=1))
+        if not len(rows):
+            continue
+        frames = marks.frames[rows]
+        off = marks.joints[rows, j] - motion.points2d[frames, j]
+        moved = _spread_in_time(off, frames, motion.time)
+        flat[:, j] += moved
+        space[:, j, :2] += moved * space[:, j, 2:] / focal
+        confidence[frames, j], source[frames, j] = 1.0, SOURCES.index("annotated")
+    held = replace(
+        motion, points2d=flat, points3d=space, confidence=confidence, source=source,
+        keyframes=np.union1d(motion.keyframes, marks.frames),
+    )  # fmt: skip
+    return replace(fitted, motion=held)
+
+
+def _spread_in_time(
+    off: Float[np.ndarray, "n 2"], frames: Int[np.ndarray, "n"], time: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "T 2"]:
+    """Offsets at some frames in all frames."""
+
+    def alike(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        apart = np.sqrt(3) * np.abs(one[:, None] - other) / FADING
+        return (1 + apart) * np.exp(-apart)
+
+    at = time[frames]
+    weights = solve(alike(at, at) + SAME_MOMENT * np.eye(len(at)), off, assume_a="pos")
+    spread: Float[np.ndarray, "T 2"] = alike(time, at) @ weights
+    return spread
