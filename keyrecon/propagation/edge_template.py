@@ -196,6 +196,8 @@ class AnnotatedPoses:
     joints: Complex[np.ndarray, "K J"]
     known: Bool[np.ndarray, "K J"]
     """False where a joint was not marked and stands where it does on the median."""
+    longest: Float[np.ndarray, "B"]
+    """Length that each bone has in the picture at most, player heights."""
 
 
 @dataclass(frozen=True, eq=False)

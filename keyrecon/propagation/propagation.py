@@ -22,6 +22,7 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
+from keyrecon.numerics.geometry import to_complex
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.appearance import (
@@ -31,6 +32,7 @@ from keyrecon.propagation.appearance import (
     regular_frames,
 )
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
+from keyrecon.propagation.bone_bounds import bone_lengths, bound_bones, ends_too_long
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
@@ -146,25 +148,51 @@ def propagate_joints(
         return _with_marks(annotations, annotations.visible, tracks)
     tracks = _propagate_fused(preparation, annotations, options, progress)
     if flow is not None:
-        tracks = with_flow(tracks, flow, preparation.track.height)
+        body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
+        bounds = bound_bones(annotations, body_frame)
+        tracks = with_flow(tracks, flow, preparation.track.height, bounds)
     return _with_marks(annotations, marked, tracks)
 
 
-def with_flow(tracks: JointTracks, flow: FlowTracks, height: Float[np.ndarray, "T"]) -> JointTracks:
+def with_flow(
+    tracks: JointTracks,
+    flow: FlowTracks,
+    height: Float[np.ndarray, "T"],
+    bounds: Float[np.ndarray, "J J"] | None = None,
+) -> JointTracks:
     """Tracks with joints where flow from both sides meets, if it is surer and they are elsewhere.
 
     A joint that is followed from one mark alone is left to edges: of four that were sure and far
-    from them, flow had stayed behind on an even shirt.
+    from them, flow had stayed behind on an even shirt. Nor does flow have a joint where a bone
+    would become longer than `bounds` (player heights) and than it is.
     """
     apart = np.linalg.norm(tracks.joints - flow.joints, axis=2) / height[:, None]
     elsewhere = ~(apart < FLOW_TOLERANCE) & np.isfinite(flow.joints).all(axis=2)
     doubted = ~(tracks.confidence > SURE_EDGES) & (flow.confidence > MIN_FLOW_CONFIDENCE)
     replaced = elsewhere & flow.joined & (doubted | (flow.confidence > SURE_FLOW))
+    if bounds is not None:
+        replaced &= ~_stretched(tracks.joints, flow.joints, replaced, height, bounds)
     return JointTracks(
         np.where(replaced[..., None], flow.joints, tracks.joints),
         np.where(replaced, flow.confidence, tracks.confidence),
         tracks.keyframe,
     )
+
+
+def _stretched(
+    joints: Float[np.ndarray, "T J 2"],
+    others: Float[np.ndarray, "T J 2"],
+    replaced: Bool[np.ndarray, "T J"],
+    height: Float[np.ndarray, "T"],
+    bounds: Float[np.ndarray, "J J"],
+) -> Bool[np.ndarray, "T J"]:
+    """Joints that end a bone which is too long with others in the place of those `replaced`."""
+    bones = np.argwhere(np.triu(np.isfinite(bounds)))
+    longest = bounds[bones[:, 0], bones[:, 1]]
+    before = to_complex(joints) / height[:, None]
+    after = np.where(replaced, to_complex(others) / height[:, None], before)
+    longest = np.maximum(longest, bone_lengths(before, bones))
+    return ends_too_long(after, bones, longest)
 
 
 def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
@@ -241,6 +269,7 @@ def propagate_half(
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
+    confidence[ends_too_long(joints, half.bones, poses.longest)] = 0
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
 
 
@@ -269,7 +298,9 @@ def gather_poses(
             f"Too few joints of the {half.name} body are marked to propagate them to other "
             "frames; mark all of them on at least one keyframe."
         )
-    return AnnotatedPoses(half, frames, poses, known)
+    one, other = half.joints[half.bones].T
+    longest = bound_bones(annotations, body_frame)[one, other]
+    return AnnotatedPoses(half, frames, poses, known, longest)
 
 
 def distances_to(

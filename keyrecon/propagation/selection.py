@@ -11,12 +11,13 @@ The weights were tried at half and twice their values on rendered strokes and se
 them moves the share of joints that are right by more than half a percent.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.viterbi import find_cheapest_path
+from keyrecon.propagation.bone_bounds import too_long
 from keyrecon.propagation.edge_template import FOOT_MATCH_DISTANCE, EdgeTemplates, FootEvidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import PoseHypotheses
@@ -39,6 +40,8 @@ one clip."""
 UNEXPLAINED_WEIGHT = 48.0
 """Cost of leaving all of the frame's elements unexplained. Halved or doubled, others with it: at
 most 0.4 points, 0.3 mm on one clip."""
+TOO_LONG_COST = 1e3
+"""Cost of a bone that is longer than it can be: no such limb while there is another."""
 APPEARANCE_WEIGHT = 4.0
 """Cost of a joint that looks like no mark of it at all. On five real clips with three choices of
 marks each .6 points of PCK more than without, .5 more where looks tell left and right as well;
@@ -81,9 +84,14 @@ def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
     unlikeness = hypotheses.unlikeness[:, 0].copy()
     groups = [half.middle, *half.sides]
     states = [_limb_states(templates, hypotheses, group, fps) for group in groups]
-    paths = [choose_one(states[0]) if half.middle else _best_trunk(hypotheses, half)]
-    _, one, other = states
-    paths += choose_two(one, other, _unexplained_costs(templates, hypotheses, paths[0]))
+    trunk = choose_one(states[0]) if half.middle else _best_trunk(hypotheses, half)
+    joints[:, half.middle] = states[0].joints[frames, trunk]
+    one, other = (
+        replace(state, cost=state.cost + _joining_costs(templates, joints, state, group))
+        for state, group in zip(states[1:], groups[1:], strict=True)
+    )
+    clash = _unexplained_costs(templates, hypotheses, trunk) + _breadth_costs(templates, one, other)
+    paths = [trunk, *choose_two(one, other, clash)]
     for group, state, path in zip(groups, states, paths, strict=True):
         joints[:, group] = state.joints[frames, path]
         unlikeness[..., group] = state.unlikeness[frames, path]
@@ -125,13 +133,50 @@ def _limb_states(
         costs[-1] += SIDE_SWAP_COST * number
         if foot_cost is not None:
             costs[-1] += FOOT_WEIGHT * foot_cost[:, :, side].sum(axis=2)
+    joints = np.concatenate([hypotheses.joints[:, :, side] for side in sides], axis=1)
+    inside = np.flatnonzero(np.isin(half.bones, members).all(axis=1))
+    place = np.array([[group.index(end) for end in half.bones[row]] for row in inside], int)
+    ends = place.reshape(-1, 2)
     states = np.concatenate(costs, axis=1)
+    states += TOO_LONG_COST * too_long(joints, ends, poses.longest[inside]).sum(axis=2)
     # all states of an annotated frame are the annotation
     states[poses.frames] = 0
-    joints = np.concatenate([hypotheses.joints[:, :, side] for side in sides], axis=1)
     joints[poses.frames] = poses.joints[:, None, members]
     depth = np.clip(half.depth[members] - 1, 0, None)
     return LimbStates(joints, states, unlikeness, STEP_SPEED / fps * 2.0**depth)
+
+
+def _joining_costs(
+    templates: EdgeTemplates,
+    joints: Complex[np.ndarray, "T J"],
+    states: LimbStates,
+    group: tuple[int, ...],
+) -> Float[np.ndarray, "T S"]:
+    """Cost of bones from the trunk, whose joints are chosen, that are too long."""
+    half, poses = templates.half, templates.poses
+    cost = np.zeros(states.cost.shape)
+    for (parent, child), longest in zip(half.bones.tolist(), poses.longest, strict=True):
+        if parent in half.middle and child in group:
+            place = states.joints[:, :, group.index(child)]
+            cost += TOO_LONG_COST * (np.abs(place - joints[:, parent, None]) > longest)
+    cost[poses.frames] = 0
+    return cost
+
+
+def _breadth_costs(
+    templates: EdgeTemplates, one: LimbStates, other: LimbStates
+) -> Float[np.ndarray, "T S S"]:
+    """Cost of pairs of sides that are too far apart where a bone joins them."""
+    half, poses = templates.half, templates.poses
+    cost = np.zeros((len(one.joints), one.joints.shape[1], other.joints.shape[1]))
+    for (start, stop), longest in zip(half.bones.tolist(), poses.longest, strict=True):
+        ends = {start, stop}
+        for place, pair in enumerate(zip(*half.sides, strict=True)):
+            if ends == set(pair):
+                across = one.joints[:, :, None, place] - other.joints[:, None, :, place]
+                cost += TOO_LONG_COST * (np.abs(across) > longest)
+    cost[poses.frames] = 0
+    return cost
 
 
 def _foot_costs(

@@ -71,7 +71,13 @@ def draw(joints, colors=(PINK, BLACK)):
 @pytest.fixture(scope="module")
 def appearance():
     marked = np.array([0, FRAMES - 1])
-    poses = AnnotatedPoses(LEGS, marked, JOINTS[marked], np.ones((2, len(LEGS.joints)), bool))
+    poses = AnnotatedPoses(
+        LEGS,
+        marked,
+        JOINTS[marked],
+        np.ones((2, len(LEGS.joints)), bool),
+        np.full(len(LEGS.bones), np.inf),
+    )
     return learn_appearance(describe_player(draw(JOINTS), BODY, np.arange(FRAMES)), poses, JOINTS)
 
 

@@ -37,7 +37,9 @@ def templates_of(preparation, truth, frames, half):
     body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
     rows = np.array(frames)
     joints = body_frame.from_pixels(truth[rows][:, half.joints], rows[:, None])
-    poses = AnnotatedPoses(half, rows, joints, np.ones(joints.shape, bool))
+    poses = AnnotatedPoses(
+        half, rows, joints, np.ones(joints.shape, bool), np.full(len(half.bones), np.inf)
+    )
     edges = preparation.contours.edges
     return (
         make_edge_templates(edges, body_frame, poses, 400),

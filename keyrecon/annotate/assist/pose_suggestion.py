@@ -183,7 +183,7 @@ MAX_SOURCES = 10
 """Annotated frames used for each half; with more a suggestion gets slower and no better."""
 HYPOTHESIS_WEIGHT = 1 / HYPOTHESIS_SPREAD**2
 """Weight of the chosen hypothesis in the final registration."""
-_PER_POSE_FIELDS = [field for field in fields(AnnotatedPoses) if field.name != "half"]
+_PER_POSE_FIELDS = [f for f in fields(AnnotatedPoses) if f.name not in ("half", "longest")]
 
 
 @dataclass(frozen=True, eq=False)
