@@ -1,6 +1,7 @@
 """`keyrecon court`: the camera of every frame from the tennis court in the picture."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +20,23 @@ from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.clicked_points import ContradictoryClicks, check_click
 from keyrecon.world.court import tennis_court
-from keyrecon.world.placement import place_motion, run_length, run_speed
+from keyrecon.world.placement import place_motion
 from keyrecon.world.records import CourtCamera, CourtClick, WorldMotion
+from keyrecon.world.run_measures import measure_run
 
 MAX_MISFIT = 0.2
 """Share by which the player's size by the court may differ from the height that was given: rendered
 sequences are off by 2 to 9 %, a court taken for another by a third and more."""
 STATURES = (1.1, 2.3)
 """Heights that players have, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedMotion:
+    """A motion on the court, where it was put there, and what is said of it."""
+
+    lines: tuple[str, ...] = ()
+    court: tuple[WorldMotion, CourtCamera] | None = None
 
 
 def court_click(text: str) -> CourtClick:
@@ -73,7 +83,7 @@ def calibrate(
     drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
     picture = workspace.folder / "court.jpg"
     write_court_picture(picture, drawn)
-    placed = []
+    placed = PlacedMotion()
     if workspace.motion_file.is_file():
         placed = write_placed_motion(workspace, read_motion(workspace.motion_file))
     return "\n".join(
@@ -83,9 +93,17 @@ def calibrate(
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
             *([f"By {len(together)} clicked points; they are kept."] if together else []),
-            *placed,
+            *placed.lines,
+            *_old_report(workspace, placed),
         ]
     )
+
+
+def _old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
+    """The way to a report with the court."""
+    if placed.court is None or not workspace.report_file.is_file():
+        return []
+    return [f"For a report with the court: keyrecon run {quoted(workspace.folder)}"]
 
 
 def _find_camera(
@@ -126,30 +144,31 @@ def _how_many(clicks: Sequence[CourtClick]) -> str:
     return f" Clicked so far, and kept: {names}." if clicks else ""
 
 
-def write_placed_motion(workspace: Workspace, motion: Motion) -> list[str]:
-    """Write motion.npz, with the motion on the court where that is known; lines to show.
+def write_placed_motion(workspace: Workspace, motion: Motion) -> PlacedMotion:
+    """Write motion.npz, with the motion on the court where that is known.
 
     What the motion is without a court is written the same in any case.
     """
     if not workspace.camera_file.is_file():
         write_motion(workspace.motion_file, motion)
-        return []
+        return PlacedMotion()
     camera, world = read_camera(workspace.camera_file), None
     if len(camera.found) == len(motion.time):
         world = place_motion(motion, camera)
     doubt = _doubt(world, motion, camera)
     if world is None or doubt:
         write_motion(workspace.motion_file, motion)
-        return [f"No way on the court: {doubt}"]
+        return PlacedMotion((f"No way on the court: {doubt}",))
     write_motion(workspace.motion_file, motion, (world, camera))
-    length, speed = run_length(world, motion)
+    way = measure_run(world, motion)
+    if way is None:
+        return PlacedMotion(court=(world, camera))
     picture = workspace.folder / "way.jpg"
-    title = f"{length:.1f} m run, top speed {speed:.1f} m/s"
-    write_court_picture(picture, draw_way(world.root, run_speed(world, motion), title))
+    title = f"{way.length.value:.1f} m run, top speed {way.top_speed.value:.1f} m/s"
+    write_court_picture(picture, draw_way(world.root, way.speed, title))
     height = f" The player is {world.height_ratio:.2f} m tall by the court."
-    return [
-        f"On the court: {title}; {picture} shows the way." + (height if motion.units != "m" else "")
-    ]
+    line = f"On the court: {title}; {picture} shows the way."
+    return PlacedMotion((line + (height if motion.units != "m" else ""),), (world, camera))
 
 
 def _doubt(world: WorldMotion | None, motion: Motion, camera: CourtCamera) -> str:

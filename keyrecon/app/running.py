@@ -61,6 +61,7 @@ def run(
         truth=truth,
         options=options,
         contradictions=found.contradictions(),
+        court=placed.court,
     )
     write_report(workspace.report_file, material, progress)
     workspace.remember(told, Options())
@@ -68,7 +69,7 @@ def run(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
-            *placed,
+            *placed.lines,
             *found.contradictions(),
             *_describe_doubt(motion),
             *_other_choice(workspace, options, preparation.keyframes),

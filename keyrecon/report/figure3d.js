@@ -2,7 +2,9 @@
 // has this file inlined, the annotator serves it. Axes of the camera: x right, y down, z away from it.
 import { cssColor } from "./colors.js";
 
+const FREE_EYE = 25; // of an eye that has no name, over lines on the ground, their lengths
 const EYE_DISTANCE = 6; // of the eye that sees the figure in perspective, body heights
+const NEAREST = 0.1; // of the eye's distance: nothing is drawn nearer to it
 const ZOOM_RANGE = [0.4, 4];
 const ZOOM_PER_PIXEL = 0.002; // of the wheel, as an exponent
 const TURN_PER_PIXEL = 0.01; // radians
@@ -22,8 +24,9 @@ export function prepareCanvas(canvas) {
 }
 
 // Maps a point to [x, y, depth, magnification] on a canvas: turned about `center`, in perspective.
-// `view` has yaw and pitch (radians), `scale` is in pixels per unit of length at the center.
-export function createProjection(view, { center, unit, scale, size }) {
+// `view` has yaw and pitch (radians), `scale` is in pixels per unit of length at the center, `eye` is
+// how far away the eye is.
+export function createProjection(view, { center, unit, scale, size, eye = EYE_DISTANCE * unit }) {
   const [cy, sy] = [Math.cos(view.yaw), Math.sin(view.yaw)];
   const [cp, sp] = [Math.cos(view.pitch), Math.sin(view.pitch)];
   return (point) => {
@@ -31,7 +34,7 @@ export function createProjection(view, { center, unit, scale, size }) {
     const across = x * cy + z * sy,
       away = z * cy - x * sy;
     const depth = y * sp + away * cp,
-      near = 1 / (1 + depth / (EYE_DISTANCE * unit));
+      near = 1 / Math.max(NEAREST, 1 + depth / eye);
     return [
       size[0] / 2 + across * scale * near,
       size[1] / 2 + (y * cp - away * sp) * scale * near,
@@ -90,6 +93,33 @@ function drawGrid(pen, project, { center, level }, { lines, step }) {
     line([-end, n * step], [end, n * step]);
   }
   pen.stroke();
+}
+
+// Lines on the ground in place of squares: [{from, to, color, width}]; those too near the eye are left out.
+function drawGroundLines(pen, project, lines) {
+  for (const { from, to, color, width } of lines) {
+    const [a, b] = [project(from), project(to)];
+    if (Math.max(a[3], b[3]) >= 0.99 / NEAREST || !Number.isFinite(a[0] + b[0])) continue;
+    drawLine(pen, [a, b], { color, width: Math.max(1, (width * (a[3] + b[3])) / 2) });
+  }
+}
+
+// Where a foot stands: a disc on the ground under it.
+function drawStances(pen, project, places) {
+  pen.fillStyle = cssColor("accent");
+  for (const place of places) {
+    const [x, y, , near] = project(place);
+    pen.beginPath();
+    pen.ellipse(x, y, 6 * near, 4 * near, 0, 0, 2 * Math.PI);
+    pen.fill();
+  }
+}
+
+// The direction in which an eye sees a point, and how far away it is.
+export function seenFrom(eye, center) {
+  const [x, y, z] = [0, 1, 2].map((axis) => center[axis] - eye[axis]),
+    flat = Math.hypot(x, z);
+  return { yaw: Math.atan2(-x, z), pitch: Math.atan2(y, flat), distance: Math.hypot(flat, y) };
 }
 
 // All bones in one stroke: the shadow on the ground, and a second pose.
@@ -157,8 +187,8 @@ export function viewInWords({ yaw, pitch }) {
 
 // What the colours and the squares mean, and from where the body is seen.
 // In two corners: the left of the upper edge belongs to the page's buttons.
-function drawLegend(pen, [width, height], { view, ground }) {
-  drawText(pen, viewInWords(view), [10, height - 12], "left");
+function drawLegend(pen, [width, height], { words, ground }) {
+  drawText(pen, words, [10, height - 12], "left");
   drawText(pen, ground, [10, height - 28], "left");
   for (const [n, side] of ["right", "left"].entries()) {
     const y = 14 + 16 * n;
@@ -259,6 +289,9 @@ function drawBones(pen, bones, { boneWidth, marksEnds }, zoom) {
 //   center   the point that stays in the middle; level: y of the ground; unit: the body's height
 //   ground   what is said of the ground, such as the size of its squares
 //   trunk    keys around the trunk (left shoulder, right shoulder, right hip, left hip), head: its lower and upper key; both may be empty
+//   lines    what is painted on the ground, in place of squares and the camera: [{from, to, color, width}]
+//   stances  points of the ground on which a foot stands; eyes: by name, places from which it is seen,
+//            {eye, zoom, words}; reach: how many times more than the body is shown
 //   other    a second pose to compare with: {points, color, width, alpha}, or null
 // `style` is what differs between pages: start (yaw, pitch), fit(width, height) in body heights, grid
 // {lines, step} in body heights, boneWidth (px), marksEnds, and whether a plain wheel scrolls the page.
@@ -266,31 +299,42 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
   let view = { ...style.start, zoom: 1 },
     waiting = false;
 
+  // From a named eye the view follows the body.
+  const followed = (now) => {
+    const named = view.from && now.eyes?.[view.from];
+    return named ? { ...view, ...seenFrom(named.eye, now.center), words: named.words } : view;
+  };
+
   function draw() {
     const [pen, width, height] = prepareCanvas(canvas),
       now = scene();
     if (!now) return;
-    const project = createProjection(view, {
+    const seen = followed(now);
+    const project = createProjection(seen, {
       ...now,
-      scale: (style.fit(width, height) / now.unit) * view.zoom,
+      scale: (style.fit(width, height) / now.unit / (now.reach || 1)) * seen.zoom,
       size: [width, height],
+      eye: now.lines && (seen.distance || FREE_EYE),
     });
     const onGround = (key) => {
       const point = now.points[key];
       return point && project([point[0], now.level, point[2]]);
     };
     pen.lineCap = pen.lineJoin = "round";
-    drawGrid(pen, project, now, { ...style.grid, step: style.grid.step * now.unit });
+    if (now.lines) drawGroundLines(pen, project, now.lines);
+    else drawGrid(pen, project, now, { ...style.grid, step: style.grid.step * now.unit });
+    drawStances(pen, project, now.stances || []);
     drawFlat(pen, now.bones, onGround, { color: cssColor("shadow"), width: style.shadowWidth });
     if (now.other) {
       const there = (key) => now.other.points[key] && project(now.other.points[key]);
       drawFlat(pen, now.bones, there, now.other);
     }
-    drawCamera(pen, project, now);
+    if (!now.lines) drawCamera(pen, project, now);
     if (now.trunk.length) drawVolumes(pen, project, now, view.zoom);
     drawBones(pen, sortBones(now, project), style, view.zoom);
     if (now.trunk.length) drawFront(pen, project, now);
-    drawLegend(pen, [width, height], { view, ground: now.ground });
+    const words = seen.words || (now.lines ? "" : viewInWords(seen));
+    drawLegend(pen, [width, height], { words, ground: now.ground });
   }
 
   // At most once for every picture on the screen.
@@ -308,10 +352,17 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
     redraw();
   }
 
+  // The present view, no longer tied to an eye: what is turned stays where it is turned to.
+  function free() {
+    const now = scene(),
+      { yaw, pitch, zoom, distance } = now ? followed(now) : view;
+    return { yaw, pitch, zoom, distance };
+  }
+
   canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
   canvas.addEventListener("pointermove", (event) => {
     if (!event.buttons) return;
-    change(turned(view, event.movementX * -TURN_PER_PIXEL, event.movementY * TURN_PER_PIXEL));
+    change(turned(free(), event.movementX * -TURN_PER_PIXEL, event.movementY * TURN_PER_PIXEL));
   });
   canvas.addEventListener(
     "wheel",
@@ -327,7 +378,7 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
     if (!(event.key in turns)) return;
     event.preventDefault();
     event.stopPropagation();
-    change(turned(view, ...turns[event.key].map((sign) => sign * TURN_PER_KEY)));
+    change(turned(free(), ...turns[event.key].map((sign) => sign * TURN_PER_KEY)));
   });
   for (const button of buttons) {
     button.addEventListener("click", () => {
@@ -337,6 +388,7 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
       change({ yaw, pitch, zoom: 1 });
     });
   }
+  const lookFrom = (name) => change({ ...view, from: name, zoom: scene()?.eyes?.[name]?.zoom || 1 });
   new ResizeObserver(redraw).observe(canvas);
-  return { redraw };
+  return { redraw, lookFrom };
 }

@@ -18,6 +18,7 @@ from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import stature
 from keyrecon.progress import Progress, silent
 from keyrecon.report import charts, sections, tables
+from keyrecon.report.court_section import court_numbers, court_section, run_chart, view_buttons
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
 from keyrecon.report.headline import figures, opening
 from keyrecon.report.instants import key_instants
@@ -35,7 +36,7 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; media-src data: blob:"
 )
-SCRIPTS = ("charts", "matrices", "figure")
+SCRIPTS = ("charts", "matrices", "figure", "court")
 VIEW_COUNT = 12
 """Frames shown from elsewhere; the paper shows every 50th of 36 s."""
 
@@ -78,7 +79,8 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
         (
             opening(material),
             sections.contradictions(material),
-            _figure_player(pictures, material.truth is not None),
+            _figure_player(pictures, material),
+            _on_court(material),
             sections.instants(material, pictures),
             sections.story(pictures, material.motion.time),
             _trust(material),
@@ -174,7 +176,12 @@ def _joint_curves(material: ReportMaterial) -> str:
     )
 
 
-def _figure_player(pictures: Pictures, has_truth: bool) -> str:
+def _on_court(material: ReportMaterial) -> str:
+    figure = run_chart(material)
+    return "" if figure is None else court_section(material, _chart("run", figure))
+
+
+def _figure_player(pictures: Pictures, material: ReportMaterial) -> str:
     views = "".join(
         f'<button type="button" data-yaw="{yaw}" data-pitch="{pitch}">{name}</button>'
         for name, yaw, pitch in (
@@ -187,7 +194,7 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
     )
     truth_switch = (
         '<label><input type="checkbox" id="show-truth" checked> truth in grey</label>'
-        if has_truth
+        if material.truth is not None
         else ""
     )
     return section(
@@ -198,11 +205,17 @@ def _figure_player(pictures: Pictures, has_truth: bool) -> str:
         'aria-label="The player with the reconstructed pose"></video>'
         '<div class="plate"><canvas id="figure-canvas" tabindex="0" '
         'aria-label="Turnable 3D figure"></canvas></div></div>'
-        f'<div class="views-bar">{views}{truth_switch}</div>',
+        f'<div class="views-bar">{view_buttons(material)}<span class="off-court">{views}</span>'
+        f"{truth_switch}</div>",
         note(
             "Play it at the foot of the page. Drag the figure to turn it, arrow keys while it has "
-            "the focus, Ctrl and wheel to zoom. The body is held at its root; the grid lies at the "
-            "lower foot."
+            "the focus, Ctrl and wheel to zoom. "
+            + (
+                "The body is held at its root; the grid lies at the lower foot."
+                if material.court is None
+                else "It stands on the court, and the way of two seconds lies on the ground; off "
+                "the court the body is held at its root, and the grid lies at the lower foot."
+            )
         ),
     )
 
@@ -237,6 +250,7 @@ def _navigation(material: ReportMaterial, pictures: Pictures) -> str:
     links = (
         ("figure", "Motion"),
         *([("instants", "Key instants")] if pictures.instants else []),
+        *([("court", "Court")] if material.court is not None else []),
         ("video", "Video"),
         ("accuracy", "Trust"),
         *([("doubts", "Doubts")] if material.motion.expected_error is not None else []),
@@ -281,5 +295,6 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
         "refined": pack(motion.points2d),
         "raw": pack(motion.points2d_propagated),
         "truth2d": None if truth is None else pack(truth.points2d),
+        "court": court_numbers(material),
         "marked": {"frames": marks.frames.tolist(), "points": pack(marks.joints)},
     }

@@ -34,7 +34,7 @@ def stored(workspace):
 
 def test_without_a_camera_the_motion_is_as_it_was(bare, motion):
     workspace = Workspace(bare)
-    assert write_placed_motion(workspace, motion) == []
+    assert write_placed_motion(workspace, motion).lines == ()
     assert "points3d_world" not in stored(workspace)
 
 
@@ -43,7 +43,7 @@ def test_with_a_camera_the_motion_is_on_the_court_too(bare, motion):
     write_placed_motion(workspace, motion)
     before = stored(workspace)
     write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
-    (line,) = write_placed_motion(workspace, motion)
+    (line,) = write_placed_motion(workspace, motion).lines
     assert "m run, top speed" in line
     after = stored(workspace)
     assert all(np.array_equal(before[name], after[name]) for name in before)
@@ -54,7 +54,7 @@ def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bar
     workspace = Workspace(bare)
     far = replace(PINHOLE, centre=PINHOLE.centre * [1, 1, 2.0])
     write_camera(workspace.camera_file, court_camera(far, len(motion.time)))
-    (line,) = write_placed_motion(workspace, motion)
+    (line,) = write_placed_motion(workspace, motion).lines
     assert "times the height given" in line
     assert "points3d_world" not in stored(workspace)
 
@@ -62,7 +62,7 @@ def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bar
 def test_a_camera_of_another_trim_is_told_of(bare, motion):
     workspace = Workspace(bare)
     write_camera(workspace.camera_file, court_camera(PINHOLE, 7))
-    (line,) = write_placed_motion(workspace, motion)
+    (line,) = write_placed_motion(workspace, motion).lines
     assert "made for 7 frames" in line
     assert "points3d_world" not in stored(workspace)
 

@@ -1,7 +1,7 @@
 // The figure in space: where a turned point is seen, and what lies before what.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { chestDirection, createProjection, sortBones, turned, viewInWords, zoomed } from "../../keyrecon/report/figure3d.js";
+import { chestDirection, createProjection, seenFrom, sortBones, turned, viewInWords, zoomed } from "../../keyrecon/report/figure3d.js";
 
 const SCENE = { center: [1, 2, 3], unit: 1.8, scale: 100, size: [400, 300] };
 const AHEAD = { yaw: 0, pitch: 0, zoom: 1 };
@@ -58,4 +58,13 @@ test("where the body is seen from is told in words", () => {
   assert.equal(viewInWords({ yaw: Math.PI / 2, pitch: 0 }), "90° to the right of the camera");
   assert.equal(viewInWords({ yaw: -0.5, pitch: 0.2 }), "29° to the left of the camera, 11° from above");
   assert.equal(viewInWords({ yaw: 1, pitch: Math.PI / 2 }), "from above");
+});
+
+test("from an eye the center is straight ahead, as far away as it is", () => {
+  const { yaw, pitch, distance } = seenFrom([4, -3, 8], SCENE.center);
+  near(distance, Math.hypot(3, 5, 5));
+  const [x, y, depth] = createProjection({ yaw, pitch }, SCENE)([4, -3, 8]);
+  near(x, 200);
+  near(y, 150);
+  near(depth, -distance);
 });

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_material import make_material, renamed_video, walk
+from report_material import make_material, on_court, renamed_video, walk
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
@@ -67,6 +67,13 @@ def test_our_scripts_and_styles_know_no_addresses():
     for path in (*OWN.glob("*.js"), *OWN.glob("*.css")):
         source = path.read_text()
         assert not re.search(r"https?:|//[a-z]|@import|fetch\(|XMLHttpRequest|url\(", source), path
+
+
+def test_a_way_on_the_court_is_told_in_numbers(material, pictures, page):
+    assert 'id="court"' not in page
+    told = re.sub(r"<[^>]+>", " ", build_page(on_court(material), pictures))
+    for words in ("Distance", "Top speed", "Behind the baseline", "100% of the time", "± 0.25 m/s"):
+        assert words in re.sub(r"\s+", " ", told)
 
 
 def test_the_page_shows_every_section_once(page):

@@ -2,7 +2,7 @@
 
 import pytest
 from page_driver import CHROMIUM
-from report_material import make_material
+from report_material import make_material, on_court
 
 from keyrecon.report.page import write_report
 
@@ -21,7 +21,7 @@ TOPS = """
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    write_report(folder / "report.html", make_material(folder))
+    write_report(folder / "report.html", on_court(make_material(folder)))
     return folder / "report.html"
 
 
@@ -36,3 +36,27 @@ def test_a_report_fits_its_window_and_its_pictures_stand_in_rows(chromium, repor
     page.close()
     assert len(tops) > 20
     assert all(picture - card <= 1 for card, picture in tops)
+
+
+def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
+    page = chromium.new_page(viewport={"width": 1366, "height": 900})
+    faults = []
+    page.on("pageerror", lambda fault: faults.append(str(fault)))
+    page.goto(report.as_uri())
+    page.wait_for_selector(".js-plotly-plot .main-svg")
+    figure = "document.getElementById('figure-canvas').toDataURL()"
+    seen = set()
+    for eye in ("camera", "umpire", "above", "opponent"):
+        page.click(f"[data-eye={eye}]")
+        page.wait_for_timeout(60)
+        seen.add(page.evaluate(figure))
+    for kind in ("time", "heat", "speed"):
+        page.click(f"[data-map={kind}]")
+    assert "2.1 m behind the baseline" in page.inner_text("#court-now")
+    box = page.locator("#court-map").bounding_box()
+    way = box["x"] + 0.5 * box["width"], box["y"] + box["height"] * 15.1 / 16.6
+    page.mouse.click(*way)
+    page.uncheck("#on-court")
+    page.close()
+    assert len(seen) == 4
+    assert faults == []

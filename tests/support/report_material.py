@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+from court_walker import court_camera
+from painted_court import camera_at
 
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
@@ -10,6 +12,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, PoseDistances, Track
 from keyrecon.report.drawing import draw_pose
 from keyrecon.report.markup import ReportMaterial
+from keyrecon.world.records import WorldMotion
 
 SCALE, FPS = 90.0, 25.0
 
@@ -132,6 +135,19 @@ def make_material(folder, count=40, with_truth=True, video=None, name="walk.mp4"
         {"track": 1.5, "edges": 0.7},
         truth if with_truth else None,
     )
+
+
+def on_court(material):
+    """The same walk about two metres behind the baseline; the court is lost in frames 5 to 7."""
+    motion = material.motion
+    count = len(motion.time)
+    middle = np.column_stack([np.linspace(-2, 2, count), np.full(count, -14.0), np.ones(count)])
+    x, y, z = (motion.points3d - motion.points3d[:, :1]).transpose(2, 0, 1)
+    points, root = np.stack([x, z, -y], axis=2) + middle[:, None], middle
+    points[5:8], root[5:8] = np.nan, np.nan
+    world = WorldMotion(points, root, np.ones((count, 2), dtype=bool), 1.0)
+    camera = court_camera(camera_at((1, -25, 5), (0, -9, 0), size=(240, 320)), count)
+    return replace(material, court=(world, camera))
 
 
 def renamed_video(material, path):

@@ -9,7 +9,8 @@ from painted_court import camera_at
 
 from keyrecon.body import LSP14
 from keyrecon.io.formats.motion_file import read_motion, write_motion
-from keyrecon.world.placement import place_motion, run_length
+from keyrecon.world.placement import place_motion
+from keyrecon.world.run_measures import measure_run
 
 PINHOLE = camera_at((2, -20, 3), (0, -9, 0.8), 1.6)
 FEET = [LSP14.index("right_ankle"), LSP14.index("left_ankle")]
@@ -56,7 +57,8 @@ def test_the_way_is_as_long_as_it_was(walked):
     points, _, motion, world = walked
     ground = points.mean(axis=1)[:, :2]
     true = np.linalg.norm(ground[-1] - ground[0])
-    length, speed = run_length(world, motion)
+    way = measure_run(world, motion)
+    length, speed = way.length.value, way.top_speed.value
     assert true * 0.9 < length < true * 1.2
     assert speed < 2.5
 
