@@ -15,7 +15,11 @@ from keyrecon.app.court import export_calibration
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.export import check_suffix, cut_motion, export_motion
-from keyrecon.io.formats.motion_file import cut_further_arrays, read_further_arrays
+from keyrecon.io.formats.motion_file import (
+    cut_further_arrays,
+    read_further_arrays,
+    read_on_court,
+)
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
@@ -45,8 +49,8 @@ def export(
     check_overlay(overlay)
     if overlay != OverlayOptions() and not any(f.suffix.lower() == OVERLAY for f in files):
         raise KeyreconError(
-            "--view, --skeleton, --slowmo and --size are for the overlay video; name an .mp4 file, "
-            "or leave them out."
+            "--view, --skeleton, --slowmo, --size and --no-court are for the overlay video; name "
+            "an .mp4 file, or leave them out."
         )
     cameras = [file for file in files if file.suffix.lower() == CALIBRATION]
     done = [export_calibration(workspace, file) for file in cameras]
@@ -62,7 +66,8 @@ def export(
             continue
         if file.suffix.lower() == OVERLAY:
             shown = None if frames is None else (first, last)
-            write_overlay(file, workspace.video(), motion, progress, overlay, shown)
+            court = read_on_court(workspace.motion_file)
+            write_overlay(file, workspace.video(), motion, progress, overlay, shown, court)
             lines.append(f"Wrote {file}.")
         else:
             lines.append(_write(file, cut, workspace, first, further))

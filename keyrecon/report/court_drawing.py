@@ -7,11 +7,17 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.io.durable import write_durably
+from keyrecon.records import Motion
+from keyrecon.report.drawing import LEFT, RIGHT
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, CourtModel, tennis_court
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import CourtCamera, WorldMotion
 
 GROUND, NET = (255, 40, 120), (0, 220, 255)
 """Colours of the lines on the ground and of the net's tape: neither is found on courts."""
+WAY, STANCE = (255, 225, 60), 0.16
+"""Colour of the way, and radius of the ring about a standing foot, metres."""
+RECENT, FAINT = 2.0, 0.4
+"""Seconds of the way that are drawn in full, and how much of the rest is seen."""
 SURFACE, SURROUND = (52, 84, 138), (64, 106, 88)
 PER_METRE, BESIDE = 28, 4.5
 """px per metre of the court from above, and metres shown beside it."""
@@ -79,6 +85,51 @@ def draw_way(
     words = f"from dark (0) to yellow ({top:.1f} m/s)"
     cv2.putText(picture, words, (16, 62), font, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
     return picture
+
+
+def draw_ground(
+    picture: UInt8[np.ndarray, "h w 3"],
+    court: tuple[WorldMotion, CourtCamera],
+    motion: Motion,
+    frame: int,
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A copy of the picture with the court's lines, the way so far and rings about standing feet.
+
+    The way lies on the ground under the middle of the hips. As it is where the court is not seen.
+    """
+    world, camera = court
+    drawn = draw_court(picture, camera, frame)
+    if frame >= len(camera.found) or not camera.found[frame]:
+        return drawn
+    thick = max(1, round(picture.shape[1] / 640))
+    way = world.root[: frame + 1] * [1, 1, 0]
+    recent = motion.time[: frame + 1] > motion.time[frame] - RECENT
+    faint = drawn.copy()
+    _draw_line(faint, camera.project(frame, way), WAY, thick)
+    cv2.addWeighted(faint, FAINT, drawn, 1 - FAINT, 0, dst=drawn)
+    _draw_line(drawn, camera.project(frame, way[recent]), WAY, thick)
+    turn = np.linspace(0, 2 * np.pi, 25)
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(25)]) * STANCE
+    for foot, (side, color) in enumerate((("right", RIGHT), ("left", LEFT))):
+        ankle = world.points[frame, motion.skeleton.index(f"{side}_ankle")] * [1, 1, 0]
+        if world.contact[frame, foot]:
+            _draw_line(drawn, camera.project(frame, ankle + ring), color, thick + 1)
+    return drawn
+
+
+def _draw_line(
+    picture: UInt8[np.ndarray, "h w 3"],
+    pixels: Float[np.ndarray, "n 2"],
+    color: tuple[int, int, int],
+    thick: int,
+) -> None:
+    """Draw into the picture; gaps and what is far outside are left out."""
+    limit = 4 * max(picture.shape)
+    usable = np.isfinite(pixels).all(axis=1) & (np.abs(np.nan_to_num(pixels)) < limit).all(axis=1)
+    places = np.rint(np.where(usable[:, None], pixels, 0) * 2**SUBPIXEL).astype(np.int32)
+    for k in np.flatnonzero(usable[1:] & usable[:-1]):
+        a, b = places[k].tolist(), places[k + 1].tolist()
+        cv2.line(picture, a, b, color, thick, cv2.LINE_AA, SUBPIXEL)
 
 
 def write_court_picture(path: Path, picture: UInt8[np.ndarray, "h w 3"]) -> None:

@@ -19,7 +19,9 @@ from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
+from keyrecon.report.court_drawing import draw_ground
 from keyrecon.report.drawing import TRUNK, draw_pose, joint_sides
+from keyrecon.world.records import CourtCamera, WorldMotion
 
 View = Literal["camera", "right", "left", "back", "above"]
 Limbs = Literal["all", "upper", "lower", "left", "right", "none"]
@@ -53,6 +55,9 @@ class OverlayOptions:
     """How many times slower than life the overlay plays."""
     size: int | None = None
     """Height of the overlay, px; that of the video by default."""
+    court: bool = True
+    """Where the court is known: its lines, the player's way on the ground, and rings about feet
+    that stand."""
 
 
 def write_overlay(
@@ -62,6 +67,7 @@ def write_overlay(
     progress: Progress = silent,
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
+    court: tuple[WorldMotion, CourtCamera] | None = None,
 ) -> None:
     """Write the video with the refined pose and the frame number on every frame.
 
@@ -70,7 +76,7 @@ def write_overlay(
     Raises KeyreconError for options that no video can follow.
     """
     check_overlay(options)
-    pictures = overlay_frames(video, motion, progress, options, frames)
+    pictures = overlay_frames(video, motion, progress, options, frames, court)
     write_video(path, pictures, video.fps / options.slowmo)
 
 
@@ -96,6 +102,7 @@ def overlay_frames(
     progress: Progress = silent,
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
+    court: tuple[WorldMotion, CourtCamera] | None = None,
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The pictures of `write_overlay`, one at a time."""
     first, last = frames or (0, len(video) - 1)
@@ -108,6 +115,8 @@ def overlay_frames(
         progress(pictures, "Drawing the overlay", last - first + 1), first
     ):
         panes = []
+        if court is not None and options.court and frame < len(motion.time):
+            picture = draw_ground(picture, court, motion, frame)
         for view in options.view:
             if view == "camera":
                 panes.append(_camera_pane(picture, motion, frame, hidden, height))

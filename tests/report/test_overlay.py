@@ -1,7 +1,7 @@
 """Poses drawn on pictures."""
 
 import numpy as np
-from report_material import make_material
+from report_material import make_material, on_court
 
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
@@ -130,3 +130,23 @@ def test_the_figure_from_elsewhere_stands_on_its_floor(tmp_path):
     assert 0 < ground.sum() < 40
     figure = ((pane != PAPER) & (pane != GROUND)).any(axis=2)[:170]
     assert figure.any()
+
+
+def test_court_way_and_standing_feet_are_drawn_where_the_court_is_known(tmp_path):
+    material = on_court(make_material(tmp_path))
+    world, camera = material.court
+
+    def frame(number, **chosen):
+        options = OverlayOptions(skeleton="none", **chosen)
+        shown = overlay_frames(
+            material.video, material.motion, silent, options, (number, number), material.court
+        )
+        return next(shown).astype(int)
+
+    plain, drawn = frame(20, court=False), frame(20)
+    beside = world.points[20, LSP14.index("right_ankle")] * [1, 1, 0] + [0.16, 0, 0]
+    for place in ([0, -11.8, 0], world.root[20] * [1, 1, 0], beside):
+        x, y = camera.project(20, np.array([place]))[0].round().astype(int)
+        near = slice(y - 3, y + 4), slice(x - 3, x + 4)
+        assert np.abs(drawn[near] - plain[near]).max() > 40
+    assert np.abs(frame(6) - frame(6, court=False)).max() > 40  # no way, but the court

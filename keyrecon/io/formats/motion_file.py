@@ -119,6 +119,29 @@ def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
         return further
 
 
+def read_on_court(path: Path) -> tuple[WorldMotion, CourtCamera] | None:
+    """The motion on the court and the camera, as `write_motion` wrote them; None without them.
+
+    How sure the camera is, and the size by the court, are not in the file: they are NaN.
+    """
+    data = read_further_arrays(path)
+    if "points3d_world" not in data:
+        return None
+    with reading(path, "a motion on the court", "make it with keyrecon court"):
+        unknown = np.full(data["camera_t"].shape, np.nan)
+        inner, turn, shift = (data[f"camera_{name}"].astype(float) for name in "KRt")
+        found = np.isfinite(inner).all(axis=(1, 2))
+        return (
+            WorldMotion(
+                data["points3d_world"].astype(float),
+                data["root_world"].astype(float),
+                data["contact"].astype(bool),
+                float("nan"),
+            ),
+            CourtCamera(inner, turn, shift, found, unknown, unknown[:, 0]),
+        )
+
+
 def cut_further_arrays(
     arrays: Mapping[str, np.ndarray], first: int, last: int
 ) -> dict[str, np.ndarray]:
