@@ -1,4 +1,4 @@
-"""A stiff figure that walks on a court: one foot stands while the other swings."""
+"""A figure of stiff bones that walks on a court: one foot stands while the other swings."""
 
 import numpy as np
 
@@ -8,13 +8,15 @@ from keyrecon.world.placement import ANKLE_SHARE
 from keyrecon.world.records import CourtCamera
 
 STATURE, FPS, STEP = 1.8, 50.0, 25
+THIGH, SHANK = 0.25, 0.24
+"""Statures."""
 
 
 def _stand():
     """Joints above the ground, metres: x to the figure's right, z up."""
     place = {
-        "ankle": (0.12, ANKLE_SHARE), "knee": (0.1, 0.28), "hip": (0.09, 0.52),
-        "wrist": (0.22, 0.45), "elbow": (0.2, 0.6), "shoulder": (0.11, 0.81),
+        "ankle": (0.12, ANKLE_SHARE), "hip": (0.09, 0.49),
+        "wrist": (0.22, 0.42), "elbow": (0.2, 0.57), "shoulder": (0.11, 0.78),
     }  # fmt: skip
     joints = np.zeros((14, 3))
     for j, name in enumerate(LSP14.names):
@@ -23,7 +25,7 @@ def _stand():
             x, z = place[part]
             joints[j] = (x if side == "right" else -x, 0, z)
         else:
-            joints[j] = (0, 0, 0.84 if name == "neck" else 1.0)
+            joints[j] = (0, 0, 0.81 if name == "neck" else 0.97)
     return joints * STATURE
 
 
@@ -49,7 +51,21 @@ def walk(steps=6, stride=0.5, start=(-1.0, -9.0)):
     points[..., :2] += body[:, None]
     for foot, name in enumerate(("right_ankle", "left_ankle")):
         points[:, LSP14.index(name), :2] += feet[:, foot] - feet.mean(axis=1)
+    for side in ("right", "left"):
+        hip, knee, ankle = (LSP14.index(f"{side}_{part}") for part in ("hip", "knee", "ankle"))
+        points[:, knee] = _knees(points[:, hip], points[:, ankle])
     return points, contact
+
+
+def _knees(hips, ankles):
+    """Knees bent forward, y, so that thighs and shanks keep their lengths."""
+    leg = ankles - hips
+    far = np.linalg.norm(leg, axis=1, keepdims=True)
+    along = (far**2 + (THIGH**2 - SHANK**2) * STATURE**2) / (2 * far)
+    leg = leg / far
+    forward = np.array([0, 1.0, 0]) - leg * leg[:, 1:2]
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    return hips + along * leg + np.sqrt((THIGH * STATURE) ** 2 - along**2) * forward
 
 
 def court_camera(pinhole, frames):

@@ -1,0 +1,28 @@
+"""Lines of sight, and the axes about them in which a lifted pose lives."""
+
+import numpy as np
+from jaxtyping import Float
+
+from keyrecon.world.records import CourtCamera
+
+
+def sight_lines(
+    camera: CourtCamera, pixels: Float[np.ndarray, "T 2"]
+) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Unit lines of sight through pixels, in camera axes and in the world's."""
+    flat = (pixels - camera.K[:, :2, 2]) / camera.K[:, 0, :1]
+    ray = np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    return ray, np.einsum("tji,tj->ti", camera.R, ray)
+
+
+def sight_axes(camera: CourtCamera, pixels: Float[np.ndarray, "T 2"]) -> Float[np.ndarray, "T 3 3"]:
+    """Columns: right, down and away along the line of sight through a pixel, in the world.
+
+    Scaled orthography has its picture plane at right angles to the line of sight to the player,
+    not to the camera's own axis.
+    """
+    ray, _ = sight_lines(camera, pixels)
+    right = np.cross(np.array([0.0, 1.0, 0.0]), ray)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    return np.einsum("tji,tjk->tik", camera.R, np.stack([right, np.cross(ray, right), ray], axis=2))
