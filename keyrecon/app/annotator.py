@@ -26,6 +26,7 @@ from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import keyframing, project, running
+from keyrecon.app.court import calibrate
 from keyrecon.app.exporting import export
 from keyrecon.app.preparing import prepare_project
 from keyrecon.errors import KeyreconError
@@ -36,6 +37,8 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames
 from keyrecon.progress import Progress
 from keyrecon.report.overlay import Limbs, OverlayOptions, View
+from keyrecon.world.calibration import CalibrationOptions
+from keyrecon.world.court_finding import ASK
 
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
@@ -111,6 +114,7 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
         "keyframes": partial(_find_keyframes, folder),
         "run": partial(_run, folder),
         "export": partial(_export, folder),
+        "court": partial(_find_court, folder),
     }
 
 
@@ -151,6 +155,19 @@ def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
     settings = running.settings(workspace, Options(), options.get("height"))
     return _contradictions(running.run(workspace, settings, progress, partial=True))
+
+
+def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+    """The court from its lines and the points clicked so far."""
+    workspace = Workspace(folder)
+    try:
+        calibrate(workspace, (), CalibrationOptions(), progress)
+    except KeyreconError as fault:
+        text = str(fault).replace(ASK, "click four of its points in the picture.")
+        raise KeyreconError(
+            text.split(" Clicked so far")[0].split(" Clicks of former")[0]
+        ) from fault
+    return ""
 
 
 def _contradictions(told: str) -> str:

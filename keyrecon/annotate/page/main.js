@@ -6,6 +6,7 @@ import { createActions } from "./state/actions.js";
 import { createFrameCache } from "./state/caches.js";
 import { createModel } from "./state/model.js";
 import { createBodies } from "./views/bodies.js";
+import { createCourt } from "./views/court.js";
 import { createDepth } from "./views/depth.js";
 import { byId } from "./views/dom.js";
 import { createExports } from "./views/exports.js";
@@ -19,7 +20,7 @@ import { createPick } from "./views/pick.js";
 import { createPrompt, createScrub } from "./views/prompt.js";
 import { createShell } from "./views/shell.js";
 
-const VIEWS = ["bodies", "keyframes", "motion", "files"];
+const VIEWS = ["bodies", "keyframes", "motion", "files", "court"];
 
 const model = await createModel();
 const { ui } = model;
@@ -46,6 +47,7 @@ const panels = [
 ];
 const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
+const court = createCourt(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
 createFiles(model);
 const exports = createExports(model, shell);
@@ -102,6 +104,7 @@ model.onDraw(() => {
   if (ui.view === "pick") pick.draw();
   if (ui.view === "motion") motion.draw();
   if (ui.view === "files") exports.draw();
+  if (ui.view === "court") court.draw();
 });
 
 function go(view) {
@@ -109,6 +112,7 @@ function go(view) {
   model.update({ view });
   if (view === "pick") pick.opened();
   if (view === "files") exports.opened();
+  if (view === "court") court.opened();
 }
 
 const commands = {
@@ -124,6 +128,7 @@ const commands = {
   pick: pick.commands,
   motion: motion.commands,
   files: exports.commands,
+  court: court.commands,
 };
 
 function execute(command, key) {

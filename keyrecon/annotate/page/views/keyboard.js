@@ -7,7 +7,7 @@ export const KEYS = {
   any: [
     [["Ctrl+z"], "undo", "undo"],
     [["Ctrl+Shift+z", "Ctrl+y"], "redo", "redo"],
-    [["1", "2", "3", "4"].map((n) => `Alt+${n}`), "body, keyframes, motion, files", "page"],
+    [["1", "2", "3", "4", "5"].map((n) => `Alt+${n}`), "body, keyframes, motion, files, court", "page"],
     [["?"], "show or hide the keys", "help"],
   ],
   keyframes: [
@@ -71,6 +71,13 @@ export const KEYS = {
     [["m"], "the body in space large or small", "stage"],
   ],
   files: [[["Enter"], "write the chosen files", "primary"]],
+  court: [
+    [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
+    [["Backspace", "Delete"], "take the last point of this frame away", "clear"],
+    [["z"], "the whole picture", "zoom"],
+    [["+", "-"], "zoom in, out", "zoomBy"],
+    [["Enter"], "find the court", "primary"],
+  ],
 };
 
 const shiftMatters = (key) => key.startsWith("Arrow") || key.length > 1;

@@ -10,7 +10,7 @@ const SAVING = {
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
 const LASTING = {}; // an offer of nothing: the notice stays until it is closed
-const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files" };
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
 
 function keyElements(keys) {
   const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;

@@ -1,0 +1,143 @@
+"""What the page's step "Court" asks of the server: the model over a frame, and clicked points.
+
+Clicks are in court_points.json before the page hears of it. Once four of one frame are newer than
+the camera, the page is shown the court as they put it, before the whole clip is fitted.
+"""
+
+from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from msgspec import Struct
+
+from keyrecon.annotate.server.handlers import ApiRequest
+from keyrecon.annotate.server.session import Session
+from keyrecon.annotate.store.edits import Frame, Name, check_frame
+from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.workspace import Workspace
+from keyrecon.world.clicked_points import FEWEST, camera_from_points, check_click
+from keyrecon.world.court import POINTS, tennis_court
+from keyrecon.world.records import CourtCamera, CourtClick
+
+Json = dict[str, Any]
+PIECE = 0.5
+"""Metres of a line that are drawn straight: perspective keeps lines straight, but not those that go
+behind the camera."""
+FARTHEST = 4.0
+"""Widths of the picture beyond which nothing is drawn."""
+
+
+class CourtPointRequest(Struct, forbid_unknown_fields=True):
+    """A named point of the court in a frame; without a place its click is taken away."""
+
+    name: Name
+    frame: Frame
+    x: float | None = None
+    y: float | None = None
+
+
+def court(session: Session, request: ApiRequest) -> Json:
+    """The court's map, its points, and what was clicked."""
+    ends = tennis_court().ends
+    return {
+        "lines": ends.round(3).tolist(),
+        "points": {name: list(place) for name, place in POINTS.items()},
+        "fewest": FEWEST,
+        **_state(session.workspace),
+    }
+
+
+def court_point(session: Session, request: ApiRequest) -> Json:
+    """Keep a click, or take one away; durable when this is answered."""
+    body: CourtPointRequest = request.body
+    check_frame(body.frame, session.limits)
+    workspace = session.workspace
+    if body.x is None or body.y is None:
+        old = [
+            click
+            for click in workspace.court_clicks()
+            if (click.name, click.frame) == (body.name, body.frame)
+        ]
+        workspace.change_court_clicks((), old)
+    else:
+        click = CourtClick(body.name, body.frame, body.x, body.y)
+        check_click(click, session.limits.n_frames, session.limits.size)
+        workspace.change_court_clicks([click])
+    return _state(workspace)
+
+
+def court_view(session: Session, request: ApiRequest) -> Json:
+    """The court over one frame: as the camera has it, or as newer clicks of this frame put it."""
+    frame, workspace = request.path["frame"], session.workspace
+    check_frame(frame, session.limits)
+    here = [click for click in workspace.court_clicks() if click.frame == frame]
+    if len(here) >= FEWEST and _changed(workspace):
+        size = session.limits.size
+        try:
+            pixels = np.array([(click.x, click.y) for click in here])
+            pinhole = camera_from_points([c.name for c in here], pixels, size[::-1])
+        except KeyreconError as fault:
+            return {"source": "clicks", "fault": str(fault), "lines": [], "points": {}}
+        return {"source": "clicks", "fault": "", **_drawn(pinhole.project, size)}
+    camera = _camera(workspace)
+    if camera is None or frame >= len(camera.found) or not camera.found[frame]:
+        return {"source": None, "fault": "", "lines": [], "points": {}}
+
+    def project(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
+        return camera.project(frame, points)
+
+    return {"source": "camera", "fault": "", **_drawn(project, session.limits.size)}
+
+
+def _state(workspace: Workspace) -> Json:
+    camera = _camera(workspace)
+    return {
+        "clicks": [asdict(click) for click in workspace.court_clicks()],
+        "changed": _changed(workspace),
+        "found": None if camera is None else round(float(camera.found.mean()), 4),
+        "lost": [] if camera is None else np.flatnonzero(~camera.found)[:1].tolist(),
+    }
+
+
+def _changed(workspace: Workspace) -> bool:
+    """Whether clicks are newer than the camera."""
+    points, camera = workspace.court_points_file, workspace.camera_file
+    if not points.is_file() or not workspace.court_clicks():
+        return False
+    return not camera.is_file() or points.stat().st_mtime_ns > camera.stat().st_mtime_ns
+
+
+def _camera(workspace: Workspace) -> CourtCamera | None:
+    file = workspace.camera_file
+    return _read(file, file.stat().st_mtime_ns) if file.is_file() else None
+
+
+@lru_cache(maxsize=1)
+def _read(file: Path, changed: int) -> CourtCamera:
+    """The camera; read again when the file has changed."""
+    return read_camera(file)
+
+
+def _drawn(project: Any, size: tuple[int, int]) -> Json:
+    """Lines as pieces in the picture, and points that lie in it, px."""
+    lines = []
+    for start, end in tennis_court().ends:
+        count = int(np.ceil(np.linalg.norm(end - start) / PIECE)) + 1
+        pixels = project(start + np.linspace(0, 1, count)[:, None] * (end - start))
+        near = np.isfinite(pixels).all(axis=1)
+        near &= (np.abs(np.nan_to_num(pixels)) < FARTHEST * size[0]).all(axis=1)
+        for part in np.split(np.arange(count), np.flatnonzero(np.diff(near)) + 1):
+            if near[part[0]] and len(part) > 1:
+                lines.append(pixels[part][[0, -1]].round(1).tolist())
+    places = project(np.array(list(POINTS.values())))
+    inside = ((places >= 0) & (places < size)).all(axis=1)
+    points = {
+        name: place.round(1).tolist()
+        for name, place, shown in zip(POINTS, places, inside, strict=True)
+        if shown
+    }
+    return {"lines": lines, "points": points}
