@@ -41,5 +41,11 @@ class Assistant:
     "last", "text", "frame", "half"}: the frame to mark and which half of the body there."""
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
     """Head and feet found on a few frames with these picks."""
+    court: Callable[[], Json] | None = None
+    """The court's map, what was clicked of it, and how much of the video the camera is known in."""
+    court_view: Callable[[tuple[int, int], int], Json] | None = None
+    """The court over a frame of pictures of a size."""
+    court_point: Callable[[str, int, tuple[float, float] | None], Json] | None = None
+    """Keeps a clicked point of the court by name and frame, or drops it without a place."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None
     """How much each pixel of a frame looks like a part: RGBA, (h, w, 4)."""

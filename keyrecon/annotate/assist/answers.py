@@ -13,6 +13,11 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate
 from keyrecon.annotate.assist.checks import EVEN_EXCESS, find_checks, measure_excess
+from keyrecon.annotate.assist.court_views import (
+    describe_court,
+    describe_court_view,
+    keep_court_point,
+)
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
 from keyrecon.annotate.assist.pose_estimate import (
     Alternative,
@@ -46,6 +51,9 @@ def make_assistant(workspace: Workspace) -> Assistant:
         stretches=partial(describe_stretches, cache),
         preview=partial(describe_preview, cache),
         backprojection=partial(show_part, cache),
+        court=partial(describe_court, workspace),
+        court_view=partial(describe_court_view, workspace),
+        court_point=partial(keep_court_point, workspace),
     )
 
 

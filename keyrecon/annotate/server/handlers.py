@@ -110,6 +110,14 @@ class JobRequest(Struct, forbid_unknown_fields=True):
     options: JobOptions = JobOptions()
 
 
+class CourtPointRequest(Struct, forbid_unknown_fields=True):
+    """A named point of the court in a frame; without a place its click is taken away."""
+
+    name: Name
+    frame: Frame
+    place: tuple[float, float] | None = None
+
+
 class ImportRequest(Struct, forbid_unknown_fields=True):
     """A file of marks; without `accept` it is only compared."""
 
@@ -211,6 +219,26 @@ def backprojection(session: Session, request: ApiRequest) -> Response:
         return Response(status_code=204)
     picture = tint(tuple(picks), request.path["frame"], request.query.get("part", "head"))
     return Response(encode_png(picture), media_type="image/png")
+
+
+def court(session: Session, request: ApiRequest) -> Json:
+    """The court's map, and what was clicked of it."""
+    describe = session.assistant.court
+    return describe() if describe else {}
+
+
+def court_view(session: Session, request: ApiRequest) -> Json:
+    """The court over one frame."""
+    describe, frame = session.assistant.court_view, request.path["frame"]
+    check_frame(frame, session.limits)
+    return describe(session.limits.size, frame) if describe else {}
+
+
+def court_point(session: Session, request: ApiRequest) -> Json:
+    """Keep or drop a clicked point of the court."""
+    keep, body = session.assistant.court_point, request.body
+    check_frame(body.frame, session.limits)
+    return keep(body.name, body.frame, body.place) if keep else {}
 
 
 def jobs(session: Session, request: ApiRequest) -> list[Json]:

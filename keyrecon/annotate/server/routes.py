@@ -20,7 +20,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from keyrecon.annotate.server import court, handlers
+from keyrecon.annotate.server import handlers
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.security import Credentials, SecurityMiddleware
 from keyrecon.annotate.server.session import Session
@@ -64,9 +64,9 @@ ROUTES = (
     ApiRoute("GET", "/api/jobs", handlers.jobs),
     ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
     ApiRoute("DELETE", "/api/jobs/{job:int}", handlers.cancel_job),
-    ApiRoute("GET", "/api/court", court.court),
-    ApiRoute("GET", "/api/court/{frame:int}", court.court_view, alone=True),
-    ApiRoute("POST", "/api/court", court.court_point, court.CourtPointRequest),
+    ApiRoute("GET", "/api/court", handlers.court),
+    ApiRoute("GET", "/api/court/{frame:int}", handlers.court_view, alone=True),
+    ApiRoute("POST", "/api/court", handlers.court_point, handlers.CourtPointRequest),
     ApiRoute("GET", "/api/motion", handlers.motion),
     ApiRoute("GET", "/api/report", handlers.report),
     ApiRoute("GET", "/api/exports", handlers.exports),

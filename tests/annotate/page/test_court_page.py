@@ -5,6 +5,7 @@ import pytest
 from page_driver import CHROMIUM, Person, serving
 from painted_court import camera_at, paint
 
+from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.project import start
 from keyrecon.io.video_writer import write_video
@@ -39,7 +40,9 @@ def on_screen(person, place):
 
 
 def test_a_court_is_found_looked_at_and_mended_by_dragging(folder, chromium):
-    with serving(folder, commands=job_commands(folder)) as server:
+    with serving(
+        folder, make_assistant(Workspace(folder)), commands=job_commands(folder)
+    ) as server:
         context = chromium.new_context(viewport={"width": 1440, "height": 900})
         person = Person(context, server.credentials.address)
         person.press("Alt+5")

@@ -36,6 +36,8 @@ export function createCourt(model, { frames, shell }) {
 
   async function load() {
     court = await api.read("court");
+    if (!court.clicks) court = null;
+    if (!court) return;
     const agreed = court.found !== null && !court.changed;
     selection.point = agreed ? null : (selection.point ?? nextPoint(court.clicks));
     loadView(selection.frame);
@@ -68,7 +70,7 @@ export function createCourt(model, { frames, shell }) {
     if (viewer.shown() !== selection.frame || name === null) return;
     if (x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
     const [px, py] = [x, y].map((value) => Math.round(value * 10) / 10);
-    await keep({ name, frame: selection.frame, x: px, y: py });
+    await keep({ name, frame: selection.frame, place: [px, py] });
     choose(nextPoint(court.clicks));
   }
 

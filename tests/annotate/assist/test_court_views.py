@@ -5,6 +5,7 @@ from annotator import ask
 from court_walker import court_camera
 from painted_court import camera_at
 
+from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.workspace import Workspace
 from keyrecon.world.court import POINTS
@@ -15,7 +16,7 @@ NAMES = ("near-left", "near-right", "far-left", "far-right")
 
 def put(session, name, place, frame=3):
     x, y = (float(value) for value in place)
-    return ask(session, "POST", "/api/court", {"name": name, "frame": frame, "x": x, "y": y})
+    return ask(session, "POST", "/api/court", {"name": name, "frame": frame, "place": [x, y]})
 
 
 def place_of(name):
@@ -23,7 +24,7 @@ def place_of(name):
 
 
 def test_the_courts_camera_is_shown_over_its_frames(opened, folder):
-    session = opened()
+    session = opened(make_assistant(Workspace(folder)))
     assert ask(session, "GET", "/api/court/3").json()["source"] is None
     write_camera(Workspace(folder).camera_file, court_camera(CAMERA, 50))
     view = ask(session, "GET", "/api/court/3").json()
@@ -33,7 +34,7 @@ def test_the_courts_camera_is_shown_over_its_frames(opened, folder):
 
 
 def test_four_clicks_of_a_frame_show_where_they_put_the_court(opened, folder):
-    session = opened()
+    session = opened(make_assistant(Workspace(folder)))
     write_camera(Workspace(folder).camera_file, court_camera(CAMERA, 50))
     aside = np.array([4.0, 0.0])
     for name in NAMES:
@@ -49,7 +50,7 @@ def test_four_clicks_of_a_frame_show_where_they_put_the_court(opened, folder):
 
 
 def test_a_click_is_on_disk_when_it_is_answered_and_can_be_taken_away(opened, folder):
-    session = opened()
+    session = opened(make_assistant(Workspace(folder)))
     put(session, "net-middle", (60, 30))
     assert [click.name for click in Workspace(folder).court_clicks()] == ["net-middle"]
     answer = put(session, "net-midle", (60, 30))

@@ -1,9 +1,10 @@
-"""What the page's step "Court" asks of the server: the model over a frame, and clicked points.
+"""What the page's step "Court" shows: the model over a frame, and clicked points of it.
 
 Clicks are in court_points.json before the page hears of it. Once four of one frame are newer than
 the camera, the page is shown the court as they put it, before the whole clip is fitted.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
@@ -11,11 +12,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from msgspec import Struct
 
-from keyrecon.annotate.server.handlers import ApiRequest
-from keyrecon.annotate.server.session import Session
-from keyrecon.annotate.store.edits import Frame, Name, check_frame
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera
 from keyrecon.io.workspace import Workspace
@@ -24,6 +21,7 @@ from keyrecon.world.court import POINTS, tennis_court
 from keyrecon.world.records import CourtCamera, CourtClick
 
 Json = dict[str, Any]
+Projection = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n 2"]]
 PIECE = 0.5
 """Metres of a line that are drawn straight: perspective keeps lines straight, but not those that go
 behind the camera."""
@@ -31,52 +29,40 @@ FARTHEST = 4.0
 """Widths of the picture beyond which nothing is drawn."""
 
 
-class CourtPointRequest(Struct, forbid_unknown_fields=True):
-    """A named point of the court in a frame; without a place its click is taken away."""
-
-    name: Name
-    frame: Frame
-    x: float | None = None
-    y: float | None = None
-
-
-def court(session: Session, request: ApiRequest) -> Json:
+def describe_court(workspace: Workspace) -> Json:
     """The court's map, its points, and what was clicked."""
     ends = tennis_court().ends
     return {
         "lines": ends.round(3).tolist(),
         "points": {name: list(place) for name, place in POINTS.items()},
         "fewest": FEWEST,
-        **_state(session.workspace),
+        **_state(workspace),
     }
 
 
-def court_point(session: Session, request: ApiRequest) -> Json:
-    """Keep a click, or take one away; durable when this is answered."""
-    body: CourtPointRequest = request.body
-    check_frame(body.frame, session.limits)
-    workspace = session.workspace
-    if body.x is None or body.y is None:
-        old = [
-            click
-            for click in workspace.court_clicks()
-            if (click.name, click.frame) == (body.name, body.frame)
-        ]
+def keep_court_point(
+    workspace: Workspace, name: str, frame: int, place: tuple[float, float] | None
+) -> Json:
+    """Keep a click, or take one away where there is no place; durable when this is answered."""
+    if place is None:
+        clicks = workspace.court_clicks()
+        old = [click for click in clicks if (click.name, click.frame) == (name, frame)]
         workspace.change_court_clicks((), old)
     else:
-        click = CourtClick(body.name, body.frame, body.x, body.y)
-        check_click(click, session.limits.n_frames, session.limits.size)
+        video = workspace.video()
+        click = CourtClick(name, frame, *place)
+        check_click(click, len(video), (video.width, video.height))
         workspace.change_court_clicks([click])
     return _state(workspace)
 
 
-def court_view(session: Session, request: ApiRequest) -> Json:
-    """The court over one frame: as the camera has it, or as newer clicks of this frame put it."""
-    frame, workspace = request.path["frame"], session.workspace
-    check_frame(frame, session.limits)
+def describe_court_view(workspace: Workspace, size: tuple[int, int], frame: int) -> Json:
+    """The court over one frame: as the camera has it, or as newer clicks of this frame put it.
+
+    `size` is the picture's, px.
+    """
     here = [click for click in workspace.court_clicks() if click.frame == frame]
     if len(here) >= FEWEST and _changed(workspace):
-        size = session.limits.size
         try:
             pixels = np.array([(click.x, click.y) for click in here])
             pinhole = camera_from_points([c.name for c in here], pixels, size[::-1])
@@ -90,7 +76,7 @@ def court_view(session: Session, request: ApiRequest) -> Json:
     def project(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         return camera.project(frame, points)
 
-    return {"source": "camera", "fault": "", **_drawn(project, session.limits.size)}
+    return {"source": "camera", "fault": "", **_drawn(project, size)}
 
 
 def _state(workspace: Workspace) -> Json:
@@ -99,7 +85,6 @@ def _state(workspace: Workspace) -> Json:
         "clicks": [asdict(click) for click in workspace.court_clicks()],
         "changed": _changed(workspace),
         "found": None if camera is None else round(float(camera.found.mean()), 4),
-        "lost": [] if camera is None else np.flatnonzero(~camera.found)[:1].tolist(),
     }
 
 
@@ -122,7 +107,7 @@ def _read(file: Path, changed: int) -> CourtCamera:
     return read_camera(file)
 
 
-def _drawn(project: Any, size: tuple[int, int]) -> Json:
+def _drawn(project: Projection, size: tuple[int, int]) -> Json:
     """Lines as pieces in the picture, and points that lie in it, px."""
     lines = []
     for start, end in tennis_court().ends:
@@ -134,7 +119,7 @@ def _drawn(project: Any, size: tuple[int, int]) -> Json:
             if near[part[0]] and len(part) > 1:
                 lines.append(pixels[part][[0, -1]].round(1).tolist())
     places = project(np.array(list(POINTS.values())))
-    inside = ((places >= 0) & (places < size)).all(axis=1)
+    inside = np.asarray(((places >= 0) & (places < size)).all(axis=1))
     points = {
         name: place.round(1).tolist()
         for name, place, shown in zip(POINTS, places, inside, strict=True)
