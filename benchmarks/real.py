@@ -1,7 +1,7 @@
 """Accuracy on real videos whose joints were marked by eye (`annotations/real/`).
 
     python benchmarks/real.py [--half develop|report|all] [--only NAME ...] [--cost 0.06]
-        [--work DIR] [--sheets]
+        [--work DIR] [--sheets] [--mirrored]
 
 For every clip: a whole body is marked in one clear frame and in three more where the program is
 least sure (no colour is clicked), the
@@ -17,6 +17,10 @@ propagated and lifted, and every other frame marked by eye is held against the r
     flow      PCK@0.2 of optical flow (Lucas-Kanade) from the marks before and after, blended
     swaps     share of frames in which both legs, or both arms, are exchanged
     knee      3D angle minus the angle in the picture, degrees, median where that is above 165
+
+With `--mirrored` every clip is shown mirrored, its marks too: the same motion, of which the program
+may choose other keyframes and see other noise. How far a clip's two rows differ is how far one of
+them can be trusted.
 
 The frames that are marked by a person are left out of every figure. The clips fall into two halves:
 `develop` may be looked at while the program is changed, `report` may not.
@@ -86,8 +90,11 @@ class Clip:
     """Right hip to left shoulder, median, px."""
 
 
-def load_clip(name: str) -> Clip:
-    """A clip with its truth."""
+MIRRORED = "-mirrored"
+
+
+def load_clip(name: str, mirrored: bool = False) -> Clip:
+    """A clip with its truth, as it is or in a mirror."""
     file, video = TRUTH / f"{name}.json", open_video(VIDEOS / f"{name}.mp4")
     truth = read_coco(file, LSP14, len(video), (video.width, video.height))
     notes = json.loads(file.read_text())
@@ -99,7 +106,18 @@ def load_clip(name: str) -> Clip:
         truth.joints[:, LSP14.index("right_hip")] - truth.joints[:, LSP14.index("left_shoulder")]
     )
     torso = float(np.nanmedian(np.linalg.norm(trunk, axis=1)))
-    return Clip(name, video, truth, truth.visible, action, torso)
+    clip = Clip(name, video, truth, truth.visible, action, torso)
+    return mirror_clip(clip) if mirrored else clip
+
+
+def mirror_clip(clip: Clip) -> Clip:
+    """The same clip seen in a mirror: another video of the same motion."""
+    video, truth = clip.video, clip.truth
+    mirrored = replace(video, mirrored=not video.mirrored, turns=-video.turns % 4)
+    joints = truth.joints[:, LSP14.mirror] * [-1, 1] + [video.width - 1, 0]
+    visible = truth.visible[:, LSP14.mirror]
+    marks = replace(truth, joints=joints, visible=visible)
+    return replace(clip, name=clip.name + MIRRORED, video=mirrored, truth=marks, seen=visible)
 
 
 def choose_bodies(clip: Clip, count: int) -> np.ndarray:
@@ -270,7 +288,7 @@ def knee_bias(result: Result) -> float:
 
 
 COLUMNS = (
-    f"{'clip':<25}{'half':<9}{'asked':>7}{'cost':>7}{'PCK.2':>7}{'PCK.1':>7}{'hidden':>8}"
+    f"{'clip':<34}{'half':<9}{'asked':>7}{'cost':>7}{'PCK.2':>7}{'PCK.1':>7}{'hidden':>8}"
     f"{'action':>8}{'lines':>7}{'flow':>7}{'swaps':>7}{'knee':>7}{'s':>6}"
 )
 
@@ -299,10 +317,10 @@ def describe(result: Result) -> tuple[str, dict[str, float]]:
         "knee": knee_bias(result),
     }
     asked = f"{len(result.asked.upper.frames)}+{len(result.asked.lower.frames)}"
-    half = "develop" if clip.name in DEVELOP else "report"
+    half = "develop" if clip.name.removesuffix(MIRRORED) in DEVELOP else "report"
     f = figures
     text = (
-        f"{clip.name:<25}{half:<9}{asked:>7}{f['cost']:7.1%}{f['pck']:7.1%}{f['pck1']:7.1%}"
+        f"{clip.name:<34}{half:<9}{asked:>7}{f['cost']:7.1%}{f['pck']:7.1%}{f['pck1']:7.1%}"
         f"{f['hidden']:8.1%}{f['action']:8.1%}{f['lines']:7.1%}{f['flow']:7.1%}"
         f"{f['swaps']:7.1%}{f['knee']:7.1f}{result.seconds:6.0f}"
     )
@@ -344,7 +362,7 @@ def summarise(table: list[dict[str, float]]) -> str:
     f = {name: np.nanmean([row[name] for row in table]) for name in table[0]}
     worst = min(row["pck"] for row in table)
     return (
-        f"{'mean':<41}{f['cost']:7.1%}{f['pck']:7.1%}{f['pck1']:7.1%}{f['hidden']:8.1%}"
+        f"{'mean':<50}{f['cost']:7.1%}{f['pck']:7.1%}{f['pck1']:7.1%}{f['hidden']:8.1%}"
         f"{f['action']:8.1%}{f['lines']:7.1%}{f['flow']:7.1%}{f['swaps']:7.1%}{f['knee']:7.1f}"
         f"   worst PCK {worst:.1%}"
     )
@@ -358,6 +376,7 @@ def main() -> None:
     parser.add_argument("--cost", type=float, default=0.06, help="annotation cost asked for")
     parser.add_argument("--work", type=Path, default=Path("benchmarks/work/real"))
     parser.add_argument("--sheets", action="store_true", help="write contact sheets")
+    parser.add_argument("--mirrored", action="store_true", help="show every clip in a mirror")
     words = parser.parse_args()
     if not VIDEOS.is_dir():
         raise SystemExit(f"The real videos are not at {VIDEOS}.")
@@ -369,9 +388,9 @@ def main() -> None:
     table = []
     for name in [n for n in chosen if not words.only or n in words.only]:
         try:
-            result = solve(load_clip(name), words.cost, words.work)
+            result = solve(load_clip(name, words.mirrored), words.cost, words.work)
         except KeyreconError as fault:
-            print(f"{name:<25}{halves[name]:<9}{fault}", flush=True)
+            print(f"{name:<34}{halves[name]:<9}{fault}", flush=True)
             continue
         text, figures = describe(result)
         table.append(figures)
