@@ -49,3 +49,7 @@ class Assistant:
     """Keeps a clicked point of the court by name and frame, or drops it without a place."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None
     """How much each pixel of a frame looks like a part: RGBA, (h, w, 4)."""
+    swing: Callable[[tuple[int, int], Json, Json, Json], Json] | None = None
+    """Of a golf swing, from the pictures' size, what is told of it, joints clicked at the address
+    and frames of key postures: {"needed", "wrong"}, and after a fit {"keys", "club", "seen",
+    "doubts", "tempo", "fresh"}; `fresh` tells whether it knows all marks."""

@@ -25,13 +25,14 @@ from keyrecon.annotate.server.address import (
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
-from keyrecon.app import keyframing, project, running
+from keyrecon.app import golf, keyframing, project, running
 from keyrecon.app.court import calibrate
 from keyrecon.app.exporting import export
 from keyrecon.app.preparing import prepare_project
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames
@@ -113,6 +114,7 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
         "follow": partial(_follow_player, folder),
         "keyframes": partial(_find_keyframes, folder),
         "run": partial(_run, folder),
+        "golf": partial(_fit_swing, folder),
         "export": partial(_export, folder),
         "court": partial(_find_court, folder),
     }
@@ -168,6 +170,13 @@ def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
             text.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
     return ""
+
+
+def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+    """A golf fit; what the page shows in no other place is returned."""
+    model = read_motion_model(BUILT_IN_SWING_PRIOR)
+    told = golf.fit_project(Workspace(folder), model, progress=progress)
+    return "\n".join(line for line in told.splitlines() if line.startswith("Note: "))
 
 
 def _contradictions(told: str) -> str:

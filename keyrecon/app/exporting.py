@@ -67,7 +67,8 @@ def export(
         if file.suffix.lower() == OVERLAY:
             shown = None if frames is None else (first, last)
             court = read_on_court(workspace.motion_file)
-            write_overlay(file, workspace.video(), motion, progress, overlay, shown, court)
+            club = read_further_arrays(workspace.motion_file).get("club2d")
+            write_overlay(file, workspace.video(), motion, progress, overlay, shown, court, club)
             lines.append(f"Wrote {file}.")
         else:
             lines.append(_write(file, cut, workspace, first, further))

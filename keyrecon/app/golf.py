@@ -17,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.app.golf_recipe import find_swing
+from keyrecon.app.project import load_annotations
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
+from keyrecon.golf.marks import join_marks
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.records import (
     NO_MARKS,
@@ -33,7 +35,7 @@ from keyrecon.golf.records import (
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.clicks import read_clicks
-from keyrecon.io.formats.golf_marks import MARKS_FILE, read_golf_marks
+from keyrecon.io.formats.golf_marks import read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
@@ -101,17 +103,18 @@ def fit_project(
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
-    video, folder = workspace.video(), workspace.folder
+    video, folder, evidence = workspace.video(), workspace.folder, workspace.golf_evidence()
     clicks = kept_clicks(workspace)
     slow_motion = workspace.project["video"].get("slow_motion", 1.0)
     check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
     options = workspace.options(options, GolfOptions(), GOLF)
     video = hold_frames(video)
-    marks = read_golf_marks(folder / MARKS_FILE, len(video), (video.width, video.height))
+    marks = kept_marks(workspace, video)
     fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress, marks)
     workspace.remember(options, GolfOptions(), GOLF)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
+    workspace.note_fitted(evidence)
     spent = time.perf_counter() - began
     return "\n".join(
         [
@@ -133,6 +136,16 @@ def kept_clicks(workspace: Workspace) -> GolfClicks:
             f"keyrecon annotate {folder}, and fit the swing there; or give --clicks FILE."
         )
     return read_clicks(workspace.golf_clicks_file)
+
+
+def kept_marks(workspace: Workspace, video: Video) -> SwingMarks:
+    """What a person marked in the swing: corrections of a fit, and joints of keyframes."""
+    size = video.width, video.height
+    marks = read_golf_marks(workspace.golf_marks_file, len(video), size)
+    if not workspace.annotations_file.is_file():
+        return marks
+    bodies = load_annotations(workspace, video)
+    return join_marks(marks, SwingMarks.of_joints(bodies.frames, bodies.joints))
 
 
 def check_evidence(

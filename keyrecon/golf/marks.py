@@ -50,6 +50,18 @@ def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
     )  # fmt: skip
 
 
+def join_marks(first: SwingMarks, second: SwingMarks) -> SwingMarks:
+    """All that either tells; where both tell, the first counts."""
+    frames = np.union1d(first.frames, second.frames)
+    joints, shafts = np.full((len(frames), 14, 2), np.nan), np.full((len(frames), 2, 2), np.nan)
+    for marks in (second, first):
+        rows = np.searchsorted(frames, marks.frames)
+        for held, told in ((joints, marks.joints), (shafts, marks.shafts)):
+            held[rows] = np.where(np.isfinite(told), told, held[rows])
+    keys = np.where(np.isfinite(first.keys), first.keys, second.keys)
+    return SwingMarks(frames, joints, shafts, keys)
+
+
 def hold_keys(keys: Float[np.ndarray, "4"], marks: SwingMarks) -> Float[np.ndarray, "4"]:
     """Key postures of which the marked ones are where they were marked, the others in order."""
     marked = np.isfinite(marks.keys)

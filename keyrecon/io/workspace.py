@@ -16,9 +16,11 @@
 What a person made is written durably and never replaced by something that does not parse.
 """
 
+import hashlib
+import json
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +50,7 @@ from keyrecon.io.project_file import (
 )
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, has_fingerprint, open_video
-from keyrecon.reading import read_text
+from keyrecon.reading import parse_json, read_text
 from keyrecon.records import Pick
 from keyrecon.world.records import CourtClick
 
@@ -60,6 +62,8 @@ OWN_NAMES = (
 """Files that a project has or may come to have."""
 GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
+CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
+"""What golf_clicks.json tells."""
 SECTIONS = (GOLF,)
 """Tables of options beside those of the pipeline."""
 
@@ -139,6 +143,34 @@ class Workspace:
     def is_golf(self) -> bool:
         """Whether the project is one of a golf swing: begun as one, or with clicks for a fit."""
         return self.project.get("kind") == GOLF or self.golf_clicks_file.is_file()
+
+    @property
+    def _fitted_file(self) -> Path:
+        """Tells what the last golf fit was made from."""
+        return self.folder / "cache" / "golf_fitted"
+
+    def golf_evidence(self) -> str:
+        """A digest of all that a person told a golf fit."""
+        told = [
+            _parts_of(self.golf_clicks_file, CLICK_PARTS),
+            _parts_of(self.golf_marks_file, ("keys", "frames")),
+            _parts_of(self.annotations_file, ("annotations",)),
+        ]
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+    def note_fitted(self, evidence: str) -> None:
+        """Remember from what the last golf fit was made."""
+        write_durably(self._fitted_file, evidence)
+
+    def is_fitted(self) -> bool:
+        """Whether the last golf fit was made from all that a person has told by now."""
+        noted = self._fitted_file
+        return noted.is_file() and noted.read_text() == self.golf_evidence()
+
+    def golf_results(self) -> list[Path]:
+        """Files besides motion and report that a golf fit wrote."""
+        files = (self.folder / name for name in ("golf.csv", "overlay.mp4"))
+        return [file for file in files if self.is_golf and file.is_file()]
 
     @property
     def exports(self) -> Path:
@@ -334,6 +366,16 @@ def _section_of(name: str) -> str | None:
 
 def _without_sections(told: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in told.items() if name not in SECTIONS}
+
+
+def _parts_of(file: Path, names: Sequence[str]) -> list:
+    """What a JSON file says under some names; None for each where there is no such file."""
+    content = {}
+    if file.is_file():
+        with suppress(ValueError):  # who reads the file says what is wrong with it
+            content = parse_json(read_text(file))
+    told = content if isinstance(content, dict) else {}
+    return [told.get(name) or None for name in names]
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -16,6 +16,8 @@ from keyrecon.records import SOURCES
 
 LEFT, RIGHT, TRUNK = (86, 180, 233), (230, 159, 0), (245, 245, 245)
 SEAM = (20, 20, 24)
+CLUB = (213, 94, 0)
+"""Vermillion of Okabe and Ito."""
 SUBPIXEL = 4
 """OpenCV draws at 1 / 2**SUBPIXEL px."""
 BONE_SHARE = 0.016
@@ -100,6 +102,14 @@ def draw_pose(
             kind = SOURCES[1 if source is None else source[joint]]
             _draw_joint(drawn, points2d[joint], kind, joint_colors[joint], thickness)
     return drawn
+
+
+def draw_club(picture: UInt8[np.ndarray, "h w 3"], ends: Float[np.ndarray, "2 2"]) -> None:
+    """A golf club from between the hands to its head (px), drawn into the picture."""
+    grip, head = (tuple(p) for p in (np.clip(ends, -9e3, 9e3) * 2**SUBPIXEL).astype(int).tolist())
+    cv2.line(picture, grip, head, SEAM, 4, cv2.LINE_AA, SUBPIXEL)
+    cv2.line(picture, grip, head, CLUB, 2, cv2.LINE_AA, SUBPIXEL)
+    cv2.circle(picture, head, 4 * 2**SUBPIXEL, TRUNK, 1, cv2.LINE_AA, SUBPIXEL)
 
 
 def _draw_bone(

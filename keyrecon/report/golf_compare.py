@@ -16,11 +16,10 @@ from keyrecon.golf.records import RecordedSwing
 from keyrecon.io.durable import write_durably
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
-from keyrecon.report.drawing import SEAM, draw_pose
+from keyrecon.report.drawing import CLUB, SEAM, draw_pose
 from keyrecon.report.golf_charts import curve_charts
 from keyrecon.report.golf_measures import KEY_NAMES, SwingMeasures, measure_swing
 from keyrecon.report.golf_page import golf_page
-from keyrecon.report.golf_pictures import CLUB
 from keyrecon.report.golf_player import cut_clip, find_window, player
 from keyrecon.report.golf_tables import DOUBT_NOTE, comparison_table, warning
 from keyrecon.report.markup import note, section, text

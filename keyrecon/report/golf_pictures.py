@@ -20,11 +20,9 @@ from keyrecon.golf.records import Camera, Capsules, FittedSwing, Observations, R
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
-from keyrecon.report.drawing import LEFT, RIGHT, SEAM, SUBPIXEL, TRUNK, draw_pose
+from keyrecon.report.drawing import CLUB, LEFT, RIGHT, SEAM, SUBPIXEL, draw_club, draw_pose
 from keyrecon.report.pictures import jpeg_uri
 
-CLUB = (213, 94, 0)
-"""Vermillion of Okabe and Ito."""
 BODY = (196, 190, 180)
 FLOOR = (46, 52, 50)
 VIEW_RADIUS = 1.5
@@ -57,7 +55,7 @@ def draw_golfer(
     layer = picture.copy()
     _draw_discs(layer, discs, fitted.capsules)
     drawn = cv2.addWeighted(layer, 0.6, picture, 0.4, 0)
-    _draw_club(drawn, fitted.club2d[frame])
+    draw_club(drawn, fitted.club2d[frame])
     return drawn
 
 
@@ -74,7 +72,7 @@ def draw_from_above(fitted: FittedSwing, frame: int, size: int) -> UInt8[np.ndar
     discs = Discs(from_above(ends), radii * scale, np.argsort(-ends[..., 1].mean(axis=1)).tolist())
     picture = np.full((size, size, 3), FLOOR, np.uint8)
     _draw_discs(picture, discs, fitted.capsules)
-    _draw_club(picture, from_above(fitted.club[frame]))
+    draw_club(picture, from_above(fitted.club[frame]))
     return picture
 
 
@@ -97,13 +95,6 @@ def _draw_discs(picture: UInt8[np.ndarray, "h w 3"], discs: Discs, capsules: Cap
         side = LEFT if name.startswith("left") else RIGHT if name.startswith("right") else BODY
         cv2.fillConvexPoly(picture, hull, side, cv2.LINE_AA, SUBPIXEL)
         cv2.polylines(picture, [hull], True, SEAM, 1, cv2.LINE_AA, SUBPIXEL)
-
-
-def _draw_club(picture: UInt8[np.ndarray, "h w 3"], ends: Float[np.ndarray, "2 2"]) -> None:
-    grip, head = (tuple(p) for p in (np.clip(ends, -9e3, 9e3) * 2**SUBPIXEL).astype(int).tolist())
-    cv2.line(picture, grip, head, SEAM, 4, cv2.LINE_AA, SUBPIXEL)
-    cv2.line(picture, grip, head, CLUB, 2, cv2.LINE_AA, SUBPIXEL)
-    cv2.circle(picture, head, 4 * 2**SUBPIXEL, TRUNK, 1, cv2.LINE_AA, SUBPIXEL)
 
 
 HANDS = (0, 114, 178)

@@ -20,7 +20,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_ground
-from keyrecon.report.drawing import TRUNK, draw_pose, joint_sides
+from keyrecon.report.drawing import TRUNK, draw_club, draw_pose, joint_sides
 from keyrecon.world.records import CourtCamera, WorldMotion
 
 View = Literal["camera", "right", "left", "back", "above"]
@@ -68,15 +68,17 @@ def write_overlay(
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
     court: tuple[WorldMotion, CourtCamera] | None = None,
+    club: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> None:
     """Write the video with the refined pose and the frame number on every frame.
 
     The pose is the projection of the 3D joints; near limbs cross over far ones. `frames` are the
     first and the last to be shown; those after the last one of the motion are shown as they are.
-    Raises KeyreconError for options that no video can follow.
+    `club` is that of a golf swing, from between the hands to its head, px. Raises KeyreconError for
+    options that no video can follow.
     """
     check_overlay(options)
-    pictures = overlay_frames(video, motion, progress, options, frames, court)
+    pictures = overlay_frames(video, motion, progress, options, frames, court, club)
     write_video(path, pictures, video.fps / options.slowmo)
 
 
@@ -103,6 +105,7 @@ def overlay_frames(
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
     court: tuple[WorldMotion, CourtCamera] | None = None,
+    club: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The pictures of `write_overlay`, one at a time."""
     first, last = frames or (0, len(video) - 1)
@@ -117,6 +120,9 @@ def overlay_frames(
         panes = []
         if court is not None and options.court and frame < len(motion.time):
             picture = draw_ground(picture, court, motion, frame)
+        if club is not None and frame < len(club) and np.isfinite(club[frame]).all():
+            picture = picture.copy()
+            draw_club(picture, club[frame])
         for view in options.view:
             if view == "camera":
                 panes.append(_camera_pane(picture, motion, frame, hidden, height))

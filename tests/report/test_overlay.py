@@ -122,6 +122,21 @@ def test_an_overlay_can_show_one_half_of_the_body_or_nothing(tmp_path):
     assert rows["upper"] < rows["lower"]
 
 
+def test_a_golf_club_is_drawn_where_it_is(tmp_path):
+    material = make_material(tmp_path, 12)
+    club = np.full((len(material.motion.time), 2, 2), np.nan)
+    club[0] = (20, 20), (60, 20)
+
+    def drawn(club):
+        return overlay_frames(material.video, material.motion, silent, club=club)
+
+    bare, held = drawn(None), drawn(club)
+    changed = (next(held) != next(bare)).any(axis=2)
+    assert changed[18:23, 25:55].all(axis=1).any()
+    assert not changed[30:].any()
+    assert (next(held) == next(bare)).all()
+
+
 def test_the_figure_from_elsewhere_stands_on_its_floor(tmp_path):
     material = make_material(tmp_path, 12)
     options = OverlayOptions(view=("right",), size=200)

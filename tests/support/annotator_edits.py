@@ -28,3 +28,19 @@ def read_edits(text):
 
 def submit(store, *edits):
     return store.submit(read_edits(json.dumps({"edits": edits})))
+
+
+def golf(name, to, was=None):
+    return edit("golf", name=name, to=to, was=was)
+
+
+def golf_click(joint, to, was=None):
+    return edit("click", joint=joint, to=to, was=was)
+
+
+def shaft(frame, to, was=None):
+    return edit("shaft", frame=frame, to=to, was=was)
+
+
+def key_posture(name, to, was=None):
+    return edit("key", name=name, to=to, was=was)

@@ -7,6 +7,7 @@ is left out, and points in space have the camera's axes in body heights.
 from collections.abc import Iterable
 from dataclasses import asdict, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -54,7 +55,15 @@ def make_assistant(workspace: Workspace) -> Assistant:
         court=partial(describe_court, workspace),
         court_view=partial(describe_court_view, workspace),
         court_point=partial(keep_court_point, workspace),
+        swing=partial(_describe_swing, workspace) if workspace.is_golf else None,
     )
+
+
+def _describe_swing(workspace: Workspace, *told: Any) -> Json:
+    """A golf swing; its modules are loaded when one is asked for."""
+    from keyrecon.annotate.assist.swing_answers import describe_swing
+
+    return describe_swing(workspace, *told)
 
 
 def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:

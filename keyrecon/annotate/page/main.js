@@ -19,8 +19,10 @@ import { createMotion } from "./views/motion.js";
 import { createPick } from "./views/pick.js";
 import { createPrompt, createScrub } from "./views/prompt.js";
 import { createShell } from "./views/shell.js";
-
-const VIEWS = ["bodies", "keyframes", "motion", "files", "court"];
+import { createAddress } from "./views/address.js";
+import { createSwing } from "./views/swing.js";
+import { nextClick } from "./state/swing.js";
+import { stepsOf } from "./state/workflow.js";
 
 const model = await createModel();
 const { ui } = model;
@@ -49,6 +51,8 @@ const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
 const court = createCourt(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
+const address = createAddress(model, { frames, shell, colors });
+const swing = createSwing(model, { frames, shell, actions, colors, go });
 createFiles(model);
 const exports = createExports(model, shell);
 
@@ -100,6 +104,8 @@ model.onDraw(() => {
   if (ui.view === null) return;
   shell.draw();
   if (ui.view === "keyframes") drawKeyframes();
+  if (ui.view === "address") address.draw();
+  if (ui.view === "swing") swing.draw();
   if (ui.view === "bodies") bodies.draw();
   if (ui.view === "pick") pick.draw();
   if (ui.view === "motion") motion.draw();
@@ -110,6 +116,7 @@ model.onDraw(() => {
 function go(view) {
   actions.dropDragged();
   model.update({ view });
+  if (view === "address") address.opened();
   if (view === "pick") pick.opened();
   if (view === "files") exports.opened();
   if (view === "court") court.opened();
@@ -120,10 +127,12 @@ const commands = {
     undo: actions.undo,
     redo: actions.redo,
     help: shell.help,
-    page: ({ index }) => go(VIEWS[index]),
+    page: ({ index }) => stepsOf(model.project)[index] && go(stepsOf(model.project)[index]),
     stage: toggleStage,
   },
   keyframes: keyframeCommands(model, { actions, viewer, lists }),
+  address: address.commands,
+  swing: swing.commands,
   bodies: bodies.commands,
   pick: pick.commands,
   motion: motion.commands,
@@ -146,7 +155,7 @@ document.addEventListener("keydown", (event) => {
 });
 document.addEventListener(
   "keyup",
-  ({ key }) => key.toLowerCase() === "h" && model.update({ hidden: false }),
+  ({ key }) => ["h", "x"].includes(key.toLowerCase()) && ui.hidden && model.update({ hidden: false }),
 );
 // A button pressed with the mouse does not keep the keys to itself.
 document.addEventListener(
@@ -179,4 +188,7 @@ await model.readState();
 model.listen();
 shell.refreshJobs();
 lists.refresh();
-go(bodies.isWaiting() ? "bodies" : "keyframes");
+if (model.project.golf) {
+  await model.readSwing();
+  go(model.swing?.keys && !nextClick(model.state) ? "swing" : "address");
+} else go(bodies.isWaiting() ? "bodies" : "keyframes");

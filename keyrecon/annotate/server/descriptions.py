@@ -149,6 +149,10 @@ def describe_state(state: JournalState) -> Json:
         "picks": picks_of(cells),
         "own": by_frame(cells, "own"),
         "locked": by_frame(cells, "lock"),
+        "golf": by_frame(cells, "golf"),
+        "clicks": by_frame(cells, "click"),
+        "shafts": by_frame(cells, "shaft"),
+        "keys": by_frame(cells, "key"),
         **describe_stacks(state),
     }
 
@@ -181,6 +185,10 @@ def describe_changes(changes: Iterable[Change]) -> list[Json]:
         "pick": lambda key: {"id": key[1]},
         "own": lambda key: {"frame": key[1]},
         "lock": lambda key: {"frame": key[1]},
+        "golf": lambda key: {"name": key[1]},
+        "click": lambda key: {"joint": key[1]},
+        "shaft": lambda key: {"frame": key[1]},
+        "key": lambda key: {"name": key[1]},
     }
     return [
         {"kind": key[0], **where[str(key[0])](key), "from": before, "to": after}

@@ -22,8 +22,15 @@ from keyrecon.annotate.server.descriptions import (
     describe_state,
 )
 from keyrecon.annotate.server.frame_cache import encode_png
+from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.session import Session, describe_project
-from keyrecon.annotate.store.cells import Cells, Change, cells_from_annotations, of_kind
+from keyrecon.annotate.store.cells import (
+    Cells,
+    Change,
+    by_frame,
+    cells_from_annotations,
+    of_kind,
+)
 from keyrecon.annotate.store.edits import (
     EditList,
     Frame,
@@ -205,6 +212,17 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
     return find(session.store.annotations()) if find else []
 
 
+def swing(session: Session, request: ApiRequest) -> Json:
+    """A golf swing: whether the clicks can be, and the last fit."""
+    describe, cells = session.assistant.swing, session.store.state.cells
+    if describe is None:
+        return {}
+    told = (by_frame(cells, kind) for kind in ("golf", "click", "key"))
+    found = describe(session.limits.size, *told)
+    texts = {"wrong": found["wrong"] and in_page_words(found["wrong"])}
+    return found | texts
+
+
 def preview(session: Session, request: ApiRequest) -> Json:
     """Head and feet found on some frames."""
     find_player, picks = session.assistant.preview, picks_from_cells(session.store.state.cells)
@@ -273,17 +291,19 @@ def report(session: Session, request: ApiRequest) -> Response:
 
 def exports(session: Session, request: ApiRequest) -> list[Json]:
     """The files that were written for other programs, the latest first."""
-    files = session.workspace.exported_files()
-    stamps = {file: file.stat() for file in files}
+    workspace = session.workspace
+    fitted, files = workspace.golf_results(), workspace.exported_files()
+    stamps = {file: file.stat() for file in (*fitted, *files)}
     files.sort(key=lambda file: stamps[file].st_mtime_ns, reverse=True)
     return [
         {
             "name": file.name,
             "bytes": stamps[file].st_size,
             "place": str(file.parent),
-            "current": stamps[file].st_mtime_ns >= _last_change(session.workspace.motion_file),
+            "current": file in fitted
+            or stamps[file].st_mtime_ns >= _last_change(workspace.motion_file),
         }
-        for file in files
+        for file in (*fitted, *files)
     ]
 
 
@@ -294,7 +314,7 @@ def _last_change(file: Path) -> int:
 def exported_file(session: Session, request: ApiRequest) -> Response:
     """One of these files, to be kept."""
     name = request.path["name"]
-    for file in session.workspace.exported_files():
+    for file in (*session.workspace.golf_results(), *session.workspace.exported_files()):
         if file.name == name:
             return FileResponse(file, filename=name, media_type="application/octet-stream")
     raise KeyreconError(f"There is no file '{name}' among the exports.")

@@ -14,6 +14,10 @@ PHRASES = (
     (r"or stop that keyrecon annotate first", "or stop the program that serves it"),
     (r"mark (more )?joints with `keyrecon annotate`", r"mark \1joints (2 Keyframes)"),
     (rf"Mark them on the page of keyrecon annotate {_NAME}.*--partial", "Mark them (2 Keyframes)."),
+    (rf"on the page of keyrecon annotate {_NAME}, and fit the swing there; or give --clicks FILE",
+     "(1 Address)"),
+    (r"\(say \"left_handed\": (?:true|false)\)", "(see to 'left-handed' in 1 Address)"),
+    (r"give --slowmo if you know", "begin a new project with the slow motion it has if you know"),
     (rf" on the page of keyrecon annotate {_NAME}", " (1 Body)"),
     (r",? or with: keyrecon pick [^;]*(?=;)", ""),
     (rf"import them: keyrecon import {_NAME} FILE", "take them from a file (4 Files)"),
@@ -43,9 +47,12 @@ OTHER = {
     "annotate": "mark joints (2 Keyframes)",
     "import": "take marks from a file (4 Files)",
     "run": "make the motion (3 Motion)",
+    "golf": "fit the swing (2 Swing)",
     "export": "write the files (4 Files)",
 }
 """What the page calls the work of a command, in messages that nobody thought of here."""
+FOR_TERMINALS = ("keyrecon ", "--", '"left_handed"')
+"""What only messages to somebody at a command line, or at a file of clicks, have in them."""
 _PHRASES = tuple((re.compile(said), read) for said, read in PHRASES)
 _COMMAND = re.compile(rf"(?:\b(?:run|with): )?`?\bkeyrecon ({'|'.join(OTHER)})\b[^.;\n]*")
 _NEXT = re.compile(r"^Next: .*\n?", re.MULTILINE)
@@ -54,7 +61,7 @@ _OPTION = re.compile(r"--[a-z][\w-]*(?:\.\w+)*")
 
 def in_page_words(text: str) -> str:
     """A message without commands and options; one that names none is left as it is."""
-    if "keyrecon " not in text and "--" not in text:
+    if not any(sign in text for sign in FOR_TERMINALS):
         return text
     told = _NEXT.sub("", text).rstrip()
     for said, read in _PHRASES:

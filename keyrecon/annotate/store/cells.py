@@ -9,6 +9,14 @@ A cell is named by a tuple and holds a plain value; a cell that is not there is 
                               (kinds are the words of the journal on the disk, and stay)
     ("lock", frame)           True: a keyframe that no new choice may drop
 
+and of a golf swing
+
+    ("golf", name)            what is known before a fit: "frame" of the address, "stature" (m),
+                              "left_handed" (True); "focal" and "principal" (px) of a file
+    ("click", joint)          [x, y, v] on that frame, v as above; also "root"
+    ("shaft", frame)          [x, y, x, y] of the club: between the hands, and its head
+    ("key", name)             the frame of "start", "top", "hit" or "finish"
+
 A change says what stood in a cell and what shall stand there. That makes three things one line
 each: to apply it, to take it back, and to see that somebody else was faster.
 
@@ -139,6 +147,14 @@ def _is_cell(key: Key, value: Value) -> bool:
             return all(isinstance(n, int | float) and math.isfinite(n) for n in (x, y))
         case ("own", int(), ("upper" | "lower" | "both")):
             return True
+        case ("click", str(), [x, y, (1 | 2)]):
+            return all(isinstance(n, int | float) and math.isfinite(n) for n in (x, y))
+        case ("shaft", int(), [_, _, _, _]):
+            return all(isinstance(n, int | float) and math.isfinite(n) for n in value)
+        case ("golf", str(), (int() | float() | list())):
+            return True
+        case ("key", str(), (int() | float())):
+            return math.isfinite(value)
     return False
 
 
@@ -151,7 +167,9 @@ def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> 
             f"Marks of {', '.join(unknown)} were made in this project, and its skeleton has no "
             "such joint; bring the former skeleton.json back, or begin a new project."
         )
-    last = max((int(key[1]) for key in decided), default=0)
+    swing = [int(key[1]) for key in of_kind(cells, "shaft")]
+    swing += [int(frame) for frame in of_kind(cells, "key").values()]
+    last = max([0, *swing, *(int(key[1]) for key in decided)])
     if last >= n_frames:
         raise KeyreconError(
             f"Frame {last} was marked in this project, and its video now has {n_frames} frames; "
@@ -159,6 +177,8 @@ def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> 
         )
 
 
+KEY_POSTURES = ("start", "top", "hit", "finish")
+"""Key postures of a golf swing, in the order of time."""
 ABSENT = (0, 0, 0)
 """The mark of a joint that is absent, as a file has it."""
 

@@ -16,6 +16,8 @@ from keyrecon.errors import KeyreconError
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Frame = Annotated[int, Meta(ge=0, le=100_000_000)]
 Place = tuple[float, float, Literal[0, 1, 2]]
+Click = tuple[float, float, Literal[1, 2]]
+Shaft = tuple[float, float, float, float]
 Half = Literal["upper", "lower", "both"]
 Sign = Literal[1, -1]
 
@@ -84,16 +86,53 @@ class LockEdit(Edit, frozen=True, tag="lock"):
     was: bool = field(name="from")
 
 
+class ClickEdit(Edit, frozen=True, tag="click"):
+    """One joint of a golfer at the address."""
+
+    joint: Name
+    to: Click | None
+    was: Click | None = field(name="from")
+
+
+class ShaftEdit(Edit, frozen=True, tag="shaft"):
+    """A golf club on one frame: between the hands, and its head."""
+
+    frame: Frame
+    to: Shaft | None
+    was: Shaft | None = field(name="from")
+
+
+class KeyPostureEdit(Edit, frozen=True, tag="key"):
+    """The frame of one of a swing's key postures."""
+
+    name: Literal["start", "top", "hit", "finish"]
+    to: Frame | None
+    was: Frame | None = field(name="from")
+
+
+class GolfEdit(Edit, frozen=True, tag="golf"):
+    """What is known of a swing before a fit."""
+
+    name: Literal["frame", "stature", "left_handed"]
+    to: bool | float | None
+    was: bool | float | None = field(name="from")
+
+
 Part = MarkEdit | MarksEdit | NearerEdit | PickEdit | OwnKeyframeEdit | LockEdit
+GOLF_CELLS = ("golf", "click", "shaft", "key")
+"""Kinds of cells that only a golf swing has."""
+LARGEST_STATURE = 3.0
+"""Metres; what is plausible is for the fit to say."""
+GolfPart = ClickEdit | ShaftEdit | KeyPostureEdit | GolfEdit
 
 
 class GroupEdit(Edit, frozen=True, tag="group"):
     """Several edits that stand together or not at all, and are undone as one."""
 
-    edits: Annotated[list[Part], Meta(min_length=1, max_length=5000)]
+    edits: Annotated[list[Part | GolfPart], Meta(min_length=1, max_length=5000)]
 
 
-AnyEdit = Part | GroupEdit
+AnyEdit = Part | GolfPart | GroupEdit
 
 
 @dataclass(frozen=True)
@@ -135,6 +174,8 @@ def _cells(edit: AnyEdit) -> list[tuple[Key, Value, Value]]:
             return [(("own", frame), edit.was, edit.to)]
         case LockEdit(frame=frame):
             return [(("lock", frame), edit.was or None, edit.to or None)]
+        case ClickEdit() | ShaftEdit() | KeyPostureEdit() | GolfEdit():
+            return [_golf_cell(edit)]
         case GroupEdit(edits=parts):
             return [cell for part in parts for cell in _cells(part)]
 
@@ -159,12 +200,35 @@ def _pick_value(place: PickPlace | None) -> dict[str, Any] | None:
     return {"frame": place.frame, "part": part, "x": place.x, "y": place.y}
 
 
-def _listed(place: Place | None) -> list[float | int] | None:
+def _golf_cell(edit: GolfPart) -> tuple[Key, Value, Value]:
+    match edit:
+        case ClickEdit(joint=joint):
+            return ("click", joint), _listed(edit.was), _listed(edit.to)
+        case ShaftEdit(frame=frame):
+            return ("shaft", frame), _listed(edit.was), _listed(edit.to)
+        case KeyPostureEdit(name=name):
+            return ("key", name), edit.was, edit.to
+        case GolfEdit(name=name):
+            return ("golf", name), _known(name, edit.was), _known(name, edit.to)
+
+
+def _known(name: str, value: bool | float | None) -> bool | int | float | None:
+    """A value as its cell holds it; what is not so is not told."""
+    if value is None or value is False:
+        return None
+    return int(value) if name == "frame" else value
+
+
+def _listed(place: Place | Click | Shaft | None) -> list[float | int] | None:
     return None if place is None else list(place)
 
 
 def _check(change: Change, limits: Limits) -> None:
     kind, *where = change.key
+    if kind in GOLF_CELLS:
+        if change.after is not None:
+            _check_golf(str(kind), where[0], change.after, limits)
+        return
     pick = change.after if kind == "pick" else None
     frame = pick["frame"] if pick else where[0]
     if isinstance(frame, int):
@@ -177,6 +241,25 @@ def _check(change: Change, limits: Limits) -> None:
         raise KeyreconError("A click needs the name of the part that it is on.")
     if pick:
         _check_place([pick["x"], pick["y"]], limits.size, margin=0.0)
+
+
+def _check_golf(kind: str, name: str | int, value: Value, limits: Limits) -> None:
+    """What is said of a golf swing is of a frame and place that there are."""
+    match kind, name:
+        case ("key", _) | ("golf", "frame"):
+            check_frame(value, limits)
+        case ("golf", "left_handed") if value is not True:
+            raise KeyreconError("Whether a player is left-handed is true or false.")
+        case ("golf", "stature") if value is True or not 0 < value < LARGEST_STATURE:
+            raise KeyreconError(f"A player's height in metres cannot be {value:g}.")
+        case ("click", _):
+            if name != "root":
+                _check_name(str(name), kind, limits.skeleton)
+            _check_place(value[:2], limits.size, margin=0.0)
+        case ("shaft", int()):
+            check_frame(int(name), limits)
+            for end in (value[:2], value[2:]):
+                _check_place(end, limits.size, margin=1.0)
 
 
 def check_frame(frame: int, limits: Limits) -> None:

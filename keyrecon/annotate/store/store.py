@@ -28,6 +28,7 @@ from keyrecon.annotate.store.cells import (
 )
 from keyrecon.annotate.store.edits import AnyEdit, Limits, changes_of
 from keyrecon.annotate.store.file_sync import FileSync, annotations_form, picks_form
+from keyrecon.annotate.store.golf_files import clicks_form, marks_form
 from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import hold_lock
@@ -108,7 +109,9 @@ class Store:
                 self.state = advance(JournalState(), self._journal.entries())
                 check_cells(self.state.cells)
                 check_fit(self.state.cells, limits.skeleton, limits.n_frames)
-                forms = (annotations_form(workspace, limits), picks_form(workspace))
+                forms = [annotations_form(workspace, limits), picks_form(workspace)]
+                if workspace.is_golf:
+                    forms += [clicks_form(workspace, limits), marks_form(workspace, limits)]
                 notes = [self._journal.note(form.path.name) for form in forms]
                 self._files = [FileSync(f, note) for f, note in zip(forms, notes, strict=True)]
             self.refresh()

@@ -26,6 +26,7 @@ from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import parse_json, read_text, reading, real, whole
 
+__all__ = ["SwingMarks", "golf_marks_text", "read_golf_marks", "write_golf_marks"]
 FORMAT = 1
 """Version of the file."""
 MARKS_FILE = "golf_marks.json"
@@ -70,7 +71,12 @@ def read_golf_marks(path: Path, n_frames: int, size: tuple[int, int]) -> SwingMa
 
 
 def write_golf_marks(path: Path, marks: SwingMarks, size: tuple[int, int]) -> None:
-    """Write marks, one frame to a line; `size` is that of the video's pictures."""
+    """Write marks; `size` is that of the video's pictures."""
+    write_durably(path, golf_marks_text(marks, size))
+
+
+def golf_marks_text(marks: SwingMarks, size: tuple[int, int]) -> str:
+    """Marks as their file has them, one frame to a line."""
     rows = []
     for frame, joints, ends in zip(marks.frames.tolist(), marks.joints, marks.shafts, strict=True):
         named = zip(LSP14.names, joints, strict=True)
@@ -84,10 +90,9 @@ def write_golf_marks(path: Path, marks: SwingMarks, size: tuple[int, int]) -> No
     named_keys = zip(KEY_NAMES, marks.keys.tolist(), strict=True)
     keys = {name: key for name, key in named_keys if np.isfinite(key)}
     body = ",\n    ".join(rows)
-    write_durably(
-        path,
+    return (
         f'{{\n  "keyrecon_golf_marks": {FORMAT},\n  "size": {json.dumps(list(size))},\n'
-        f'  "keys": {json.dumps(keys)},\n  "frames": [\n    {body}\n  ]\n}}\n',
+        f'  "keys": {json.dumps(keys)},\n  "frames": [\n    {body}\n  ]\n}}\n'
     )
 
 

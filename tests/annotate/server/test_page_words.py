@@ -11,12 +11,23 @@ from keyrecon.annotate.server.page_words import in_page_words
 
 PACKAGE = Path(keyrecon.__file__).parent
 ELSEWHERE = (
-    *("cli.py", "cli_commands", "demo.py", "golf", "golf.py", "golf_commands.py", "golf_demo.py"),
+    *("cli.py", "cli_commands", "demo.py", "golf_commands.py", "golf_demo.py"),
     *("golf_training.py", "golf_page.py", "depth_training.py", "model_file.py", "synthetic"),
     *("paper", "annotator.py", "page_words.py", "address.py", "security.py"),
 )
 """Files and folders whose messages are for a terminal: nothing the page asks for ends there."""
-COMMANDS = ("new", "pick", "keyframes", "annotate", "import", "run", "export", "evaluate", "relink")
+COMMANDS = (
+    "new",
+    "golf",
+    "pick",
+    "keyframes",
+    "annotate",
+    "import",
+    "run",
+    "export",
+    "evaluate",
+    "relink",
+)
 COMMAND_LINE = re.compile(rf"keyrecon ({'|'.join(COMMANDS)})\b|--[a-z]")
 
 
@@ -61,6 +72,15 @@ def test_no_message_names_a_command_or_an_option_to_somebody_on_the_page(text):
         (
             "--height is the athlete's height in metres; 188 cannot be.",
             "The player's height cannot be 188 m.",
+        ),
+        (
+            "swing has no clicks yet. Click six joints of the address on the page of keyrecon "
+            "annotate swing, and fit the swing there; or give --clicks FILE.",
+            "swing has no clicks yet. Click six joints of the address (1 Address).",
+        ),
+        (
+            'Either the player is left-handed (say "left_handed": true), or not.',
+            "Either the player is left-handed (see to 'left-handed' in 1 Address), or not.",
         ),
         ("picks.json: 1 head.\nNext: keyrecon keyframes p", "picks.json: 1 head."),
         ("Frame 40 cannot be decoded.", "Frame 40 cannot be decoded."),

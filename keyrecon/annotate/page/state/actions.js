@@ -301,7 +301,8 @@ function createNavigation(model, placing, opened) {
 
   function nextKeyframe() {
     const frame = nextOpen(model.keyframes(), ui.frame, model.isDone);
-    if (frame === null) model.update({ view: model.project.has.keyframes ? "motion" : "bodies" });
+    if (model.project.golf && !model.project.has.keyframes) model.update({ view: "swing" });
+    else if (frame === null) model.update({ view: model.project.has.keyframes ? "motion" : "bodies" });
     else open(frame);
   }
 

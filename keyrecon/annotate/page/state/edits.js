@@ -1,7 +1,8 @@
 // What a person has decided, as plain values, and edits of it. An edit is a record of what is to be
 // there and what was believed to be there before; it makes a new state and leaves the old one.
 
-// `own` are keyframes that the person added, by frame the half of the body; the journal calls them so.
+// `golf`, `clicks` (of the address, by joint), `shafts` (by frame) and `keys` (frames by key posture) are
+// those of a golf swing. `own` are keyframes that the person added, by frame the half of the body; the journal calls them so.
 const empty = {
   revision: 0,
   marks: {},
@@ -9,6 +10,10 @@ const empty = {
   picks: [],
   own: {},
   locked: {},
+  golf: {},
+  clicks: {},
+  shafts: {},
+  keys: {},
   undo: 0,
   redo: 0,
 };
@@ -39,6 +44,10 @@ const appliers = {
     return { picks: to ? [...others, to] : others };
   },
   own: (state, { frame, to }) => ({ own: withValues(state.own, { [frame]: to }) }),
+  click: (state, { joint, to }) => ({ clicks: withValues(state.clicks, { [joint]: to }) }),
+  shaft: (state, { frame, to }) => ({ shafts: withValues(state.shafts, { [frame]: to }) }),
+  key: (state, { name, to }) => ({ keys: withValues(state.keys, { [name]: to }) }),
+  golf: (state, { name, to }) => ({ golf: withValues(state.golf, { [name]: to === false ? null : to }) }),
   lock: (state, { frame, to }) => ({ locked: withValues(state.locked, { [frame]: to || null }) }),
 };
 
@@ -54,20 +63,20 @@ export const nearerOf = (state, frame) => state.nearer[frame] ?? {};
 
 // The cells that an edit touches, such as "marks/12/neck".
 export function cellsOf(edit) {
-  const { kind, frame, joint } = edit;
+  const { kind, frame, joint, name } = edit;
   if (kind === "group") return edit.edits.flatMap(cellsOf);
   if (kind === "mark") return [`marks/${frame}/${joint}`];
   if (kind === "marks" || kind === "nearer")
-    return Object.keys(edit.to).map((name) => `${kind}/${frame}/${name}`);
+    return Object.keys(edit.to).map((cell) => `${kind}/${frame}/${cell}`);
   if (kind === "pick") return [`pick/${(edit.to ?? edit.from)?.id}`];
-  return [`${kind}/${frame}`];
+  return [`${kind}/${joint ?? name ?? frame}`];
 }
 
 // A change of a cell that the server reports, as an edit.
-export function editFromChange({ kind, frame, joint, limb, id, to, from }) {
+export function editFromChange({ kind, frame, joint, name, limb, id, to, from }) {
   if (kind === "nearer") return { kind, frame, to: { [limb]: to } };
   if (kind === "pick") return { kind, to: to && { ...to, id }, from: from && { ...from, id } };
-  return { kind, frame, joint, to };
+  return { kind, frame, joint, name, to };
 }
 
 export function newId() {
@@ -120,6 +129,18 @@ export function setLock(state, frame, locked) {
   return { id: newId(), kind: "lock", frame, to: locked, from: Boolean(state.locked[frame]) };
 }
 
+const golfEdit = (kind, where, to, from) => ({ id: newId(), kind, ...where, to, from: from ?? null });
+
+export const placeClick = (state, joint, to) =>
+  golfEdit("click", { joint }, rounded(to), state.clicks[joint]);
+export const setShaft = (state, frame, ends) =>
+  golfEdit("shaft", { frame }, ends && ends.map((n) => Math.round(n * 10) / 10), state.shafts[frame]);
+export const setKey = (state, name, frame) => golfEdit("key", { name }, frame, state.keys[name]);
+export const setGolf = (state, name, to) => golfEdit("golf", { name }, to, state.golf[name]);
+
+// Edits that stand together or not at all, and are undone as one.
+export const together = (edits) => ({ id: newId(), kind: "group", edits });
+
 function exchanged(values, pairs) {
   const to = {};
   for (const [left, right] of pairs) {
@@ -139,7 +160,7 @@ export function swapSides(state, frame, pairs) {
   if (Object.keys(places).length) parts.push(placeJoints(state, frame, places));
   if (Object.keys(depths).length) parts.push(setNearer(state, frame, depths));
   if (parts.length < 2) return parts[0] ?? null;
-  return { id: newId(), kind: "group", edits: parts };
+  return together(parts);
 }
 
 // visible -> placed though hidden -> absent -> visible; an unplaced joint becomes absent.
@@ -174,6 +195,14 @@ export function rebased(state, edit) {
       return setOwnKeyframe(state, frame, edit.to);
     case "lock":
       return setLock(state, frame, edit.to);
+    case "click":
+      return placeClick(state, edit.joint, edit.to);
+    case "shaft":
+      return setShaft(state, frame, edit.to);
+    case "key":
+      return setKey(state, edit.name, edit.to);
+    case "golf":
+      return setGolf(state, edit.name, edit.to);
     default:
       return {
         ...edit,

@@ -28,6 +28,7 @@ export async function createModel() {
     saving: { status: "saved", waiting: 0 },
     notice: null,
     jobs: new Map(),
+    swing: null, // of a golf swing: what the server says of clicks and fit
     stretches: [], // where the program is least sure of itself: {first, last, text, frame, half}
   };
   const drawers = [],
@@ -83,6 +84,22 @@ export async function createModel() {
     model.state = outbox.waiting().reduce(apply, { ...emptyState(), ...fresh });
     model.redraw();
   };
+
+  // What the server says of a golf swing, when edits have come to rest and after a fit.
+  const readSwing = api.latestOnly(
+    async () => {
+      const { revision } = model.state;
+      model.swing = { ...(await api.read("swing")), revision };
+      model.redraw();
+    },
+    (fault) => model.notify(fault.message),
+  );
+  model.readSwing = () => (model.project.golf ? readSwing() : null);
+  model.onIdle(model.readSwing);
+  model.onProject(model.readSwing);
+  // Whether the fit knows all that is marked at this moment.
+  model.swingIsFresh = () =>
+    Boolean(model.swing?.fresh) && model.swing.revision === model.state.revision && !outbox.waiting().length;
 
   model.edit = (edit) => {
     if (!edit) return;

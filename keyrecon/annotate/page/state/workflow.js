@@ -93,6 +93,12 @@ export function allKeyframes(project, state) {
 
 const joinHalves = (a, b) => (!a || a === b ? b : "both");
 
+// The pages of a project, in the order of the work; a golf swing has pages of its own.
+export const stepsOf = ({ golf, has }) =>
+  golf
+    ? ["address", "swing", ...(has.keyframes ? ["keyframes", "motion"] : []), "files"]
+    : ["bodies", "keyframes", "motion", "files", "court"];
+
 // "right_ankle" -> "right ankle"
 export const label = (joint) => joint.replaceAll("_", " ");
 

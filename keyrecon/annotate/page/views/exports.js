@@ -39,6 +39,9 @@ const choice = (rows, label) => {
   return field;
 };
 
+// What a golf fit writes by itself.
+const FITTED = { "golf.csv": "the numbers and curves of the swing", "overlay.mp4": "body and club over the video" };
+
 export function createExports(model, shell) {
   let files = [];
 
@@ -111,7 +114,8 @@ export function createExports(model, shell) {
 
   function fileRow({ name, bytes, current }) {
     const link = make("a", { href: `/api/exports/${encodeURIComponent(name)}`, download: name }, name);
-    return make("div", {}, link, make("small", {}, current ? sizeText(bytes) : "of an earlier motion"));
+    const told = current ? [FITTED[name], sizeText(bytes)].filter(Boolean).join(", ") : "of an earlier motion";
+    return make("div", {}, link, make("small", {}, told));
   }
 
   function drawFiles() {
@@ -125,12 +129,16 @@ export function createExports(model, shell) {
   }
 
   function draw() {
-    const { has } = model.project;
+    const { has } = model.project,
+      doubtful = Boolean(model.swing?.doubts?.length);
+    toggle(byId("report-text"), "wrong", doubtful);
     setText(
       byId("report-text"),
-      has.report
+      doubtful
+        ? "The fit of this swing is doubtful: do not use its numbers. 2 Swing tells what is, and what to do."
+        : has.report
         ? "What was found, how sure it is, and the figure beside the video; one file that can be passed on."
-        : "It is written when the motion is made (3 Motion).",
+        : `It is written when ${model.project.golf ? "the swing is fitted (2 Swing)" : "the motion is made (3 Motion)"}.`,
     );
     byId("report").hidden = !has.report;
     const whole = part(),

@@ -32,7 +32,7 @@ function draw(tag, properties) {
 }
 
 // `show(joint)` marks one joint, null marks none; `exists` is false for joints that have no picture.
-export function createGuide(root, model) {
+export function createGuide(root, model, joints = model.project.joints) {
   const picture = draw("svg", { viewBox: "14 -1 72 101", role: "img" });
   picture.setAttribute("aria-label", "Where the joints are on a body that faces you");
   for (const path of OUTLINES) picture.append(draw("path", { d: path, class: "flesh" }));
@@ -42,9 +42,9 @@ export function createGuide(root, model) {
   }
   picture.append(draw("path", { d: BELT, class: "belt" }));
   const dots = new Map();
-  for (const joint of model.project.joints.filter((name) => FIGURE[name])) {
+  for (const joint of joints.filter((name) => FIGURE[name])) {
     const [cx, cy] = FIGURE[joint],
-      dot = draw("circle", { cx, cy, r: 1.7, class: `place ${model.sides[joint]}` }),
+      dot = draw("circle", { cx, cy, r: 1.7, class: `place ${model.sides[joint] ?? "middle"}` }),
       title = draw("title", {});
     title.textContent = `${label(joint)}: ${jointWords(joint)}`;
     dot.append(title);

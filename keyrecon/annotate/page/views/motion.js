@@ -5,9 +5,20 @@ import { createMotionCache } from "../state/caches.js";
 import { createPoseFigure } from "./depth.js";
 import { heightIn, label } from "../state/workflow.js";
 import { byId, make, setText, toggle } from "./dom.js";
+import { createPlayer } from "./player.js";
 
 const PREFETCHED = 24; // frames fetched ahead while playing
 const WIDTH = 960; // of the pictures, px
+
+// Where the figure stands: the ground does not follow each step, nor its size each bend.
+export function groundBelow(ground, body) {
+  const around = ["left_hip", "right_hip"].map((name) => body[name]).filter(Boolean);
+  if (!ground || !around.length) return null;
+  const { level, unit, units } = ground,
+    mean = (axis) => around.reduce((sum, point) => sum + point[axis], 0) / around.length,
+    square = units === "m" ? `${Math.round(unit * 25)} cm` : "¼ body height";
+  return { center: [mean(0), level - unit / 2, mean(2)], level, unit, ground: `ground, squares of ${square}` };
+}
 
 export function createMotion(model, { frames, shell, actions, colors }) {
   const { project, sides } = model,
@@ -91,17 +102,6 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     return `Expected error here: ${mean.toFixed(0)} px; least sure: ${named.join(", ")}. Discs show it.`;
   }
 
-  // Where the figure stands: the ground does not follow each step, nor its size each bend.
-  function groundBelow(body) {
-    const ground = motion.ground(frame),
-      around = ["left_hip", "right_hip"].map((name) => body[name]).filter(Boolean);
-    if (!ground || !around.length) return null;
-    const { level, unit, units } = ground,
-      mean = (axis) => around.reduce((sum, point) => sum + point[axis], 0) / around.length,
-      square = units === "m" ? `${Math.round(unit * 25)} cm` : "¼ body height";
-    return { center: [mean(0), level - unit / 2, mean(2)], level, unit, ground: `ground, squares of ${square}` };
-  }
-
   function drawStretches() {
     const list = byId("stretches"),
       content = JSON.stringify(model.stretches);
@@ -170,7 +170,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     drawSkeleton();
     const body = points("points3d");
     byId("motion-empty").hidden = body !== null;
-    figure.show(body, null, body && groundBelow(body));
+    figure.show(body, null, body && groundBelow(motion.ground(frame), body));
   }
 
   const commands = {
@@ -184,40 +184,4 @@ export function createMotion(model, { frames, shell, actions, colors }) {
       go(frame + (index ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
   };
   return { draw, commands };
-}
-
-// A clock that plays frames. A frame whose picture is not here yet holds the clock up, so that the
-// picture and what is drawn over it always belong together.
-function createPlayer({ fps, last, ready, load, show, active }) {
-  let playing = null; // {frame, since}: where and when the clock was set
-
-  function step(now) {
-    if (!playing || !active()) {
-      playing = null;
-      return;
-    }
-    const due = playing.frame + Math.floor(((now - playing.since) * fps) / 1000);
-    const frame = Math.min(last, due);
-    if (ready(frame)) {
-      show(frame);
-    } else {
-      load(playing.frame + 1);
-      if (ready(playing.frame + 1)) playing.frame += 1;
-      playing.since = now;
-      show(playing.frame);
-    }
-    if (frame >= last) playing = null;
-    requestAnimationFrame(step);
-  }
-
-  return {
-    playing: () => playing !== null,
-    stop() {
-      playing = null;
-    },
-    start(frame) {
-      playing = { frame: frame >= last ? 0 : frame, since: performance.now() };
-      requestAnimationFrame(step);
-    },
-  };
 }

@@ -16,6 +16,12 @@ const sentence = (words) => (words ? `${words[0].toUpperCase()}${words.slice(1)}
 
 // Before there are keyframes: what a marked body is for.
 function afterBody(model) {
+  if (model.project.golf)
+    return {
+      text: "This body is marked",
+      more: "What is marked holds in the next fit of the swing.",
+      button: "Back to the swing",
+    };
   const { left } = nextBeginning(model.project, model.keyframes(), model.isDone);
   if (left)
     return {

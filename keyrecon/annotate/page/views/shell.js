@@ -3,6 +3,8 @@
 import * as api from "../state/api.js";
 import { byId, counted, make, numberIn, setText } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
+import { CLICKS } from "../state/swing.js";
+import { stepsOf } from "../state/workflow.js";
 
 const SAVING = {
   saved: () => "All saved",
@@ -10,7 +12,7 @@ const SAVING = {
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
 const LASTING = {}; // an offer of nothing: the notice stays until it is closed
-const TITLES = { any: "Everywhere", keyframes: "Keyframes", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
 
 function keyElements(keys) {
   const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;
@@ -20,8 +22,10 @@ function keyElements(keys) {
   ]);
 }
 
-function keysTable() {
-  const parts = Object.entries(KEYS).map(([page, rows]) =>
+function keysTable(project) {
+  const shown = new Set(["any", ...stepsOf(project), project.golf ? "keyframes" : "pick"]);
+  const tables = [...shown].map((page) => [page, KEYS[page]]);
+  const parts = tables.map(([page, rows]) =>
     make(
       "section",
       {},
@@ -67,7 +71,7 @@ export function createShell(model, go) {
       { method: "dialog" },
       make("button", { className: "plain close", "aria-label": "Close" }, "✕"),
     ),
-    make("div", { className: "keys" }, ...keysTable()),
+    make("div", { className: "keys" }, ...keysTable(model.project)),
   );
   const help = () => (keys.open ? keys.close() : keys.showModal());
   byId("help").addEventListener("click", help);
@@ -116,6 +120,9 @@ export function createShell(model, go) {
     setText(byId("body-count"), has.keyframes ? "" : counts);
     setText(byId("done-count"), has.keyframes ? counts : "");
     setText(byId("motion-state"), has.motion ? "made" : "");
+    const clicked = CLICKS.filter((joint) => model.state.clicks[joint]).length;
+    setText(byId("address-count"), clicked ? `${clicked} of ${CLICKS.length}` : "");
+    setText(byId("swing-state"), model.swing?.keys ? (model.swing.doubts.length ? "doubtful" : "found") : "");
   }
 
   function draw() {
@@ -126,7 +133,10 @@ export function createShell(model, go) {
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
     document.querySelectorAll("nav [data-go]").forEach((button) => {
       const beginning = view === "pick" || (view === "keyframes" && !model.project.has.keyframes),
-        own = button.dataset.go === (beginning ? "bodies" : view);
+        own = button.dataset.go === (beginning ? (model.project.golf ? "swing" : "bodies") : view),
+        number = stepsOf(model.project).indexOf(button.dataset.go) + 1;
+      button.hidden = !number;
+      setText(button.querySelector("b"), String(number));
       button.setAttribute("aria-current", own ? "step" : "false");
     });
     setText(byId("project-name"), model.project.name);
@@ -178,6 +188,7 @@ function createJobs(model) {
     model.readProject().then(() => {
       if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });
+      if (job.kind === "golf") model.update({ view: "swing" });
       if (job.kind === "run") model.update({ view: "motion" });
     });
   }
