@@ -12,7 +12,8 @@ from keyrecon.io.formats.model_file import (
     read_depth_model,
     read_motion_model,
 )
-from keyrecon.pipeline import Keep, Models, Options, call_stage
+from keyrecon.keeping import Keep, call_stage
+from keyrecon.pipeline import Models, Options
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Preparation
 

@@ -7,17 +7,20 @@ calls them; the command line passes one that returns stored results where nothin
 Nothing here reads or writes a file: learnt models come in as values (`Models`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, ParamSpec, Protocol, TypeVar, runtime_checkable
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Int
 
 from keyrecon.errors import KeyreconError
+from keyrecon.following import FollowedPlayer, FollowOptions, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.video import Video
+from keyrecon.keeping import Keep, call_stage
+from keyrecon.keyframes.absence import restore_frames, select_frames
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
 from keyrecon.keyframes.selection import (
@@ -29,62 +32,48 @@ from keyrecon.keyframes.selection import (
 )
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
-from keyrecon.numerics.threads import one_order_of_sums
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, propagate_joints
 from keyrecon.records import (
     SOURCES,
     Annotations,
+    CameraPath,
+    Colors,
+    FlowTracks,
     JointTracks,
+    Keyframes,
     Motion,
     Pick,
+    PoseDistances,
     Preparation,
+    Shots,
     TrackAnchors,
 )
-from keyrecon.segmentation.background_model import BackgroundOptions, build_background
+from keyrecon.segmentation.background_model import BackgroundOptions
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
-from keyrecon.segmentation.contours import EdgeOptions, find_edges
+from keyrecon.segmentation.contours import EdgeOptions
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
+from keyrecon.timeline import (
+    cut_motion,
+    join_frames,
+    motion_in_file,
+    part_of_keyframes,
+    part_of_marks,
+    part_of_path,
+    part_of_video,
+    put_back,
+    spread_distances,
+    spread_edges,
+    spread_track,
+    take_frames,
+)
 from keyrecon.tracking.anchors import contradicted_frames, least_sure_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
-from keyrecon.tracking.detection import EVERY_FRAME, FindOptions, find_player
+from keyrecon.tracking.detection import EVERY_FRAME, FindOptions
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
-from keyrecon.tracking.tracker import TrackOptions, track_player
+from keyrecon.tracking.shot_sorting import ShotOptions
+from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
-
-Inputs = ParamSpec("Inputs")
-Result = TypeVar("Result")
-
-
-@runtime_checkable
-class Keep(Protocol):
-    """Calls a stage, or gives what the same call gave before.
-
-    The name is for those that store results. Arguments and result are typed as the stage's own.
-    """
-
-    def __call__(
-        self,
-        name: str,
-        stage: Callable[Inputs, Result],
-        /,
-        *inputs: Inputs.args,
-        **named: Inputs.kwargs,
-    ) -> Result:
-        """The stage's result for these inputs."""
-        ...
-
-
-def call_stage(
-    name: str,
-    stage: Callable[Inputs, Result],
-    /,
-    *inputs: Inputs.args,
-    **named: Inputs.kwargs,
-) -> Result:
-    """Call a stage; the simplest `Keep`."""
-    with one_order_of_sums():
-        return stage(*inputs, **named)
 
 
 @dataclass(frozen=True)
@@ -92,6 +81,7 @@ class Options:
     """What every stage can be told."""
 
     camera: CameraMotionOptions = field(default_factory=CameraMotionOptions)
+    shots: ShotOptions = field(default_factory=ShotOptions)
     colors: ColorOptions = field(default_factory=ColorOptions)
     find: FindOptions = field(default_factory=FindOptions)
     track: TrackOptions = field(default_factory=TrackOptions)
@@ -144,51 +134,19 @@ def prepare(
     clicks, anchors = tuple(picks), TrackAnchors.none()
     if marks is not None:
         clicks += picks_from_bodies(marks, (video.width, video.height))
-        flow = keep(
-            "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
-        )
+        shots = Shots.between(camera.cuts, len(video))
+        flow = follow_marks(video, marks, shots, options, keep, progress)
         anchors = anchors_from_bodies(marks, flow)
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
-    detected = keep(
-        "find", find_player, video, colors, camera, anchors, options=options.find, progress=progress
+    told = FollowOptions(
+        options.shots, options.find, options.background, options.track, options.edges
     )
-    background = keep(
-        "background",
-        build_background,
-        video,
-        camera,
-        detected,
-        options=options.background,
-        progress=progress,
-    )
-    track = keep(
-        "track",
-        track_player,
-        video,
-        detected,
-        camera,
-        background,
-        colors,
-        anchors,
-        options=options.track,
-        progress=progress,
-    )
-    contours = keep(
-        "edges",
-        find_edges,
-        video,
-        track,
-        camera,
-        background,
-        colors,
-        options=options.edges,
-        progress=progress,
-    )
+    followed = follow_player(video, camera, colors, clicks, anchors, told, keep, progress)
     distances = keep(
         "compare",
         compare_frames,
-        contours.edges,
-        track,
+        followed.edges,
+        followed.track,
         options=options.compare,
         progress=progress,
     )
@@ -200,7 +158,47 @@ def prepare(
         options=options.keyframes,
         progress=progress,
     )
-    return Preparation(video, camera, colors, track, background, contours, distances, keyframes)
+    return _in_file(video, camera, colors, followed, distances, keyframes)
+
+
+def _in_file(
+    video: Video,
+    camera: CameraPath,
+    colors: Colors,
+    followed: FollowedPlayer,
+    distances: PoseDistances,
+    keyframes: Keyframes,
+) -> Preparation:
+    """What was made of the usable shots, over the frames of the file."""
+    shots, track, edges = followed.shots, followed.track, followed.edges
+    if not all(shots.usable):
+        frames, count = shots.usable_frames, len(video)
+        track = spread_track(track, frames, count)
+        edges = spread_edges(edges, frames, count)
+        distances = spread_distances(distances, frames, count)
+        upper, lower = (
+            restore_frames(half, frames, count) for half in (keyframes.upper, keyframes.lower)
+        )
+        keyframes = replace(keyframes, upper=upper, lower=lower)
+    return Preparation(video, camera, colors, track, edges, distances, keyframes, shots)
+
+
+def usable_part(preparation: Preparation) -> Preparation:
+    """The usable shots end to end, as if the file held nothing else."""
+    shots = preparation.shots
+    if all(shots.usable):
+        return preparation
+    frames, distances = shots.usable_frames, preparation.pose_distances
+    return Preparation(
+        part_of_video(preparation.video, frames),
+        part_of_path(preparation.camera, frames),
+        preparation.colors,
+        take_frames(preparation.track, frames),
+        tuple(preparation.edges[t] for t in frames),
+        select_frames(distances, frames),
+        part_of_keyframes(preparation.keyframes, frames),
+        shots.joined(),
+    )
 
 
 def with_marked_keyframes(
@@ -265,9 +263,15 @@ def reconstruct(
     ECCV 2004, Sections 5 and 6. Lengths are in metres where `options.lift.height` is given, else
     in body heights. Raises KeyreconError when keyframes are not annotated.
     """
+    shots, whole = preparation.shots, preparation.video
+    if not all(shots.usable):
+        annotations = marks_in_shots(annotations, shots)
     preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
-    video, height = preparation.video, preparation.track.height
     tracks = carry_joints(preparation, annotations, options, keep, progress)
+    if not all(shots.usable):
+        preparation, used = usable_part(preparation), shots.usable_frames
+        tracks, annotations = take_frames(tracks, used), part_of_marks(annotations, used)
+    video, height = preparation.video, preparation.track.height
     expected = None
     if options.prior == "golf" and models.swing is not None:
         expected = keep(
@@ -289,11 +293,22 @@ def reconstruct(
         preparation.keyframes,
         height,
         video.fps,
-        LiftPriors(expected, models.depth),
+        LiftPriors(expected, models.depth, preparation.shots),
         options=options.lift,
         progress=progress,
     )
-    return assemble_motion(video, annotations, tracks, lifted, options.lift.height)
+    motion = assemble_motion(
+        video, annotations, tracks, lifted, options.lift.height, preparation.shots
+    )
+    return motion if len(shots.parts) == 1 else motion_in_file(motion, shots, whole.time)
+
+
+def marks_in_shots(marks: Annotations, shots: Shots) -> Annotations:
+    """What was marked in usable shots, by the frames of the file."""
+    used = shots.usable_frames
+    own = part_of_marks(marks, used)
+    absent = tuple((int(used[frame]), name) for frame, name in own.absent)
+    return replace(own, frames=used[own.frames], absent=absent)
 
 
 def carry_joints(
@@ -304,20 +319,51 @@ def carry_joints(
     progress: Progress = silent,
 ) -> JointTracks:
     """The annotated joints in every frame of the video."""
-    video, flow = preparation.video, None
+    flow, shots = None, preparation.shots
     if options.propagate.method == "fused":
-        flow = keep(
-            "flow", track_marked_joints, video, annotations, options=options.flow, progress=progress
-        )
-    return keep(
+        flow = follow_marks(preparation.video, annotations, shots, options, keep, progress)
+    used = shots.usable_frames
+    if not all(shots.usable):
+        flow = flow and take_frames(flow, used)
+        annotations = part_of_marks(annotations, used)
+    tracks = keep(
         "propagate",
         propagate_joints,
-        preparation,
+        usable_part(preparation),
         annotations,
         flow,
         options=options.propagate,
         progress=progress,
     )
+    return tracks if all(shots.usable) else put_back(tracks, used, shots.n_frames)
+
+
+def follow_marks(
+    video: Video,
+    marks: Annotations,
+    shots: Shots,
+    options: Options,
+    keep: Keep,
+    progress: Progress,
+) -> FlowTracks:
+    """Marked joints followed by optical flow within the shots that have any."""
+    if len(shots.parts) == 1:
+        return keep(
+            "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
+        )
+    frames, found = [], []
+    for part in shots.parts:
+        inside = np.arange(part.start, part.stop)
+        own = part_of_marks(marks, inside)
+        if np.isfinite(own.joints).any():
+            frames.append(inside)
+            found.append(
+                keep(
+                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part), own,
+                    options=options.flow, progress=progress,
+                )
+            )  # fmt: skip
+    return put_back(join_frames(found), np.concatenate(frames), len(video))
 
 
 def _with_annotated_keyframes(
@@ -345,6 +391,7 @@ def assemble_motion(
     tracks: JointTracks,
     lifted: LiftResult,
     height: float | None,
+    shots: Shots | None = None,
 ) -> Motion:
     """The result with the evidence behind each joint, in metres where a height was given."""
     propagated = np.isfinite(tracks.joints).all(axis=2)
@@ -367,7 +414,10 @@ def assemble_motion(
         units="body heights" if height is None else "m",
         keyframes=annotations.frames,
     )
-    return replace(motion, expected_error=expected_error(motion))
+    if shots is None:
+        shots = Shots.between((), len(video))
+    errors = [expected_error(cut_motion(motion, shot)) for shot in shots.parts]
+    return replace(motion, expected_error=np.concatenate(errors))
 
 
 def as_printed(options: Options = Options()) -> Options:

@@ -4,7 +4,9 @@ Axis letters, the same everywhere: T frames, K keyframes, J joints, B bones, E e
 C colours. Unknown numbers are NaN. Pixels and axes as in the package docstring.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -40,6 +42,57 @@ class CameraPath:
     """Frames with which another shot begins; the path means nothing across them."""
 
 
+PLAYER = "the player"
+"""What a usable shot shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """The shots of a video: nothing moves on from one to the next."""
+
+    first: tuple[int, ...]
+    """First frame of each, ascending from 0."""
+    n_frames: int
+    """Of the video."""
+    shows: tuple[str, ...]
+    """What each shows: `PLAYER`, or what makes it of no use."""
+
+    @classmethod
+    def between(cls, cuts: tuple[int, ...], n_frames: int) -> "Shots":
+        """The shots that begin with frame 0 and with every cut, all of them of the player."""
+        return cls((0, *cuts), n_frames, (PLAYER,) * (1 + len(cuts)))
+
+    @property
+    def parts(self) -> tuple[slice, ...]:
+        """The frames of each shot."""
+        return tuple(slice(*ends) for ends in pairwise((*self.first, self.n_frames)))
+
+    @property
+    def usable(self) -> tuple[bool, ...]:
+        """Whether each shot shows the player whole."""
+        return tuple(shown == PLAYER for shown in self.shows)
+
+    @property
+    def number(self) -> Int[np.ndarray, "T"]:
+        """The shot of each frame."""
+        return np.searchsorted(self.first, np.arange(self.n_frames), side="right") - 1
+
+    @property
+    def usable_frames(self) -> Int[np.ndarray, "N"]:
+        """Frames of usable shots, ascending."""
+        return np.flatnonzero(np.array(self.usable)[self.number])
+
+    def joined(self) -> "Shots":
+        """The usable shots alone, one after the other without the frames between."""
+        lengths = [part.stop - part.start for part in self.parts]
+        used = [length for length, good in zip(lengths, self.usable, strict=True) if good]
+        return Shots.between(tuple(np.cumsum(used[:-1]).tolist()), sum(used))
+
+    def in_each(self, work: Callable[..., np.ndarray], *values: np.ndarray) -> np.ndarray:
+        """`work` done on the values of each shot by themselves; its results end to end."""
+        return np.concatenate([work(*(value[part] for value in values)) for part in self.parts])
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """Where the player is in every frame, px."""
@@ -51,9 +104,15 @@ class Track:
     height: Float[np.ndarray, "T"]
     """Standing length from head centre to mid-feet, smoothed over time: the unit of distance."""
     box: Float[np.ndarray, "T 4"]
-    """x0, y0, x1, y1 around the player and a raised arm; may leave the picture."""
+    """x0, y0, x1, y1 around the player and a raised arm; may leave the picture. NaN in shots that
+    do not show the player."""
     confidence: Float[np.ndarray, "T"]
     """0-1; 0 where head or feet were not seen and are interpolated."""
+
+    @property
+    def known(self) -> Bool[np.ndarray, "T"]:
+        """Frames of shots that show the player."""
+        return ~np.isnan(self.box).any(axis=1)
 
     @property
     def mid_feet(self) -> Float[np.ndarray, "T 2"]:
@@ -132,21 +191,6 @@ class Background:
 
 
 @dataclass(frozen=True, eq=False)
-class PlayerContours:
-    """The player's coloured regions in every frame, and their directed edges."""
-
-    edges: tuple[Edges, ...]
-    """One per frame."""
-    labels: UInt8[np.ndarray, "T h w"]
-    """Crops around the player at a common player height: 0 background, 1 + c colour c of
-    `Colors.names`."""
-    origin: Float[np.ndarray, "T 2"]
-    """Picture position of each crop's pixel (0, 0), px."""
-    scale: Float[np.ndarray, "T"]
-    """Crop pixels per picture pixel."""
-
-
-@dataclass(frozen=True, eq=False)
 class PoseDistances:
     """Pose distances between every two frames, each half of the body apart (Section 4.2).
 
@@ -216,10 +260,11 @@ class Preparation:
     camera: CameraPath
     colors: Colors
     track: Track
-    background: Background
-    contours: PlayerContours
+    edges: tuple[Edges, ...]
+    """One for each frame; none in shots that are of no use."""
     pose_distances: PoseDistances
     keyframes: Keyframes
+    shots: Shots
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,3 +340,22 @@ class Motion:
     """Annotated frames."""
     expected_error: Float[np.ndarray, "T J"] | None = None
     """Expected distance of `points2d` from the joints, px; None where it is not known."""
+    cuts: Int[np.ndarray, "C"] | None = None
+    """Frames with which another shot begins; None where there is one shot. In shots that do not
+    show the player everything but the time is unknown, and confidence is 0."""
+
+    @property
+    def known(self) -> Bool[np.ndarray, "T"]:
+        """Frames in which there is a motion."""
+        return np.isfinite(self.points3d).all(axis=(1, 2))
+
+    @property
+    def stretches(self) -> tuple[slice, ...]:
+        """Frames that follow one another within a shot, and in which there is a motion."""
+        known = self.known
+        cut = np.zeros(len(known), dtype=bool)
+        cut[[] if self.cuts is None else self.cuts] = True
+        begins = known & (cut | ~np.append(False, known[:-1]))
+        ends = known & np.append(cut[1:] | ~known[1:], True)
+        pairs = zip(np.flatnonzero(begins).tolist(), np.flatnonzero(ends).tolist(), strict=True)
+        return tuple(slice(first, last + 1) for first, last in pairs)

@@ -177,13 +177,15 @@ def uncertain_share(motion: Motion) -> float:
     """Share of the frames in which arms, legs or head are uncertain."""
     if motion.expected_error is None:
         return 0.0
-    return float(_is_uncertain(_doubt_by_part(motion)).mean())
+    return float(_is_uncertain(_doubt_by_part(motion))[motion.known].mean())
 
 
 def _doubt_by_part(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
-    """Mean expected error of each part of the body, player heights."""
+    """Mean expected error of each part of the body, player heights; 0 where there is no motion."""
     height, errors = player_height(motion), motion.expected_error
     assert errors is not None  # callers ask first
+    known = motion.known
+    errors, height = np.where(known[:, None], errors, 0.0), np.where(known, height, 1.0)
     return {
         name: errors[:, members].mean(axis=1) / height
         for name, members in body_parts(motion.skeleton).items()
@@ -210,7 +212,7 @@ def _worst_stretch(
     members = np.concatenate([parts[name] for name in bad])
     lower = motion.skeleton.is_lower[members]
     half = "both" if lower.any() and not lower.all() else "lower" if lower.all() else "upper"
-    height = player_height(motion)[inside]
+    height = np.nan_to_num(player_height(motion)[inside])
     error = float(np.mean([doubt[name][inside] * height for name in bad]))
     total = float(np.sum([doubt[name][inside] for name in bad]))
     return UncertainStretch(first, last, " and ".join(bad), error, frame, half), total
@@ -225,7 +227,8 @@ def _bad_parts(doubt: Mapping[str, Float[np.ndarray, "T"]], inside: slice) -> li
 
 def unsure_track(track: Track, reach: int, count: int = 3) -> list[UncertainStretch]:
     """The longest stretches in which the track is a guess, before there is a motion."""
-    runs = [r for r in _runs(track.confidence < MIN_CONFIDENCE, 0) if r[1] - r[0] >= reach]
+    guessed = (track.confidence < MIN_CONFIDENCE) & track.known
+    runs = [r for r in _runs(guessed, 0) if r[1] - r[0] >= reach]
     longest = sorted(runs, key=lambda run: run[0] - run[1])[:count]
     return [
         UncertainStretch(first, last, "the player's place", np.nan, (first + last) // 2, "both")

@@ -11,8 +11,19 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "keyframes", "propagation", "lifting", "golf", "world", "strokes"}
-OUTER = {"app", "cli", "commands", "pipeline", "annotate", "report", "synthetic"}
-BASE = {"records", "body", "metrics", "errors", "reading", "ranges", "progress", "numerics"}
+OUTER = {"app", "cli", "commands", "pipeline", "following", "annotate", "report", "synthetic"}
+OUTER |= {"keeping"}
+BASE = {
+    "records",
+    "timeline",
+    "body",
+    "metrics",
+    "errors",
+    "reading",
+    "ranges",
+    "progress",
+    "numerics",
+}
 SHARED = BASE | {"segmentation", "io"}
 
 

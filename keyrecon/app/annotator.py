@@ -28,7 +28,7 @@ from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import golf, keyframing, project, running
 from keyrecon.app.court import calibrate
 from keyrecon.app.exporting import export
-from keyrecon.app.preparing import prepare_project
+from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
@@ -128,10 +128,10 @@ def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     marks = project.load_annotations(workspace, video)
     options = workspace.options(Options(), Options())
     found = prepare_project(workspace, video, marks, options, progress)
-    seen = float((found.preparation.track.confidence > 0).mean())
-    return "\n".join(
-        [f"Player found in {seen:.1%} of {len(video)} frames.", *found.contradictions()]
-    )
+    shots = found.preparation.shots
+    seen = float((found.preparation.track.confidence[shots.usable_frames] > 0).mean())
+    told = f"Player found in {seen:.1%} of {len(shots.usable_frames)} frames."
+    return "\n".join([told, *describe_shots(shots), *found.contradictions()])
 
 
 def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
@@ -182,7 +182,7 @@ def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
 def _contradictions(told: str) -> str:
     """Of what a command tells, the cuts, clicks and marks that do not fit the rest: the page shows
     everything else in places of its own."""
-    named = re.compile(r"The video cuts|The [\w ]+ (clicked|marked) in frame \d+")
+    named = re.compile(r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+")
     return "\n".join(line for line in told.splitlines() if named.match(line))
 
 

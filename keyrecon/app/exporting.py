@@ -14,7 +14,7 @@ import numpy as np
 from keyrecon.app.court import export_calibration
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.export import check_suffix, cut_motion, export_motion
+from keyrecon.io.formats.export import check_suffix, export_motion
 from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     read_further_arrays,
@@ -24,6 +24,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
 from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
+from keyrecon.timeline import cut_motion
 
 OVERLAY, CALIBRATION = ".mp4", ".toml"
 WITH_VIDEO = (OVERLAY, ".json")
@@ -58,7 +59,7 @@ def export(
         return done
     motion = load_motion(workspace.folder)
     first, last = chosen_frames(frames, len(motion.time))
-    cut = cut_motion(motion, first, last)
+    cut = cut_motion(motion, slice(first, last + 1))
     further = cut_further_arrays(read_further_arrays(workspace.motion_file), first, last)
     lines = done
     for file in files:

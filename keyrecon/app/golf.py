@@ -43,7 +43,7 @@ from keyrecon.io.held_video import hold_frames
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import GOLF, Workspace
-from keyrecon.pipeline import Keep, call_stage
+from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_measures import measure_swing, record_swing
 from keyrecon.report.golf_page import write_golf_report

@@ -16,7 +16,7 @@ from keyrecon.golf.swing_fit import (
     swing_found,
 )
 from keyrecon.io.video import Video
-from keyrecon.pipeline import Keep, call_stage
+from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
 from keyrecon.records import CameraPath
 

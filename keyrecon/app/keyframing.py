@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from keyrecon.annotation_budget import annotation_cost
-from keyrecon.app.preparing import prepare_project
+from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import counted, load_annotations
 from keyrecon.errors import quoted
 from keyrecon.io.durable import make_folder, write_durably
@@ -71,8 +71,8 @@ def describe_keyframes(
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     found, frames = preparation.keyframes, len(preparation.video)
-    folder = quoted(workspace.folder)
-    seen = float((preparation.track.confidence > 0).mean())
+    folder, used = quoted(workspace.folder), preparation.shots.usable_frames
+    seen = float((preparation.track.confidence[used] > 0).mean())
     halves = [
         f"{name} body: {counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
         f"frames (beta {half.beta:.4f}; {_compare_with_printed(found, half)})."
@@ -80,7 +80,8 @@ def describe_keyframes(
     ]
     return "\n".join(
         [
-            f"Player found in {seen:.1%} of {frames} frames.",
+            f"Player found in {seen:.1%} of {len(used)} frames.",
+            *describe_shots(preparation.shots),
             *contradictions,
             *_describe_absence(preparation),
             *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
@@ -105,7 +106,8 @@ def _describe_absence(preparation: Preparation) -> list[str]:
         preparation.pose_distances.visibility_score,
         preparation.keyframes.reach,
     )
-    stretches = list_stretches(absent_frames(visibility_score, reach))
+    absent = absent_frames(visibility_score, reach) & preparation.track.known
+    stretches = list_stretches(absent)
     if not stretches:
         return []
     listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])

@@ -8,7 +8,6 @@ it is as sure of the player.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, CameraPath, Pick, Preparation
+from keyrecon.records import Annotations, Pick, Preparation, Shots
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
 
@@ -44,8 +43,7 @@ class ProjectPreparation:
     def contradictions(self) -> list[str]:
         """A line for every click or mark that does not fit the rest."""
         track = self.preparation.track
-        lines = describe_cuts(self.preparation.camera)
-        lines += [
+        lines = [
             f"{_named(pick)} lies {distance_to_track(track, pick):.1f} body heights from where the "
             f"player's {pick.part} was found, and was left aside: without it the player is found "
             "as surely or more so. Click it anew."
@@ -61,24 +59,33 @@ class ProjectPreparation:
                 f"The {mark.part} marked in frame {mark.frame}: {mark.distance:.1f} body heights "
                 "off the way through the frames before and after; look at that mark."
                 for mark in misplaced_marks(
-                    track, anchors_from_bodies(self.marks), self.preparation.video.fps
+                    track,
+                    anchors_from_bodies(self.marks),
+                    self.preparation.video.fps,
+                    self.preparation.shots,
                 )
             ]
         return lines
 
 
-def describe_cuts(camera: CameraPath) -> list[str]:
-    """A line where the video holds several shots, which the rest takes for one."""
-    cuts, frames = camera.cuts, len(camera.confidence)
-    if not cuts:
+MOST_LISTED = 12
+"""Shots that are listed one by one."""
+
+
+def describe_shots(shots: Shots) -> list[str]:
+    """How many shots there are, which of them show the player, and what the others show."""
+    if len(shots.parts) == 1:
         return []
-    shots = list(pairwise([0, *cuts, frames]))
-    first, end = max(shots, key=lambda shot: shot[1] - shot[0])
-    listed = ", ".join(map(str, cuts[:8])) + (" ..." if len(cuts) > 8 else "")
+    used = sum(shots.usable)
+    listed = [
+        f"{number} ({part.start}-{part.stop - 1}) {shown}"
+        for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
+    ]
+    more = f"; and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
     return [
-        f"The video cuts to another shot at frame {listed}, and a project follows the player "
-        "through one: make one of a shot with keyrecon new VIDEO --project DIR --start FRAME --end "
-        f"FRAME. The longest has the frames {first} to {end - 1} of this project."
+        f"{len(listed)} shots, {used} usable (frames): {'; '.join(listed[:MOST_LISTED])}{more}. "
+        "Nothing is made of the others; where this is wrong, say so with --shots.use or "
+        "--shots.skip and their numbers, or mark the player there."
     ]
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from keyrecon.app.court import write_placed_motion
-from keyrecon.app.preparing import prepare_project
+from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.workspace import Workspace
@@ -62,6 +62,7 @@ def run(
         options=options,
         contradictions=found.contradictions(),
         court=placed.court,
+        shots=describe_shots(preparation.shots),
     )
     write_report(workspace.report_file, material, progress)
     workspace.remember(told, Options())
@@ -70,6 +71,7 @@ def run(
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
             *placed.lines,
+            *describe_shots(preparation.shots),
             *found.contradictions(),
             *_describe_doubt(motion),
             *_other_choice(workspace, options, preparation.keyframes),

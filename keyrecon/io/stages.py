@@ -26,6 +26,7 @@ PACKAGE = Path(__file__).parent.parent
 SHARED_CODE = (
     "body.py",
     "records.py",
+    "timeline.py",
     "io/frame_reader.py",
     "io/video.py",
     "numerics/*.py",
@@ -69,7 +70,9 @@ class StageStore:
             started = time.perf_counter()
             with one_order_of_sums():
                 result = stage(*inputs, **named)
-            self.seconds[name] = time.perf_counter() - started
+            stage_of_shot = name.partition("@")
+            before = self.seconds.get(stage_of_shot[0], 0.0) if stage_of_shot[1] else 0.0
+            self.seconds[stage_of_shot[0]] = before + time.perf_counter() - started
             save_record(path, result)
             self._forget(name, path)
         self._keys[id(result)] = (result, key)

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_opening
 
 from keyrecon.records import HalfKeyframes, PoseDistances
+from keyrecon.timeline import frames_before
 
 
 def absent_frames(visibility_score: Float[np.ndarray, "T"], reach: int) -> Bool[np.ndarray, "T"]:
@@ -57,7 +58,7 @@ def restore_frames(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int)
 
     They are given the keyframe of the last frame before them, for want of a better one.
     """
-    before = np.clip(np.searchsorted(kept, np.arange(frames), side="right") - 1, 0, None)
+    before = frames_before(kept, frames)
     represented = np.zeros(frames, dtype=bool)
     represented[kept] = half.represented
     return replace(

@@ -16,11 +16,11 @@ of more than `most` frames is therefore first reduced to exemplars (see exemplar
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float, Float32
 from scipy.sparse import csr_matrix
 
 from keyrecon.errors import KeyreconError
@@ -36,6 +36,7 @@ from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Edges, HalfName, PoseDistances, Track
+from keyrecon.timeline import take_frames
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
 
@@ -101,7 +102,7 @@ def _compare_exemplars(
     """The same by exemplars: linear in the length of the video, but for their own matrix."""
 
     def compare(window: slice) -> Float32[np.ndarray, "2 W W"]:
-        part = take_frames(track, np.arange(len(edges))[window])
+        part = take_frames(track, window)
         return np.stack([measure_matrix(edges[window], part, h, options) for h in HALVES])
 
     band = measure_band(compare, len(edges), progress)
@@ -117,11 +118,6 @@ def _compare_exemplars(
         consecutive_distance=band[:, :-1, 0],
         visibility_score=score_visibility(edges, track),
     )
-
-
-def take_frames(track: Track, frames: Int[np.ndarray, "M"]) -> Track:
-    """The track of some frames only."""
-    return Track(**{field.name: getattr(track, field.name)[frames] for field in fields(track)})
 
 
 def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:

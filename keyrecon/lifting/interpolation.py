@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.body import Skeleton
 from keyrecon.lifting.bone_directions import pose_from_directions
+from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.numerics.geometry import unit_vectors
-from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.records import HalfKeyframes, Keyframes, Shots
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +36,15 @@ def interpolate_poses(
     key_frames: Int[np.ndarray, "K"],
     keyframes: Keyframes,
     joints: Float[np.ndarray, "T J 2"],
-    lengths: Float[np.ndarray, "B"],
-    skeleton: Skeleton,
+    size: BodySize,
+    shots: Shots,
 ) -> Interpolation:
-    """Bone directions in every frame from those of the keyframes.
+    """Bone directions in every frame from those of the keyframes; slerped within each shot.
 
     `joints` in units of length; `key_frames` are the annotated frames, sorted.
     """
-    flat = pose_from_directions(key_directions, lengths, skeleton)[..., :2]
+    skeleton = size.skeleton
+    flat = pose_from_directions(key_directions, size.lengths, skeleton)[..., :2]
     lower_bone = skeleton.is_lower[skeleton.bones[:, 1]]
     directions = np.empty((len(joints), *key_directions.shape[1:]))
     controls = []
@@ -53,10 +54,14 @@ def interpolate_poses(
     ):
         key = _key_index(half, key_frames)
         residual = reprojection_residual(flat[key][:, member], joints[:, member])
-        control = drop_controls(half, residual, keyframes.reach)
-        poses = key_directions[key[control]][:, bones]
-        directions[:, bones] = slerp_between(poses, control, len(joints))
-        controls.append(control)
+        own: list[Int[np.ndarray, "_"]] = []
+        for shot in shots.parts:
+            control = drop_controls(half, residual, keyframes.reach, shot)
+            poses = key_directions[key[control]][:, bones]
+            count = shot.stop - shot.start
+            directions[shot, bones] = slerp_between(poses, control - shot.start, count)
+            own.append(control)
+        controls.append(np.concatenate(own))
     return Interpolation(directions, *controls)
 
 
@@ -79,12 +84,19 @@ def reprojection_residual(
 
 
 def drop_controls(
-    half: HalfKeyframes, residual: Float[np.ndarray, "T"], reach: int
+    half: HalfKeyframes, residual: Float[np.ndarray, "T"], reach: int, shot: slice = slice(None)
 ) -> Int[np.ndarray, "u"]:
-    """Represented frames that remain control points; gaps grow to `reach` frames at most."""
-    frames = np.flatnonzero(half.represented)
+    """Represented frames of a shot that remain control points; gaps grow to `reach` at most.
+
+    Where none is represented, keyframes are, and in a shot without any the frame that is most like
+    its keyframe.
+    """
+    everyone = np.arange(len(residual))[shot]
+    frames = everyone[half.represented[shot]]
     if len(frames) == 0:
-        frames = half.frames
+        frames = half.frames[np.isin(half.frames, everyone)]
+    if len(frames) == 0:
+        frames = everyone[[residual[shot].argmin()]]
     breaks = (np.diff(frames) > 1) | (np.diff(half.nearest[frames]) != 0)
     run = np.concatenate([[0], np.cumsum(breaks)])
     left = np.bincount(run)

@@ -7,6 +7,7 @@ depth moves, with the person's signs fixed, and the keyframes adopt what they pa
 outline speak for an arm behind it. Long motions are taken in chunks, with a margin on both sides.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks, smooth
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
+from keyrecon.records import Shots
 
 _SMOOTHING_SECONDS = 0.03
 """Standard deviation of the smoothing of the tracks; half of the fastest stroke's rise."""
@@ -32,13 +34,14 @@ def infer_keyframe_signs(
     observed: PreparedTracks,
     marks: KeyframeMarks,
     size: BodySize,
+    shots: Shots,
     fps: float,
     options: DepthSignOptions = DepthSignOptions(),
     model: DepthModel | None = None,
 ) -> DepthSigns:
     """Signs of every bone in every keyframe; those that the person annotated stay."""
     skeleton, frames, nearer = size.skeleton, marks.frames, marks.nearer
-    joints = _smoothed_joints(observed, marks, fps)
+    joints = _smoothed_joints(observed, marks, shots, fps)
     noise = np.full(joints.shape[:2], _SMOOTHED_NOISE)
     noise[frames] = np.where(marks.marked, observed.spread[frames], _SMOOTHED_NOISE)
     bones = foreshorten_bones(joints, noise, size.lengths, skeleton, model)
@@ -49,12 +52,12 @@ def infer_keyframe_signs(
     options = replace(at_rate(options, fps), exemplars=0.0, initial_motion=0.0)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
-    for first in range(0, len(joints), _CHUNK_FRAMES):
-        inside = (frames >= first) & (frames < first + _CHUNK_FRAMES)
+    for first, end, shot in _chunks(shots):
+        inside = (frames >= first) & (frames < end)
         if not inside.any():
             continue
-        start = max(first - _MARGIN_FRAMES, 0)
-        chunk = slice(start, first + _CHUNK_FRAMES + _MARGIN_FRAMES)
+        start = max(first - _MARGIN_FRAMES, shot.start)
+        chunk = slice(start, min(end + _MARGIN_FRAMES, shot.stop))
         part = bones.part(chunk)
         exemplars = ExemplarPrior(
             vectors=vectors,
@@ -70,12 +73,21 @@ def infer_keyframe_signs(
     return DepthSigns(np.where(given, -nearer, sign), np.where(given, 1.0, probability))
 
 
+def _chunks(shots: Shots) -> Iterator[tuple[int, int, slice]]:
+    """First frames and ends of what is decided together, and the shot that it lies in."""
+    for shot in shots.parts:
+        for first in range(shot.start, shot.stop, _CHUNK_FRAMES):
+            yield first, min(first + _CHUNK_FRAMES, shot.stop), shot
+
+
 def _smoothed_joints(
-    observed: PreparedTracks, marks: KeyframeMarks, fps: float
+    observed: PreparedTracks, marks: KeyframeMarks, shots: Shots, fps: float
 ) -> Float[np.ndarray, "T J 2"]:
     """Joints of all frames, smoothed; marked ones as they were marked."""
-    at_rest = np.zeros_like(observed.joints)
-    joints = smooth_joints(observed.joints, at_rest, _SMOOTHING_SECONDS * fps)
+    sigma = _SMOOTHING_SECONDS * fps
+    joints = shots.in_each(
+        lambda part: smooth_joints(part, np.zeros_like(part), sigma), observed.joints
+    )
     marked = observed.joints[marks.frames]
     joints[marks.frames] = np.where(marks.marked[..., None], marked, joints[marks.frames])
     return joints

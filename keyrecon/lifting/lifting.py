@@ -37,7 +37,7 @@ from keyrecon.lifting.taylor import lift_keyframes
 from keyrecon.numerics.geometry import project_orthographic, unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
-from keyrecon.records import Annotations, JointTracks, Keyframes
+from keyrecon.records import Annotations, JointTracks, Keyframes, Shots
 
 _SPIKE_SECONDS = 0.08
 """Half of the window of the median that spikes are held against: a spike is over within this."""
@@ -88,12 +88,14 @@ class LiftResult:
 
 @dataclass(frozen=True, eq=False)
 class LiftPriors:
-    """What helps where the picture leaves the depth open; None does without."""
+    """What is known beside the tracks; None does without."""
 
     motion: Float[np.ndarray, "T J 3"] | None = None
     """Poses of a motion prior in camera axes, which take the place of the slerped key poses."""
     depth_model: DepthModel | None = None
     """Helps with the depth signs that nobody annotated."""
+    shots: Shots | None = None
+    """Nothing moves on from one to the next; None is one shot."""
 
 
 def lift_motion(
@@ -108,35 +110,38 @@ def lift_motion(
 ) -> LiftResult:
     """Lift tracked joints to 3D with the help of annotated keyframes.
 
-    `height_px` is the tracked standing height. Raises KeyreconError without annotations.
+    `height_px` is the tracked standing height. The player has the same bones in all shots, and key
+    poses serve all of them; the motion of each is fitted by itself. Raises KeyreconError without
+    annotations.
     """
     _check(tracks, annotations)
-    size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths)
+    shots = priors.shots or Shots.between((), len(height_px))
+    size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths, shots)
     marks = keyframe_marks(annotations)
     tracks = replace(tracks, joints=marked_joints(tracks, annotations))
     observed = prepare_tracks(tracks, marks, size, fps, options.lengths)
     signs = infer_keyframe_signs(
-        observed, marks, size, fps, options.depth_signs, priors.depth_model
+        observed, marks, size, shots, fps, options.depth_signs, priors.depth_model
     )
     keys = lift_keyframes(observed, marks, size, signs)
     slerped = interpolate_poses(
-        keys.directions, keys.frames, keyframes, observed.joints, size.lengths, size.skeleton
+        keys.directions, keys.frames, keyframes, observed.joints, size, shots
     )
     directions = slerped.directions
     if priors.motion is not None:
         directions = unit_vectors(bone_vectors(priors.motion, size.skeleton))
-    initial = _align_translation(directions, observed, size)
-    outliers = _find_outliers(observed, initial, size, fps, options.lengths.track_noise)
+    initial = _align_translation(directions, observed, size, shots)
+    outliers = _find_outliers(observed, initial, size, shots, fps, options.lengths.track_noise)
     outliers[keys.frames] = False
     clean = replace(observed, joints=np.where(outliers[..., None], np.nan, observed.joints))
     player = PlayerModel(size, keys, priors.depth_model)
     if options.method == "paper":
         rotated = _align_rotation(initial.directions, clean, size)
-        initial = _align_translation(rotated, clean, size)
-        state = descend_motion(initial, clean, size, options.refine)
+        initial = _align_translation(rotated, clean, size, shots)
+        state = descend_motion(initial, clean, size, shots, options.refine)
     else:
         state = fit_motion(
-            initial, clean, player, fps, options.depth_signs, options.refine, progress
+            initial, clean, player, shots, fps, options.depth_signs, options.refine, progress
         )
     return _in_space(state, player, slerped, outliers, options.height)
 
@@ -171,6 +176,7 @@ def _find_outliers(
     observed: PreparedTracks,
     initial: MotionState,
     size: BodySize,
+    shots: Shots,
     fps: float,
     track_noise: float,
 ) -> Bool[np.ndarray, "T J"]:
@@ -178,11 +184,11 @@ def _find_outliers(
     residual = observed.joints - initial.points(size.lengths, size.skeleton)[..., :2]
     window = 2 * round(_SPIKE_SECONDS * fps) + 1
     least = _MIN_SPIKE_DEVIATION * track_noise
-    return reject_spikes(residual, window, _SPIKE_LIMIT, least)
+    return reject_spikes(residual, window, _SPIKE_LIMIT, least, shots)
 
 
 def _align_translation(
-    directions: Float[np.ndarray, "T B 3"], observed: PreparedTracks, size: BodySize
+    directions: Float[np.ndarray, "T B 3"], observed: PreparedTracks, size: BodySize, shots: Shots
 ) -> MotionState:
     """Poses shifted onto the observed joints, frame by frame (translation, step 1 of Fig. 9)."""
     flat = pose_from_directions(directions, size.lengths, size.skeleton)[..., :2]
@@ -190,7 +196,7 @@ def _align_translation(
     offset = observed.joints - flat
     known = np.isfinite(offset[..., 0]).any(axis=1)
     shift[known, 0] = np.nanmedian(offset[known], axis=1)
-    return MotionState(bridge_gaps(shift)[:, 0], directions)
+    return MotionState(shots.in_each(bridge_gaps, shift)[:, 0], directions)
 
 
 def _align_rotation(

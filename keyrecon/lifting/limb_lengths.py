@@ -16,13 +16,14 @@ from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.foreshortening import INCLINATIONS, log_density
 from keyrecon.ranges import within
-from keyrecon.records import Annotations, JointTracks
+from keyrecon.records import Annotations, JointTracks, Shots
 
 logger = logging.getLogger(__name__)
 
@@ -83,6 +84,7 @@ def estimate_lengths(
     height_px: Float[np.ndarray, "T"],
     fps: float,
     options: LengthOptions = LengthOptions(),
+    shots: Shots | None = None,
 ) -> BodySize:
     """Bone lengths, breadths and scale that explain the lengths in the picture.
 
@@ -100,9 +102,11 @@ def estimate_lengths(
             "No bone has both ends marked or tracked, so nothing tells how large the player is; "
             "mark more joints with `keyrecon annotate`."
         )
-    knots = np.linspace(0, len(height_px) - 1, 2 + int(len(height_px) / fps / options.knot))
+    if shots is None:
+        shots = Shots.between((), len(height_px))
+    drift = _drift_of_scale(shots, fps, options)
     ties = _length_ties(skeleton)
-    fit = _fit(observations, np.log(table), ties, np.log(height_px), knots, options)
+    fit = _fit(observations, np.log(table), ties, np.log(height_px), drift, options)
     bones = len(skeleton.bones)
     lengths = np.exp(fit.log_lengths)[group_of]
     size = _standing(lengths[:bones], skeleton) / _standing(skeleton.lengths, skeleton)
@@ -175,6 +179,29 @@ def _observe_lengths(
 
 
 @dataclass(frozen=True, eq=False)
+class _ScaleDrift:
+    """How the scale strays from the tracked height: linear between knots, in each shot anew."""
+
+    blend: Float[np.ndarray, "T k"]
+    """Share of each knot in each frame."""
+    steps: Float[np.ndarray, "q k"]
+    """From each knot to the next of its shot: one row each, -1 and 1."""
+
+
+def _drift_of_scale(shots: Shots, fps: float, options: LengthOptions) -> _ScaleDrift:
+    blends, steps = [], []
+    for shot in shots.parts:
+        count = shot.stop - shot.start
+        knots = np.linspace(0, count - 1, 2 + int(count / fps / options.knot))
+        frames, still = np.arange(count), np.eye(len(knots))
+        blends.append(np.stack([np.interp(frames, knots, row) for row in still], axis=1))
+        steps.append(np.diff(still, axis=0))
+    if len(blends) == 1:
+        return _ScaleDrift(blends[0], steps[0])
+    return _ScaleDrift(block_diag(*blends), block_diag(*steps))
+
+
+@dataclass(frozen=True, eq=False)
 class _LengthFit:
     """The most probable lengths and scale."""
 
@@ -189,17 +216,16 @@ def _fit(
     log_table: Float[np.ndarray, "m"],
     ties: Float[np.ndarray, "r m"],
     log_height: Float[np.ndarray, "T"],
-    knots: Float[np.ndarray, "k"],
+    scale_drift: _ScaleDrift,
     options: LengthOptions,
 ) -> _LengthFit:
     """Maximise the posterior by L-BFGS-B."""
     groups = len(log_table)
-    frames = np.arange(len(log_height))
-    blend = np.stack([np.interp(frames, knots, row) for row in np.eye(len(knots))], axis=1)
+    blend = scale_drift.blend
     at_observation = blend[observations.frame]
     factor = _initial_factor(observations, log_table, log_height)
-    start = np.concatenate([log_table, [factor], 0 * knots])
-    prior = _prior(ties, len(knots), options)
+    start = np.concatenate([log_table, [factor], np.zeros(blend.shape[1])])
+    prior = _prior(ties, scale_drift.steps, options)
     expected = prior[:, :groups] @ log_table
 
     def cost(x: Float[np.ndarray, "n"]) -> tuple[float, Float[np.ndarray, "n"]]:
@@ -232,13 +258,13 @@ def _fit(
 
 
 def _prior(
-    ties: Float[np.ndarray, "r m"], knots: int, options: LengthOptions
+    ties: Float[np.ndarray, "r m"], steps: Float[np.ndarray, "s k"], options: LengthOptions
 ) -> Float[np.ndarray, "q n"]:
     """Rows of what is expected to be small: (lengths, factor, drift of the scale) -> nats^0.5."""
-    groups = ties.shape[1]
+    groups, knots = ties.shape[1], steps.shape[1]
     still = np.eye(knots)
     jump = options.scale_spread * np.sqrt(2 * (1 - np.exp(-0.5)))  # alike over two knots
-    drift = np.concatenate([still / (2 * options.scale_spread), np.diff(still, axis=0) / jump])
+    drift = np.concatenate([still / (2 * options.scale_spread), steps / jump])
     lengths = np.concatenate([np.eye(groups) / options.spread, ties / options.tie_spread])
     rows = np.zeros((len(lengths) + len(drift), groups + 1 + knots))
     rows[: len(lengths), :groups] = lengths

@@ -23,6 +23,7 @@ from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import KeyPoses, foreshorten_bones, lift_foreshortened
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
+from keyrecon.records import Shots
 
 WINDOW_FRAMES, OVERLAP_FRAMES = 2000, 100
 """Frames solved together, and shared by neighbours."""
@@ -45,16 +46,19 @@ def fit_motion(
     initial: MotionState,
     observed: PreparedTracks,
     player: PlayerModel,
+    shots: Shots,
     fps: float,
     sign_options: DepthSignOptions = DepthSignOptions(),
     refine_options: RefineOptions = RefineOptions(),
     progress: Progress = silent,
 ) -> MotionState:
-    """Root and bone directions in every frame; `initial` bridges what was not observed."""
-    frames = len(initial.root)
+    """Root and bone directions in every frame; `initial` bridges what was not observed.
+
+    Windows overlap within a shot, and end where it does.
+    """
     root = np.zeros_like(initial.root)
     directions = np.zeros_like(initial.directions)
-    windows = list(_windows(frames))
+    windows = [window for shot in shots.parts for window in _windows(shot)]
     for window in progress(windows, "Lifting to 3D", len(windows)):
         part, keys = slice(window.first, window.last), player.keys
         fitted = _fit_window(
@@ -79,20 +83,20 @@ class _Window:
     weight: Float[np.ndarray, "n"]
 
 
-def _windows(frames: int) -> Iterator[_Window]:
-    first = 0
+def _windows(shot: slice) -> Iterator[_Window]:
+    first = shot.start
     while True:
-        last = frames
-        if frames - first > WINDOW_FRAMES + OVERLAP_FRAMES:
+        last = shot.stop
+        if shot.stop - first > WINDOW_FRAMES + OVERLAP_FRAMES:
             last = first + WINDOW_FRAMES
         weight = np.ones(last - first)
         ramp = (np.arange(OVERLAP_FRAMES) + 0.5) / OVERLAP_FRAMES
-        if first > 0:
+        if first > shot.start:
             weight[:OVERLAP_FRAMES] = ramp
-        if last < frames:
+        if last < shot.stop:
             weight[-OVERLAP_FRAMES:] = 1 - ramp
         yield _Window(first, last, weight)
-        if last == frames:
+        if last == shot.stop:
             return
         first = last - OVERLAP_FRAMES
 

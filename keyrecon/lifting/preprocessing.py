@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions, joint_noise
-from keyrecon.records import Annotations, JointTracks
+from keyrecon.records import Annotations, JointTracks, Shots
 
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
@@ -84,16 +84,26 @@ def prepare_tracks(
 
 
 def reject_spikes(
-    residual: Float[np.ndarray, "T J 2"], window: int, limit: float, least: float = 1e-6
+    residual: Float[np.ndarray, "T J 2"],
+    window: int,
+    limit: float,
+    least: float = 1e-6,
+    shots: Shots | None = None,
 ) -> Bool[np.ndarray, "T J"]:
     """Joints whose residual leaves its running median by more than `limit` robust deviations.
 
     The residual is the difference to any plausible motion, so that fast joints are not taken
     for outliers. A deviation is at least `least`: a foot that rests most of the time deviates by
-    next to nothing, and its steps are no outliers. Joints that were missing are not counted.
+    next to nothing, and its steps are no outliers. Joints that were missing are not counted. The
+    median runs within each of the `shots`; None is one.
     """
-    bridged = bridge_gaps(residual)
-    off = np.linalg.norm(residual - median_filter(bridged, (window, 1, 1), mode="nearest"), axis=-1)
+    if shots is None:
+        shots = Shots.between((), len(residual))
+
+    def median(values: Float[np.ndarray, "T J 2"]) -> Float[np.ndarray, "T J 2"]:
+        return median_filter(bridge_gaps(values), (window, 1, 1), mode="nearest")
+
+    off = np.linalg.norm(residual - shots.in_each(median, residual), axis=-1)
     known = np.isfinite(off).any(axis=0)
     spread = np.ones(off.shape[1])
     spread[known] = MAD_TO_SIGMA * np.nanmedian(off[:, known], axis=0) / RAYLEIGH_MEDIAN

@@ -30,6 +30,7 @@ from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.ranges import within
+from keyrecon.records import Shots
 
 _MIN_TRUNK_HEIGHT = 0.3
 """Height of the trunk's middle above the ankles from which the tilt of the camera is read."""
@@ -128,15 +129,20 @@ def descend_motion(
     start: MotionState,
     observed: PreparedTracks,
     size: BodySize,
+    shots: Shots,
     options: RefineOptions = RefineOptions(),
 ) -> MotionState:
-    """Projected gradient descent from the slerped key poses (Fig. 9)."""
+    """Projected gradient descent from the slerped key poses (Fig. 9), each shot by itself."""
     skeleton = size.skeleton
     root = skeleton.root
     points = start.points(size.lengths, skeleton)
     lengths = keep_lengths(size.lengths, skeleton)
-    fitted = descend(
-        points, observed.joints, (lengths, low_pass(options.sigma)), options.step, options.descents
+    fitted = shots.in_each(
+        lambda start, wanted: descend(
+            start, wanted, (lengths, low_pass(options.sigma)), options.step, options.descents
+        ),
+        points,
+        observed.joints,
     )
     valid = lengths(fitted)
     return MotionState(valid[:, root, :2], unit_vectors(bone_vectors(valid, skeleton)))

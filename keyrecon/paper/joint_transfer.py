@@ -224,7 +224,7 @@ def transfer_joints(
             model = models.get((name, int(keyframes.nearest[t])))
             if model is None:
                 continue
-            edges = align_edges(preparation.contours.edges[t], preparation.track, t, name)
+            edges = align_edges(preparation.edges[t], preparation.track, t, name)
             search, share = _shift_joints(model, edges, bool(keyframes.represented[t]))
             refined = refine_joints(
                 model.picture, picture, search, bones, _anchor(preparation, t, name)
@@ -266,7 +266,7 @@ def _gather_models(
             height = float(preparation.track.height[frame])
             picture = crop_patches(video.frame(frame, width), video.width, height)
             origin = _anchor(preparation, frame, name)
-            edges = align_edges(preparation.contours.edges[frame], preparation.track, frame, name)
+            edges = align_edges(preparation.edges[frame], preparation.track, frame, name)
             joints = np.where(members[:, None], (seen[rows[frame]] - origin) / height, np.nan)
             models[name, frame] = TransferModel(edges, joints, picture.around(origin))
     return models

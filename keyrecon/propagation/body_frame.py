@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.geometry import from_complex, to_complex, warp_points
-from keyrecon.records import CameraPath, Track
+from keyrecon.records import CameraPath, Shots, Track
+from keyrecon.timeline import part_of_path, take_frames
 
 SMOOTHING_SECONDS = 0.05
 """Standard deviation of the smoothing of the origin: short against a step of 0.3 s and more, long
@@ -42,10 +43,22 @@ class BodyFrame:
         return from_complex(points * self.height[frames] + self.origin[frames])
 
 
-def stabilise_player(track: Track, camera: CameraPath, fps: float) -> BodyFrame:
-    """Player coordinates from head, feet and the camera's motion.
+def stabilise_shots(track: Track, camera: CameraPath, shots: Shots, fps: float) -> BodyFrame:
+    """Player coordinates in every shot by itself."""
+    parts = [
+        stabilise_player(take_frames(track, part), part_of_path(camera, part), fps)
+        for part in shots.parts
+    ]
+    return BodyFrame(
+        np.concatenate([part.origin for part in parts]),
+        np.concatenate([part.height for part in parts]),
+    )
 
-    Beyond the ends of the video the path is continued by its point reflection in the end, so that
+
+def stabilise_player(track: Track, camera: CameraPath, fps: float) -> BodyFrame:
+    """Player coordinates from head, feet and the camera's motion, in one shot.
+
+    Beyond the ends of the shot the path is continued by its point reflection in the end, so that
     the smoothed origin of a player who moves on lies on the path there too.
     """
     middle = (track.head + track.mid_feet) / 2

@@ -30,6 +30,7 @@ from keyrecon.propagation.registration import (
     register_templates,
     shape_equations,
 )
+from keyrecon.records import Shots
 
 TRACKING_SCHEDULE = (RegistrationStep(0.05, 0.006, 0.02), RegistrationStep(0.03, 0.006, 0.02))
 """Corrections of a pose that was predicted from the neighbouring frame. Halved or doubled, others
@@ -132,9 +133,13 @@ def fit_hypotheses(
 
 
 def track_from_keyframes(
-    templates: EdgeTemplates, index: ElementIndex, similar: Int[np.ndarray, "T"], fps: float
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    similar: Int[np.ndarray, "T"],
+    shots: Shots,
+    fps: float,
 ) -> PoseHypotheses:
-    """Track every annotated pose forwards and back up to the next annotated one.
+    """Track every annotated pose forwards and back up to the next annotated one of its shot.
 
     Two hypotheses per frame: from the annotated frame before it, and from the one after it.
     """
@@ -144,11 +149,12 @@ def track_from_keyframes(
     joints[:, poses.frames], age[:, poses.frames] = poses.joints, 0
     way, last = np.repeat([0, 1], len(poses.frames)), np.tile(poses.frames, 2)
     velocity = np.zeros((len(last), joints.shape[2]), complex)
-    persistence = VELOCITY_PERSISTENCE ** (50 / fps)
+    persistence, shot = VELOCITY_PERSISTENCE ** (50 / fps), shots.number
     while len(last):
         ahead = last + np.where(way == 0, 1, -1)
         going = (ahead >= 0) & (ahead < count)
         going[going] = np.isinf(age[way[going], ahead[going]])
+        going[going] = shot[ahead[going]] == shot[last[going]]
         way, last, ahead, velocity = way[going], last[going], ahead[going], velocity[going]
         predicted = joints[way, last] + persistence * velocity
         lengths = shape_equations(templates, predicted, poses.joints[similar[ahead]], LENGTH_PRIOR)

@@ -28,6 +28,7 @@ from jaxtyping import Bool, Complex, Float, Int, Shaped
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
+from keyrecon.records import Shots
 
 PLACE_SPREAD = 0.03
 """Error of a hypothesis's joint, player heights. The weights below and this were tried on six
@@ -102,6 +103,25 @@ class LimbIdentity:
         return np.where(self.exchanged[:, None], values[:, mirror], values)
 
 
+def identify_in_shots(
+    half: BodyHalf,
+    joints: Complex[np.ndarray, "T J"],
+    gain: Float[np.ndarray, "T"],
+    marked: Int[np.ndarray, "K"],
+    shots: Shots,
+    fps: float,
+) -> LimbIdentity:
+    """Where the sides of one half of the body are exchanged, in every shot by itself."""
+    found = []
+    for part in shots.parts:
+        inside = marked[(marked >= part.start) & (marked < part.stop)] - part.start
+        found.append(identify_limbs(half, joints[part], gain[part], inside, fps))
+    return LimbIdentity(
+        np.concatenate([one.exchanged for one in found]),
+        np.concatenate([one.probability for one in found]),
+    )
+
+
 def identify_limbs(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
@@ -109,9 +129,10 @@ def identify_limbs(
     marked: Int[np.ndarray, "K"],
     fps: float,
 ) -> LimbIdentity:
-    """Where the sides of one half of the body are exchanged; in `marked` frames they are right.
+    """Where the sides of one half of the body are exchanged in one shot.
 
-    `gain` is what is known for the sides as they are and against the exchanged, nats.
+    In `marked` frames they are right. `gain` is what is known for the sides as they are and against
+    the exchanged, nats.
     """
     sides = [list(side) for side in half.sides]
     pair = np.stack([joints[:, side] for side in sides], axis=1)

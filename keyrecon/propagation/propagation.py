@@ -31,7 +31,7 @@ from keyrecon.propagation.appearance import (
     learn_appearance,
     regular_frames,
 )
-from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
+from keyrecon.propagation.body_frame import BodyFrame, stabilise_shots
 from keyrecon.propagation.bone_bounds import bone_lengths, bound_bones, ends_too_long
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
@@ -49,7 +49,7 @@ from keyrecon.propagation.hypotheses import (
 )
 from keyrecon.propagation.limb_identity import (
     appearance_gain,
-    identify_limbs,
+    identify_in_shots,
     template_gain,
 )
 from keyrecon.propagation.registration import ChosenHypotheses
@@ -63,6 +63,7 @@ from keyrecon.records import (
     JointTracks,
     PoseDistances,
     Preparation,
+    Shots,
 )
 
 LEAST_MARKED = 0.5
@@ -116,6 +117,8 @@ class HalfStart:
     """Joints that the other half has estimated."""
     features: PlayerFeatures
     """What the player looks like in every frame."""
+    shots: Shots
+    """Nothing is carried from one to the next but what is marked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +215,8 @@ def _propagate_fused(
     progress: Progress,
 ) -> JointTracks:
     """Both halves of the body over the whole video."""
-    track, edges, fps = preparation.track, preparation.contours.edges, preparation.video.fps
-    body_frame = stabilise_player(track, preparation.camera, fps)
+    track, edges, fps = preparation.track, preparation.edges, preparation.video.fps
+    body_frame = stabilise_shots(track, preparation.camera, preparation.shots, fps)
     index = index_elements(edges, body_frame)
     count, frames = len(edges), np.arange(len(edges))
     looked_at = np.union1d(regular_frames(preparation.video), annotations.frames)
@@ -234,7 +237,7 @@ def _propagate_fused(
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
         shift = at[:, None] - at[poses.frames]
-        start = HalfStart(shift, distance, fixed, features)
+        start = HalfStart(shift, distance, fixed, features, preparation.shots)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -256,18 +259,19 @@ def propagate_half(
     fitted = fit_similar(templates, index, start.distance, start.shift, similar)
     nearest = fitted.template[:, 0]
     with ThreadPoolExecutor(1) as beside:
-        tracked = beside.submit(track_from_keyframes, templates, index, nearest, fps)
+        tracked = beside.submit(track_from_keyframes, templates, index, nearest, start.shots, fps)
         limbs = propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)
     hypotheses = join_hypotheses(fitted, limbs, tracked.result())
     appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
     unlikeness = appearance.unlikeness(hypotheses.joints)
-    limbs_chosen = choose_limbs(templates, replace(hypotheses, unlikeness=unlikeness), fps)
+    hypotheses = replace(hypotheses, unlikeness=unlikeness)
+    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    identity = identify_limbs(half, limbs_chosen.joints, gain, poses.frames, fps)
+    identity = identify_in_shots(half, limbs_chosen.joints, gain, poses.frames, start.shots, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
-    joints = smooth_trajectories(templates, index, chosen, fps, rounds)
+    joints = smooth_trajectories(templates, index, chosen, start.shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     confidence[ends_too_long(joints, half.bones, poses.longest)] = 0
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))

@@ -21,6 +21,7 @@ from keyrecon.propagation.bone_bounds import too_long
 from keyrecon.propagation.edge_template import FOOT_MATCH_DISTANCE, EdgeTemplates, FootEvidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import PoseHypotheses
+from keyrecon.records import Shots
 
 STEP_SPEED = 1.5
 """Speed of a joint next to the root in a step that costs 1, player heights per second; it doubles
@@ -58,9 +59,13 @@ class LimbStates:
     """How unlike marks each joint looks: those of its own side, then of the other."""
     spread: Float[np.ndarray, "J"]
     """Of a joint's step from one frame to the next, player heights."""
+    first: frozenset[int] = frozenset()
+    """Frames that shots begin with: any state follows on any other there."""
 
     def steps(self, t: int) -> Float[np.ndarray, "S S"]:
         """Cost of going from each state of frame t - 1 to each of frame t."""
+        if t in self.first:
+            return np.zeros((self.joints.shape[1], self.joints.shape[1]))
         step = np.abs(self.joints[t][None] - self.joints[t - 1][:, None]) / self.spread
         return np.minimum(step**2, MAX_STEP_COST).mean(axis=2)
 
@@ -76,14 +81,16 @@ class ChosenLimbs:
     """How unlike marks each joint looks: those of its own side, then of the other."""
 
 
-def choose_limbs(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
+def choose_limbs(
+    templates: EdgeTemplates, hypotheses: PoseHypotheses, shots: Shots, fps: float
+) -> ChosenLimbs:
     """The cheapest limbs of every frame."""
     half, frames = templates.half, np.arange(len(hypotheses.template))
     joints = hypotheses.joints[:, 0].copy()
     template = np.broadcast_to(hypotheses.template[:, :1], joints.shape).copy()
     unlikeness = hypotheses.unlikeness[:, 0].copy()
     groups = [half.middle, *half.sides]
-    states = [_limb_states(templates, hypotheses, group, fps) for group in groups]
+    states = [_limb_states(templates, hypotheses, group, shots, fps) for group in groups]
     trunk = choose_one(states[0]) if half.middle else _best_trunk(hypotheses, half)
     joints[:, half.middle] = states[0].joints[frames, trunk]
     one, other = (
@@ -110,6 +117,7 @@ def _limb_states(
     templates: EdgeTemplates,
     hypotheses: PoseHypotheses,
     group: tuple[int, ...],
+    shots: Shots,
     fps: float,
 ) -> LimbStates:
     """The same side of every hypothesis, then the other side."""
@@ -143,7 +151,9 @@ def _limb_states(
     states[poses.frames] = 0
     joints[poses.frames] = poses.joints[:, None, members]
     depth = np.clip(half.depth[members] - 1, 0, None)
-    return LimbStates(joints, states, unlikeness, STEP_SPEED / fps * 2.0**depth)
+    return LimbStates(
+        joints, states, unlikeness, STEP_SPEED / fps * 2.0**depth, frozenset(shots.first)
+    )
 
 
 def _joining_costs(

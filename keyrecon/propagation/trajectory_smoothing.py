@@ -30,6 +30,7 @@ from keyrecon.propagation.registration import (
     point_equations,
     shape_equations,
 )
+from keyrecon.records import Shots
 
 SEARCH_RADII = (0.05, 0.04, 0.03)
 """Farthest match in the first, second and later rounds, player heights. Halved or doubled, others
@@ -51,10 +52,11 @@ def smooth_trajectories(
     templates: EdgeTemplates,
     index: ElementIndex,
     chosen: ChosenHypotheses,
+    shots: Shots,
     fps: float,
     rounds: int,
 ) -> Complex[np.ndarray, "T J"]:
-    """Joints of all frames; those fixed by the other half stay where they are."""
+    """Joints of all frames, smooth in each shot; those fixed by the other half stay in place."""
     half, frames = templates.half, np.arange(len(chosen.template))
     average = np.full(len(frames), templates.average)
     spread = ACCELERATION_SPREAD * 2.0**half.depth * (50 / fps) ** 2
@@ -67,7 +69,11 @@ def smooth_trajectories(
         for rows in (chosen.template, average):
             fits = TemplateFits(frames, rows, joints)
             equations = equations + edge_equations_of_all(templates, index, fits, radius)
-        joints = solve_smooth(equations, spread)
+        joints = shots.in_each(
+            lambda matrix, right: solve_smooth(NormalEquations(matrix, right), spread),
+            equations.matrix,
+            equations.right,
+        )
     return joints
 
 

@@ -59,10 +59,14 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
 
 
 def hand_speed(motion: Motion, name: str) -> Float[np.ndarray, "T"]:
-    """Speed of a joint relative to the middle of the body, units per second."""
+    """Speed of a joint relative to the middle of the body, units per second; NaN where unknown."""
     points = motion.points3d[:, motion.skeleton.index(name)] - _middle(motion)
-    smooth = gaussian_filter1d(points, max(SMOOTHING_SECONDS * motion.fps, 0.5), axis=0)
-    return np.linalg.norm(np.gradient(smooth, 1 / motion.fps, axis=0), axis=1)
+    speed, sigma = np.full(len(points), np.nan), max(SMOOTHING_SECONDS * motion.fps, 0.5)
+    for part in motion.stretches:
+        if part.stop - part.start > 1:
+            smooth = gaussian_filter1d(points[part], sigma, axis=0)
+            speed[part] = np.linalg.norm(np.gradient(smooth, 1 / motion.fps, axis=0), axis=1)
+    return speed
 
 
 def instant_angles(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
@@ -79,7 +83,8 @@ def instant_angles(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
 
 def separation(motion: Motion) -> Float[np.ndarray, "T"] | None:
     """Angle between the lines of shoulders and hips seen from above, degrees; None without them."""
-    if not _has_trunk(motion.skeleton) or not np.isfinite(motion.points3d).all():
+    known = np.isfinite(motion.points3d).all(axis=2)
+    if not _has_trunk(motion.skeleton) or not (known.all(axis=1) | ~known.any(axis=1)).all():
         return None
     points = stand_on_floor(motion, even_times=False).points
     shoulders, hips = (

@@ -39,6 +39,8 @@ class ReportMaterial:
     """The motion on the court, where that is known, and the camera."""
     contradictions: Sequence[str] = ()
     """What of the video and of what a person told does not fit the rest, a line each."""
+    shots: Sequence[str] = ()
+    """Which shots the motion is of, a line; none for a video of one."""
 
     @cached_property
     def true_joints(self) -> Truth | None:

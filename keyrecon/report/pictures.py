@@ -105,7 +105,8 @@ def cut_pictures(
     """Read the video once and cut everything that the report shows of it."""
     windows = follow_player(track, motion.fps)
     count = len(motion.points2d)
-    even = np.unique(np.linspace(0, count - 1, min(strip, count)).round().astype(int))
+    known = np.flatnonzero(motion.known)
+    even = known[np.linspace(0, len(known) - 1, min(strip, len(known))).round().astype(int)]
     stills: dict[int, str] = {}
     marked: dict[int, str] = {}
 

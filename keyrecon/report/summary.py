@@ -110,12 +110,13 @@ def hinge_angles(
 
 def source_shares(motion: Motion) -> Float[np.ndarray, "J S"]:
     """Share of frames in which each joint comes from each of SOURCES."""
-    return np.stack([(motion.source == kind).mean(axis=0) for kind in range(len(SOURCES))], axis=1)
+    source = motion.source[motion.known]
+    return np.stack([(source == kind).mean(axis=0) for kind in range(len(SOURCES))], axis=1)
 
 
 def missing_shares(motion: Motion) -> Float[np.ndarray, "J"]:
     """Share of frames in which each joint was not found in the picture before refinement."""
-    return _missing(motion).mean(axis=0)
+    return _missing(motion)[motion.known].mean(axis=0)
 
 
 def _missing(motion: Motion) -> Bool[np.ndarray, "T J"]:
@@ -149,8 +150,9 @@ def foot_speed(motion: Motion, track: Track) -> Float[np.ndarray, "steps"]:
     should then be near 0, and what is left is slip.
     """
     feet = _leaves(motion.skeleton, motion.skeleton.is_lower)
-    steps = np.linalg.norm(np.diff(motion.points2d[:, feet], axis=0), axis=-1)
-    return steps.min(axis=1) * motion.fps / float(np.median(track.height))
+    steps = [np.diff(motion.points2d[part][:, feet], axis=0) for part in motion.stretches]
+    slower = np.linalg.norm(np.concatenate(steps), axis=-1).min(axis=1)
+    return slower * motion.fps / float(np.median(track.height))
 
 
 def truth_error_2d(

@@ -20,7 +20,7 @@ from keyrecon.numerics.geometry import cut_affine, from_complex
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
-from keyrecon.records import Background, CameraPath, Colors, Edges, PlayerContours, Track
+from keyrecon.records import Background, CameraPath, Colors, Edges, Track
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
 from keyrecon.segmentation.part_labels import build_part_tables, label_crop
@@ -59,15 +59,14 @@ def find_edges(
     colors: Colors,
     options: EdgeOptions = EdgeOptions(),
     progress: Progress = silent,
-) -> PlayerContours:
-    """Label crops and directed edges of every frame; edges in px of the full picture."""
+) -> tuple[Edges, ...]:
+    """Directed edges of every frame, px of the full picture."""
     scene = ForegroundModel(background, camera)
     tables = build_part_tables(colors)
     size = (round(CROP_HEIGHT * options.player), round(CROP_WIDTH * options.player))
     cropping = Cropping.around_boxes(track, float(options.player), size)
     width = cropping.reading_width(video)
     to_small = shrinking(width / video.width)
-    labels = np.zeros((len(video), *size), np.uint8)
 
     def trace(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> Edges:
         t, picture = entry
@@ -77,13 +76,12 @@ def find_edges(
         foreground = scene.foreground(crop, t, to_picture)
         foreground = foreground * _inside_picture(way, size, picture.shape[:2])
         axis = cropping.from_picture(np.stack([track.head[t], track.mid_feet[t]]), t)
-        labels[t] = label_crop(crop, foreground, tables, axis, options.player)
-        elements = trace_edges(labels[t], options)
+        labels = label_crop(crop, foreground, tables, axis, options.player)
+        elements = trace_edges(labels, options)
         return _to_picture(elements, cropping, track, t)
 
     pictures = progress(read_small(video, width), "Tracing edges", len(video))
-    edges = tuple(side_by_side(trace, enumerate(pictures)))
-    return PlayerContours(edges, labels, cropping.origin, cropping.scale)
+    return tuple(side_by_side(trace, enumerate(pictures)))
 
 
 def _inside_picture(

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from scipy.ndimage import uniform_filter1d
 
 from keyrecon.numerics.geometry import warp_points
-from keyrecon.records import CameraPath, Pick, Track, TrackAnchors
+from keyrecon.records import CameraPath, Pick, Shots, Track, TrackAnchors
 
 ANCHOR_COST = -60.0
 """Cost of a marked place, nats: beyond what two jumps and the skips around it could save."""
@@ -137,7 +137,7 @@ def least_sure_frames(
     time = np.arange(len(doubt)) / fps if time is None else time
     for _ in range(count):
         apart = np.abs(time[:, None] - time[chosen]).min(axis=1, initial=FAR_SECONDS)
-        value = (LEAST_DOUBT + doubt) * apart
+        value = np.where(track.known, (LEAST_DOUBT + doubt) * apart, 0.0)
         if value.max() <= 0:
             break
         chosen.append(int(value.argmax()))
@@ -162,8 +162,11 @@ class MisplacedMark:
     """Player heights."""
 
 
-def misplaced_marks(track: Track, anchors: TrackAnchors, fps: float) -> list[MisplacedMark]:
+def misplaced_marks(
+    track: Track, anchors: TrackAnchors, fps: float, shots: Shots | None = None
+) -> list[MisplacedMark]:
     """Marked heads and feet to which the track would have to jump, and back again."""
+    shot = (shots or Shots.between((), len(track.height))).number
     step = max(1, round(WAY_SECONDS * fps))
     found: list[MisplacedMark] = []
     for row in np.flatnonzero(anchors.marked):
@@ -171,6 +174,8 @@ def misplaced_marks(track: Track, anchors: TrackAnchors, fps: float) -> list[Mis
         if not step <= frame < len(track.height) - step:
             continue
         around = [frame - step, frame + step]
+        if shot[around[0]] != shot[around[1]]:
+            continue
         head = np.linalg.norm(anchors.head[row] - track.head[around].mean(axis=0))
         way = track.feet[around].mean(axis=0)
         feet = min(

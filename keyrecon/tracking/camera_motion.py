@@ -29,8 +29,9 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
-from keyrecon.records import CameraPath
+from keyrecon.records import CameraPath, Shots
 from keyrecon.segmentation.static_overlay import StaticOverlay
+from keyrecon.timeline import part_of_video
 from keyrecon.tracking.shots import CutDetector
 
 Grey = UInt8[np.ndarray, "h w"]
@@ -157,31 +158,61 @@ def _to_start(key: _KeyPicture, match: _Match) -> Float[np.ndarray, "3 3"]:
 def estimate_camera_motion(
     video: Video, options: CameraMotionOptions = CameraMotionOptions(), progress: Progress = silent
 ) -> CameraPath:
-    """Homographies from every frame to the middle one, and their confidence.
+    """Homographies from every frame to the middle one of its shot, and their confidence.
 
-    Exactly the identity for a static camera. Where the video cuts to another shot is told beside
-    it (`CameraPath.cuts`): one path can only follow one of them.
+    Exactly the identity where the camera is static. Where the video cuts to another shot is told
+    beside it (`CameraPath.cuts`).
     """
+    detector = CutDetector()
+    path = _estimate_path(video, options, progress, detector)
+    if not detector.cuts:
+        return path
+    shots = Shots.between(tuple(detector.cuts), len(video))
+    parts = progress(shots.parts, "Estimating the camera's motion in each shot", len(shots.parts))
+    paths = [_estimate_path(part_of_video(video, part), options) for part in parts]
+    return CameraPath(
+        np.concatenate([path.to_reference for path in paths]),
+        np.concatenate([path.confidence for path in paths]),
+        tuple(detector.cuts),
+    )
+
+
+def _estimate_path(
+    video: Video,
+    options: CameraMotionOptions,
+    progress: Progress = silent,
+    detector: CutDetector | None = None,
+) -> CameraPath:
+    """The path of one shot; of several, as the `detector` finds, it means nothing."""
     width = min(options.width, video.width)
     shape = (round(video.height * width / video.width), width)
 
     def pictures() -> Iterator[Grey]:
         return progress(read_grey(video, width), "Estimating the camera's motion", len(video))
 
-    tracker, detector = _FeatureTracker(options), CutDetector()
-    path, confidence = _register_all(detector.watch(pictures()), tracker, max(1, len(video) // 64))
-    cuts = tuple(detector.cuts)
+    tracker = _FeatureTracker(options)
+    watched = pictures() if detector is None else _first_shot(pictures(), detector)
+    path, confidence = _register_all(watched, tracker, max(1, len(video) // 64))
     if _is_static(path, shape, options):
-        return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence, cuts)
+        return CameraPath(np.tile(np.eye(3), (len(path), 1, 1)), confidence)
+    if detector is not None and detector.cuts:
+        return CameraPath(path, confidence)
     if tracker.overlay.share(np.concatenate([k.corners for k in tracker.keys])) > MAX_OVERLAY_SHARE:
         tracker = _FeatureTracker(options, tracker.overlay.mask())
         path, confidence = _register_all(pictures(), tracker)
         if _is_static(path, shape, options):
-            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence, cuts)
+            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
     small = shrinking(width / video.width)
     full = np.linalg.inv(small) @ to_reference @ small
-    return CameraPath(full / full[:, 2:, 2:], confidence, cuts)
+    return CameraPath(full / full[:, 2:, 2:], confidence)
+
+
+def _first_shot(pictures: Iterable[Grey], detector: CutDetector) -> Iterator[Grey]:
+    """Pictures up to the first cut, or a little beyond; the detector sees all of them."""
+    for grey in detector.watch(pictures):
+        if not detector.cuts:
+            yield grey
 
 
 def _register_all(

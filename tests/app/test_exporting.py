@@ -12,12 +12,12 @@ from small_motion import make_motion
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.export import cut_motion
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
 from keyrecon.report.overlay import OverlayOptions
+from keyrecon.timeline import cut_motion
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_a_range_is_written_with_the_videos_frame_numbers(project):
 
 
 def test_keyframes_of_a_range_count_from_its_start():
-    cut = cut_motion(make_motion(60), 20, 40)  # keyframes at 0 and 30
+    cut = cut_motion(make_motion(60), slice(20, 41))  # keyframes at 0 and 30
     assert cut.keyframes.tolist() == [10]
 
 

@@ -1,20 +1,16 @@
-"""What the automatic part tells of a video and of what a person told."""
+"""What the automatic part tells of the shots of a video."""
 
-import numpy as np
-
-from keyrecon.app.preparing import describe_cuts
-from keyrecon.records import CameraPath
+from keyrecon.app.preparing import describe_shots
+from keyrecon.records import PLAYER, Shots
 
 
-def path(frames, cuts):
-    return CameraPath(np.tile(np.eye(3), (frames, 1, 1)), np.ones(frames), cuts)
-
-
-def test_a_video_of_several_shots_is_told_with_its_cuts_and_its_longest_shot():
-    (line,) = describe_cuts(path(100, (20, 70)))
-    assert "at frame 20, 70" in line
-    assert "frames 20 to 69" in line
+def test_every_shot_is_told_with_its_frames_and_what_it_shows():
+    shots = Shots((0, 20, 70), 100, (PLAYER, "black", PLAYER))
+    (line,) = describe_shots(shots)
+    assert line.startswith("3 shots, 2 usable")
+    assert "2 (20-69) black" in line
+    assert "3 (70-99) the player" in line
 
 
 def test_a_video_of_one_shot_tells_nothing():
-    assert describe_cuts(path(100, ())) == []
+    assert describe_shots(Shots.between((), 100)) == []

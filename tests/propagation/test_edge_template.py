@@ -40,7 +40,7 @@ def templates_of(preparation, truth, frames, half):
     poses = AnnotatedPoses(
         half, rows, joints, np.ones(joints.shape, bool), np.full(len(half.bones), np.inf)
     )
-    edges = preparation.contours.edges
+    edges = preparation.edges
     return (
         make_edge_templates(edges, body_frame, poses, 400),
         index_elements(edges, body_frame),
@@ -61,7 +61,7 @@ def test_elements_belong_to_the_bone_they_outline():
     preparation, truth = scene([standing()], (0,))
     body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
     pose = body_frame.from_pixels(truth[0][UPPER.joints], 0)
-    elements = assign_to_bones(preparation.contours.edges[0], body_frame, 0, pose, UPPER)
+    elements = assign_to_bones(preparation.edges[0], body_frame, 0, pose, UPPER)
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]
     forearm = np.isin(UPPER.joints[UPPER.bones[elements.bone, 1]], wrists)
     assert forearm[elements.color == 2].mean() > 0.9

@@ -10,14 +10,13 @@ from keyrecon.io.video import Video
 from keyrecon.keyframes.distance_matrix import compare_frames
 from keyrecon.records import (
     Annotations,
-    Background,
     CameraPath,
     Colors,
     Edges,
     HalfKeyframes,
     Keyframes,
-    PlayerContours,
     Preparation,
+    Shots,
     Track,
 )
 
@@ -103,19 +102,16 @@ def scene(poses, keyframes, scale=180.0, origin=(600.0, 200.0)):
     comparison = compare_frames(edges, track)
     halves = [_assign(getattr(comparison, name), keyframes) for name in ("upper", "lower")]
     camera = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
-    figures = PlayerContours(edges, np.zeros((count, 1, 1), np.uint8), origin, np.ones(count))
     colors = Colors((), np.zeros((0, 8)), np.zeros(8), 1.0)
-    scenery = np.zeros((1, 1), np.uint8)
-    background = Background(np.dstack([scenery] * 3), scenery + 1.0, scenery > 0, np.eye(3))
     prepared = Preparation(
         pictures(count),
         camera,
         colors,
         track,
-        background,
-        figures,
+        edges,
         comparison,
         Keyframes(*halves, 10, 0.95),
+        Shots.between((), count),
     )
     return prepared, truth
 

@@ -106,11 +106,11 @@ def test_the_player_and_nobody_else_is_foreground(found):
 def test_edges_lie_on_the_outline_of_the_player(found):
     panning, video, camera, colors, track = found
     background = build_background(video, camera, track)
-    figures = find_edges(video, track, camera, background, colors)
-    assert len(figures.edges) == COUNT
+    found_edges = find_edges(video, track, camera, background, colors)
+    assert len(found_edges) == COUNT
     shirt = colors.names.index("shirt")
     head = (heads(COUNT) - corners(COUNT, panning))[COUNT // 2]
-    edges = figures.edges[COUNT // 2]
+    edges = found_edges[COUNT // 2]
     outline = edges.points[edges.color == shirt] - head
     assert len(outline) > 20
     assert np.abs(outline[:, 0]).max() < 14

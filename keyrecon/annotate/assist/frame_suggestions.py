@@ -191,7 +191,7 @@ def _measure_half(
     distances: PoseDistances, motion: Motion, annotations: Annotations, half: HalfName
 ) -> _HalfUncertainty:
     members = motion.skeleton.is_lower == (half == "lower")
-    uncertainty = 1 - motion.confidence[:, members].mean(axis=1)
+    uncertainty = np.where(motion.known, 1 - motion.confidence[:, members].mean(axis=1), 0.0)
     marked = np.isfinite(annotations.joints[:, members, 0]).mean(axis=1) >= LEAST_MARKED
     table = distances.upper if half == "upper" else distances.lower
     rows = distances.row[annotations.frames[marked]]
@@ -211,7 +211,7 @@ def _explain_gain(
     uncertainty = np.zeros(len(motion.skeleton.names))
     for half in halves:
         closer = np.maximum(half.nearest - half.distance[row], 0) > CLOSER_SHARE * half.nearest
-        frames = closer[distances.row]
+        frames = closer[distances.row] & motion.known
         members = motion.skeleton.is_lower == (half.half == "lower")
         uncertainty[members] = (1 - motion.confidence[frames][:, members]).sum(axis=0)
         helped |= frames

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from keyrecon.propagation.body_frame import BodyFrame, stabilise_player
+from keyrecon.propagation.body_frame import BodyFrame, stabilise_shots
 from keyrecon.propagation.correspondence import (
     HYPOTHESIS_SPREAD,
     ElementIndex,
@@ -49,7 +49,7 @@ from keyrecon.propagation.registration import (
 )
 from keyrecon.propagation.selection import ChosenLimbs, choose_limbs
 from keyrecon.propagation.trajectory_smoothing import SEARCH_RADII, SHAPE_PRIOR
-from keyrecon.records import Annotations, Preparation
+from keyrecon.records import Annotations, Preparation, Shots
 
 OPTIONS = PropagateOptions()
 HIP_POSITION = 0.45
@@ -79,7 +79,9 @@ def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
     """The scene of a preparation."""
     return SuggestionScene(
         preparation,
-        stabilise_player(preparation.track, preparation.camera, preparation.video.fps),
+        stabilise_shots(
+            preparation.track, preparation.camera, preparation.shots, preparation.video.fps
+        ),
         sources,
     )
 
@@ -109,7 +111,7 @@ def prepare_fitting(
     """Edge templates of a half; `joints` has what the other half gives to it."""
     preparation, body_frame = scene.preparation, scene.body_frame
     poses = gather_poses(scene.sources, body_frame, half, joints[:, half.joints[half.fixed]])
-    edges = tuple(preparation.contours.edges[t] for t in frames)
+    edges = tuple(preparation.edges[t] for t in frames)
     index = index_elements(edges, _select_frames(body_frame, frames))
     distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
     at = scene.at(preparation.track.head if half.name == "upper" else preparation.track.mid_feet)
@@ -127,7 +129,7 @@ def _make_templates(
     scene: SuggestionScene, poses: AnnotatedPoses, frames: Int[np.ndarray, "N"]
 ) -> EdgeTemplates:
     """Templates of the annotated frames, and the elements of the frames they are fitted to."""
-    edges, half, body_frame = scene.preparation.contours.edges, poses.half, scene.body_frame
+    edges, half, body_frame = scene.preparation.edges, poses.half, scene.body_frame
     known = replace(poses, frames=np.arange(len(poses.frames)))
     outlines = tuple(edges[t] for t in poses.frames)
     templates = make_edge_templates(
@@ -285,7 +287,7 @@ def _choose_each(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
             frame_elements=templates.frame_elements[n : n + 1],
             feet=feet,
         )
-        chosen.append(choose_limbs(single, one, fps))
+        chosen.append(choose_limbs(single, one, Shots.between((), 1), fps))
     return ChosenLimbs(
         *(
             np.concatenate([getattr(one, field.name) for one in chosen])

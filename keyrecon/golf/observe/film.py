@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
 from keyrecon.io.frame_reader import read_grey
@@ -21,22 +21,10 @@ from keyrecon.io.steady_video import steady_video
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import CameraPath
+from keyrecon.segmentation.repeated_frames import COMPARED_WIDTH, find_repeats, picture_change
 
-COMPARED_WIDTH = 240
-"""Width of the pictures that tell repeats and cuts, px."""
-CHANGED = 99.7
-"""Percentile of the changes of all pixels that stands for a frame's: an arm's share of a picture
-is a few thousandths."""
-REPEATED = 0.3
-"""A frame that changes by less than this share of what frames before and after it do repeats the
-one before: .02 to .1 in clips with repeated frames, .5 and more in all others."""
-NEXT = 8
-"""Frames on either side of which one must change: a picture is shown seven times at most in the
-clips at hand. On one side alone it would be the end of a rest."""
 AROUND = 12
 """Frames on either side of a cut."""
-LEAST_CHANGE = 4.0
-"""Grey levels; where frames around change by less, all are noise and none is dropped."""
 OFTEN_REPEATED = 0.08
 """Share of repeated frames from which on they are a conversion of the frame rate, and pictures are
 evenly spaced in the world; fewer are faults of a recording."""
@@ -117,7 +105,7 @@ class Film:
 def choose_frames(video: Video, camera: CameraPath, clicked: int) -> Film:
     """The frames that are fitted, in the picture of the clicked one."""
     greys = np.stack(list(read_grey(video, min(COMPARED_WIDTH, video.width)))).astype(np.int16)
-    change = np.array([0.0] + [_change(a, b) for a, b in pairwise(greys)])
+    change = np.array([0.0] + [picture_change(a, b) for a, b in pairwise(greys)])
     whole = np.array([0.0] + [float(np.abs(a - b).mean()) for a, b in pairwise(greys)])
     first, last = _shot(whole, clicked)
     repeats = find_repeats(change)
@@ -133,27 +121,6 @@ def choose_frames(video: Video, camera: CameraPath, clicked: int) -> Film:
         kept, time, place, steady.warps, steady.size, steady.corner, steady.still, shot, repeated
     )
     return film.take(np.arange(0, len(kept), frame_step(film.fps)))
-
-
-def _change(one: np.ndarray, other: np.ndarray) -> float:
-    return float(np.percentile(np.abs(one - other), CHANGED))
-
-
-def find_repeats(change: Float[np.ndarray, "F"]) -> Bool[np.ndarray, "F"]:
-    """Frames that show the picture of the one before, by how much each frame changes."""
-    rank = np.arange(len(change))
-    # Before the first frame and after the last anything may have been.
-    known = np.concatenate([[np.inf], change[1:], [np.inf]])
-    before = np.array([known[max(0, t - NEXT) : t + 1].max() for t in rank])
-    after = np.array([known[t : t + NEXT + 1].max() for t in rank])
-    around = np.minimum(before, after)
-    low = (change < REPEATED * around) & (around > LEAST_CHANGE) & (rank > 0)
-    # A pause is reached and left step by step, a repeated picture at once.
-    for run in np.split(rank, np.flatnonzero(np.diff(low)) + 1):
-        if low[run[0]]:
-            beside = min(known[run[0] - 1], known[run[-1] + 1])
-            low[run] = beside > LEAST_CHANGE and change[run].max() < REPEATED * beside
-    return low & ~np.isinf(around)
 
 
 def _shot(whole: Float[np.ndarray, "F"], clicked: int) -> tuple[int, int]:

@@ -33,7 +33,7 @@ def write_bvh(path: Path, motion: Motion, world: World = None) -> str:
 
     Raises KeyreconError for a skeleton without the limbs, hips and neck of a person.
     """
-    standing = stand_on_floor(motion, world=world)
+    standing = stand_on_floor(motion, world=world).standing_still()
     figure = make_humanoid(standing)
     write_durably(path, _format(figure, standing.fps))
     placed = f"Y up; {standing.placing}; {standing.timing}"

@@ -244,10 +244,11 @@ def write_c3d(path: Path, motion: Motion, world: World = None) -> str:
         ) from fault
     standing = stand_on_floor(motion, world=world)
     millimetres = standing.units == "m"
-    # The column behind x, y, z is the residual: 0, measured by one camera group.
+    # The column behind x, y, z is the residual: 0, measured by one camera group; -1, not seen.
     rows = np.zeros((*standing.points.shape[:2], 5), dtype=np.float32)
     rows[..., :3] = standing.points[..., [0, 2, 1]] * np.array([1, -1, 1])
     rows[..., :3] *= 1000 if millimetres else 1
+    rows[~standing.known] = (0, 0, 0, -1, 0)
     writer = c3d.Writer(point_rate=standing.fps, point_units="mm" if millimetres else "bh")
     writer.set_point_labels(list(motion.skeleton.names))
     writer.set_screen_axis(X="+X", Y="+Z")

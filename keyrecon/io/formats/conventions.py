@@ -15,12 +15,15 @@ is nor where the ground lies, so three things are estimated, and every file or t
 
 Where a court's lines have told where the player stands (`points3d_world` of motion.npz), nothing is
 estimated: the origin is on the ground at the middle of the net, x along the net to the right.
+
+Every shot of a video stands by itself. Where shots do not show the player there is no figure:
+markers are missing there, and formats that hold a figure in every frame have it stand still.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial.transform import Rotation
 
@@ -28,6 +31,7 @@ from keyrecon.body import ANKLE_HEIGHT, Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
+from keyrecon.timeline import cut_motion, frames_before
 
 UNEVEN = 0.1
 """Frame times that stray further than this share of a frame from an even spacing are uneven.
@@ -60,7 +64,7 @@ class StandingMotion:
 
     skeleton: Skeleton
     points: Float[np.ndarray, "N J 3"]
-    """x right, y up, z towards the camera."""
+    """x right, y up, z towards the camera; NaN in frames without a motion."""
     time: Float[np.ndarray, "N"]
     """Seconds from the first frame."""
     fps: float
@@ -72,6 +76,20 @@ class StandingMotion:
     """How it was turned and placed, for whoever opens the file."""
     timing: str
     """What was done to the frame times."""
+
+    @property
+    def known(self) -> Bool[np.ndarray, "N"]:
+        """Frames in which there is a figure."""
+        return np.isfinite(self.points).all(axis=(1, 2))
+
+    def standing_still(self) -> "StandingMotion":
+        """With the last figure held where there is none, and the first before it."""
+        known = np.flatnonzero(self.known)
+        if len(known) == len(self.points):
+            return self
+        timing = f"{self.timing}; where the video does not show the player the figure stands still"
+        held = known[frames_before(known, len(self.points))]
+        return replace(self, points=self.points[held], timing=timing)
 
 
 def y_up(points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
@@ -100,13 +118,67 @@ def stand_on_floor(motion: Motion, even_times: bool = True, world: World = None)
     which are taken as they are if all of them are known. Raises KeyreconError where joints are
     missing.
     """
-    missing = np.argwhere(~np.isfinite(motion.points3d).all(axis=2))
+    parts = motion.stretches
+    if len(parts) > 1 or not motion.known.all():
+        return _stand_in_shots(motion, parts, even_times, world)
+    return _stand(motion, even_times, world)
+
+
+def _stand_in_shots(
+    motion: Motion, parts: tuple[slice, ...], even_times: bool, world: World
+) -> StandingMotion:
+    """Each stretch of frames as `_stand` places it; NaN in the frames between."""
+    _check_whole(motion)
+    own = [
+        _stand(cut_motion(motion, part), False, None if world is None else world[part])
+        for part in parts
+    ]
+    points = np.full(motion.points3d.shape, np.nan)
+    for part, standing in zip(parts, own, strict=True):
+        points[part] = standing.points
+    time, fps = motion.time - motion.time[0], motion.fps
+    if not is_uneven(motion):
+        time = np.arange(len(time)) / fps
+    elif even_times:
+        uneven, time = time, np.linspace(0, time[-1], len(time))
+        fps = (len(time) - 1) / float(time[-1])
+        even = np.full(points.shape, np.nan)
+        for part in parts:
+            inside = (time >= uneven[part][0]) & (time <= uneven[part][-1])
+            even[inside] = _resample(points[part], uneven[part], time[inside], motion.skeleton)
+        points = even
+    longest = max(range(len(parts)), key=lambda k: parts[k].stop - parts[k].start)
+    units = {standing.units for standing in own}
+    if len(units) > 1:
+        return _stand_in_shots(motion, parts, even_times, None)
+    gaps = f", {(~motion.known).sum()} of them without a figure" if not motion.known.all() else ""
+    return replace(
+        own[longest],
+        points=points,
+        time=time,
+        fps=fps,
+        placing=f"{own[longest].placing}; each of {len(parts)} shots by itself",
+        timing=describe_times(motion, even_times) + gaps,
+    )
+
+
+def _check_whole(motion: Motion) -> None:
+    """KeyreconError where a frame lacks a joint and not all of them."""
+    finite = np.isfinite(motion.points3d).all(axis=2)
+    missing = np.argwhere(~finite & finite.any(axis=1, keepdims=True))
+    if not finite.any():
+        missing = np.argwhere(~finite)
     if len(missing):
         frame, joint = missing[0]
         raise KeyreconError(
             f"Frame {frame} has no {motion.skeleton.names[joint]}; this format needs every joint, "
             "use .csv or .npz."
         )
+
+
+def _stand(motion: Motion, even_times: bool, world: World) -> StandingMotion:
+    """A motion of one shot in which every frame is known."""
+    _check_whole(motion)
     units, size, lean = motion.units, stature(motion), camera_pitch(motion)
     on_court = world is not None and bool(np.isfinite(world).all())
     if world is not None and on_court:

@@ -44,7 +44,7 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = N
         cells = [str(first_frame + frame), f"{motion.time[frame]:.6f}"]
         for joint, origin in zip(values, source, strict=True):
             cells += ["" if np.isnan(v) else f"{v:.6g}" for v in joint]
-            cells.append(SOURCES[origin])
+            cells.append("" if np.isnan(joint).any() and not joint[-1] else SOURCES[origin])
         rows.append(",".join(cells))
     write_durably(path, "\n".join(head + rows) + "\n")
     return f"camera axes{WITH_WORLD if world is not None else ''}; {describe_times(motion)}"

@@ -1,7 +1,6 @@
 """A motion in other programs' formats, told by suffix. The overlay video is the report's work."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from keyrecon.io.formats.coco import write_coco_motion
 from keyrecon.io.formats.conventions import WITH_WORLD, World, describe_times
 from keyrecon.io.formats.csv_table import write_csv
 from keyrecon.io.formats.glb import write_glb
-from keyrecon.io.formats.motion_file import ARRAYS, OPTIONAL, write_motion
+from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.formats.netcdf import write_netcdf
 from keyrecon.io.formats.trc import write_trc
 from keyrecon.records import Motion
@@ -82,11 +81,3 @@ def export_motion(
         )
     write_coco_motion(path, motion, size, first_frame)
     return f"pixels; {describe_times(motion)}"
-
-
-def cut_motion(motion: Motion, first: int, last: int) -> Motion:
-    """Frames first..last; times stay those of the video, keyframes count from the new start."""
-    per_frame = [n for n, axes in (ARRAYS | OPTIONAL).items() if axes.startswith("T")]
-    kept = {n: v[first : last + 1] for n in per_frame if (v := getattr(motion, n)) is not None}
-    inside = (motion.keyframes >= first) & (motion.keyframes <= last)
-    return replace(motion, **kept, keyframes=motion.keyframes[inside] - first)

@@ -89,7 +89,7 @@ def write_glb(path: Path, motion: Motion, world: World = None) -> str:
 
     Raises KeyreconError where a joint is missing.
     """
-    standing = stand_on_floor(motion, even_times=False, world=world)
+    standing = stand_on_floor(motion, even_times=False, world=world).standing_still()
     person = not missing_joints(motion.skeleton.names)
     figure = _person(standing) if person else _sticks(standing)
     buffer = _Buffer()

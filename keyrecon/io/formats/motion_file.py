@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
 
 from keyrecon import __version__
 from keyrecon.body import Skeleton, check_skeleton
@@ -25,12 +26,12 @@ ARRAYS = {
     "keyframes": "K",
 }
 """Arrays of a `Motion` and the letters of their axes."""
-KINDS = {"source": np.int64, "keyframes": np.int64}
+KINDS = {"source": np.int64, "keyframes": np.int64, "cuts": np.int64}
 """Arrays that are whole numbers."""
-WITH_GAPS = ("points2d_propagated", "expected_error")
+WITH_GAPS = ("points3d", "points2d", "points2d_propagated", "expected_error", "scale")
 UNITS = ("m", "body heights")
-OPTIONAL = {"expected_error": "TJ"}
-"""Arrays that files of former versions and of golf fits lack."""
+OPTIONAL = {"expected_error": "TJ", "cuts": "C"}
+"""Arrays that files of former versions and of golf fits lack; `cuts` that of one shot."""
 ABOUT = (
     *("source_names", "joint_names", "parents", "mirrored", "proportions", "lower"),
     *("fps", "units", "keyrecon_version"),
@@ -97,7 +98,11 @@ def read_motion(path: Path) -> Motion:
         return Motion(
             skeleton=check_skeleton(_skeleton(data)),
             **{name: data[name].astype(KINDS.get(name, np.float64)) for name in ARRAYS},
-            **{name: data[name].astype(np.float64) for name in OPTIONAL if name in data},
+            **{
+                name: data[name].astype(KINDS.get(name, np.float64))
+                for name in OPTIONAL
+                if name in data
+            },
             fps=float(data["fps"]),
             units=str(data["units"]),
         )
@@ -167,20 +172,39 @@ def _skeleton(data: dict[str, np.ndarray]) -> Skeleton:
 
 def _check_values(data: dict[str, np.ndarray]) -> None:
     """Raise ValueError for values that no motion has; joints that nobody saw are NaN in pixels."""
-    for name in (*ARRAYS, *(OPTIONAL.keys() & data.keys()), "fps", "proportions"):
-        check_numbers(name, data[name], gaps=name in WITH_GAPS)
-    for name in (*KINDS, "parents", "mirrored", "lower"):
-        if data[name].dtype.kind not in "iu" and data[name].size:
-            raise ValueError(f"{name} are no whole numbers")
+    _check_kinds(data)
     if not len(data["time"]) or (np.diff(data["time"]) <= 0).any():
         raise ValueError("it has no frames, or their times do not grow")
-    if not data["fps"].item() > 0 or not (data["scale"] > 0).all():
+    known = _frames_with_motion(data)
+    if not data["fps"].item() > 0 or not (data["scale"][known] > 0).all():
         raise ValueError("fps and scale must be above 0")
     if str(data["units"]) not in UNITS:
         raise ValueError(f"units must be one of {', '.join(UNITS)}")
-    keyframes = data["keyframes"]
-    if not ((keyframes >= 0) & (keyframes < len(data["time"]))).all():
-        raise ValueError("a keyframe is outside of its frames")
+    for name in ("keyframes", "cuts"):
+        frames = data.get(name, np.zeros(0))
+        if not ((frames >= 0) & (frames < len(data["time"]))).all():
+            raise ValueError(f"{name} are outside of its frames")
+
+
+def _check_kinds(data: dict[str, np.ndarray]) -> None:
+    for name in (*ARRAYS, *(OPTIONAL.keys() & data.keys()), "fps", "proportions"):
+        check_numbers(name, data[name], gaps=name in WITH_GAPS)
+    whole = [name for name in KINDS if name in data]
+    for name in (*whole, "parents", "mirrored", "lower"):
+        if data[name].dtype.kind not in "iu" and data[name].size:
+            raise ValueError(f"{name} are no whole numbers")
+
+
+def _frames_with_motion(data: dict[str, np.ndarray]) -> Bool[np.ndarray, "T"]:
+    """ValueError where a frame is known in part, or none is."""
+    known = np.isfinite(data["points3d"]).all(axis=(1, 2))
+    for name in ("points3d", "points2d", "scale"):
+        finite = np.isfinite(data[name]).reshape(len(known), -1)
+        if not (finite == known[:, None]).all():
+            raise ValueError(f"{name} is not a finite number in every frame that has a motion")
+    if not known.any():
+        raise ValueError("no frame has a motion")
+    return known
 
 
 def _check_shapes(data: dict[str, np.ndarray]) -> None:
@@ -189,6 +213,7 @@ def _check_shapes(data: dict[str, np.ndarray]) -> None:
         "T": len(data["time"]),
         "J": len(data["joint_names"]),
         "K": len(data["keyframes"]),
+        "C": data["cuts"].size if "cuts" in data else 0,
         "2": 2,
         "3": 3,
     }

@@ -12,7 +12,8 @@ from keyrecon.records import Motion
 def write_trc(path: Path, motion: Motion, world: World = None, first_frame: int = 0) -> str:
     """Write joints with Y up (x right, z towards the camera), in metres or body heights.
 
-    Returns what was done to them. The format has no comments: the same stands behind the file's
+    Cells of frames without a motion are empty, as OpenSim reads a marker that is missing. Returns
+    what was done to them. The format has no comments: the same stands behind the file's
     name in the first line, which readers take as a whole. `first_frame` is the video's frame that
     comes first.
     """
@@ -32,7 +33,8 @@ def write_trc(path: Path, motion: Motion, world: World = None, first_frame: int 
         "",
     ]
     for frame, row in enumerate(standing.points.reshape(frames, -1)):
-        values = "\t".join(np.char.mod("%.6f", row))
+        known = np.isfinite(row).all()
+        values = "\t".join(np.char.mod("%.6f", row) if known else [""] * len(row))
         lines.append(f"{frame + 1}\t{standing.time[frame]:.8f}\t{values}")
     write_durably(path, "\n".join(lines) + "\n")
     return done

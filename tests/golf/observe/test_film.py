@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.golf.observe.film import choose_frames, find_repeats
+from keyrecon.golf.observe.film import choose_frames
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath
+from keyrecon.segmentation.repeated_frames import find_repeats
 
 SIZE = (160, 120)
 RNG = np.random.default_rng(0)

@@ -117,7 +117,8 @@ export function createMotionCache(project, arrived) {
       const row = chunks.get(number)?.[kind][frame - number * CHUNK];
       if (!row) return null;
       const named = row.map((point, joint) => [project.joints[joint], point]);
-      return Object.fromEntries(named.filter(([, point]) => point && point[0] !== null));
+      const known = named.filter(([, point]) => point && point[0] !== null);
+      return known.length ? Object.fromEntries(known) : null;
     },
     // {level, unit, units} of a frame: the height of the ground, that of the lower foot on average over
     // half a second, and the player's stature; null while it is not known.

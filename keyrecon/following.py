@@ -1,0 +1,151 @@
+"""The player followed through the shots of a video, each shot by itself.
+
+Camera, scene and tracks of one shot say nothing of the next. What the player looks like does:
+colours are learnt once, and tell which shots show the player at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from keyrecon.io.video import Video
+from keyrecon.keeping import Keep
+from keyrecon.progress import Progress, silent
+from keyrecon.records import CameraPath, Colors, Edges, Pick, Shots, Track, TrackAnchors
+from keyrecon.segmentation.background_model import BackgroundOptions, build_background
+from keyrecon.segmentation.color_model import picked_height
+from keyrecon.segmentation.contours import EdgeOptions, find_edges
+from keyrecon.timeline import (
+    join_frames,
+    part_of_anchors,
+    part_of_path,
+    part_of_picks,
+    part_of_video,
+)
+from keyrecon.tracking.detection import FindOptions, find_player
+from keyrecon.tracking.shot_sorting import ShotOptions, Sighting, sight_player, sort_shots
+from keyrecon.tracking.tracker import TrackOptions, track_player
+
+
+@dataclass(frozen=True)
+class FollowOptions:
+    """What the stages that follow the player can be told."""
+
+    shots: ShotOptions = field(default_factory=ShotOptions)
+    find: FindOptions = field(default_factory=FindOptions)
+    background: BackgroundOptions = field(default_factory=BackgroundOptions)
+    track: TrackOptions = field(default_factory=TrackOptions)
+    edges: EdgeOptions = field(default_factory=EdgeOptions)
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedPlayer:
+    """The player in the usable shots, these put end to end."""
+
+    shots: Shots
+    """All shots of the file."""
+    track: Track
+    edges: tuple[Edges, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """What the stages are given of one shot."""
+
+    name: str
+    """Appended to those of its stages; nothing for the only one."""
+    video: Video
+    camera: CameraPath
+    colors: Colors
+    anchors: TrackAnchors
+    told: bool
+    """Whether a person clicked or marked in it."""
+
+
+def follow_player(
+    video: Video,
+    camera: CameraPath,
+    colors: Colors,
+    clicks: Sequence[Pick],
+    anchors: TrackAnchors,
+    options: FollowOptions,
+    keep: Keep,
+    progress: Progress = silent,
+) -> FollowedPlayer:
+    """Sort the shots, and follow the player through the usable ones.
+
+    Raises KeyreconError where the player is not found.
+    """
+    shots = Shots.between(camera.cuts, len(video))
+    if not camera.cuts:
+        only = _Shot("", video, camera, colors, anchors, True)
+        detected = keep(
+            "find", find_player, video, colors, camera, anchors,
+            options=options.find, progress=progress,
+        )  # fmt: skip
+        return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
+    each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
+    sightings = [
+        keep(
+            f"find{shot.name}", sight_player, shot.video, shot.colors, shot.camera, shot.anchors,
+            options=options.find, progress=silent,
+        )
+        for shot in progress(each, "Looking for the player in each shot", len(each))
+    ]  # fmt: skip
+    told = np.array([shot.told for shot in each])
+    shots = sort_shots(shots, sightings, told, video.fps, options.shots)
+    usable = np.flatnonzero(shots.usable).tolist()
+    tracks: list[Track] = []
+    edges: list[Edges] = []
+    for number in progress(usable, "Following the player in each shot", len(usable)):
+        track, own = _follow(each[number], _found(sightings[number]), options, keep, silent)
+        tracks.append(track)
+        edges += own
+    return FollowedPlayer(shots, join_frames(tracks), tuple(edges))
+
+
+def _found(sighting: Sighting) -> Track:
+    assert sighting.track is not None  # a usable shot has one
+    return sighting.track
+
+
+def _shot(
+    part: slice,
+    video: Video,
+    camera: CameraPath,
+    colors: Colors,
+    clicks: Sequence[Pick],
+    anchors: TrackAnchors,
+) -> _Shot:
+    """One of several shots; a player who is clicked or marked in it has the size that is told."""
+    own = part_of_picks(clicks, part)
+    sized = {pick.frame for pick in own if pick.part == "head"}
+    sized &= {pick.frame for pick in own if pick.part == "foot"}
+    return _Shot(
+        f"@{part.start}",
+        part_of_video(video, part),
+        part_of_path(camera, part),
+        replace(colors, height=picked_height(own)) if sized else colors,
+        part_of_anchors(anchors, part),
+        bool(own),
+    )
+
+
+def _follow(
+    shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
+) -> tuple[Track, tuple[Edges, ...]]:
+    """Scene, track and edges of a shot in which the player was found."""
+    background = keep(
+        f"background{shot.name}", build_background, shot.video, shot.camera, detected,
+        options=options.background, progress=progress,
+    )  # fmt: skip
+    track = keep(
+        f"track{shot.name}", track_player, shot.video, detected, shot.camera, background,
+        shot.colors, shot.anchors, options=options.track, progress=progress,
+    )  # fmt: skip
+    edges = keep(
+        f"edges{shot.name}", find_edges, shot.video, track, shot.camera, background, shot.colors,
+        options=options.edges, progress=progress,
+    )  # fmt: skip
+    return track, edges

@@ -1,0 +1,217 @@
+"""Records of some of a video's frames, and of shots put end to end.
+
+What changes from frame to frame is held in arrays whose first axis is time, so that frames are
+taken, joined and put back alike in every record. Where a video has shots that are of no use, the
+stages after tracking work on the others put end to end; what they make is then spread over
+the frames of the file, unknown in between.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.io.video import Video
+from keyrecon.records import (
+    SOURCES,
+    Annotations,
+    CameraPath,
+    Edges,
+    FlowTracks,
+    JointTracks,
+    Keyframes,
+    Motion,
+    Pick,
+    PoseDistances,
+    Shots,
+    Track,
+    TrackAnchors,
+)
+
+PerFrame = TypeVar("PerFrame", Track, FlowTracks, JointTracks)
+"""Records whose every value has one entry per frame."""
+
+
+def take_frames(record: PerFrame, frames: slice | Int[np.ndarray, "n"]) -> PerFrame:
+    """A record of some frames only."""
+    return type(record)(
+        **{field.name: getattr(record, field.name)[frames] for field in fields(record)}
+    )
+
+
+def join_frames(records: Sequence[PerFrame]) -> PerFrame:
+    """The frames of several records one after the other; of one, that itself."""
+    if len(records) == 1:
+        return records[0]
+    return type(records[0])(
+        **{
+            field.name: np.concatenate([getattr(record, field.name) for record in records])
+            for field in fields(records[0])
+        }
+    )
+
+
+def part_of_video(video: Video, frames: slice | Int[np.ndarray, "n"]) -> Video:
+    """A video of some frames; its times stay those of the whole."""
+    own = {field.name: getattr(video, field.name) for field in fields(Video)}
+    return Video(**(own | {"stamps": video.stamps[frames], "time": video.time[frames]}))
+
+
+def part_of_path(camera: CameraPath, frames: slice | Int[np.ndarray, "n"]) -> CameraPath:
+    """How the camera moves in some frames of one shot or of several."""
+    return CameraPath(camera.to_reference[frames], camera.confidence[frames])
+
+
+def part_of_marks(marks: Annotations, frames: Int[np.ndarray, "n"]) -> Annotations:
+    """What was marked in some frames, ascending, which are numbered anew."""
+    inside = np.isin(marks.frames, frames)
+    row = {int(frame): number for number, frame in enumerate(frames)}
+    return replace(
+        marks,
+        frames=np.searchsorted(frames, marks.frames[inside]),
+        joints=marks.joints[inside],
+        visible=marks.visible[inside],
+        nearer=marks.nearer[inside],
+        absent=tuple((row[t], name) for t, name in marks.absent if t in row),
+    )
+
+
+def part_of_anchors(anchors: TrackAnchors, part: slice) -> TrackAnchors:
+    """Fixed points within a shot, whose frames count from 0."""
+    inside = (anchors.frames >= part.start) & (anchors.frames < part.stop)
+    return TrackAnchors(
+        anchors.frames[inside] - part.start,
+        anchors.head[inside],
+        anchors.feet[inside],
+        anchors.marked[inside],
+    )
+
+
+def part_of_picks(picks: Sequence[Pick], part: slice) -> tuple[Pick, ...]:
+    """Clicks within a shot, whose frames count from 0."""
+    inside = (pick for pick in picks if part.start <= pick.frame < part.stop)
+    return tuple(replace(pick, frame=pick.frame - part.start) for pick in inside)
+
+
+def put_back(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerFrame:
+    """A record of `frames` as one of `count` frames: those between have NaN, or 0."""
+    values: dict[str, np.ndarray] = {}
+    for field in fields(record):
+        own: np.ndarray = getattr(record, field.name)
+        unknown = np.nan if own.dtype.kind == "f" and "confidence" not in field.name else 0
+        values[field.name] = np.full((count, *own.shape[1:]), unknown, own.dtype)
+        values[field.name][frames] = own
+    return type(record)(**values)
+
+
+def frames_before(frames: Int[np.ndarray, "n"], count: int) -> Int[np.ndarray, "T"]:
+    """For each of `count` frames the place in `frames` of the last one up to it, or the first."""
+    return np.clip(np.searchsorted(frames, np.arange(count), side="right") - 1, 0, None)
+
+
+def spread_track(track: Track, frames: Int[np.ndarray, "n"], count: int) -> Track:
+    """The track of `frames` among `count`: between them the player is nowhere, and the rest stands
+    as before, with no confidence."""
+    spread = take_frames(track, frames_before(frames, count))
+    known = np.isin(np.arange(count), frames)
+    return replace(
+        spread,
+        box=np.where(known[:, None], spread.box, np.nan),
+        confidence=np.where(known, spread.confidence, 0.0),
+    )
+
+
+def spread_edges(
+    edges: Sequence[Edges], frames: Int[np.ndarray, "n"], count: int
+) -> tuple[Edges, ...]:
+    """The edges of `frames` among `count`; none between them."""
+    first = edges[0]
+    none = Edges(*(getattr(first, field.name)[:0] for field in fields(Edges)))
+    spread = [none] * count
+    for frame, own in zip(frames.tolist(), edges, strict=True):
+        spread[frame] = own
+    return tuple(spread)
+
+
+def spread_distances(
+    distances: PoseDistances, frames: Int[np.ndarray, "n"], count: int
+) -> PoseDistances:
+    """Pose distances of `frames` among `count`: the others are like none, and not to be seen."""
+    before = frames_before(frames, count)
+    known = np.isin(np.arange(count), frames)
+    farthest = np.array([[distances.upper.max()], [distances.lower.max()]])
+    steps = distances.consecutive_distance
+    usual = np.median(steps, axis=1, keepdims=True) if steps.size else np.zeros((2, 1))
+    follows = np.minimum(before[:-1], max(steps.shape[1] - 1, 0))
+    both = known[:-1] & known[1:]
+    return PoseDistances(
+        upper=distances.upper,
+        lower=distances.lower,
+        frames=frames[distances.frames],
+        row=distances.row[before],
+        exemplar_distance=np.where(known, distances.exemplar_distance[:, before], farthest).astype(
+            distances.exemplar_distance.dtype
+        ),
+        consecutive_distance=np.where(both, steps[:, follows], usual).astype(steps.dtype),
+        visibility_score=np.where(known, distances.visibility_score[before], 0.0),
+    )
+
+
+def part_of_keyframes(keyframes: Keyframes, frames: Int[np.ndarray, "n"]) -> Keyframes:
+    """Keyframes numbered anew within `frames`, which hold all of them."""
+    upper, lower = (
+        replace(
+            half,
+            frames=np.searchsorted(frames, half.frames),
+            nearest=np.searchsorted(frames, half.nearest[frames]),
+            represented=half.represented[frames],
+            distance=half.distance[frames],
+        )
+        for half in (keyframes.upper, keyframes.lower)
+    )
+    return replace(keyframes, upper=upper, lower=lower)
+
+
+PER_FRAME = ("points3d", "points2d", "points2d_propagated", "confidence", "source", "scale", "time")
+"""Values of a motion that have one entry per frame."""
+
+
+def cut_motion(motion: Motion, part: slice) -> Motion:
+    """Some frames of a motion; times stay those of the video, frames count from the new start."""
+    own: dict[str, Any] = {name: getattr(motion, name)[part] for name in PER_FRAME}
+    errors = motion.expected_error
+    return replace(
+        motion,
+        **own,
+        expected_error=None if errors is None else errors[part],
+        keyframes=_within(motion.keyframes, part),
+        cuts=None if motion.cuts is None else _within(motion.cuts, part, beside=1),
+    )
+
+
+def _within(frames: Int[np.ndarray, "n"], part: slice, beside: int = 0) -> Int[np.ndarray, "m"]:
+    inside = (frames >= part.start + beside) & (frames < part.stop)
+    return frames[inside] - part.start
+
+
+def motion_in_file(motion: Motion, shots: Shots, time: Float[np.ndarray, "T"]) -> Motion:
+    """The motion of the usable shots, over the frames of the file; unknown in the others."""
+    frames, count = shots.usable_frames, shots.n_frames
+
+    def spread(values: np.ndarray, unknown: float) -> np.ndarray:
+        whole = np.full((count, *values.shape[1:]), unknown, values.dtype)
+        whole[frames] = values
+        return whole
+
+    nothing = {"confidence": 0.0, "source": float(SOURCES.index("interpolated"))}
+    own: dict[str, Any] = {n: spread(getattr(motion, n), nothing.get(n, np.nan)) for n in PER_FRAME}
+    errors = motion.expected_error
+    return replace(
+        motion,
+        **(own | {"time": time}),
+        expected_error=None if errors is None else spread(errors, np.nan),
+        keyframes=frames[motion.keyframes],
+        cuts=np.array(shots.first[1:]),
+    )

@@ -1,0 +1,196 @@
+"""Which shots of a video show the player, whole and at the size that was marked.
+
+Whatever a shot shows, a player is looked for in it and, in a crowd or a close-up, something is
+found. But where head, shirt, legs and shoes of this player lie to one another is peculiar: the
+maps of the player's colours, cut out below the head as it was found, are held against those of
+the shots in which a person clicked or marked the player. Where they do not correlate, it is
+somebody or something else. Pictures shown several times make a replay in slow motion. A shot in
+which a person clicked or marked shows the player; what a person says of a shot stands over all of
+this.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.frame_reader import read_grey, read_small, shrinking
+from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import cut_affine
+from keyrecon.progress import Progress, silent
+from keyrecon.ranges import within
+from keyrecon.records import PLAYER, CameraPath, Colors, Shots, Track, TrackAnchors
+from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_tables, to_lab
+from keyrecon.segmentation.player_crops import Cropping
+from keyrecon.segmentation.repeated_frames import COMPARED_WIDTH, find_repeats, picture_change
+from keyrecon.tracking.detection import FindOptions, find_player
+from keyrecon.tracking.shots import PLAIN, thumbnail
+
+FRAMES = 16
+"""Of a shot that are looked at, evenly spread."""
+TALL = 48.0
+"""Of the player in the pictures, px."""
+CELLS = 12, 8
+"""Rows and columns that a map of colours is averaged to: .13 by .22 player heights."""
+
+MORE_REPEATED = 0.25
+"""Share of repeated frames beyond that of the shots with clicks or marks from which a shot is slow
+motion: half speed repeats every second picture."""
+
+
+@dataclass(frozen=True)
+class ShotOptions:
+    """Which shots are worked on, where a video has several."""
+
+    shortest: Annotated[float, within(0, 60)] = 0.5
+    """Shots of less are left out, seconds: no stroke is that short."""
+    alike: Annotated[float, within(0, 1)] = 0.5
+    """Correlation of the player's colours with those of the shots with clicks or marks, as a share
+    of what frames of these have with one another, from which a shot shows the player."""
+    use: str = ""
+    """Numbers of shots that are used whatever they seem to show, such as '3,5'; the first is 1."""
+    skip: str = ""
+    """Numbers of shots that are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """What was found of the player in one shot."""
+
+    track: Track | None
+    """None where no path of a head and feet was found."""
+    why: str
+    """Why there is none."""
+    layout: Float[np.ndarray, "n P y x"]
+    """Where the player's colours are, in some frames, relative to the head."""
+    plain: bool
+    """Whether the pictures show nothing, such as black."""
+    repeated: float
+    """Share of the frames that show the picture of the one before."""
+
+
+def sight_player(
+    video: Video,
+    colors: Colors,
+    camera: CameraPath,
+    anchors: TrackAnchors,
+    options: FindOptions = FindOptions(),
+    progress: Progress = silent,
+) -> Sighting:
+    """Look for the player in one shot of several: there may be none."""
+    nothing = np.zeros((0, len(colors.names) + 1, *CELLS), np.float32)
+    plain, repeated = _look_over(video)
+    if plain:
+        return Sighting(None, "", nothing, plain, repeated)
+    try:
+        track = find_player(video, colors, camera, anchors, options, progress)
+    except KeyreconError as missing:
+        return Sighting(None, str(missing), nothing, plain, repeated)
+    return Sighting(track, "", _layouts(video, colors, track), plain, repeated)
+
+
+def _look_over(video: Video) -> tuple[bool, float]:
+    """Whether a shot shows nothing at all, and the share of its frames that are repeated."""
+    contrast, change, before = [], [0.0], None
+    for grey in read_grey(video, min(COMPARED_WIDTH, video.width)):
+        contrast.append(float(thumbnail(grey).std()))
+        now = grey.astype(np.int16)
+        if before is not None:
+            change.append(picture_change(before, now))
+        before = now
+    repeats = find_repeats(np.array(change))
+    return float(np.median(contrast)) < PLAIN, float(repeats.mean())
+
+
+def _layouts(video: Video, colors: Colors, track: Track) -> Float[np.ndarray, "n P y x"]:
+    """Maps of every part's colours below the head; left and right are alike."""
+    frames = np.unique(np.linspace(0, len(video) - 1, FRAMES).round().astype(int))
+    cropping = Cropping.below_heads(track, TALL)
+    width = cropping.reading_width(video)
+    to_small = shrinking(width / video.width)
+    tables = np.stack([*posterior_tables(colors), foot_table(colors)]).astype(np.float32)
+    found = []
+    pictures = read_small(video, width, set(frames.tolist()))
+    for t, picture in zip(frames.tolist(), pictures, strict=True):
+        way = (to_small @ cropping.crop_to_picture(t))[:2]
+        maps = tables[:, color_bins(to_lab(cut_affine(picture, way, cropping.size)))]
+        small = [cv2.resize(one, CELLS[::-1], interpolation=cv2.INTER_AREA) for one in maps]
+        both = np.stack(small)
+        found.append((both + both[..., ::-1]) / 2)
+    return np.stack(found)
+
+
+def sort_shots(
+    shots: Shots,
+    sightings: Sequence[Sighting],
+    told: Bool[np.ndarray, "S"],
+    fps: float,
+    options: ShotOptions = ShotOptions(),
+) -> Shots:
+    """The shots with what each shows; `told` are those in which a person clicked or marked.
+
+    Raises KeyreconError where a person's shot is asked for that is none, or where no shot is left.
+    """
+    likeness = _likeness(sightings, told)
+    own = [seen.repeated for seen, tell in zip(sightings, told, strict=True) if tell]
+    usual = float(np.median(own)) if own else 0.0
+    used, skipped = (_numbers(text, len(told)) for text in (options.use, options.skip))
+    shows = []
+    for number, (part, seen) in enumerate(zip(shots.parts, sightings, strict=True)):
+        if number in skipped:
+            shows.append("left out by --shots.skip")
+        elif number in used or told[number]:
+            shows.append(PLAYER if seen.track is not None else "nobody found")
+        elif seen.plain:
+            shows.append("black")
+        elif part.stop - part.start < options.shortest * fps:
+            shows.append("too short")
+        elif seen.track is None:
+            shows.append("nobody found")
+        elif seen.repeated > usual + MORE_REPEATED:
+            shows.append("slow motion")
+        else:
+            shows.append(PLAYER if likeness[number] >= options.alike else "somebody else")
+    if PLAYER not in shows:
+        first = next(s for s, tell in zip(sightings, told, strict=True) if tell or not told.any())
+        raise KeyreconError(f"No shot of the video shows the player. {first.why}".strip())
+    return Shots(shots.first, shots.n_frames, tuple(shows))
+
+
+def _likeness(sightings: Sequence[Sighting], told: Bool[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
+    """Of each shot with those that a person told of, relative to what these have themselves."""
+    known = [s.layout for s, tell in zip(sightings, told, strict=True) if tell and len(s.layout)]
+    if not known:
+        return np.ones(len(sightings))
+    usual = np.concatenate(known)
+    expected = _centred(np.median(usual, axis=0)[None])[0]
+    own = float(np.median(_centred(usual) @ expected))
+    return np.array(
+        [
+            float(np.median(_centred(s.layout) @ expected)) / max(own, 1e-6)
+            if len(s.layout)
+            else 0.0
+            for s in sightings
+        ]
+    )
+
+
+def _centred(layouts: Float[np.ndarray, "n P y x"]) -> Float[np.ndarray, "n q"]:
+    """Unit vectors of what stands out of each map's mean."""
+    apart = layouts - layouts.mean(axis=(2, 3), keepdims=True)
+    flat = apart.reshape(len(apart), -1)
+    return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
+
+
+def _numbers(text: str, count: int) -> set[int]:
+    """Shots by the numbers that a person gave, from 0 on."""
+    words = text.replace(",", " ").split()
+    if not all(word.isdigit() and 1 <= int(word) <= count for word in words):
+        raise KeyreconError(
+            f"Shots are named by their numbers, 1 to {count}, such as '3,5'; got '{text}'."
+        )
+    return {int(word) - 1 for word in words}

@@ -1,0 +1,176 @@
+"""A video of two points with a close-up, a replay and black between: from the file to exports."""
+
+import shutil
+import sys
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from keyrecon import cli
+from keyrecon.io.formats.c3d import read_points
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.keyframes import keyframes_from_json
+from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.library import reconstruct
+from keyrecon.metrics import pa_mpjpe, read_truth
+from keyrecon.pipeline import Options, prepare, with_height
+from keyrecon.synthetic.cameras import CameraPlanOptions
+from keyrecon.synthetic.clips import JoinOptions
+from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
+from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
+
+SIZE, FPS = (480, 270), 30.0
+LENGTH, SECOND = 60, 75
+"""Frames of each point, and where the second begins in what was rendered."""
+CLOSE_UP, BLACK, REPLAY = 24, 20, 30
+FIRST_OF_SECOND = LENGTH + CLOSE_UP + BLACK + REPLAY
+FRAMES = FIRST_OF_SECOND + LENGTH
+BUDGET = 0.06
+POINTS = slice(0, LENGTH), slice(FIRST_OF_SECOND, FRAMES)
+
+
+def keyrecon(*words):
+    """Run the command line in this process; returns its exit code."""
+    before, sys.argv = sys.argv, ["keyrecon", *map(str, words)]
+    try:
+        cli.main()
+    except SystemExit as stop:
+        return stop.code or 0
+    finally:
+        sys.argv = before
+    return 0
+
+
+def closer(picture):
+    return cv2.resize(picture[60:128, 180:300], SIZE, interpolation=cv2.INTER_LINEAR)
+
+
+def in_file(values):
+    """Truths of the rendered frames, by frames of the joined file; 0 elsewhere."""
+    spread = np.zeros((FRAMES, *values.shape[1:]), values.dtype)
+    for part, first in zip(POINTS, (0, SECOND), strict=True):
+        spread[part] = values[first : first + LENGTH]
+    return spread
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """(project, motion, what the commands said, truth of the rendered, its folder)."""
+    folder = tmp_path_factory.mktemp("match")
+    camera = CameraPlanOptions(width=SIZE[0], height=SIZE[1], player_px=150.0)
+    scene = SceneOptions(seed=2, camera=camera, workers=1)
+    length = JoinOptions(seconds=(SECOND + LENGTH) / FPS, fps=FPS)
+    synthesize(folder, (), SynthOptions(scene, length))
+    pictures = list(open_video(folder / "video.mp4").frames())
+    joined = [
+        *pictures[:LENGTH],
+        *map(closer, pictures[20 : 20 + CLOSE_UP]),
+        *[pictures[10 + n // 3] for n in range(REPLAY)],
+        *[np.full_like(pictures[0], 14)] * BLACK,
+        *pictures[SECOND : SECOND + LENGTH],
+    ]
+    write_video(folder / "match.mp4", joined, FPS)
+    made = folder / "project"
+    assert keyrecon("new", folder / "match.mp4", "--project", made) == 0
+    clicks = [pick for pick in read_picks(folder / "picks.json") if pick.frame < LENGTH]
+    Workspace(made).add_picks(clicks)
+    assert keyrecon("keyframes", made, "--budget", BUDGET) == 0
+    truth = read_truth(folder / "truth.npz")
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    marks = mark_from_truth(
+        asked,
+        *(in_file(truth[name]) for name in ("points2d", "points3d", "visible")),
+        MarkOptions(noise=1.0),
+    )
+    write_coco(folder / "marks.json", marks, SIZE)
+    assert keyrecon("import", made, folder / "marks.json") == 0
+    assert keyrecon("run", made, "--height", f"{float(truth['height_m']):.2f}") == 0
+    return made, read_motion(made / "motion.npz"), truth, folder
+
+
+def test_keyframes_are_asked_for_in_points_alone_by_the_frames_of_the_file(solved):
+    made = solved[0]
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    for half in (asked.upper, asked.lower):
+        inside = [part.start <= t < part.stop for t in half.frames for part in POINTS]
+        assert sum(inside) == len(half.frames)
+        assert len(half.nearest) == FRAMES
+
+
+def test_there_is_a_motion_in_the_points_and_nothing_anywhere_else(solved):
+    motion = solved[1]
+    assert motion.stretches == POINTS
+    assert motion.cuts.tolist() == list(np.cumsum([LENGTH, CLOSE_UP, REPLAY, BLACK]))
+    elsewhere = ~motion.known
+    for name in ("points3d", "points2d", "points2d_propagated", "scale", "expected_error"):
+        assert np.isnan(getattr(motion, name)[elsewhere]).all(), name
+    assert (motion.confidence[elsewhere] == 0).all()
+
+
+def test_each_point_is_as_good_as_when_it_is_run_by_itself(solved):
+    _, motion, truth, folder = solved
+    height = float(truth["height_m"])
+    for part, first in zip(POINTS, (0, SECOND), strict=True):
+        video = open_video(folder / "video.mp4", first, first + LENGTH)
+        clicks = [
+            replace(pick, frame=pick.frame - first)
+            for pick in read_picks(folder / "picks.json")
+            if first <= pick.frame < first + LENGTH
+        ]
+        options = with_height(Options(), height)
+        options = replace(options, keyframes=replace(options.keyframes, budget=BUDGET))
+        preparation = prepare(video, clicks, options)
+        own = {name: truth[name][first : first + LENGTH] for name in truth if truth[name].ndim > 1}
+        marks = mark_from_truth(
+            preparation.keyframes,
+            *(own[name] for name in ("points2d", "points3d", "visible")),
+            MarkOptions(noise=1.0),
+        )
+        alone = reconstruct(preparation, marks, options)
+        together = pa_mpjpe(motion.points3d[part], own["points3d"])
+        assert together < pa_mpjpe(alone.points3d, own["points3d"]) + 0.003
+
+
+def test_exports_hold_nothing_where_nobody_is(solved, tmp_path):
+    made, motion, _, _ = solved
+    files = [tmp_path / f"match.{suffix}" for suffix in ("trc", "c3d", "csv", "json", "bvh", "glb")]
+    assert keyrecon("export", made, *files) == 0
+    trc = (tmp_path / "match.trc").read_text().splitlines()[6:]
+    empty = np.array([not "".join(line.split("\t")[2:]) for line in trc])
+    np.testing.assert_array_equal(empty, ~motion.known)
+    markers, _ = read_points(tmp_path / "match.c3d")
+    for points in markers.values():
+        np.testing.assert_array_equal(np.isnan(points).all(axis=1), ~motion.known)
+    bvh = (tmp_path / "match.bvh").read_text().splitlines()[-FRAMES:]
+    assert len(set(bvh[LENGTH - 1 : FIRST_OF_SECOND])) == 1
+    assert "nan" not in "".join(bvh).lower()
+
+
+def test_the_overlay_draws_nobody_where_nobody_is(solved, tmp_path):
+    made = solved[0]
+    assert keyrecon("export", made, tmp_path / "overlay.mp4") == 0
+    drawn = list(open_video(tmp_path / "overlay.mp4").frames())
+    plain = list(open_video(solved[3] / "match.mp4").frames())
+    changed = [np.abs(a.astype(int) - b)[:200].mean() for a, b in zip(drawn, plain, strict=True)]
+    assert min(changed[0], changed[FIRST_OF_SECOND]) > 2 * max(changed[LENGTH:FIRST_OF_SECOND])
+
+
+def test_the_report_tells_the_shots(solved):
+    report = (solved[0] / "report.html").read_text()
+    assert "5 shots, 2 usable" in report
+    assert "slow motion" in report
+
+
+def test_a_shot_that_was_left_out_can_be_asked_for_by_its_number(solved, tmp_path):
+    made = tmp_path / "project"
+    shutil.copytree(solved[0], made)
+    assert keyrecon("keyframes", made, "--shots.use", "3", "--budget", BUDGET) == 0
+    asked = keyframes_from_json((made / "keyframes.json").read_text())
+    replay = slice(LENGTH + CLOSE_UP, LENGTH + CLOSE_UP + REPLAY)
+    assert asked.upper.represented[replay].any()
