@@ -1,7 +1,11 @@
 """What `keyrecon keyframes` does to a project folder, and what it tells of the keyframes."""
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import UInt8
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.app.preparing import describe_shots, prepare_project
@@ -9,6 +13,7 @@ from keyrecon.app.project import counted, load_annotations
 from keyrecon.errors import quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
+from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
@@ -17,6 +22,7 @@ from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
+from keyrecon.timeline import part_of_video
 from keyrecon.uncertainty import unsure_track
 
 
@@ -118,10 +124,21 @@ def _describe_absence(preparation: Preparation) -> list[str]:
 def write_keyframe_pictures(
     workspace: Workspace, preparation: Preparation, progress: Progress
 ) -> None:
-    """One PNG per keyframe, named by frame number as labelling tools keep it."""
+    """One PNG per keyframe, named by frame number as labelling tools keep it.
+
+    The video is read once from the first to the last: to seek each by itself decodes as many
+    frames before it as lie between two that stand alone, 250 in most files.
+    """
     make_folder(workspace.pictures)
-    frames = preparation.keyframes.frames.tolist()
-    for frame in progress(frames, "Writing keyframe pictures", len(frames)):
-        path = workspace.pictures / f"frame_{frame:06d}.png"
-        if not path.exists():
-            write_picture(path, preparation.video.frame(frame))
+    frames = preparation.keyframes.frames
+    paths = {int(t): workspace.pictures / f"frame_{t:06d}.png" for t in frames}
+    missing = [t for t, path in paths.items() if not path.exists()]
+    if not missing:
+        return
+    pictures = part_of_video(preparation.video, np.array(missing)).frames()
+    shown = progress(pictures, "Writing keyframe pictures", len(missing))
+
+    def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:
+        write_picture(paths[entry[0]], entry[1])
+
+    deque(side_by_side(write, zip(missing, shown, strict=True)), maxlen=0)

@@ -14,6 +14,7 @@ import hashlib
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +42,8 @@ MAX_PIXELS = 1 << 26
 """Of a picture: twice those of 8K video."""
 MIN_FPS, MAX_FPS = 0.05, 100_000.0
 """Frames per second of a video, from time lapse to high-speed cameras."""
+SOUGHT_SECONDS, SOUGHT_FRAMES = 4.0, 100
+"""A gap between frames of a video of parts that is longer is jumped over, not decoded."""
 MIN_DISTINCT = 0.9
 """Share of pictures that must have a time of their own; of others with the same, one is shown."""
 PICTURES = ("image2", "_pipe")
@@ -113,6 +116,13 @@ class Video:
         stop = len(self) if stop is None else min(stop, len(self))
         if start >= stop:
             return
+        apart = np.diff(self.time[start:stop])
+        gaps = np.flatnonzero(apart > max(SOUGHT_SECONDS, SOUGHT_FRAMES / self.fps)) + 1
+        for first, last in pairwise([start, *(start + gaps).tolist(), stop]):
+            yield from self._decoded_run(first, last)
+
+    def _decoded_run(self, start: int, stop: int) -> Iterator[av.VideoFrame]:
+        """Frames that are decoded one after the other, those between them too."""
         wanted = self.stamps[start:stop]
         found = 0
         with _open(self.path) as container:

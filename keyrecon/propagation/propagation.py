@@ -151,7 +151,9 @@ def propagate_joints(
         return _with_marks(annotations, annotations.visible, tracks)
     tracks = _propagate_fused(preparation, annotations, options, progress)
     if flow is not None:
-        body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
+        body_frame = stabilise_shots(
+            preparation.track, preparation.camera, preparation.shots, preparation.video.fps
+        )
         bounds = bound_bones(annotations, body_frame)
         tracks = with_flow(tracks, flow, preparation.track.height, bounds)
     return _with_marks(annotations, marked, tracks)

@@ -9,6 +9,7 @@ import base64
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -16,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d
 
-from keyrecon.io.frame_reader import reduce_picture
+from keyrecon.io.frame_reader import read_small, reduce_picture, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
@@ -110,23 +111,27 @@ def cut_pictures(
     stills: dict[int, str] = {}
     marked: dict[int, str] = {}
 
+    def cut(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> UInt8[np.ndarray, "side side 3"]:
+        frame, picture = entry
+        if frame in annotations.frames:
+            row = int(np.searchsorted(annotations.frames, frame))
+            marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
+        crop = _posed_crop(windows, frame, picture, motion, SIDE)
+        if frame in even or frame in instants:
+            stills[frame] = jpeg_uri(crop)
+        return crop
+
     def crops() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-        frames = progress(video.frames(0, count), "Cutting pictures for the report", count)
-        for frame, picture in enumerate(frames):
-            if frame in annotations.frames:
-                row = int(np.searchsorted(annotations.frames, frame))
-                marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
-            crop = _posed_crop(windows, frame, picture, motion, SIDE)
-            if frame in even or frame in instants:
-                stills[frame] = jpeg_uri(crop)
-            yield crop
+        frames = islice(read_small(video, video.width), count)
+        shown = progress(frames, "Cutting pictures for the report", count)
+        yield from side_by_side(cut, enumerate(shown))
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         write_video(path, crops(), motion.fps, CLIP_QUALITY)
         clip = video_uri(path.read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
-    return Pictures(shown[0], shown[1], marked, clip)
+    return Pictures(shown[0], shown[1], dict(sorted(marked.items())), clip)
 
 
 def video_uri(content: bytes) -> str:

@@ -164,12 +164,12 @@ def estimate_camera_motion(
     beside it (`CameraPath.cuts`).
     """
     detector = CutDetector()
-    path = _estimate_path(video, options, progress, detector)
+    path = estimate_shot_motion(video, options, progress, detector)
     if not detector.cuts:
         return path
     shots = Shots.between(tuple(detector.cuts), len(video))
     parts = progress(shots.parts, "Estimating the camera's motion in each shot", len(shots.parts))
-    paths = [_estimate_path(part_of_video(video, part), options) for part in parts]
+    paths = [estimate_shot_motion(part_of_video(video, part), options) for part in parts]
     return CameraPath(
         np.concatenate([path.to_reference for path in paths]),
         np.concatenate([path.confidence for path in paths]),
@@ -177,13 +177,16 @@ def estimate_camera_motion(
     )
 
 
-def _estimate_path(
+def estimate_shot_motion(
     video: Video,
-    options: CameraMotionOptions,
+    options: CameraMotionOptions = CameraMotionOptions(),
     progress: Progress = silent,
     detector: CutDetector | None = None,
 ) -> CameraPath:
-    """The path of one shot; of several, as the `detector` finds, it means nothing."""
+    """The same for a video that is known to be one shot, such as pictures far apart in time.
+
+    A `detector` looks at all frames; where it finds cuts, the path means nothing.
+    """
     width = min(options.width, video.width)
     shape = (round(video.height * width / video.width), width)
 

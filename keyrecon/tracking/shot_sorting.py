@@ -149,10 +149,10 @@ def sort_shots(
             shows.append("black")
         elif part.stop - part.start < options.shortest * fps:
             shows.append("too short")
-        elif seen.track is None:
-            shows.append("nobody found")
         elif seen.repeated > usual + MORE_REPEATED:
             shows.append("slow motion")
+        elif seen.track is None:
+            shows.append("nobody found")
         else:
             shows.append(PLAYER if likeness[number] >= options.alike else "somebody else")
     if PLAYER not in shows:

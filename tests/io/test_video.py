@@ -10,6 +10,7 @@ from keyrecon import KeyreconError
 from keyrecon.io.frame_reader import read_grey, read_small
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.video import open_video
+from keyrecon.timeline import part_of_video
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -191,3 +192,18 @@ def test_damage_inside_a_file_names_the_frame(write_numbered, tmp_path):
 def test_a_trim_that_does_not_fit_is_refused(write_numbered):
     with pytest.raises(KeyreconError, match="has 60 frames"):
         open_video(write_numbered("short.mp4", EVEN), start=70)
+
+
+@pytest.mark.parametrize("longest", [1e9, 3], ids=["decoded through", "jumped over"])
+def test_a_video_of_parts_has_their_pictures_whatever_lies_between(
+    write_numbered, monkeypatch, longest
+):
+    whole = open_video(write_numbered("whole.mp4", EVEN, {"g": "10"}))
+    monkeypatch.setattr("keyrecon.io.video.SOUGHT_SECONDS", 0.0)
+    monkeypatch.setattr("keyrecon.io.video.SOUGHT_FRAMES", longest)
+    frames = np.r_[3:6, 21:24, 50, 58:60]
+    part = part_of_video(whole, frames)
+    assert [read_number(p) for p in part.frames()] == frames.tolist()
+    assert [read_number(p) for p in part.chosen_frames({1, 4, 6}, 6)] == [4, 22, 50]
+    assert read_number(part.frame(7)) == 58
+    np.testing.assert_allclose(part.time, whole.time[frames])

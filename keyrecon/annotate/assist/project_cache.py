@@ -32,7 +32,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, prepare
 from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick, Preparation
 from keyrecon.segmentation.color_model import learn_colors
-from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.tracking.camera_motion import estimate_shot_motion
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -116,7 +116,7 @@ class ProjectCache:
 
     def _cut_strip(self, frames: tuple[int, ...]) -> tuple[Strip, CameraPath]:
         strip = cut_strip(self.video, frames)
-        return strip, estimate_camera_motion(strip)
+        return strip, estimate_shot_motion(strip)
 
     def suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
         """Where the joints of a frame probably are; None while nothing else is annotated."""

@@ -32,7 +32,7 @@ def cache(folder, monkeypatch):
     monkeypatch.setattr(project_cache, "learn_colors", lambda video, picks: make(Colors, picks))
     monkeypatch.setattr(project_cache, "cut_strip", lambda video, frames: make(Strip, frames))
     path = object.__new__(CameraPath)
-    monkeypatch.setattr(project_cache, "estimate_camera_motion", lambda strip: path)
+    monkeypatch.setattr(project_cache, "estimate_shot_motion", lambda strip: path)
     return cache
 
 
