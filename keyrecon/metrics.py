@@ -143,7 +143,8 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
     """Accuracy over the joints that both have, matched by name; truth as `read_truth` gives it.
 
     The root is midway between the hips. A motion in body heights is scaled to the truth by one
-    factor for the whole sequence first. Raises KeyreconError when frames or joints do not match.
+    factor for the whole sequence first. Of a video of several shots, frames of those that were of
+    no use are left out. Raises KeyreconError when frames or joints do not match.
     """
     ours, theirs, names = _match_joints(motion.skeleton.names, truth["joint_names"])
     if len(motion.points3d) != len(truth["points3d"]):
@@ -152,16 +153,17 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
             f"{len(truth['points3d'])}; evaluate against the truth of the same video and trim."
         )
     root = [names.index("right_hip"), names.index("left_hip")]
-    points, known = motion.points3d[:, ours], truth["points3d"][:, theirs]
+    used = slice(None) if motion.cuts is None else motion.known
+    points, known = motion.points3d[used][:, ours], truth["points3d"][used][:, theirs]
     scaled = motion.units != "m"
     if scaled:
         scale = _best_scale(_centred(points, root), _centred(known, root), axes=(0, 1, 2))
         points = points * scale
     points, known = 1000 * points, 1000 * known
-    pixels, known_pixels = motion.points2d[:, ours], truth["points2d"][:, theirs]
+    pixels, known_pixels = motion.points2d[used][:, ours], truth["points2d"][used][:, theirs]
     torso = (names.index("right_hip"), names.index("left_shoulder"))
     errors = joint_errors(points, known, root)
-    variation = limb_variation(motion.points3d, motion.skeleton.bones)
+    variation = limb_variation(motion.points3d[used], motion.skeleton.bones)
     return Scores(
         mpjpe=mpjpe(points, known, root),
         n_mpjpe=n_mpjpe(points, known, root),

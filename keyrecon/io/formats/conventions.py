@@ -167,7 +167,7 @@ def _check_whole(motion: Motion) -> None:
     finite = np.isfinite(motion.points3d).all(axis=2)
     missing = np.argwhere(~finite & finite.any(axis=1, keepdims=True))
     if not finite.any():
-        missing = np.argwhere(~finite)
+        raise KeyreconError("No usable shot is among these frames: there is no motion to write.")
     if len(missing):
         frame, joint = missing[0]
         raise KeyreconError(
