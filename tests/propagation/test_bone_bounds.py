@@ -11,7 +11,7 @@ from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import PoseHypotheses
 from keyrecon.propagation.propagation import with_flow
 from keyrecon.propagation.selection import choose_limbs
-from keyrecon.records import FlowTracks, JointTracks
+from keyrecon.records import FlowTracks, JointTracks, Shots
 
 KNEE, ANKLE = LSP14.index("left_knee"), LSP14.index("left_ankle")
 ELBOW, WRIST = LSP14.index("right_elbow"), LSP14.index("right_wrist")
@@ -75,8 +75,9 @@ def test_a_limb_that_cannot_be_that_long_is_refused_whatever_speaks_for_it():
     stretched[ankle] = pose[knee] + 1.4 * (pose[ankle] - pose[knee])
     joints = np.tile(np.stack([stretched, pose]), (5, 1, 1))
     cost, longest = np.tile([0.0, 0.5], (5, 1)), 1.1 * bone_lengths(pose, legs.bones)
+    one_shot = Shots.between((), 5)
     found = {
-        limit: choose_limbs(*choice(legs, joints, cost, scale * longest), 50.0).joints[2]
+        limit: choose_limbs(*choice(legs, joints, cost, scale * longest), one_shot, 50.0).joints[2]
         for limit, scale in (("bounded", 1.0), ("not", np.inf))
     }
     np.testing.assert_array_equal(found["bounded"], pose)
