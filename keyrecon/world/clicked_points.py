@@ -25,6 +25,8 @@ TOLERANCE = 0.012
 careful click is off by 3 px; beyond this it is on another point."""
 CLICK_NOISE = 3.0
 """px, of a picture 1280 wide."""
+ON_LINE, AWAY = 0.3, 2
+"""Metres from a line within which a point lies on it, and points that must lie away from it."""
 FOCAL_LENGTHS = np.geomspace(0.5, 10.0, 14)
 """Tried, in widths of the picture."""
 USUAL_FOCAL, FOCAL_SPREAD = 1.5, 1.2
@@ -61,13 +63,33 @@ def camera_from_points(
     """The camera that sees named points at these pixels; they are all in one picture.
 
     Raises ContradictoryClicks where no camera can see them so, which names the click that does not
-    fit the others where that can be told.
+    fit the others where that can be told, and KeyreconError for points that leave the camera open.
     """
+    _check_spread(names)
     camera, error = _fit(names, pixels, shape)
     limit = TOLERANCE * shape[1]
     if camera is not None and error.max() <= limit:
         return camera
     raise ContradictoryClicks(_contradiction(names, pixels, shape))
+
+
+def _check_spread(names: Sequence[str]) -> None:
+    """Raise KeyreconError where all points but one lie on one line of the court.
+
+    Three on a line and one beside it are seven numbers for the camera's seven, none to spare: a
+    side view of a baseline and two sidelines has no more.
+    """
+    points = np.array([POINTS[name] for name in dict.fromkeys(names)])
+    for a, start in enumerate(points):
+        for end in points[a + 1 :]:
+            way = (end - start) / np.linalg.norm(end - start)
+            beside = np.linalg.norm(np.cross(points - start, way), axis=1) > ON_LINE
+            if beside.sum() < AWAY:
+                raise KeyreconError(
+                    f"The points clicked ({', '.join(dict.fromkeys(names))}) lie on one line of "
+                    "the court but for one at most, which leaves the camera open; click two that "
+                    "lie away from it, such as a service line's end or the net."
+                )
 
 
 def point_errors(

@@ -37,7 +37,8 @@ MAX_RIVAL = 0.75
 LOWEST = 0.2
 """Metres above the ground at which a camera is at least."""
 ASK = (
-    "click points of the court that can be seen, four or more, with --point NAME:FRAME:X,Y "
+    "click points of the court that can be seen, four or more and not all on one line, with "
+    "--point NAME:FRAME:X,Y "
     "(names: near-left, near-right, net-middle, near-service, ...)."
 )
 NO_COURT = f"No tennis court was found; if one can be seen, {ASK}"

@@ -38,6 +38,15 @@ def test_left_and_right_exchanged_are_told_of():
         camera_from_points(mirrored, clicked(NAMES), SHAPE)
 
 
+def test_points_on_one_line_leave_the_camera_open():
+    names = ("near-left", "near-left-singles", "near-mark", "near-right")
+    for more in ((), ("near-service",)):
+        with pytest.raises(KeyreconError, match="click two that lie away from it"):
+            camera_from_points(names + more, clicked(names + more), SHAPE)
+    enough = (*names, "near-service", "near-right-service")
+    assert np.median(court_error(camera_from_points(enough, clicked(enough), SHAPE), TRUTH)) < 1.5
+
+
 def test_four_that_contradict_one_another_ask_for_a_fifth():
     names = ("near-left", "near-right", "far-right", "far-left")
     pixels = clicked(names)

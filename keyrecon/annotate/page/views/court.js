@@ -125,7 +125,7 @@ export function createCourt(model, { frames, shell }) {
     const count = court.clicks.length,
       point = selection.point && namedInWords(selection.point);
     if (shell.runningJob()?.kind === "court") return ["The court is being looked for", ""];
-    if (view?.fault) return ["These points contradict one another", view.fault];
+    if (view?.fault) return ["These points do not tell the camera", view.fault];
     if (court.changed)
       return [
         count < court.fewest ? `Click ${point}` : "Do the yellow lines lie on the painted ones?",
