@@ -160,6 +160,7 @@ class Workspace:
 
     def note_fitted(self, evidence: str) -> None:
         """Remember from what the last golf fit was made."""
+        self._fitted_file.parent.mkdir(exist_ok=True)
         write_durably(self._fitted_file, evidence)
 
     def is_fitted(self) -> bool:

@@ -7,8 +7,12 @@ import numpy as np
 
 from keyrecon.app.project import start
 from keyrecon.body import LSP14
+from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.records import RecordedSwing
+from keyrecon.io.formats.clicks import write_clicks
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import HalfKeyframes, Keyframes, Motion
@@ -92,10 +96,10 @@ def follow_at_once(folder, options, progress):
     return "Followed."
 
 
-def write_true_motion(folder):
-    """The motion that is known, and a report, as a run leaves them."""
+def true_motion():
+    """The motion that is known."""
     points3d, points2d = truth()
-    motion = Motion(
+    return Motion(
         skeleton=LSP14,
         points3d=points3d,
         points2d=points2d,
@@ -108,7 +112,11 @@ def write_true_motion(folder):
         units="m",
         keyframes=np.array([10, 40, 70]),
     )
-    write_motion(folder / "motion.npz", motion)
+
+
+def write_true_motion(folder):
+    """The motion that is known, and a report, as a run leaves them."""
+    write_motion(folder / "motion.npz", true_motion())
     script = """<script>
       let seen = "a cookie";
       try { document.cookie; } catch { seen = "no cookie"; }
@@ -122,3 +130,34 @@ def run_at_once(folder, options, progress):
     (folder / "told.json").write_text(json.dumps(options))
     write_true_motion(folder)
     return ""
+
+
+ADDRESS = {
+    "head_top": (160.0, 40.0), "root": (160.0, 142.0), "right_knee": (142.0, 192.0),
+    "left_knee": (178.0, 192.0), "right_ankle": (138.0, 240.0), "left_ankle": (182.0, 240.0),
+}  # fmt: skip
+"""Six joints as a golfer has them at the address."""
+CLUB = np.array([[300.0, 120.0], [420.0, 200.0]])
+"""Both ends of a club in all frames, px."""
+
+
+def make_golf_project(folder, video_file, doubts=()):
+    """A golf project with its clicks and a fit, which is the motion that is known."""
+    start(video_file, folder, golf=True)
+    write_clicks(folder / "golf_clicks.json", GolfClicks(3, SIZE, ADDRESS))
+    motion = true_motion()
+    swing = RecordedSwing(
+        motion=motion,
+        club=np.concatenate([motion.points3d[:, :1], motion.points3d[:, :1] + 1], axis=1),
+        club2d=np.tile(CLUB, (FRAMES, 1, 1)),
+        club_seen=np.ones(FRAMES, dtype=bool),
+        keys=np.array([10.0, 40.0, 48.0, 70.0]),
+        vertical=np.array([0.0, -1.0, 0.0]),
+        left_handed=False,
+        doubts=tuple(doubts),
+    )
+    workspace = Workspace(folder)
+    workspace.note_fitted(workspace.golf_evidence())
+    (folder / "report.html").write_text("<!doctype html><body>A report</body>")
+    write_swing(folder / "motion.npz", swing)
+    return folder

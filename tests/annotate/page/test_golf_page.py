@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page_driver import CHROMIUM, Person, serving
+from golfer import Golfer
+from page_driver import CHROMIUM, serving
 
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.app.annotator import job_commands
@@ -25,22 +26,6 @@ pytestmark = pytest.mark.skipif(
 )
 QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 ORDER = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
-
-
-class Golfer(Person):
-    """Somebody at the pages of a golf swing."""
-
-    def on_screen(self, place):
-        view = self.page.get_attribute("body", "data-view")
-        picture = f"#{view}-picture"
-        scale, x, y = map(float, self.page.get_attribute(picture, "data-view").split())
-        box = self.page.locator(picture).bounding_box()
-        return box["x"] + scale * place[0] + x, box["y"] + scale * place[1] + y
-
-    def await_frame(self, view, frame):
-        self.page.wait_for_selector(f"#{view}-picture[data-frame='{frame}']")
-        self.await_text(f"#{view}-where", rf"frame {frame} of")
-        self.await_drawn()
 
 
 @pytest.fixture(scope="module")

@@ -92,7 +92,6 @@ def test_a_fit_is_fresh_until_something_else_is_told(session):
     click(session)
     folder = session.workspace
     assert not folder.is_fitted()
-    folder.stages.folder.mkdir(exist_ok=True)
     folder.note_fitted(folder.golf_evidence())
     assert folder.is_fitted()
     edit(session, shaft(4, [1, 2, 3, 4]))
