@@ -29,9 +29,10 @@ import numpy as np
 from keyrecon.app.golf_recipe import refine_fit
 from keyrecon.app.golf_training import read_swings
 from keyrecon.body import LSP14
+from keyrecon.golf.candidates import find_candidates, place_in_film
 from keyrecon.golf.clicks import ClickedPose, GolfClicks, clicked_pose
 from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
-from keyrecon.golf.observation import observe_swing, place_in_film
+from keyrecon.golf.observation import observe_swing
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.prior.captured_swing import change_swing
 from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
@@ -152,7 +153,8 @@ def observe(video: Video, pose: ClickedPose, model: MotionModel, folder: Path) -
         camera = estimate_camera_motion(video)
         film = choose_frames(video, camera, pose.frame)
         scene = observe_scene(video, film, place_in_film(pose, film))
-        observed = observe_swing(video, film, scene, pose, NO_MARKS, model)
+        (likeliest, *_) = find_candidates(scene, pose, NO_MARKS, model)
+        observed = observe_swing(video, scene, likeliest, pose, NO_MARKS, model)
         if not observed.film.is_whole(video):
             raise SystemExit(f"{folder.name}: frames were left out of a film that has no repeats.")
         save_record(file, observed.observations)

@@ -1,8 +1,9 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
+from keyrecon.golf.candidates import find_candidates, place_in_film
 from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.observation import observe_swing, place_in_film
+from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
@@ -40,23 +41,24 @@ def find_swing(
         "scene", observe_scene, video, film, place_in_film(pose, film),
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
-    observed = keep(
-        "observe", observe_swing, video, film, scene, pose, marks, model,
-        options=options.observation, progress=progress,
-    )  # fmt: skip
-    check_direction(observed.observations, place_in_film(pose, observed.film), model, "The clicks")
-    shown = observed.film.open(video)
-    tried: list[tuple[FittedSwing, Observations, list[SwingDoubt]]] = []
-    for number, candidate in enumerate(observed.candidates[: options.candidates]):
-        first = candidate.of(observed.observations)
+    candidates = keep("search", find_candidates, scene, pose, marks, model)
+    tried: list[tuple[FittedSwing, Observations, list[SwingDoubt], ObservedSwing]] = []
+    for number, candidate in enumerate(candidates[: options.candidates], 1):
+        observed = keep(
+            f"observe_{number}", observe_swing, video, scene, candidate, pose, marks, model,
+            options=options.observation, progress=progress,
+        )  # fmt: skip
+        first, shown = observed.observations, observed.film.open(video)
+        if number == 1:
+            check_direction(first, place_in_film(pose, observed.film), model, "The clicks")
         fitted, observations = fit_candidate(
-            first, shown, model, options, keep, progress, suffix=f"_{number + 1}"
+            first, shown, model, options, keep, progress, suffix=f"_{number}"
         )
         doubts = find_doubts(fitted, first)
-        tried.append((fitted, observations, doubts))
+        tried.append((fitted, observations, doubts, observed))
         if not doubts or options.method == "windows":
             break
-    fitted, observations, doubts = min(tried, key=lambda t: len(t[2]))
+    fitted, observations, doubts, observed = min(tried, key=lambda t: len(t[2]))
     return keep(
         "found", swing_found, fitted, observations, tuple(doubts), observed, marks, video, model
     )

@@ -31,10 +31,10 @@ SAME_MOMENT = 1e-6
 def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
     """Marks of a file's frames in the picture and by the frame numbers of a film.
 
-    What lies outside of the film's shot stays away; of two marked frames that are one there, the
+    What lies outside of these frames stays away; of two marked frames that are one there, the
     later one counts.
     """
-    first, last = film.shot
+    first, last = film.window
     inside = (marks.frames >= first) & (marks.frames <= last)
     frames = marks.frames[inside]
     own = np.rint(film.place[frames]).astype(int)

@@ -1,9 +1,10 @@
 """Everything that is observed of a swing before the motion model is fitted to it.
 
-The player's masks and what may be his club (`scene`) together tell where the swing is
-(`fit.swing_search`), and the club of each swing that it may be when it passes its key postures. One
-pass over reduced pictures, all at once in memory, tracks joints and matches points of the player's
-surface. What a person marked holds throughout (`marks`).
+Of all that the film shows (`scene`) those frames are taken in which a swing was found
+(`candidates`). Its club, the cheapest path through what may be one, tells when it passes its key
+postures. One pass over reduced pictures, all at once in memory, tracks joints, from the clicked
+frame on wherever that is, and matches points of the player's surface. What a person marked holds
+throughout (`marks`).
 """
 
 from collections.abc import Sequence
@@ -13,17 +14,11 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from keyrecon.errors import KeyreconError
+from keyrecon.body import LSP14
+from keyrecon.golf.candidates import choose_swing_frames, find_slow_motion, place_in_film
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.fit.handedness import (
-    mirror_evidence,
-    mirror_initial,
-    mirror_marks,
-    mirror_pixels,
-)
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
-from keyrecon.golf.fit.swing_path import SearchLimits
-from keyrecon.golf.fit.swing_search import SwingEvidence, SwingHypothesis, search_swing
+from keyrecon.golf.fit.swing_search import SwingHypothesis
 from keyrecon.golf.marks import (
     correct_tracks,
     hold_keys,
@@ -33,18 +28,16 @@ from keyrecon.golf.marks import (
 )
 from keyrecon.golf.observe.appearance_tracker import AppearanceOptions
 from keyrecon.golf.observe.club import Club, ClubOptions, track_club
-from keyrecon.golf.observe.film import Film, frame_step
+from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.foreground import Foreground, FrameForeground
-from keyrecon.golf.observe.joint_tracks import track_joints
+from keyrecon.golf.observe.joint_tracks import TrackedJoints, track_joints
 from keyrecon.golf.observe.point_matches import MatchOptions, match_points
-from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.golf.observe.swing_events import (
     TimingOptions,
     interpolate_times,
     refine_key_frames,
 )
-from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, Matches, MotionModel, Observations, SwingMarks
+from keyrecon.golf.records import Matches, MotionModel, Observations, SwingMarks
 from keyrecon.golf.scene import SwingScene, SwingSceneOptions
 from keyrecon.io.frame_reader import read_small, side_by_side
 from keyrecon.io.video import Video
@@ -85,177 +78,145 @@ class ObservationOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class SwingCandidate:
-    """A swing that may be in a film: its club and its key postures."""
-
-    club: Float[np.ndarray, "T 2 2"]
-    club_along: Float[np.ndarray, "T 2"]
-    keys: Float[np.ndarray, "4"]
-    phase: Float[np.ndarray, "T"]
-    cost: float
-    """How badly the search found it to explain the film."""
-
-    def of(self, observations: Observations) -> Observations:
-        """The observations if this is the swing."""
-        return hold_observations(replace(
-            observations, club=self.club, club_along=self.club_along, keys=self.keys,
-            phase=self.phase,
-        ))  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class ObservedFilm:
-    """What is observed in a film, and the swings that it may show."""
+class ObservedSwing:
+    """A swing that a film may show, and what is observed of it."""
 
     film: Film
-    """The frames that were observed."""
+    """The frames that were observed: those of the swing."""
     slow_motion: float
     """By how much the film is slowed down beyond what was told."""
     observations: Observations
-    """Those of the likeliest swing."""
-    candidates: tuple[SwingCandidate, ...]
-    """The likeliest first."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What is seen of a swing, and in the frames between it and the clicks."""
+
+    film: Film
+    """The swing's frames."""
+    scene: SwingScene
+    """Of all frames."""
+    chosen: Int[np.ndarray, "T"]
+    """Which of them are the swing's."""
+    reach: Int[np.ndarray, "R"]
+    """Which of them are tracked through: besides these all from the clicked one on."""
+    marks: SwingMarks
+    pose: ClickedPose
+    """In the film, or at its end if it was clicked in no frame of the swing."""
+
+    @property
+    def height(self) -> float:
+        """Of the player, px."""
+        return self.scene.foreground.height
 
 
 def observe_swing(
     video: Video,
-    film: Film,
     scene: SwingScene,
+    hypothesis: SwingHypothesis,
     pose: ClickedPose,
     marks: SwingMarks,
     model: MotionModel,
     options: ObservationOptions = ObservationOptions(),
     progress: Progress = silent,
-) -> ObservedFilm:
-    """Observations of the frames of a film of a video, and the swings in it.
+) -> ObservedSwing:
+    """Observations of the frames in which a film of a video shows a swing by some hypothesis.
 
-    `scene` is what the film shows, `pose` and `marks` are those of the file's frames. Raises
-    KeyreconError where no swing is observed.
+    `scene` is what the film shows, `pose` and `marks` are those of the file's frames.
     """
-    whole, placed = film.open(video), place_in_film(pose, film)
-    players, height = scene.players, scene.foreground.height
-    evidence = SwingEvidence(players, scene.foreground.shrink, height, scene.shafts, film.fps)
-    found = _search(evidence, placed, place_marks(marks, film), model, whole.width)
-    slow_motion = find_slow_motion(found[0].keys, film.fps)
-    chosen = np.arange(0, len(whole), frame_step(film.fps * slow_motion))
-    film = film.take(chosen, slow_motion)
-    own = place_marks(marks, film)
-    kept = _Kept(
-        replace(scene.foreground, likely=scene.foreground.likely[chosen]), players[chosen],
-        hold_shafts([scene.shafts[t] for t in chosen], own), place_in_film(pose, film), own, film,
-    )  # fmt: skip
-    candidates = tuple(_candidate(h, kept, chosen, model, options) for h in found)
-    observations = _observe(film.open(video), kept, candidates[0], options, progress)
-    return ObservedFilm(film, slow_motion, observations, candidates)
+    film = scene.film
+    slow_motion = find_slow_motion(hypothesis.keys, film.fps)
+    chosen = choose_swing_frames(hypothesis.keys, film, slow_motion)
+    reach = _reach_to(round(float(film.place[pose.frame])), chosen)
+    own, tracked = film.take(chosen, slow_motion), film.take(reach, slow_motion)
+    placed = place_in_film(pose, own)
+    seen = _Seen(own, scene, chosen, reach, place_marks(marks, own), placed)
+    shown = tracked.open(video)
+    small = read_small(shown, scene.foreground.likely.shape[2])
+    pictures = [to_lab(p) for p in progress(small, "Reading", len(shown))]
+    foreground = replace(scene.foreground, likely=scene.foreground.likely[reach])
+    tracks = track_joints(
+        pictures, foreground, place_in_film(pose, tracked), own.fps, options.appearance, progress
+    )
+    rows = np.searchsorted(reach, chosen)
+    inside = TrackedJoints(tracks.joints[rows], tracks.spread[rows])
+    if len(rows) != len(reach):
+        seen = replace(seen, pose=_carry(placed, inside))
+    swing = _time_swing(hypothesis, seen, model, options)
+    observations = _observe([pictures[row] for row in rows], seen, inside, swing, options)
+    return ObservedSwing(own, slow_motion, observations)
+
+
+def _reach_to(clicked: int, chosen: Int[np.ndarray, "T"]) -> Int[np.ndarray, "R"]:
+    """The frames of a swing and those between it and the clicked one, at the same steps."""
+    first, last = int(chosen[0]), int(chosen[-1])
+    step = int(chosen[1]) - first if len(chosen) > 1 else 1
+    before = np.maximum(np.arange(first, min(first, clicked) - step, -step), min(first, clicked))
+    after = np.minimum(np.arange(last, max(last, clicked) + step, step), max(last, clicked))
+    return np.unique(np.concatenate([before, chosen, after]))
+
+
+def _carry(pose: ClickedPose, tracks: TrackedJoints) -> ClickedPose:
+    """Clicks that were made before or after a swing where they were tracked to, at its end.
+
+    Those that were not tracked moved as the others did.
+    """
+    joints = pose.joints
+    there = np.array([
+        tracks.joints[joints.frame, LSP14.index(n)] if n in LSP14.names else (np.nan, np.nan)
+        for n in joints.names
+    ])  # fmt: skip
+    known = np.isfinite(there).all(axis=1)
+    moved = np.median((there - joints.places)[known], axis=0) if known.any() else np.zeros(2)
+    places = np.where(known[:, None], there, joints.places + moved)
+    return replace(pose, joints=replace(joints, places=places))
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """What was observed in the frames that are fitted."""
+class _TimedSwing:
+    """The club of a swing, and when it passes its key postures."""
 
-    foreground: Foreground
-    players: Bool[np.ndarray, "T h w"]
-    shafts: list[ShaftHypotheses]
-    pose: ClickedPose
-    marks: SwingMarks
-    film: Film
+    shaft: "_Shaft"
+    keys: Float[np.ndarray, "4"]
+    phase: Float[np.ndarray, "T"]
 
 
-def place_in_film(pose: ClickedPose, film: Film) -> ClickedPose:
-    """A clicked pose in the picture and by the frame numbers of a film."""
-    joints, camera = pose.joints, pose.camera
-    frame = round(float(film.place[joints.frame]))
-    return replace(
-        pose,
-        joints=replace(joints, frame=frame, places=joints.places + film.corner),
-        camera=replace(camera, principal=camera.principal + film.corner),
-        size=film.size,
-    )
-
-
-SLOW_DOWNSWING = 0.27
-"""Seconds that a downswing is thought to take where its length shows slow motion: between those of
-tour players and of others."""
-
-
-def find_slow_motion(keys: Float[np.ndarray, "4"], fps: float) -> float:
-    """By how much a film is slowed down in which a swing has these key postures; 1 if it is not."""
-    down = float(keys[2] - keys[1]) / fps
-    return down / SLOW_DOWNSWING if down > SearchLimits().downswing[1] else 1.0
-
-
-def _search(
-    evidence: SwingEvidence,
-    pose: ClickedPose,
-    marks: SwingMarks,
-    model: MotionModel,
-    width: int,
-) -> list[SwingHypothesis]:
-    """Swings that a film may show, in the film's own picture; left-handers are mirrored."""
-    joints, camera = pose.joints, pose.camera
-    if pose.left_handed:
-        evidence = mirror_evidence(evidence, width)
-        joints, marks = mirror_initial(joints, width), mirror_marks(marks, width)
-        camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
-    body = size_body(pose.stature)
-    found = search_swing(evidence, joints, camera, model, body, marks=marks)
-    if not found and np.isfinite(marks.keys).any():
-        raise KeyreconError(
-            "No swing of a pace that golfers have passes start, top, hit and finish where they "
-            f"were marked (frames {', '.join(f'{k:.0f}' for k in marks.keys if np.isfinite(k))} of "
-            "the fitted ones); correct these marks, or take some back."
-        )
-    if not found:
-        raise KeyreconError(
-            f"There is no swing in this video: its {len(evidence.players)} frames are too few for "
-            "one. Give a video with a whole swing, from the address to the finish."
-        )
-    if pose.left_handed:
-        found = [replace(h, club=mirror_pixels(h.club, width)) for h in found]
-    return found
-
-
-def _candidate(
-    hypothesis: SwingHypothesis,
-    kept: _Kept,
-    chosen: Int[np.ndarray, "T"],
-    model: MotionModel,
-    options: ObservationOptions,
-) -> SwingCandidate:
-    """A hypothesis with the club that was detected where it has it, and key postures by that."""
-    foreground, fps = kept.foreground, kept.film.fps
+def _time_swing(
+    hypothesis: SwingHypothesis, seen: _Seen, model: MotionModel, options: ObservationOptions
+) -> _TimedSwing:
+    """The club that was detected where a hypothesis has it, and key postures by that."""
+    fps, chosen = seen.film.fps, seen.chosen
+    shafts = hold_shafts([seen.scene.shafts[t] for t in chosen], seen.marks)
+    club = track_club(shafts, seen.height, fps, options.club, hypothesis.club[chosen])
     step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
-    club = track_club(kept.shafts, foreground.height, fps, options.club, hypothesis.club[chosen])
-    shaft = _describe_club(club, foreground.height, kept.film.size)
-    keys = refine_key_frames(club, hypothesis.keys / step, foreground.height, fps, options.timing)
-    keys = hold_keys(keys, kept.marks)
+    keys = (hypothesis.keys - chosen[0]) / step
+    keys = hold_keys(refine_key_frames(club, keys, seen.height, fps, options.timing), seen.marks)
     phase = interpolate_times(keys, model.keys, len(chosen))
-    return SwingCandidate(shaft.ends, shaft.along, keys, phase, hypothesis.cost)
+    return _TimedSwing(_describe_club(club, seen.height, seen.film.size), keys, phase)
 
 
 def _observe(
-    video: Video,
-    kept: _Kept,
-    candidate: SwingCandidate,
+    pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
+    seen: _Seen,
+    tracks: TrackedJoints,
+    swing: _TimedSwing,
     options: ObservationOptions,
-    progress: Progress,
 ) -> Observations:
-    """Everything that does not depend on which swing it is, and the likeliest swing."""
-    foreground, pose, players = kept.foreground, kept.pose, list(kept.players)
-    width = foreground.likely.shape[2]
-    pictures = [to_lab(p) for p in progress(read_small(video, width), "Reading", len(video))]
-    tracks = track_joints(pictures, foreground, pose, video.fps, options.appearance, progress)
+    """All of it in one record; `pictures` are in Lab."""
+    pose, marks = seen.pose, seen.marks
+    foreground = replace(seen.scene.foreground, likely=seen.scene.foreground.likely[seen.chosen])
+    players = list(seen.scene.players[seen.chosen])
     whole = find_whole(players)
-    return candidate.of(Observations(
+    return hold_observations(Observations(
         camera=pose.camera,
         initial=pose.joints,
         height=pose.height,
         stature=pose.stature,
-        joints=correct_tracks(tracks.joints, kept.marks, pose.frame),
+        joints=correct_tracks(tracks.joints, marks, pose.frame),
         spread=tracks.spread,
-        club=candidate.club,
-        club_spread=np.full(len(video), CLUB_SPREAD * foreground.height),
-        club_along=candidate.club_along,
+        club=swing.shaft.ends,
+        club_spread=np.full(len(players), CLUB_SPREAD * seen.height),
+        club_along=swing.shaft.along,
         foreground=tuple(
             _sample_mask(player & there, foreground)
             for player, there in zip(players, whole, strict=True)
@@ -267,10 +228,10 @@ def _observe(
             ]
         ),
         matches=_match_all([p[..., 0] for p in pictures], players, foreground, options.matches),
-        keys=candidate.keys,
-        phase=candidate.phase,
+        keys=swing.keys,
+        phase=swing.phase,
         left_handed=pose.left_handed,
-        marks=kept.marks,
+        marks=marks,
     ))  # fmt: skip
 
 

@@ -45,6 +45,7 @@ class SwingSceneOptions:
 class SwingScene:
     """What is seen in all frames of a film."""
 
+    film: Film
     foreground: Foreground
     packed_players: UInt8[np.ndarray, "T h b"]
     """The player's masks, eight pixels to a byte."""
@@ -73,7 +74,7 @@ def observe_scene(
     foreground = separate_player(shown, pose, options.foreground, progress)
     players = np.stack([foreground.frame(t).player() for t in range(len(shown))])
     shafts = detect_shafts(shown, foreground, players, pose.shoulders, options, progress)
-    return SwingScene(foreground, np.packbits(players, axis=2), tuple(shafts))
+    return SwingScene(film, foreground, np.packbits(players, axis=2), tuple(shafts))
 
 
 def detect_shafts(

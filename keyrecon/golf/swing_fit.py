@@ -26,7 +26,7 @@ from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.marks import hold_joints, hold_keys, hold_observations
-from keyrecon.golf.observation import ObservationOptions, ObservedFilm
+from keyrecon.golf.observation import ObservationOptions, ObservedSwing
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.swing_events import (
     SwingEventOptions,
@@ -164,7 +164,7 @@ def swing_found(
     fitted: FittedSwing,
     observations: Observations,
     doubts: tuple[SwingDoubt, ...],
-    observed: ObservedFilm,
+    observed: ObservedSwing,
     marks: SwingMarks,
     video: Video,
     model: MotionModel,
@@ -181,7 +181,7 @@ def swing_found(
     return FoundSwing(fitted, observations, doubts, notes)
 
 
-def _describe_film(observed: ObservedFilm, frames: int) -> list[str]:
+def _describe_film(observed: ObservedSwing, frames: int) -> list[str]:
     """What a person should know of the film, in words."""
     film, notes = observed.film, []
     if film.repeated > LEAST_REPEATED:
@@ -191,9 +191,13 @@ def _describe_film(observed: ObservedFilm, frames: int) -> list[str]:
             f"the film seems slowed down {observed.slow_motion:.1f} times; give --slowmo if you "
             "know better, since times and tempo in seconds depend on it"
         )
-    first, last = film.shot
-    if (first, last) != (0, frames - 1):
-        notes.append(f"only frames {first} to {last} show the shot that was clicked")
+    if film.shot != (0, frames - 1):
+        notes.append(f"only frames {film.shot[0]} to {film.shot[1]} show the shot that was clicked")
+    if film.window != film.shot:
+        notes.append(
+            f"the swing was found in frames {film.window[0]} to {film.window[1]}; nothing is "
+            "fitted to the others (their confidence is 0)"
+        )
     return notes
 
 

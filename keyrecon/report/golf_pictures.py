@@ -196,7 +196,8 @@ def _overlay_frames(
     video: Video, fitted: FittedSwing, camera: Camera, progress: Progress
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     for frame, picture in enumerate(progress(video.frames(), "Drawing the overlay", len(video))):
-        yield draw_overlay(picture, fitted, camera, frame)
+        fits = fitted.motion.confidence[frame].any()
+        yield draw_overlay(picture, fitted, camera, frame) if fits else picture
 
 
 def draw_overlay(

@@ -31,7 +31,6 @@ from keyrecon.golf.fit.regularisation import (
     stack_rows,
 )
 from keyrecon.golf.fit.residuals import (
-    MODEL_ERROR,
     build_capsules,
     club_residuals,
     foreground_residuals,
@@ -162,7 +161,7 @@ def follow_observations(
     factor = max(1.0, fps / INDEPENDENT_PER_SECOND)
     marks = [
         replace(block, weight=factor * block.weight)
-        for block in mark_blocks(observations, fit.body, options, HELD, 0.0)
+        for block in mark_blocks(observations, fit.body, options, HELD)
     ]
     return follow_picture(fit, [*residual_blocks(observations, initial, options), *marks], fps)
 
@@ -232,10 +231,9 @@ def mark_blocks(
     body: Body,
     options: FitOptions,
     robust: float,
-    model_error: float = MODEL_ERROR,
 ) -> list[ResidualBlock]:
     """What a person marked, in standard deviations."""
-    joints = partial(mark_residuals, observations, body, model_error=model_error)
+    joints = partial(mark_residuals, observations, body)
     shafts = partial(shaft_mark_residuals, observations, body)
     return [ResidualBlock(marks, options.weights.marks, robust) for marks in (joints, shafts)]
 

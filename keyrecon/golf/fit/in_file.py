@@ -3,7 +3,8 @@
 The film (`observe.film`) lacks frames of the file and stands still. Phases and places between the
 fitted frames follow by interpolation; a frame that repeats another has its swing. The camera's
 homographies are those of a turn and a zoom, so they turn the fitted swing in camera axes and bring
-it closer or farther.
+it closer or farther. Frames before and after the film hold its first and last posture, at a
+confidence of 0: nothing was fitted to them.
 """
 
 from dataclasses import replace
@@ -32,15 +33,16 @@ from keyrecon.numerics.geometry import warp_points
 def observations_in_file(observations: Observations, film: Film) -> Observations:
     """What was observed, in the frames and pictures of the file; masks and matches stay away."""
     back, nearest = np.linalg.inv(film.warps), np.rint(film.place).astype(int)
+    shown = np.where(film.shows, 1.0, np.nan)[:, None, None]
     initial, camera = observations.initial, observations.camera
     clicked = film.frame_in_file(initial.frame)
     return replace(
         observations,
         camera=replace(camera, principal=camera.principal - film.corner),
         initial=replace(initial, frame=clicked, places=initial.places - film.corner),
-        joints=_warp(back, observations.joints[nearest]),
+        joints=shown * _warp(back, observations.joints[nearest]),
         spread=observations.spread[nearest],
-        club=_warp(back, observations.club[nearest]),
+        club=shown * _warp(back, observations.club[nearest]),
         club_spread=observations.club_spread[nearest],
         club_along=observations.club_along[nearest],
         foreground=tuple(
@@ -69,7 +71,8 @@ def swing_in_file(
     described = describe_fit(fit, replace(real, camera=observations.camera), video.time)
     described = replace(described, keys=film.keys_in_file(fitted.keys))
     turned = _follow_camera(described, film, observations.camera, real.camera)
-    motion = replace(turned.motion, keyframes=np.array([real.initial.frame]))
+    confidence = turned.motion.confidence * film.shows[:, None]
+    motion = replace(turned.motion, keyframes=np.array([real.initial.frame]), confidence=confidence)
     return replace(turned, motion=motion)
 
 

@@ -114,19 +114,18 @@ def joint_residuals(observations: Observations, body: Body, pose: RootPose) -> R
                      frame, body.joint_segment[joint])  # fmt: skip
 
 
-def mark_residuals(
-    observations: Observations, body: Body, pose: RootPose, model_error: float = MODEL_ERROR
-) -> Residuals:
+def mark_residuals(observations: Observations, body: Body, pose: RootPose) -> Residuals:
     """Projected joints minus those that a person marked, in standard deviations.
 
-    `model_error` in metres stands against explaining the marks away; without it they hold.
+    Limbs of the model's proportions cannot meet all marks: drawn to them without `MODEL_ERROR`,
+    joints of a rendered swing down the line were 2 mm worse. `marks.hold_joints` closes the rest.
     """
     marks = observations.marks
     row, joint = np.nonzero(np.isfinite(marks.joints).all(axis=2))
     frame = marks.frames[row]
     points = find_joints(body, pose)[frame, joint]
     pixels, slope = project(points, observations.camera)
-    spread = _total_spread(np.full(len(row), MARK_SPREAD), slope, model_error)
+    spread = _total_spread(np.full(len(row), MARK_SPREAD), slope)
     values = (pixels - marks.joints[row, joint]) / spread[:, None]
     return pair_rows(values, slope / spread[:, None, None], points,
                      frame, body.joint_segment[joint])  # fmt: skip
@@ -157,12 +156,10 @@ def shaft_mark_residuals(observations: Observations, body: Body, pose: RootPose)
 
 
 def _total_spread(
-    tracked: Float[np.ndarray, "n"],
-    slope: Float[np.ndarray, "n 2 3"],
-    model_error: float = MODEL_ERROR,
+    tracked: Float[np.ndarray, "n"], slope: Float[np.ndarray, "n 2 3"]
 ) -> Float[np.ndarray, "n"]:
     """Standard deviation of tracker and model together, px."""
-    return np.hypot(tracked, model_error * slope[:, 0, 0])
+    return np.hypot(tracked, MODEL_ERROR * slope[:, 0, 0])
 
 
 def project(

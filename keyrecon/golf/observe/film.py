@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
 from keyrecon.io.frame_reader import read_grey
@@ -61,6 +61,14 @@ class Film:
     """First and last frame of the file in the shot that was clicked."""
     repeated: float
     """Share of the file's frames that repeat the one before."""
+    window: tuple[int, int]
+    """First and last frame of the file that these frames show."""
+
+    @property
+    def shows(self) -> Bool[np.ndarray, "F"]:
+        """Which frames of the file these frames show; all others come before or after."""
+        frames = np.arange(len(self.place))
+        return (frames >= self.window[0]) & (frames <= self.window[1])
 
     @property
     def fps(self) -> float:
@@ -84,8 +92,10 @@ class Film:
         first = np.searchsorted(self.place, own, side="left")
         last = np.searchsorted(self.place, own, side="right") - 1
         middles = (first + np.maximum(last, first)) / 2
-        # A film ends where its shot does, though its last frame stands for all after it.
-        middles[0], middles[-1] = max(middles[0], self.shot[0]), min(middles[-1], self.shot[1])
+        # The first and last frame stand for all before and after them, but are not among these.
+        begin, end = self.window
+        middles[0] = (begin + min(last[0], end)) / 2
+        middles[-1] = (max(first[-1], begin) + end) / 2
         return np.interp(keys, own, middles)
 
     def frame_in_file(self, frame: int) -> int:
@@ -96,9 +106,15 @@ class Film:
         """Some of these frames, `slow_motion` times faster than was thought."""
         if len(chosen) == len(self.numbers) and slow_motion == 1:
             return self
+        begin, end = self.window
+        if chosen[0] > 0:
+            begin = int(self.numbers[chosen[0]])
+        step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
+        if chosen[-1] + step < len(self.numbers):
+            end = int(self.numbers[chosen[-1] + 1]) - 1
         return replace(
             self, numbers=self.numbers[chosen], time=self.time[chosen] / slow_motion,
-            place=np.interp(self.place, chosen, np.arange(len(chosen))),
+            place=np.interp(self.place, chosen, np.arange(len(chosen))), window=(begin, end),
         )  # fmt: skip
 
 
@@ -118,8 +134,9 @@ def choose_frames(video: Video, camera: CameraPath, clicked: int) -> Film:
     steady = _steady(video, camera, clicked, inside)
     shot, repeated = (int(first), int(last)), float(repeats.mean())
     film = Film(
-        kept, time, place, steady.warps, steady.size, steady.corner, steady.still, shot, repeated
-    )
+        kept, time, place, steady.warps, steady.size, steady.corner, steady.still, shot, repeated,
+        shot,
+    )  # fmt: skip
     return film.take(np.arange(0, len(kept), frame_step(film.fps)))
 
 

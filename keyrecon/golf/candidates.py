@@ -1,0 +1,100 @@
+"""Swings that a film may show, and which of its frames each of them takes.
+
+The whole film is searched (`fit.swing_search`); only the frames of a swing that was found are
+observed further and fitted, so that a long wait before it costs no more than that it is seen.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.clicks import ClickedPose
+from keyrecon.golf.fit.handedness import (
+    mirror_evidence,
+    mirror_initial,
+    mirror_marks,
+    mirror_pixels,
+)
+from keyrecon.golf.fit.swing_path import SearchLimits
+from keyrecon.golf.fit.swing_search import SwingEvidence, SwingHypothesis, search_swing
+from keyrecon.golf.marks import place_marks
+from keyrecon.golf.observe.film import Film, frame_step
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, MotionModel, SwingMarks
+from keyrecon.golf.scene import SwingScene
+
+SLOW_DOWNSWING = 0.27
+"""Seconds that a downswing is thought to take where its length shows slow motion: between those of
+tour players and of others."""
+
+
+def find_slow_motion(keys: Float[np.ndarray, "4"], fps: float) -> float:
+    """By how much a film is slowed down in which a swing has these key postures; 1 if it is not."""
+    down = float(keys[2] - keys[1]) / fps
+    return down / SLOW_DOWNSWING if down > SearchLimits().downswing[1] else 1.0
+
+
+MARGINS = (1.0, 2.0)
+"""Seconds before the start and after the finish that are fitted too: a start is found up to 0.2 s
+late, and golfers hold their finish until the ball lands."""
+
+
+def choose_swing_frames(
+    keys: Float[np.ndarray, "4"], film: Film, slow_motion: float
+) -> Int[np.ndarray, "T"]:
+    """The frames of a film in which a swing with these key postures is fitted."""
+    fps, last = film.fps * slow_motion, len(film.numbers) - 1
+    begin = max(0, int(keys[0] - MARGINS[0] * fps))
+    end = min(last, int(np.ceil(keys[3] + MARGINS[1] * fps)))
+    return np.arange(begin, end + 1, frame_step(fps))
+
+
+def place_in_film(pose: ClickedPose, film: Film) -> ClickedPose:
+    """A clicked pose in the picture and by the frame numbers of a film."""
+    joints, camera = pose.joints, pose.camera
+    frame = round(float(film.place[joints.frame]))
+    return replace(
+        pose,
+        joints=replace(joints, frame=frame, places=joints.places + film.corner),
+        camera=replace(camera, principal=camera.principal + film.corner),
+        size=film.size,
+    )
+
+
+def find_candidates(
+    scene: SwingScene, pose: ClickedPose, marks: SwingMarks, model: MotionModel
+) -> tuple[SwingHypothesis, ...]:
+    """Swings that a film may show, the likeliest first, in the film's own picture.
+
+    `scene` is what the film shows, `pose` and `marks` are those of the file's frames; left-handers
+    are mirrored. Raises KeyreconError where no swing is observed.
+    """
+    film = scene.film
+    pose, marks, width = place_in_film(pose, film), place_marks(marks, film), film.size[0]
+    foreground = scene.foreground
+    evidence = SwingEvidence(
+        scene.players, foreground.shrink, foreground.height, scene.shafts, film.fps
+    )
+    joints, camera = pose.joints, pose.camera
+    if pose.left_handed:
+        evidence = mirror_evidence(evidence, width)
+        joints, marks = mirror_initial(joints, width), mirror_marks(marks, width)
+        camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
+    body = size_body(pose.stature)
+    found = search_swing(evidence, joints, camera, model, body, marks=marks)
+    if not found and np.isfinite(marks.keys).any():
+        raise KeyreconError(
+            "No swing of a pace that golfers have passes start, top, hit and finish where they "
+            f"were marked (frames {', '.join(f'{k:.0f}' for k in marks.keys if np.isfinite(k))} of "
+            "the fitted ones); correct these marks, or take some back."
+        )
+    if not found:
+        raise KeyreconError(
+            f"There is no swing in this video: its {len(evidence.players)} frames are too few for "
+            "one. Give a video with a whole swing, from the address to the finish."
+        )
+    if pose.left_handed:
+        found = [replace(h, club=mirror_pixels(h.club, width)) for h in found]
+    return tuple(found)
