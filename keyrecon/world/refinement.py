@@ -45,7 +45,7 @@ PIXEL_MEMORY = 0.08
 """Seconds that it lasts: its autocorrelation is .64 after .1 s, .32 after .2."""
 SIZE_ERROR = 0.03
 """Error of the body's size as standing feet tell it, logarithm."""
-SLIPS = (1.0, 0.3, 0.1, 0.03)
+SLIPS = (1.0, 0.2, 0.03)
 """Metres per second that a foot may move while it stands, from round to round."""
 HEIGHT_ERROR = 0.012
 """Metres by which an ankle is above or below its height while the foot stands."""
