@@ -117,12 +117,13 @@ def balance(
     masses: Float[np.ndarray, "J"],
     support: Float[np.ndarray, "T J"],
     along: Float[np.ndarray, "T 2"],
+    ahead: Float[np.ndarray, "T"],
     weight: Float[np.ndarray, "T"],
 ) -> Term:
-    """The centre of mass is above a mean of joints, along a direction on the ground."""
+    """The centre of mass is `ahead` metres from above a mean of joints, along the ground."""
     slope = np.zeros((len(weight), 1, len(masses), 3))
     slope[:, 0, :, :2] = (weight[:, None] * (masses - support))[..., None] * along[:, None]
-    return linear({0: slope}, np.zeros((len(weight), 1)))
+    return linear({0: slope}, (weight * ahead)[:, None])
 
 
 SEGMENTS = {
