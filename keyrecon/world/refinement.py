@@ -179,7 +179,7 @@ def _windows(count: int) -> Iterator[tuple[slice, Float[np.ndarray, "n"]]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Body:
+class _LiftedBody:
     """The lifted pose, upright, in the axes about the line of sight."""
 
     figure: Figure
@@ -187,13 +187,13 @@ class _Body:
     breadths: Float[np.ndarray, "n"]
     """Of the pairs of `Skeleton.breadths`, metres."""
 
-    def part(self, frames: slice) -> "_Body":
+    def part(self, frames: slice) -> "_LiftedBody":
         """Some of its frames."""
         figure = replace(self.figure, axes=self.figure.axes[frames])
         return replace(self, figure=figure, directions=self.directions[frames])
 
 
-def _lifted_body(placed: Placed) -> _Body:
+def _lifted_body(placed: Placed) -> _LiftedBody:
     motion, skeleton = placed.motion, placed.motion.skeleton
     points = placed.scale * motion.points3d
     bones = points[:, skeleton.bones[:, 1]] - points[:, skeleton.bones[:, 0]]
@@ -203,11 +203,11 @@ def _lifted_body(placed: Placed) -> _Body:
     figure = Figure(skeleton, skeleton.ancestry * lengths, axes)
     apart = [points[:, pair.left] - points[:, pair.right] for pair in skeleton.breadths]
     breadths = np.array([np.median(np.linalg.norm(pair, axis=1)) for pair in apart])
-    return _Body(figure, _upright(unit_vectors(bones), figure), breadths)
+    return _LiftedBody(figure, _upright(unit_vectors(bones), figure), breadths)
 
 
 def _refine_window(
-    placed: Placed, body: _Body, standing: Standing, log_size: float
+    placed: Placed, body: _LiftedBody, standing: Standing, log_size: float
 ) -> tuple[Float[np.ndarray, "T J 3"], float]:
     motion, skeleton, figure = placed.motion, placed.motion.skeleton, body.figure
     ankles = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
@@ -291,7 +291,7 @@ def _along(
     return flat / level[:, None], level
 
 
-def _steady_terms(placed: Placed, body: _Body, standing: Standing) -> list[Term]:
+def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list[Term]:
     """What does not hang on where the feet are."""
     motion, camera, skeleton = placed.motion, placed.camera, placed.motion.skeleton
     joints, fps = len(skeleton.names), motion.fps
