@@ -204,6 +204,8 @@ def open_golf_project(
             workspace.relink(video.path)
         if clicks_file is not None:
             keep_clicks(workspace, clicks_file.read_bytes())
+        if not workspace.is_golf:
+            workspace.become_golf()
         return workspace
     make_folder(folder)
     if clicks_file is not None:

@@ -15,6 +15,7 @@ A change keeps all of that. It is read back before it is written: a text that wo
 else than it should is not written at all.
 """
 
+import re
 import tomllib
 from collections.abc import Callable, Mapping, MutableMapping
 from pathlib import Path
@@ -101,6 +102,15 @@ def with_video_path(path: Path, video_path: str) -> str:
     table["path"] = video_path
     project["video"]["path"] = video_path
     return _proven(document.as_string(), project, path)
+
+
+def with_kind(path: Path, kind: str) -> str:
+    """The file's text of a project that becomes one of a kind as well."""
+    _, project = _parse(path)
+    text = read_text(path)
+    first_table = re.search(r"^[ \t]*\[", text, re.MULTILINE)
+    at = first_table.start() if first_table else len(text)
+    return _proven(f'{text[:at]}kind = "{kind}"\n\n{text[at:]}', {**project, "kind": kind}, path)
 
 
 def with_options(path: Path, options: Mapping[str, Any]) -> str:

@@ -45,6 +45,7 @@ from keyrecon.io.option_tables import (
 from keyrecon.io.project_file import (
     new_project,
     read_project,
+    with_kind,
     with_options,
     with_video_path,
 )
@@ -148,6 +149,13 @@ class Workspace:
     def _fitted_file(self) -> Path:
         """Tells what the last golf fit was made from."""
         return self.folder / "cache" / "golf_fitted"
+
+    def become_golf(self) -> None:
+        """Make the project one of a golf swing, besides what it is."""
+        if self.project.get("kind") != GOLF:
+            with self.exclusive():
+                write_durably(self.project_file, with_kind(self.project_file, GOLF))
+            self.project = read_project(self.project_file)
 
     def golf_evidence(self) -> str:
         """A digest of all that a person told a golf fit."""

@@ -172,6 +172,21 @@ def test_a_project_with_keyframes_takes_a_fit_too_and_keeps_the_options_of_both(
     assert workspace.options(Options(), Options()) == height
 
 
+def test_a_project_with_keyframes_gets_the_pages_of_a_swing_when_a_fit_is_asked_for(
+    swing, tmp_path
+):
+    video = open_video(swing / "video.mp4")
+    Workspace.create(tmp_path / "p", video, Path(swing / "video.mp4"), {})
+    file = tmp_path / "p" / "project.toml"
+    file.write_text(f"# mine\n{file.read_text()}\n[options]\nkeyframes.budget = 0.05 # mine too\n")
+    with pytest.raises(KeyreconError, match="on the page"):
+        fit_file(swing / "video.mp4", None, tmp_path / "p", options=QUICK)
+    workspace = Workspace(tmp_path / "p")
+    assert workspace.is_golf
+    assert workspace.options(Options(), Options()).keyframes.budget == 0.05
+    assert file.read_text().count("mine") == 2
+
+
 def test_options_of_a_former_golf_project_are_still_known(swing, tmp_path):
     video = open_video(swing / "video.mp4")
     workspace = Workspace.create(tmp_path / "p", video, Path(swing / "video.mp4"), {})
