@@ -25,8 +25,8 @@ def warning(doubts: Sequence[str]) -> str:
     return (
         '<section class="warning" role="alert"><h2>This fit is doubtful</h2>'
         f"<ul>{lines}</ul><p>Tempo and angles are not shown: they would not be measurements. Look "
-        "at the fit through the swing; where the body is off, mark whole bodies on a few frames "
-        "and use <code>keyrecon run --prior golf</code>.</p></section>"
+        "at the fit through the swing; where body or club is off, put it right on the page of "
+        "<code>keyrecon annotate</code> (2 Swing), and fit again.</p></section>"
     )
 
 
