@@ -87,12 +87,11 @@ def main() -> None:
         cells = zip(found[-1].mean(axis=0), true[-1].mean(axis=0), strict=True)
         print(f"{folder.name:<24}" + "".join(f"{a:8.2f} ({b:5.2f})" for a, b in cells))
     one, other = np.concatenate(found), np.concatenate(true)
-    share = one[:, 0] / other[:, 0]
-    off = np.sqrt(np.mean((one - other) ** 2, axis=0))
-    print(
-        f"length off by {np.sqrt(np.mean((share - 1) ** 2)):.1%} ({share.min():.2f} to "
-        f"{share.max():.2f} times), top speed by {off[1]:.2f} m/s, acceleration by {off[2]:.2f}"
-    )
+    share = one / other
+    off = np.sqrt(np.mean((share - 1) ** 2, axis=0))
+    names = ("length", "top speed", "top acceleration")
+    for name, error, times in zip(names, off, share.T, strict=True):
+        print(f"{name} off by {error:.1%} ({times.min():.2f} to {times.max():.2f} times)")
 
 
 if __name__ == "__main__":

@@ -50,7 +50,8 @@ def court_section(material: ReportMaterial, chart: str) -> str:
         note(
             "The court from above, to scale, the camera's end below; where the middle of the hips "
             "is over the ground. Press the way to go to a frame. &plusmn; is the standard error on "
-            "rendered rallies whose truth is known, of walks and short runs; the camera's own is "
+            "rendered rallies whose truth is known, of walks and short steps, which come out short "
+            "rather than long; the camera's own is "
             f"{_camera_error(material.court[1]):.2f} m. On the baseline is within {ON_BASELINE} m "
             "of it, with the hips."
         ),
