@@ -50,7 +50,7 @@ from keyrecon.pipeline import (
     prepare,
     with_marked_keyframes,
 )
-from keyrecon.records import Annotations, Keyframes, Motion
+from keyrecon.records import Annotations, Keyframes, Motion, Preparation
 from keyrecon.report.drawing import draw_pose
 
 ROOT = Path(__file__).parent.parent
@@ -179,11 +179,10 @@ class Result:
     seconds: float
 
 
-def solve(clip: Clip, cost: float, work: Path) -> Result:
-    """Mark bodies, choose keyframes, mark them, reconstruct."""
-    store = StageStore(work / clip.name / "cache")
-    began = time.perf_counter()
-    options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
+def mark_clip(
+    clip: Clip, options: Options, store: StageStore
+) -> tuple[Preparation, Keyframes, Annotations]:
+    """Mark bodies, choose keyframes, mark them: (prepared, the keyframes asked for, all marks)."""
     first = choose_bodies(clip, 1)
     preparation = prepare(clip.video, (), options, store.keep, show, take(clip, first, first))
     unsure = frames_to_mark(preparation, clip.truth.frames[first], MORE_BODIES)
@@ -195,6 +194,15 @@ def solve(clip: Clip, cost: float, work: Path) -> Result:
     marks = mark_keyframes(clip, asked, first)
     if len(frames_off_marks(preparation, marks)):
         preparation = prepare(clip.video, (), options, store.keep, show, marks)
+    return preparation, asked, marks
+
+
+def solve(clip: Clip, cost: float, work: Path) -> Result:
+    """Mark bodies, choose keyframes, mark them, reconstruct."""
+    store = StageStore(work / clip.name / "cache")
+    began = time.perf_counter()
+    options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
+    preparation, asked, marks = mark_clip(clip, options, store)
     motion = reconstruct(preparation, marks, options, store.keep, show)
     return Result(clip, asked, marks, motion, time.perf_counter() - began)
 

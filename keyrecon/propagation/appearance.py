@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Complex, Float32, Int, UInt8
+from jaxtyping import Bool, Complex, Float32, Int, UInt8
 
 from keyrecon.io.frame_reader import read_small, side_by_side
 from keyrecon.io.video import Video
@@ -121,7 +121,7 @@ def _describe(picture: UInt8[np.ndarray, "s s 3"]) -> UInt8[np.ndarray, "n n C"]
 
 @dataclass(frozen=True, eq=False)
 class JointAppearance:
-    """What joints look like on the annotated frames."""
+    """What joints, and the middles of bones, look like on the annotated frames."""
 
     features: PlayerFeatures
     half: BodyHalf
@@ -129,6 +129,8 @@ class JointAppearance:
     whitening: Float32[np.ndarray, "D C"]
     marks: tuple[Float32[np.ndarray, "_ C"], ...]
     """Descriptions of the marks of every joint."""
+    bones: tuple[Float32[np.ndarray, "_ C"], ...]
+    """Of the middles of every bone between marks."""
 
     def describe(
         self, frames: Int[np.ndarray, "P"], places: Complex[np.ndarray, "P"]
@@ -144,24 +146,52 @@ class JointAppearance:
 
         Described frames count for those around them, which have 0.
         """
-        width, share = joints.shape[1], len(joints) / len(self.features.frames)
-        result = np.zeros((*joints.shape[:2], 2, joints.shape[2]), np.float32)
+        return self._compare(joints, self.marks, self.half.free, self.half.mirror)
+
+    def bone_unlikeness(
+        self, joints: Complex[np.ndarray, "T S J"]
+    ) -> Float32[np.ndarray, "T S 2 B"]:
+        """The same of the middles of limbs' bones; 0 for those of the trunk."""
+        middles = bone_middles(self.half, joints)
+        limbs = np.flatnonzero(self.half.limb)
+        return self._compare(middles, self.bones, limbs, self.half.bone_mirror)
+
+    def _compare(
+        self,
+        places: Complex[np.ndarray, "T S P"],
+        marks: tuple[Float32[np.ndarray, "_ C"], ...],
+        compared: Int[np.ndarray, "n"],
+        mirror: Int[np.ndarray, "P"],
+    ) -> Float32[np.ndarray, "T S 2 P"]:
+        width, share = places.shape[1], len(places) / len(self.features.frames)
+        result = np.zeros((*places.shape[:2], 2, places.shape[2]), np.float32)
         for first in range(0, len(self.features.frames), FRAMES_AT_A_TIME):
             frames = self.features.frames[first : first + FRAMES_AT_A_TIME]
             repeated = np.repeat(frames, width)
-            for joint in self.half.free.tolist():
-                described = self.describe(repeated, joints[frames, :, joint].ravel())
-                for side, marked in enumerate((joint, self.half.mirror[joint])):
-                    if len(self.marks[marked]):
-                        alike = (described @ self.marks[marked].T).max(axis=1)
-                        result[frames, :, side, joint] = share * (1 - alike.reshape(-1, width))
+            for place in compared.tolist():
+                described = self.describe(repeated, places[frames, :, place].ravel())
+                for side, marked in enumerate((place, mirror[place])):
+                    if len(marks[marked]):
+                        alike = (described @ marks[marked].T).max(axis=1)
+                        result[frames, :, side, place] = share * (1 - alike.reshape(-1, width))
         return result
+
+
+def bone_middles(
+    half: BodyHalf, joints: Complex[np.ndarray, "*n J"]
+) -> Complex[np.ndarray, "*n B"]:
+    """Places halfway along every bone."""
+    return (joints[..., half.bones[:, 0]] + joints[..., half.bones[:, 1]]) / 2
 
 
 def learn_appearance(
     features: PlayerFeatures, poses: AnnotatedPoses, joints: Complex[np.ndarray, "T J"]
 ) -> JointAppearance:
-    """From annotated poses; `joints` are about where the body is in every frame."""
+    """From annotated poses; `joints` are about where the body is in every frame.
+
+    Places that optical flow between two marks is sure of were tried as further examples: no better
+    on nine real clips (.1 points of PCK fewer).
+    """
     random = np.random.default_rng(0)
     frames = random.choice(features.frames, SAMPLES)
     which = random.integers(0, joints.shape[1], SAMPLES)
@@ -172,9 +202,17 @@ def learn_appearance(
     kept = slice(-min(COMPONENTS, len(axes)), None)
     noise = np.sqrt(variance[kept] + variance[kept][0] + 1e-9)
     whitening = (axes[:, kept] / noise).astype(np.float32)
-    learnt = JointAppearance(features, poses.half, mean, whitening, ())
-    marks = tuple(
-        learnt.describe(poses.frames[known], pose[known])
-        for pose, known in zip(poses.joints.T, poses.known.T, strict=True)
-    )
-    return JointAppearance(features, poses.half, mean, whitening, marks)
+    learnt = JointAppearance(features, poses.half, mean, whitening, (), ())
+
+    def describe_marks(
+        places: Complex[np.ndarray, "K P"], known: Bool[np.ndarray, "K P"]
+    ) -> tuple[Float32[np.ndarray, "_ C"], ...]:
+        return tuple(
+            learnt.describe(poses.frames[marked], place[marked])
+            for place, marked in zip(places.T, known.T, strict=True)
+        )
+
+    marks = describe_marks(poses.joints, poses.known)
+    between = np.asarray(poses.known[:, poses.half.bones].all(axis=2))
+    bones = describe_marks(bone_middles(poses.half, poses.joints), between)
+    return JointAppearance(features, poses.half, mean, whitening, marks, bones)

@@ -55,6 +55,8 @@ LIMB_SCHEDULE = (
 )
 """A limb hypothesis starts nearer to its place than a whole template. Halved or doubled, others
 with it: at most 0.1 points, 0.2 mm on one clip."""
+MIN_FLOW_CONFIDENCE = 0.02
+"""Flow that is less sure than this leads nowhere."""
 LIMB_DISTINCTION = 0.06
 """Joints of limbs that count as different are this far apart, player heights. Halved or doubled,
 others with it: at most 0.0 points, 0.1 mm on one clip."""
@@ -81,6 +83,26 @@ class PoseHypotheses:
     """Cost before edges are considered; infinite where there is no hypothesis."""
     unlikeness: Float[np.ndarray, "T S 2 J"]
     """How unlike marks joints look (`JointAppearance`); 0 where pictures were not looked at."""
+    bone_unlikeness: Float[np.ndarray, "T S 2 B"]
+    """The same of the middles of limbs' bones."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkedWays:
+    """Where flow and straight lines lead from marks, player coordinates."""
+
+    flow: Complex[np.ndarray, "T J"]
+    """0 where flow says nothing."""
+    flow_confidence: Float[np.ndarray, "T J"]
+    """0 where it does not join two marks."""
+    lines: Complex[np.ndarray, "T J"]
+    seconds: Float[np.ndarray, "T J"]
+    """From the nearest mark of the joint."""
+
+    @property
+    def joints(self) -> Complex[np.ndarray, "T J"]:
+        """By flow where it is at all sure, else by lines."""
+        return np.where(self.flow_confidence > MIN_FLOW_CONFIDENCE, self.flow, self.lines)
 
 
 def join_hypotheses(*parts: PoseHypotheses) -> PoseHypotheses:
@@ -129,6 +151,7 @@ def fit_hypotheses(
         start.template.reshape(shape),
         np.zeros((shape[0], len(joints) // shape[0])),
         np.zeros((shape[0], len(joints) // shape[0], 2, joints.shape[1])),
+        np.zeros((shape[0], len(joints) // shape[0], 2, residual.shape[1])),
     )
 
 
@@ -197,6 +220,31 @@ def propose_limbs(
     cost = hypotheses.prior_cost[frames, best] + LIMB_HYPOTHESIS_COST
     ones = np.ones((1, count), int)
     return replace(fitted, template=row[:, None] * ones, prior_cost=cost[:, None] * ones)
+
+
+def fit_poses(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    joints: Complex[np.ndarray, "T S J"],
+    similar: Int[np.ndarray, "T"],
+    schedule: tuple[RegistrationStep, ...] = LIMB_SCHEDULE,
+) -> PoseHypotheses:
+    """Given poses, fitted to edges with the average outline."""
+    count, width = joints.shape[:2]
+    frames = np.repeat(np.arange(count), width)
+    average = np.full(len(frames), templates.average)
+    start = TemplateFits(frames, average, joints.reshape(len(frames), -1))
+    fitted = fit_hypotheses(templates, index, start, schedule)
+    return replace(fitted, template=np.repeat(similar[:, None], width, axis=1))
+
+
+def follow_marks(
+    templates: EdgeTemplates, index: ElementIndex, ways: MarkedWays, similar: Int[np.ndarray, "T"]
+) -> PoseHypotheses:
+    """Two hypotheses per frame: where flow leads as it is, and straight lines fitted to edges."""
+    flow = fit_poses(templates, index, ways.joints[:, None], similar, ())
+    lines = fit_poses(templates, index, ways.lines[:, None], similar)
+    return join_hypotheses(flow, lines)
 
 
 def _collect_limbs(templates: EdgeTemplates) -> Complex[np.ndarray, "L j"]:

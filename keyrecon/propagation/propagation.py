@@ -26,6 +26,7 @@ from keyrecon.numerics.geometry import to_complex
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.appearance import (
+    JointAppearance,
     PlayerFeatures,
     describe_player,
     learn_appearance,
@@ -42,7 +43,11 @@ from keyrecon.propagation.edge_template import (
 )
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.hypotheses import (
+    MarkedWays,
+    PoseHypotheses,
+    fit_poses,
     fit_similar,
+    follow_marks,
     join_hypotheses,
     propose_limbs,
     track_from_keyframes,
@@ -52,6 +57,7 @@ from keyrecon.propagation.limb_identity import (
     identify_in_shots,
     template_gain,
 )
+from keyrecon.propagation.limb_search import search_limbs
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.propagation.trajectory_smoothing import smooth_trajectories
@@ -119,6 +125,8 @@ class HalfStart:
     """What the player looks like in every frame."""
     shots: Shots
     """Nothing is carried from one to the next but what is marked."""
+    ways: MarkedWays
+    """Where flow and straight lines lead from marks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +157,7 @@ def propagate_joints(
     if options.method == "paper":
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
-    tracks = _propagate_fused(preparation, annotations, options, progress)
+    tracks = _propagate_fused(preparation, annotations, flow, options, progress)
     if flow is not None:
         body_frame = stabilise_shots(
             preparation.track, preparation.camera, preparation.shots, preparation.video.fps
@@ -213,6 +221,7 @@ def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
 def _propagate_fused(
     preparation: Preparation,
     annotations: Annotations,
+    flow: FlowTracks | None,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
@@ -239,7 +248,8 @@ def _propagate_fused(
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
         shift = at[:, None] - at[poses.frames]
-        start = HalfStart(shift, distance, fixed, features, preparation.shots)
+        ways = find_ways(annotations, flow, body_frame, half, fixed, preparation)
+        start = HalfStart(shift, distance, fixed, features, preparation.shots, ways)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -260,14 +270,20 @@ def propagate_half(
     half, poses = templates.half, templates.poses
     fitted = fit_similar(templates, index, start.distance, start.shift, similar)
     nearest = fitted.template[:, 0]
+    appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
     with ThreadPoolExecutor(1) as beside:
         tracked = beside.submit(track_from_keyframes, templates, index, nearest, start.shots, fps)
-        limbs = propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)
-    hypotheses = join_hypotheses(fitted, limbs, tracked.result())
-    appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
-    unlikeness = appearance.unlikeness(hypotheses.joints)
-    hypotheses = replace(hypotheses, unlikeness=unlikeness)
-    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps)
+        parts = [propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)]
+        parts.append(follow_marks(templates, index, start.ways, nearest))
+        if half.middle:
+            parts.append(propose_arms(templates, index, fitted, appearance, nearest))
+    hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
+    hypotheses = replace(
+        hypotheses,
+        unlikeness=appearance.unlikeness(hypotheses.joints),
+        bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
+    )
+    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps, start.ways)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
@@ -277,6 +293,66 @@ def propagate_half(
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     confidence[ends_too_long(joints, half.bones, poses.longest)] = 0
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
+
+
+def propose_arms(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    fitted: PoseHypotheses,
+    appearance: JointAppearance,
+    similar: Int[np.ndarray, "T"],
+) -> PoseHypotheses:
+    """The best trunk with limbs that look like marked ones, fitted to edges."""
+    best = fitted.residual.mean(axis=2).argmin(axis=1)
+    trunk = fitted.joints[np.arange(len(best)), best]
+    found = search_limbs(appearance, templates.poses, trunk, LIMB_HYPOTHESES)
+    return fit_poses(templates, index, found, similar)
+
+
+def find_ways(
+    annotations: Annotations,
+    flow: FlowTracks | None,
+    body_frame: BodyFrame,
+    half: BodyHalf,
+    fixed: Complex[np.ndarray, "T G"],
+    preparation: Preparation,
+) -> MarkedWays:
+    """Joints of one half where flow and straight lines in time lead from the marks of a shot.
+
+    Without a mark in its shot a joint is where the nearest one in another is, and that is worth
+    nothing.
+    """
+    frames, number = np.arange(len(fixed)), preparation.shots.number
+    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
+    lines = np.zeros((len(frames), len(half.joints)), complex)
+    seconds, followed, confidence = np.zeros(lines.shape), lines.copy(), np.zeros(lines.shape)
+    for joint, places in enumerate(marks.T):
+        known = np.isfinite(places)
+        lines[:, joint] = np.interp(frames, annotations.frames[known], places[known])
+        seconds[:, joint] = np.inf
+        for shot, part in enumerate(preparation.shots.parts):
+            inside = known & (number[annotations.frames] == shot)
+            at = annotations.frames[inside]
+            if len(at):
+                lines[part, joint] = np.interp(frames[part], at, places[inside])
+                away = nearest_distance(frames[part], at)
+                seconds[part, joint] = away / preparation.video.fps
+    lines[:, half.fixed] = fixed
+    if flow is not None:
+        places = body_frame.from_pixels(flow.joints[:, half.joints], frames[:, None])
+        sure = np.isfinite(places) & flow.joined[:, half.joints]
+        followed[sure] = places[sure]
+        confidence[sure] = flow.confidence[:, half.joints][sure]
+    return MarkedWays(followed, confidence, lines, seconds)
+
+
+def nearest_distance(
+    frames: Int[np.ndarray, "T"], marked: Int[np.ndarray, "k"]
+) -> Int[np.ndarray, "T"]:
+    """Frames to the nearest marked one; `marked` ascends."""
+    after = np.clip(np.searchsorted(marked, frames), 0, len(marked) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.minimum(np.abs(frames - marked[after]), np.abs(frames - marked[before]))
 
 
 def gather_poses(

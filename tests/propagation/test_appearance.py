@@ -14,6 +14,7 @@ from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.edge_template import AnnotatedPoses
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import appearance_gain
+from keyrecon.propagation.limb_search import search_limbs
 
 LEGS = split_body(LSP14)[0]
 ONE, OTHER = map(list, LEGS.sides)
@@ -68,23 +69,40 @@ def draw(joints, colors=(PINK, BLACK)):
     return Drawn(list(grass))
 
 
+def marked_poses():
+    """The first and the last frame."""
+    marked = np.array([0, FRAMES - 1])
+    known, longest = np.ones((2, len(LEGS.joints)), bool), np.full(len(LEGS.bones), np.inf)
+    return AnnotatedPoses(LEGS, marked, JOINTS[marked], known, longest)
+
+
 @pytest.fixture(scope="module")
 def appearance():
-    marked = np.array([0, FRAMES - 1])
-    poses = AnnotatedPoses(
-        LEGS,
-        marked,
-        JOINTS[marked],
-        np.ones((2, len(LEGS.joints)), bool),
-        np.full(len(LEGS.bones), np.inf),
-    )
-    return learn_appearance(describe_player(draw(JOINTS), BODY, np.arange(FRAMES)), poses, JOINTS)
+    features = describe_player(draw(JOINTS), BODY, np.arange(FRAMES))
+    return learn_appearance(features, marked_poses(), JOINTS)
 
 
 def test_a_joint_looks_like_its_mark_where_it_is_and_unlike_beside(appearance):
     both = np.stack([JOINTS, JOINTS + 0.15j, JOINTS + 0.3], axis=1)
     unlike = appearance.unlikeness(both)[2:4, :, 0][..., ONE]
     assert (unlike[:, 0] < unlike[:, 1:].min(axis=1)).all()
+
+
+def test_the_middle_of_a_bone_looks_like_that_of_a_marked_one(appearance):
+    both = np.stack([JOINTS, JOINTS + 0.3], axis=1)
+    unlike = appearance.bone_unlikeness(both)[2:4, :, 0]
+    shank = LEGS.bones.tolist().index(ONE[1:])
+    assert (unlike[:, 0, shank] < unlike[:, 1, shank]).all()
+
+
+def test_limbs_are_found_where_they_look_like_marked_ones(appearance):
+    trunk = JOINTS.copy()
+    trunk[:, [*ONE[1:], *OTHER[1:]]] = 9
+    found = search_limbs(appearance, marked_poses(), trunk, 3)
+    away = np.abs(found - JOINTS[:, None])[..., [*ONE, *OTHER]].max(axis=2)
+    apart = np.abs(JOINTS[:, ONE[0]] - JOINTS[:, OTHER[0]]) > 0.15
+    assert (away.min(axis=1)[apart] < 0.08).all()
+    np.testing.assert_array_equal(found[..., ONE[0]], JOINTS[:, None, ONE[0]].repeat(3, axis=1))
 
 
 def test_a_mark_is_alike_to_itself(appearance):

@@ -2,13 +2,12 @@
 
 import numpy as np
 from capsule_player import marks, scene, standing
+from hypothesis_choice import choice
 
 from keyrecon.body import LSP14
 from keyrecon.propagation.body_frame import stabilise_player
 from keyrecon.propagation.bone_bounds import bone_lengths, bound_bones
-from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates, TemplateElements
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.hypotheses import PoseHypotheses
 from keyrecon.propagation.propagation import with_flow
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.records import FlowTracks, JointTracks, Shots
@@ -82,29 +81,6 @@ def test_a_limb_that_cannot_be_that_long_is_refused_whatever_speaks_for_it():
     }
     np.testing.assert_array_equal(found["bounded"], pose)
     np.testing.assert_array_equal(found["not"], stretched)
-
-
-def choice(half, joints, cost, longest):
-    """Templates without elements or marks, and hypotheses that edges say nothing about."""
-    count, width = cost.shape
-    none = np.zeros(0, int)
-    poses = AnnotatedPoses(
-        half, none, joints[:0, 0], np.zeros((0, len(half.joints)), bool), longest
-    )
-    empty = TemplateElements(
-        *(np.zeros((1, 1), t) for t in (int, float, complex, complex, int, float))
-    )
-    weights = np.zeros((1, 1, len(half.joints)), np.float32)
-    templates = EdgeTemplates(poses, empty, weights, np.full((count, 1), -1))
-    hypotheses = PoseHypotheses(
-        joints,
-        np.zeros((count, width, len(half.bones))),
-        np.zeros((count, width, 3, 1)),
-        np.zeros((count, width), int),
-        cost,
-        np.zeros((count, width, 2, len(half.joints))),
-    )
-    return templates, hypotheses
 
 
 def test_flow_has_no_joint_where_a_bone_would_be_too_long():

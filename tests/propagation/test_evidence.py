@@ -1,0 +1,74 @@
+"""What speaks for a limb, and which limb is chosen for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis_choice import choice
+
+from keyrecon.body import LSP14
+from keyrecon.propagation.evidence import WEIGHTS, find_evidence
+from keyrecon.propagation.half_body import split_body
+from keyrecon.propagation.hypotheses import MarkedWays
+from keyrecon.propagation.selection import choose_limbs
+from keyrecon.records import Shots
+
+LEGS, ARMS = split_body(LSP14)
+FRAMES = 5
+ONE_SHOT = Shots.between((), FRAMES)
+
+
+def poses(half):
+    """Two poses of a half, one with its left side elsewhere, and what is chosen between."""
+    random = np.random.default_rng(3)
+    here = random.normal(size=(len(half.joints), 2)) @ [1, 1j]
+    there = here.copy()
+    there[list(half.sides[0])] += 0.3
+    joints = np.tile(np.stack([here, there]), (FRAMES, 1, 1))
+    return (
+        here,
+        there,
+        choice(half, joints, np.zeros((FRAMES, 2)), np.full(len(half.bones), np.inf)),
+    )
+
+
+def ways(joints, confidence=0.0, seconds=10.0):
+    """Flow and lines that lead to the same joints in all frames."""
+    places = np.tile(joints, (FRAMES, 1))
+    return MarkedWays(
+        places, np.full(places.shape, confidence), places, np.full(places.shape, seconds)
+    )
+
+
+@pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
+@pytest.mark.parametrize("sure", [{"confidence": 0.9}, {"seconds": 0.02}], ids=["flow", "lines"])
+def test_a_limb_is_where_flow_and_near_marks_lead(half, sure):
+    here, there, scene = poses(half)
+    for pose in (here, there):
+        found = choose_limbs(*scene, ONE_SHOT, 50.0, ways(pose, **sure)).joints
+        side = list(half.sides[0])
+        np.testing.assert_array_equal(found[2, side], pose[side])
+
+
+@pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
+@pytest.mark.parametrize("what", ["unlikeness", "bone_unlikeness", "residual"])
+def test_a_limb_that_looks_like_marked_ones_on_its_outline_is_chosen(half, what):
+    here, there, (templates, hypotheses) = poses(half)
+    side = list(half.sides[0])
+    for right, pose in enumerate((here, there)):
+        against = getattr(hypotheses, what).copy()
+        against[:, 1 - right] = 0.5
+        found = choose_limbs(
+            templates, replace(hypotheses, **{what: against}), ONE_SHOT, 50.0
+        ).joints
+        np.testing.assert_array_equal(found[2, side], pose[side])
+
+
+def test_every_weight_is_of_some_evidence_and_none_is_negative():
+    for half in (LEGS, ARMS):
+        _, _, (templates, hypotheses) = poses(half)
+        here = hypotheses.joints[0, 0]
+        found = find_evidence(templates, hypotheses, np.zeros(FRAMES, int), ways(here))
+        names = {*found.of_sides[0], *(name for name, _ in found.of_pairs)}
+        assert {*WEIGHTS[half.name]} <= names
+        assert min(WEIGHTS[half.name].values()) >= 0
