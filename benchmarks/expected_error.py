@@ -11,9 +11,10 @@ and holds the refined joints against the marks by eye that nobody made for the p
     clips          the same for each clip
     others         the same with fewer and with other predictors, the time to the nearest mark among
                    them: mean of log p + error / p, smaller is better, and the rank correlation
-    reported       arms, legs and heads of frames that would be reported (mean expected error above
-                   UNCERTAIN): how many of them have a joint that is off by more than .08 and
-                   .05 heights, and how many of those that have are reported
+    reported       arms, legs and heads of frames that would be reported (expected error of a joint
+                   above UNCERTAIN): how many of them have a joint that is off by more than .2 of
+                   the trunk, and how many of those that have are reported; the same for whole
+                   frames, of all clips and of each
     tables         to be put into keyrecon/uncertainty.py
 
 With `--half report` nothing is fitted: the tables that are there are measured on those clips.
@@ -53,8 +54,8 @@ USED = "correction", "part_correction", "part_confidence", "speed"
 PRIOR = 20
 """Joints of the mean error that every bin is begun with, so that a rare one is not overrated."""
 GROUPS = 8
-OFF = 0.08, 0.05
-"""Errors that count as off, player heights: 0.2 of the torso is about .06."""
+OFF = 0.2
+"""Error that counts as off, in trunks: as in PCK@0.2."""
 
 Sample = dict[str, np.ndarray]
 
@@ -80,6 +81,7 @@ def collect(name: str, work: Path) -> Sample:
         "error": np.minimum(error[rows, joints], MAX_ERROR),
         **{name: values[at] for name, values in predictors.items()},
         "confidence": motion.confidence[at],
+        "trunk": clip.torso / height[frames][rows, 0],
         "time": np.array(away) / clip.video.fps,
     }
 
@@ -138,23 +140,36 @@ def print_reliability(sample: Sample, expected: np.ndarray) -> None:
 
 
 def print_reported(sample: Sample, expected: np.ndarray) -> None:
-    """Of arms, legs and heads that are reported, how many are off, and the other way about."""
+    """Of arms, legs and heads, and of frames, that are reported, how many are off, and the other
+    way about."""
     part = np.zeros(len(LSP14.names), int)
     for number, members in enumerate(body_parts(LSP14).values()):
         part[members] = number
-    clip = np.unique(sample["clip"], return_inverse=True)[1]
-    keys = np.stack([clip, sample["frame"], part[sample["joint"]]])
-    groups, group = np.unique(keys, axis=1, return_inverse=True)
-    group = group.ravel()
-    told = np.bincount(group, expected) / np.bincount(group) > UNCERTAIN
-    worst = np.zeros(groups.shape[1])
-    np.maximum.at(worst, group, sample["error"])
-    for off in OFF:
-        wrong = worst > off
+    off = sample["error"] > OFF * sample["trunk"]
+    clip, frame = sample["clip"], sample["frame"]
+    for what, keys in (("parts", (clip, frame, part[sample["joint"]])), ("frames", (clip, frame))):
+        told, wrong = any_of_group(keys, expected, off)
         print(
-            f"{told.sum()} of {len(told)} parts reported: {wrong[told].mean():.0%} have a joint "
-            f"off by more than {off}; of all that have one {told[wrong].mean():.0%} are reported"
+            f"{told.mean():.1%} of {len(told)} {what} reported, {wrong.mean():.1%} have a joint "
+            f"off by more than a fifth of the trunk: {wrong[told].mean():.0%} of those reported, "
+            f"and {told[wrong].mean():.0%} of those that have are reported"
         )
+    for name in np.unique(clip):
+        own = clip == name
+        told, wrong = any_of_group((frame[own],), expected[own], off[own])
+        print(f"  {name:<26}frames reported {told.mean():4.0%}, off {wrong.mean():4.0%}")
+
+
+def any_of_group(
+    keys: tuple[np.ndarray, ...], expected: np.ndarray, off: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(whether a joint is reported, whether one is off), by group."""
+    numbers = np.stack([np.unique(key, return_inverse=True)[1] for key in keys])
+    groups, group = np.unique(numbers, axis=1, return_inverse=True)
+    told, wrong = np.zeros((2, groups.shape[1]), bool)
+    np.logical_or.at(told, group.ravel(), expected > UNCERTAIN)
+    np.logical_or.at(wrong, group.ravel(), off)
+    return told, wrong
 
 
 def main() -> None:

@@ -51,7 +51,15 @@ def make_motion(confidence=None, moved=None):
 def with_lost_arms(first, last):
     confidence, moved = np.full((FRAMES, 14), 0.9), np.zeros((FRAMES, 14))
     confidence[first : last + 1, ARMS], moved[first : last + 1, ARMS] = 0.0, 0.2 * PIXELS
-    return make_motion(confidence, moved)
+    motion = make_motion(confidence, moved)
+    away = np.zeros((FRAMES, 14, 2))  # lost arms wander
+    away[first : last + 1, ARMS, 1] = 0.01 * PIXELS * np.arange(last + 1 - first)[:, None]
+    motion = replace(
+        motion,
+        points2d=motion.points2d + away,
+        points2d_propagated=motion.points2d_propagated + away,
+    )
+    return replace(motion, expected_error=expected_error(motion))
 
 
 def test_a_player_is_as_tall_as_the_bones_say():
