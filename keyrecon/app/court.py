@@ -11,7 +11,7 @@ from keyrecon.io.formats.camera_file import read_camera, write_calibration, writ
 from keyrecon.io.formats.court_points import merge_clicks
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
@@ -64,6 +64,7 @@ def calibrate(
     clicks are taken out first. New clicks that contradict the rest are not kept.
     """
     video = workspace.video()
+    options = workspace.options(options, CalibrationOptions(), COURT)
     dropped = _forgotten(workspace.court_clicks(), forget)
     kept = [click for click in workspace.court_clicks() if click not in dropped]
     for click in clicks:
@@ -77,6 +78,7 @@ def calibrate(
         workspace.change_court_clicks(clicks, dropped)
         raise KeyreconError(f"{fault}{_how_many(together)}") from fault
     workspace.change_court_clicks(clicks, dropped)
+    workspace.remember(options, CalibrationOptions(), COURT)
     write_camera(workspace.camera_file, camera)
     seen = np.flatnonzero(camera.found)
     frame = int(seen[len(seen) // 2])

@@ -65,7 +65,9 @@ GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
 CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
 """What golf_clicks.json tells."""
-SECTIONS = (GOLF,)
+COURT = "court"
+"""The section of the options of `keyrecon court`."""
+SECTIONS = (GOLF, COURT)
 """Tables of options beside those of the pipeline."""
 
 

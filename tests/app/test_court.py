@@ -10,12 +10,13 @@ from painted_court import camera_at, paint
 from keyrecon.app.court import calibrate, court_click, describe_camera, write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.world.calibration import CalibrationOptions
-from keyrecon.world.court import POINTS
+from keyrecon.world.court import POINTS, CourtOptions
 from keyrecon.world.records import CourtClick
 
 PINHOLE = camera_at((2, -20, 3), (0, -9, 0.8), 1.6)
@@ -114,6 +115,16 @@ def test_points_that_were_clicked_are_kept_and_used_again(filmed):
     assert "By" not in calibrated(filmed, forget=["all"])
     with pytest.raises(KeyreconError, match="no click on near-left to forget; it has none"):
         calibrated(filmed, forget=["near-left"])
+
+
+def test_how_lines_are_painted_is_remembered(filmed):
+    middles = CalibrationOptions(CourtOptions(0.0, 0.0))
+    calibrate(Workspace(filmed), (), middles, silent)
+    to_middles = read_camera(Workspace(filmed).camera_file)
+    workspace = Workspace(filmed)
+    calibrated(filmed)
+    assert np.array_equal(read_camera(workspace.camera_file).t, to_middles.t)
+    assert workspace.options(Options(), Options()) == Options()
 
 
 def test_a_click_that_contradicts_the_lines_is_named_and_not_kept(filmed):
