@@ -183,7 +183,7 @@ def uncertain_share(motion: Motion) -> float:
 
 
 def _doubt_by_part(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
-    """Mean expected error of each part of the body, player heights; 0 where there is no motion."""
+    """Expected error of the worst joint of each part, player heights; 0 without motion."""
     height, errors = player_height(motion), motion.expected_error
     assert errors is not None  # callers ask first
     known = motion.known
