@@ -94,7 +94,7 @@ def follow_player(
         for shot in progress(each, "Looking for the player in each shot", len(each))
     ]  # fmt: skip
     told = np.array([shot.told for shot in each])
-    shots = sort_shots(shots, sightings, told, video.fps, options.shots)
+    shots = sort_shots(shots, sightings, told, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
     tracks: list[Track] = []
     edges: list[Edges] = []

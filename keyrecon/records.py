@@ -40,6 +40,8 @@ class CameraPath:
     """Share of background features that agree with it, 0-1."""
     cuts: tuple[int, ...] = ()
     """Frames with which another shot begins; the path means nothing across them."""
+    dissolves: tuple[int, ...] = ()
+    """Those of them with which one shot dissolves into the next."""
 
 
 PLAYER = "the player"

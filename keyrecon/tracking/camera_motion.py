@@ -174,6 +174,7 @@ def estimate_camera_motion(
         np.concatenate([path.to_reference for path in paths]),
         np.concatenate([path.confidence for path in paths]),
         tuple(detector.cuts),
+        tuple(detector.dissolves),
     )
 
 

@@ -130,8 +130,10 @@ def sort_shots(
     told: Bool[np.ndarray, "S"],
     fps: float,
     options: ShotOptions = ShotOptions(),
+    dissolves: tuple[int, ...] = (),
 ) -> Shots:
-    """The shots with what each shows; `told` are those in which a person clicked or marked.
+    """The shots with what each shows; `told` are those in which a person clicked or marked,
+    `dissolves` the first frames of those that are none.
 
     Raises KeyreconError where a person's shot is asked for that is none, or where no shot is left.
     """
@@ -145,6 +147,8 @@ def sort_shots(
             shows.append("left out by --shots.skip")
         elif number in used or told[number]:
             shows.append(PLAYER if seen.track is not None else "nobody found")
+        elif part.start in dissolves:
+            shows.append("a dissolve")
         elif seen.plain:
             shows.append("black")
         elif part.stop - part.start < options.shortest * fps:

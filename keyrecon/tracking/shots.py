@@ -3,10 +3,14 @@
 Pictures are compared as thumbnails without their coarse brightness, the middle of one wherever in
 the other it fits best: what lasts through a pan, a zoom or an exposure is the same scene. Over nine
 real clips neighbours in time correlate by 0.80 or more, thumbnails of different clips by 0.40 at
-most (4000 pairs). Cuts from one place to the same place, and dissolves, are not found.
+most (4000 pairs). Cuts from one place to the same place are not found.
+
+In a dissolve neighbours are alike throughout. But the picture in its middle is the weighted sum of
+those before and after it, which have nothing in common: no motion of a camera gives that.
 """
 
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -28,6 +32,22 @@ PLAIN = 1.0
 """Contrast of a thumbnail below which it shows nothing, such as black, grey values."""
 FLASH_FRAMES = 3
 """What is over within so many frames, a flash or a torn picture, is no cut."""
+BLENDS = 8, 16, 32, 64
+"""Frames that a dissolve may take at most, tried in turn."""
+STRANGERS = 0.4
+"""Correlation, place by place, up to which the pictures before and after may be of two scenes."""
+BLENDED = 0.88
+"""Correlation of the middle picture with the best sum of both from which it is that sum, and the
+least weight that each has. Of 60 dissolves of 8 to 45 frames between moving clips all were found;
+in 3056 frames of nine real and four rendered clips none was, nor where these were blown up two and
+four times, which with .8 gave four."""
+LEAST_WEIGHT = 0.25
+UNEVEN_SUM = 0.2
+"""How far from 1 the weights may add up to. Of blurred pictures the sum of two is the one half-way
+between them as well, but fainter: its weights add up to more."""
+MARGIN = 0.25
+"""Share of the frames between these two pictures that is added on both sides: they may be blended
+themselves already, by up to a third."""
 
 
 @dataclass(eq=False)
@@ -36,10 +56,16 @@ class CutDetector:
 
     cuts: list[int] = field(default_factory=list)
     """First frames of new shots."""
+    dissolves: list[int] = field(default_factory=list)
+    """Those of them that are no shots but dissolves from one to the next."""
     _last: Thumbnail | None = None
     """Of the shot that goes on."""
     _since: list[Thumbnail] = field(default_factory=list)
     """Frames since the picture changed, not yet known to be a shot."""
+    _recent: deque[Thumbnail] = field(default_factory=lambda: deque(maxlen=BLENDS[-1] + 1))
+    """The last frames of the shot that goes on."""
+    _blend: "_Blend | None" = None
+    """The dissolve that is going on."""
     _count: int = 0
 
     def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:
@@ -47,18 +73,86 @@ class CutDetector:
         for grey in pictures:
             self.add(grey)
             yield grey
+        self._end_blend()
+        while self.cuts and self.cuts[-1] >= self._count:
+            self.cuts.pop()
 
     def add(self, grey: Grey) -> None:
         """The next frame."""
         picture = thumbnail(grey)
+        self._recent.append(picture)
+        self._look_for_blend()
         if self._last is None or correlation(self._last, picture) >= SAME_SCENE:
             self._last, self._since = picture, []
         else:
             self._since.append(picture)
             if len(self._since) > FLASH_FRAMES:
-                self.cuts.append(self._count - FLASH_FRAMES)
+                self._end_blend()
+                if not self.cuts or self._count - FLASH_FRAMES > self.cuts[-1]:
+                    self.cuts.append(self._count - FLASH_FRAMES)
                 self._last, self._since = picture, []
+                self._recent.clear()
         self._count += 1
+
+    def _look_for_blend(self) -> None:
+        """Whether a dissolve of some length ends with this frame, or the last one was the end."""
+        now = find_blend(self._recent)
+        if now is not None:
+            length, weight = now
+            found = _Blend(self._count - length + 1, self._count, abs(weight - 0.5))
+            if self._blend is None or found.uneven < self._blend.uneven:
+                self._blend = found
+        elif self._blend is not None:
+            self._end_blend()
+
+    def _end_blend(self) -> None:
+        """Take down the dissolve that was going on."""
+        if self._blend is None:
+            return
+        before = self.cuts[-1] if self.cuts else 0
+        margin = round(MARGIN * (self._blend.end - self._blend.first))
+        first, end = max(self._blend.first - margin, before), self._blend.end + margin
+        if first > before:
+            self.cuts.append(first)
+        if first > 0:
+            self.dissolves.append(first)
+        self.cuts.append(end)
+        self._recent.clear()
+        self._blend = None
+
+
+@dataclass(frozen=True)
+class _Blend:
+    """A dissolve, as well as it is known."""
+
+    first: int
+    end: int
+    """The first frame that shows the new scene alone."""
+    uneven: float
+    """How far the weights of both scenes are from equal in its middle."""
+
+
+def find_blend(recent: Sequence[Thumbnail]) -> tuple[int, float] | None:
+    """Length of a dissolve that ends with the last picture, and the weight of the scene before in
+    its middle; None where there is no dissolve."""
+    for length in BLENDS:
+        if length >= len(recent):
+            return None
+        before, middle, after = recent[-1 - length], recent[-1 - length // 2], recent[-1]
+        if min(float(one.std()) for one in (before, middle, after)) < PLAIN:
+            continue
+        a, m, b = (one.ravel() - one.mean() for one in (before, middle, after))
+        aa, bb, ab = float(a @ a), float(b @ b), float(a @ b)
+        if ab > STRANGERS * np.sqrt(aa * bb):
+            continue
+        weights = np.linalg.solve([[aa, ab], [ab, bb]], [a @ m, b @ m])
+        if weights.min() < LEAST_WEIGHT or abs(weights.sum() - 1) > UNEVEN_SUM:
+            continue
+        blend = weights[0] * a + weights[1] * b
+        alike = float(blend @ m) / float(np.linalg.norm(blend) * np.linalg.norm(m))
+        if alike > BLENDED and correlation(before, after) < SAME_SCENE:
+            return length, float(weights[0] / weights.sum())
+    return None
 
 
 def thumbnail(grey: Grey) -> Thumbnail:

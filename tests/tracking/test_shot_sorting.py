@@ -72,3 +72,11 @@ def test_a_shot_that_is_none_is_named(player):
 def test_a_video_without_the_player_is_refused(player):
     with pytest.raises(KeyreconError, match="No shot"):
         sort([seen(player, found=False), seen(player, found=False)])
+
+
+def test_a_dissolve_is_no_shot_of_the_player(player):
+    shots = Shots.between((100, 140), 300)
+    sightings = [seen(player), seen(player), seen(player)]
+    told = np.array([True, False, False])
+    shown = sort_shots(shots, sightings, told, FPS, dissolves=(100,)).shows
+    assert shown == (PLAYER, "a dissolve", PLAYER)

@@ -60,3 +60,21 @@ def test_a_flash_is_no_cut():
 def test_black_between_two_views_of_one_place_is_a_shot_of_its_own():
     pictures = [view(scene(0))] * 10 + [np.full(SIZE[::-1], 12, np.uint8)] * 8
     assert cuts_of(pictures + [view(scene(0))] * 10) == [10, 18]
+
+
+@pytest.mark.parametrize("length", [12, 30, 50])
+def test_a_dissolve_between_moving_shots_is_taken_out_of_both(length):
+    before = [view(scene(0), shift) for shift in np.linspace(0, 60, 80 + length)]
+    after = [view(scene(1), shift) for shift in np.linspace(30, 0, 80 + length)]
+    share = np.clip((np.arange(160 + length) - 79) / (length + 1), 0, 1)
+    pictures = [
+        cv2.addWeighted(before[min(t, 79 + length)], 1 - w, after[max(0, t - 80)], w, 0)
+        for t, w in enumerate(share)
+    ]
+    detector = CutDetector()
+    list(detector.watch(pictures))
+    first, end = detector.cuts
+    assert detector.dissolves == [first]
+    assert first <= 80 + length // 3
+    assert end >= 80 + length - length // 3
+    assert end - first <= 2 * length + 8
