@@ -328,6 +328,8 @@ def main() -> None:
     parser.add_argument("--sequences", nargs="*", default=list(SEQUENCES))
     words = parser.parse_args()
     names = words.only if words.only is not None else list(real.DEVELOP)
+    if len(names) + len(words.sequences) < 2:
+        raise SystemExit("A clip is chosen by weights from the others: name at least two.")
     clips = [real_clip(name, words.work) for name in names]
     clips += [rendered_clip(name, words.rendered, words.work) for name in words.sequences]
     samples = {}
