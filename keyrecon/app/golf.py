@@ -22,7 +22,9 @@ from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
+from keyrecon.golf.fit.handedness import mirror_marks
 from keyrecon.golf.marks import join_marks
+from keyrecon.golf.mirroring import mirror_clicks, mirror_found
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.records import (
     NO_MARKS,
@@ -39,7 +41,7 @@ from keyrecon.io.formats.golf_marks import read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
-from keyrecon.io.held_video import hold_frames
+from keyrecon.io.held_video import hold_frames, mirror_video
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import GOLF, Workspace
@@ -170,8 +172,15 @@ def fit_video(
 
     Raises KeyreconError where no player or no swing is observed.
     """
-    camera = keep("camera", estimate_camera_motion, video, progress=progress)
-    found = find_swing(video, camera, clicked_pose(clicks), model, options, keep, progress, marks)
+    pose = clicked_pose(clicks)
+    seen, own_marks = video, marks
+    if clicks.left_handed:
+        seen, pose = mirror_video(video), mirror_clicks(pose)
+        own_marks = mirror_marks(marks, video.width)
+    camera = keep("camera", estimate_camera_motion, seen, progress=progress)
+    found = find_swing(seen, camera, pose, model, options, keep, progress, own_marks)
+    if clicks.left_handed:
+        found = keep("mirrored", mirror_found, found, video.width)
     return GolfFit(found.fitted, found.observations, found.doubts, found.notes)
 
 

@@ -1,5 +1,7 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
+from dataclasses import replace
+
 from keyrecon.golf.candidates import find_candidates, place_in_film
 from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
@@ -36,6 +38,7 @@ def find_swing(
 
     Raises KeyreconError where no player or no swing is observed.
     """
+    told, pose = pose, replace(pose, mirrored=False)
     film = keep("film", choose_frames, video, camera, pose.frame)
     scene = keep(
         "scene", observe_scene, video, film, place_in_film(pose, film),
@@ -50,7 +53,7 @@ def find_swing(
         )  # fmt: skip
         first, shown = observed.observations, observed.film.open(video)
         if number == 1:
-            check_direction(first, place_in_film(pose, observed.film), model, "The clicks")
+            check_direction(first, place_in_film(told, observed.film), model, "The clicks")
         fitted, observations = fit_candidate(
             first, shown, model, options, keep, progress, suffix=f"_{number}"
         )

@@ -138,11 +138,12 @@ def check_direction(
     other_hand = replace(observations, left_handed=not observations.left_handed)
     if measure_direction(other_hand, model, width) > RIGHT_WAY:
         return
-    hand, other = ("left", "right") if observations.left_handed else ("right", "left")
+    left_handed = observations.left_handed != pose.mirrored
+    hand, other = ("left", "right") if left_handed else ("right", "left")
     raise KeyreconError(
         f"{origin}: the club goes round the other way than that of a {hand}-hander who stands as "
         f'clicked. Either the player is {other}-handed (say "left_handed": '
-        f"{'false' if observations.left_handed else 'true'}), or left and right of the clicks are "
+        f"{'false' if left_handed else 'true'}), or left and right of the clicks are "
         "exchanged: right_ is the player's own right, on the left of a picture from the front."
     )
 

@@ -75,6 +75,8 @@ class ClickedPose:
     stature: float
     """Metres."""
     camera: Camera
+    mirrored: bool = False
+    """Whether left and right were exchanged: a left-hander is seen as a right-hander."""
 
     def has(self, name: str) -> bool:
         """Whether a joint was clicked, or follows from others."""

@@ -9,7 +9,7 @@ its rows are padded otherwise, which the scaler of FFmpeg may round otherwise (`
 import tempfile
 import weakref
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from threading import Lock
 from typing import IO, TYPE_CHECKING
@@ -45,6 +45,14 @@ def hold_frames(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> HeldVid
     """The same video, decoded only once."""
     own = {field.name: getattr(video, field.name) for field in fields(Video)}
     return HeldVideo(**own, most_in_memory=most_in_memory)
+
+
+def mirror_video(video: Video) -> Video:
+    """The same video with left and right exchanged; what one has decoded the other has too."""
+    other = replace(video, mirrored=not video.mirrored, turns=-video.turns % 4)
+    if isinstance(video, HeldVideo):
+        vars(other)["_held"] = video._held
+    return other
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ class StageStore:
             digest.update(known[1].encode())
         elif isinstance(value, Video):
             digest.update(value.fingerprint.encode() + value.stamps.tobytes())
-            digest.update(value.time.tobytes())
+            digest.update(value.time.tobytes() + bytes((value.turns, value.mirrored)))
         elif isinstance(value, np.ndarray):
             digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
         elif is_dataclass(value):

@@ -9,7 +9,7 @@ import pytest
 
 from keyrecon.app import golf as app
 from keyrecon.app.exporting import export
-from keyrecon.app.golf import fit_file
+from keyrecon.app.golf import fit_file, fit_video
 from keyrecon.app.golf_comparing import compare
 from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
 from keyrecon.app.project import start
@@ -18,11 +18,13 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
-from keyrecon.io.formats.clicks import write_clicks
+from keyrecon.io.formats.clicks import read_clicks, write_clicks
 from keyrecon.io.formats.golf_marks import MARKS_FILE, write_golf_marks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
+from keyrecon.io.held_video import mirror_video
+from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import GOLF, Workspace
@@ -44,7 +46,9 @@ def swing(tmp_path_factory):
     camera = replace(film.scene.camera, width=400, height=300, player_px=190.0)
     film = replace(film, scene=replace(film.scene, camera=camera, workers=1))
     film_swing(draw_swing(read_motion_model(), SEED), film, folder)
-    write_clicks(folder / "clicks.json", click_first_frame(read_truth(folder / "truth.npz")))
+    clicks = click_first_frame(read_truth(folder / "truth.npz"))
+    joints = {name: (round(4 * x) / 4, round(4 * y) / 4) for name, (x, y) in clicks.joints.items()}
+    write_clicks(folder / "clicks.json", replace(clicks, joints=joints))
     return folder
 
 
@@ -126,6 +130,30 @@ def test_two_fits_stand_side_by_side_on_a_page(swing, decoded_at_first, tmp_path
         assert shown[0].endswith("hit")
     page.close()
     assert complaints == []
+
+
+def test_a_mirrored_film_of_a_left_hander_gives_the_mirrored_swing_to_the_digit(
+    swing, decoded_at_first
+):
+    """Its stages are those of the film as it was: all are found, none is run."""
+    clicks, store = read_clicks(swing / "clicks.json"), StageStore(swing / "project" / "cache")
+    other = {"right": "left", "left": "right"}
+    joints = {}
+    for name, (x, y) in clicks.joints.items():
+        side, _, rest = name.partition("_")
+        joints[f"{other[side]}_{rest}" if side in other else name] = (clicks.size[0] - 1 - x, y)
+    clicks = replace(clicks, joints=joints, left_handed=True)
+    video = mirror_video(open_video(swing / "video.mp4"))
+    ours = fit_video(video, clicks, read_motion_model(), QUICK, store.keep)
+    assert set(store.seconds) == {"mirrored"}
+    theirs = read_swing(swing / "project" / "motion.npz")
+    mirror, flip = LSP14.mirror, [-1.0, 1.0, 1.0]
+    assert np.array_equal(ours.fitted.motion.points3d[:, mirror] * flip, theirs.motion.points3d)
+    assert np.array_equal(ours.fitted.club * flip, theirs.club)
+    assert np.array_equal(ours.fitted.keys, theirs.keys)
+    across = clicks.size[0] - 1 - ours.fitted.motion.points2d[:, mirror, 0]
+    np.testing.assert_allclose(across, theirs.motion.points2d[..., 0], atol=1e-9)
+    assert ours.observations.left_handed
 
 
 def test_a_page_never_takes_the_place_of_a_report(swing, decoded_at_first):
