@@ -1,4 +1,4 @@
-"""A left-hander's film is fitted as a right-hander's, with left and right of its pictures exchanged.
+"""A left-hander's film is fitted as a right-hander's, left and right of its pictures exchanged.
 
 So a film and its mirror image take the same steps on the same pixels, and give the same swing to
 the last digit, mirrored.

@@ -27,7 +27,7 @@ from keyrecon.golf.marks import (
     place_marks,
 )
 from keyrecon.golf.observe.appearance_tracker import AppearanceOptions
-from keyrecon.golf.observe.club import Club, ClubOptions, track_club
+from keyrecon.golf.observe.club import Club, ClubOptions, ExpectedSwing, track_club
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.foreground import Foreground, FrameForeground
 from keyrecon.golf.observe.joint_tracks import TrackedJoints, track_joints
@@ -187,9 +187,10 @@ def _time_swing(
     """The club that was detected where a hypothesis has it, and key postures by that."""
     fps, chosen = seen.film.fps, seen.chosen
     shafts = hold_shafts([seen.scene.shafts[t] for t in chosen], seen.marks)
-    club = track_club(shafts, seen.height, fps, options.club, hypothesis.club[chosen])
     step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
     keys = (hypothesis.keys - chosen[0]) / step
+    expected = ExpectedSwing(hypothesis.club[chosen], keys)
+    club = track_club(shafts, seen.height, fps, options.club, expected)
     keys = hold_keys(refine_key_frames(club, keys, seen.height, fps, options.timing), seen.marks)
     phase = interpolate_times(keys, model.keys, len(chosen))
     return _TimedSwing(_describe_club(club, seen.height, seen.film.size), keys, phase)

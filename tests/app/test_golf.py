@@ -133,10 +133,11 @@ def test_two_fits_stand_side_by_side_on_a_page(swing, decoded_at_first, tmp_path
 
 
 def test_a_mirrored_film_of_a_left_hander_gives_the_mirrored_swing_to_the_digit(
-    swing, decoded_at_first
+    swing, decoded_at_first, tmp_path
 ):
     """Its stages are those of the film as it was: all are found, none is run."""
-    clicks, store = read_clicks(swing / "clicks.json"), StageStore(swing / "project" / "cache")
+    store = StageStore(shutil.copytree(swing / "project" / "cache", tmp_path / "cache"))
+    clicks = read_clicks(swing / "clicks.json")
     other = {"right": "left", "left": "right"}
     joints = {}
     for name, (x, y) in clicks.joints.items():

@@ -106,6 +106,10 @@ benchmarks/golf.py."""
 HELD = 100.0
 """Standard deviations beyond which a mark counts less where the fit follows the picture: no mark is
 an outlier, however far the model was from it."""
+FOLLOW_TOLERANCES = (10.0, 1.0)
+"""Factors on `robust` while the fit follows the picture: a club that lies otherwise than in any
+capture is no outlier before it was tried. On two real swings with such a finish clubs within 5
+degrees rose from .73 to .93 and from .69 to .72."""
 FIRST_COMPONENTS = 6
 """Coefficients that move before all do, the largest styles first. Chosen on rendered swings; see
 benchmarks/golf.py."""
@@ -163,7 +167,11 @@ def follow_observations(
         replace(block, weight=factor * block.weight)
         for block in mark_blocks(observations, fit.body, options, HELD)
     ]
-    return follow_picture(fit, [*residual_blocks(observations, initial, options), *marks], fps)
+    for tolerance in FOLLOW_TOLERANCES:
+        wider = replace(options, robust=tolerance * options.robust)
+        blocks = residual_blocks(observations, initial, wider)
+        fit = follow_picture(fit, [*blocks, *marks], fps)
+    return fit
 
 
 def _knots(fps: float, options: FitOptions) -> KnotSpacing:
