@@ -116,7 +116,14 @@ def find_stages(trees: dict[str, ast.Module]) -> dict[str, str]:
     }
     functions = {n.name: n for n in pipeline.body if isinstance(n, ast.FunctionDef)}
     calls = [c for name in ("prepare", "reconstruct") for c in _keep_calls(name, functions)]
-    return {call.args[0].value: source[call.args[1].id] for call in calls}
+    return {_stage_name(call.args[0]): source[call.args[1].id] for call in calls}
+
+
+def _stage_name(name: ast.expr) -> str:
+    """The name that is written, or, of one for each shot, what stands before the shot."""
+    if isinstance(name, ast.JoinedStr):
+        name = name.values[0]
+    return name.value.removesuffix("@")
 
 
 def _keep_calls(name: str, functions: dict[str, ast.FunctionDef]) -> Iterator[ast.Call]:
