@@ -33,7 +33,8 @@ from keyrecon.keyframes.selection import (
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
-from keyrecon.propagation.propagation import LEAST_MARKED, PropagateOptions, propagate_joints
+from keyrecon.propagation.marked_poses import LEAST_MARKED
+from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import (
     SOURCES,
     Annotations,

@@ -22,7 +22,6 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.numerics.geometry import to_complex
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.appearance import (
@@ -32,16 +31,16 @@ from keyrecon.propagation.appearance import (
     learn_appearance,
     regular_frames,
 )
-from keyrecon.propagation.body_frame import BodyFrame, stabilise_shots
-from keyrecon.propagation.bone_bounds import bone_lengths, bound_bones, ends_too_long
+from keyrecon.propagation.body_frame import stabilise_shots
+from keyrecon.propagation.bone_bounds import bound_bones, ends_too_long
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
-    AnnotatedPoses,
     EdgeTemplates,
     learn_foot_offsets,
     make_edge_templates,
 )
-from keyrecon.propagation.half_body import BodyHalf, split_body
+from keyrecon.propagation.flow_agreement import with_flow
+from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import (
     MarkedWays,
     PoseHypotheses,
@@ -58,6 +57,7 @@ from keyrecon.propagation.limb_identity import (
     template_gain,
 )
 from keyrecon.propagation.limb_search import search_limbs
+from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.propagation.trajectory_smoothing import smooth_trajectories
@@ -65,32 +65,14 @@ from keyrecon.ranges import within
 from keyrecon.records import (
     Annotations,
     FlowTracks,
-    HalfName,
     JointTracks,
-    PoseDistances,
     Preparation,
     Shots,
 )
 
-LEAST_MARKED = 0.5
-"""Share of a half's joints that must be marked for a frame to serve as a template. Halved or
-doubled: no change on one clip."""
 LIMB_HYPOTHESES = 3
 """Limbs of other annotated frames that are fitted on each side of a frame: as many as there may be
 places for one. Halved or doubled: no change on one clip."""
-
-
-FLOW_TOLERANCE = 0.05
-"""Flow and edges that put a joint nearer together than this agree, player heights: edges are the
-more exact; two eyes mark a joint .042 apart in the worst tenth. Halved or doubled: no change on one
-clip."""
-SURE_FLOW, SURE_EDGES = 0.8, 0.1
-"""Flow that is surer than the first has a joint whatever edges say, and edges that are less sure
-than the second leave it to flow that is at all sure (`MIN_FLOW_CONFIDENCE`). In an address of golf
-edges took the arm in front for the one behind it, with a confidence of .7, for twenty frames that
-flow joins to within a pixel: +2.8 points of PCK on that clip, +.5 to -.6 on four others, 0 to -.1
-on three rendered sequences."""
-MIN_FLOW_CONFIDENCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -165,47 +147,6 @@ def propagate_joints(
         bounds = bound_bones(annotations, body_frame)
         tracks = with_flow(tracks, flow, preparation.track.height, bounds)
     return _with_marks(annotations, marked, tracks)
-
-
-def with_flow(
-    tracks: JointTracks,
-    flow: FlowTracks,
-    height: Float[np.ndarray, "T"],
-    bounds: Float[np.ndarray, "J J"] | None = None,
-) -> JointTracks:
-    """Tracks with joints where flow from both sides meets, if it is surer and they are elsewhere.
-
-    A joint that is followed from one mark alone is left to edges: of four that were sure and far
-    from them, flow had stayed behind on an even shirt. Nor does flow have a joint where a bone
-    would become longer than `bounds` (player heights) and than it is.
-    """
-    apart = np.linalg.norm(tracks.joints - flow.joints, axis=2) / height[:, None]
-    elsewhere = ~(apart < FLOW_TOLERANCE) & np.isfinite(flow.joints).all(axis=2)
-    doubted = ~(tracks.confidence > SURE_EDGES) & (flow.confidence > MIN_FLOW_CONFIDENCE)
-    replaced = elsewhere & flow.joined & (doubted | (flow.confidence > SURE_FLOW))
-    if bounds is not None:
-        replaced &= ~_stretched(tracks.joints, flow.joints, replaced, height, bounds)
-    return JointTracks(
-        np.where(replaced[..., None], flow.joints, tracks.joints),
-        np.where(replaced, flow.confidence, tracks.confidence),
-        tracks.keyframe,
-    )
-
-
-def _stretched(
-    joints: Float[np.ndarray, "T J 2"],
-    others: Float[np.ndarray, "T J 2"],
-    replaced: Bool[np.ndarray, "T J"],
-    height: Float[np.ndarray, "T"],
-    bounds: Float[np.ndarray, "J J"],
-) -> Bool[np.ndarray, "T J"]:
-    """Joints that end a bone which is too long with others in the place of those `replaced`."""
-    bones = np.argwhere(np.triu(np.isfinite(bounds)))
-    longest = bounds[bones[:, 0], bones[:, 1]]
-    before = to_complex(joints) / height[:, None]
-    after = np.where(replaced, to_complex(others) / height[:, None], before)
-    longest = np.maximum(longest, bone_lengths(before, bones))
-    return ends_too_long(after, bones, longest)
 
 
 def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
@@ -307,94 +248,6 @@ def propose_arms(
     trunk = fitted.joints[np.arange(len(best)), best]
     found = search_limbs(appearance, templates.poses, trunk, LIMB_HYPOTHESES)
     return fit_poses(templates, index, found, similar)
-
-
-def find_ways(
-    annotations: Annotations,
-    flow: FlowTracks | None,
-    body_frame: BodyFrame,
-    half: BodyHalf,
-    fixed: Complex[np.ndarray, "T G"],
-    preparation: Preparation,
-) -> MarkedWays:
-    """Joints of one half where flow and straight lines in time lead from the marks of a shot.
-
-    Without a mark in its shot a joint is where the nearest one in another is, and that is worth
-    nothing.
-    """
-    frames, number = np.arange(len(fixed)), preparation.shots.number
-    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
-    lines = np.zeros((len(frames), len(half.joints)), complex)
-    seconds, followed, confidence = np.zeros(lines.shape), lines.copy(), np.zeros(lines.shape)
-    for joint, places in enumerate(marks.T):
-        known = np.isfinite(places)
-        lines[:, joint] = np.interp(frames, annotations.frames[known], places[known])
-        seconds[:, joint] = np.inf
-        for shot, part in enumerate(preparation.shots.parts):
-            inside = known & (number[annotations.frames] == shot)
-            at = annotations.frames[inside]
-            if len(at):
-                lines[part, joint] = np.interp(frames[part], at, places[inside])
-                away = nearest_distance(frames[part], at)
-                seconds[part, joint] = away / preparation.video.fps
-    lines[:, half.fixed] = fixed
-    if flow is not None:
-        places = body_frame.from_pixels(flow.joints[:, half.joints], frames[:, None])
-        sure = np.isfinite(places) & flow.joined[:, half.joints]
-        followed[sure] = places[sure]
-        confidence[sure] = flow.confidence[:, half.joints][sure]
-    return MarkedWays(followed, confidence, lines, seconds)
-
-
-def nearest_distance(
-    frames: Int[np.ndarray, "T"], marked: Int[np.ndarray, "k"]
-) -> Int[np.ndarray, "T"]:
-    """Frames to the nearest marked one; `marked` ascends."""
-    after = np.clip(np.searchsorted(marked, frames), 0, len(marked) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.minimum(np.abs(frames - marked[after]), np.abs(frames - marked[before]))
-
-
-def gather_poses(
-    annotations: Annotations,
-    body_frame: BodyFrame,
-    half: BodyHalf,
-    fixed: Complex[np.ndarray, "T G"],
-) -> AnnotatedPoses:
-    """Annotated poses of one half: every frame on which at least half of its joints are marked.
-
-    A joint that is not marked there stands at its median place beside its parent.
-    """
-    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
-    known = np.isfinite(marks)
-    rows = np.flatnonzero(known[:, half.free].mean(axis=1) >= LEAST_MARKED)
-    frames, poses, known = annotations.frames[rows], marks[rows], known[rows]
-    poses[:, half.fixed], known[:, half.fixed] = fixed[frames], True
-    # from the joints that are there outwards, back for parents that are not, and out from these
-    for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
-        bone = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
-        missing = np.isnan(poses[:, child])
-        poses[missing, child] = poses[missing, parent] + bone
-    if not np.isfinite(poses).all() or not rows.size:
-        raise KeyreconError(
-            f"Too few joints of the {half.name} body are marked to propagate them to other "
-            "frames; mark all of them on at least one keyframe."
-        )
-    one, other = half.joints[half.bones].T
-    longest = bound_bones(annotations, body_frame)[one, other]
-    return AnnotatedPoses(half, frames, poses, known, longest)
-
-
-def distances_to(
-    distances: PoseDistances, name: HalfName, frames: Int[np.ndarray, "K"]
-) -> Float[np.ndarray, "T K"]:
-    """Pose distance of every frame to a few, player heights; by way of their exemplars."""
-    table = distances.upper if name == "upper" else distances.lower
-    exemplar_distance = distances.exemplar_distance[0 if name == "upper" else 1]
-    result = table[distances.row[:, None], distances.row[frames]]
-    result = result + exemplar_distance[:, None] + exemplar_distance[frames]
-    result[frames, np.arange(len(frames))] = 0
-    return result
 
 
 def _with_marks(

@@ -7,7 +7,7 @@ import pytest
 from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes
-from keyrecon.propagation.propagation import distances_to
+from keyrecon.propagation.marked_poses import distances_to
 
 
 @pytest.fixture(scope="module")

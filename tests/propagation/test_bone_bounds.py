@@ -7,8 +7,8 @@ from hypothesis_choice import choice
 from keyrecon.body import LSP14
 from keyrecon.propagation.body_frame import stabilise_player
 from keyrecon.propagation.bone_bounds import bone_lengths, bound_bones
+from keyrecon.propagation.flow_agreement import with_flow
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.propagation import with_flow
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.records import FlowTracks, JointTracks, Shots
 

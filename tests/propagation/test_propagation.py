@@ -6,7 +6,8 @@ from capsule_player import hide, marks, scene, standing, turned
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.propagation.propagation import PropagateOptions, propagate_joints, with_flow
+from keyrecon.propagation.flow_agreement import with_flow
+from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import FlowTracks, JointTracks
 
 PAPER = PropagateOptions(method="paper")

@@ -35,7 +35,7 @@ from keyrecon.body import Skeleton
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import fit_similar
-from keyrecon.propagation.propagation import LEAST_MARKED
+from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.records import Annotations, Preparation, Track
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 

@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.propagation.propagation import LEAST_MARKED, distances_to
+from keyrecon.propagation.marked_poses import LEAST_MARKED, distances_to
 from keyrecon.records import Annotations, HalfName, Keyframes, Motion, PoseDistances
 
 HALVES: tuple[HalfName, ...] = ("upper", "lower")

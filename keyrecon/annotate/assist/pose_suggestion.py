@@ -34,13 +34,8 @@ from keyrecon.propagation.hypotheses import (
     join_hypotheses,
     propose_limbs,
 )
-from keyrecon.propagation.propagation import (
-    LEAST_MARKED,
-    LIMB_HYPOTHESES,
-    PropagateOptions,
-    distances_to,
-    gather_poses,
-)
+from keyrecon.propagation.marked_poses import LEAST_MARKED, distances_to, gather_poses
+from keyrecon.propagation.propagation import LIMB_HYPOTHESES, PropagateOptions
 from keyrecon.propagation.registration import (
     FIXED_WEIGHT,
     RegistrationStep,

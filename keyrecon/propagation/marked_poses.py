@@ -1,0 +1,107 @@
+"""What the marks tell of one half of the body: its poses, and where its joints can be between them.
+
+All of it in the player's own frame (`body_frame`), in player heights.
+"""
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from keyrecon.errors import KeyreconError
+from keyrecon.propagation.body_frame import BodyFrame
+from keyrecon.propagation.bone_bounds import bound_bones
+from keyrecon.propagation.edge_template import AnnotatedPoses
+from keyrecon.propagation.half_body import BodyHalf
+from keyrecon.propagation.hypotheses import MarkedWays
+from keyrecon.records import Annotations, FlowTracks, HalfName, PoseDistances, Preparation
+
+LEAST_MARKED = 0.5
+"""Share of a half's joints that must be marked for a frame to serve as a template. Halved or
+doubled: no change on one clip."""
+
+
+def gather_poses(
+    annotations: Annotations,
+    body_frame: BodyFrame,
+    half: BodyHalf,
+    fixed: Complex[np.ndarray, "T G"],
+) -> AnnotatedPoses:
+    """Annotated poses of one half: every frame on which at least half of its joints are marked.
+
+    A joint that is not marked there stands at its median place beside its parent.
+    """
+    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
+    known = np.isfinite(marks)
+    rows = np.flatnonzero(known[:, half.free].mean(axis=1) >= LEAST_MARKED)
+    frames, poses, known = annotations.frames[rows], marks[rows], known[rows]
+    poses[:, half.fixed], known[:, half.fixed] = fixed[frames], True
+    # from the joints that are there outwards, back for parents that are not, and out from these
+    for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
+        bone = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
+        missing = np.isnan(poses[:, child])
+        poses[missing, child] = poses[missing, parent] + bone
+    if not np.isfinite(poses).all() or not rows.size:
+        raise KeyreconError(
+            f"Too few joints of the {half.name} body are marked to propagate them to other "
+            "frames; mark all of them on at least one keyframe."
+        )
+    one, other = half.joints[half.bones].T
+    longest = bound_bones(annotations, body_frame)[one, other]
+    return AnnotatedPoses(half, frames, poses, known, longest)
+
+
+def distances_to(
+    distances: PoseDistances, name: HalfName, frames: Int[np.ndarray, "K"]
+) -> Float[np.ndarray, "T K"]:
+    """Pose distance of every frame to a few, player heights; by way of their exemplars."""
+    table = distances.upper if name == "upper" else distances.lower
+    exemplar_distance = distances.exemplar_distance[0 if name == "upper" else 1]
+    result = table[distances.row[:, None], distances.row[frames]]
+    result = result + exemplar_distance[:, None] + exemplar_distance[frames]
+    result[frames, np.arange(len(frames))] = 0
+    return result
+
+
+def find_ways(
+    annotations: Annotations,
+    flow: FlowTracks | None,
+    body_frame: BodyFrame,
+    half: BodyHalf,
+    fixed: Complex[np.ndarray, "T G"],
+    preparation: Preparation,
+) -> MarkedWays:
+    """Joints of one half where flow and straight lines in time lead from the marks of a shot.
+
+    Without a mark in its shot a joint is where the nearest one in another is, and that is worth
+    nothing.
+    """
+    frames, number = np.arange(len(fixed)), preparation.shots.number
+    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
+    lines = np.zeros((len(frames), len(half.joints)), complex)
+    seconds, followed, confidence = np.zeros(lines.shape), lines.copy(), np.zeros(lines.shape)
+    for joint, places in enumerate(marks.T):
+        known = np.isfinite(places)
+        lines[:, joint] = np.interp(frames, annotations.frames[known], places[known])
+        seconds[:, joint] = np.inf
+        for shot, part in enumerate(preparation.shots.parts):
+            inside = known & (number[annotations.frames] == shot)
+            at = annotations.frames[inside]
+            if len(at):
+                lines[part, joint] = np.interp(frames[part], at, places[inside])
+                away = nearest_distance(frames[part], at)
+                seconds[part, joint] = away / preparation.video.fps
+    lines[:, half.fixed] = fixed
+    if flow is not None:
+        places = body_frame.from_pixels(flow.joints[:, half.joints], frames[:, None])
+        sure = np.isfinite(places) & flow.joined[:, half.joints]
+        followed[sure] = places[sure]
+        confidence[sure] = flow.confidence[:, half.joints][sure]
+    return MarkedWays(followed, confidence, lines, seconds)
+
+
+def nearest_distance(
+    frames: Int[np.ndarray, "T"], marked: Int[np.ndarray, "k"]
+) -> Int[np.ndarray, "T"]:
+    """Frames to the nearest marked one; `marked` ascends."""
+    after = np.clip(np.searchsorted(marked, frames), 0, len(marked) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.minimum(np.abs(frames - marked[after]), np.abs(frames - marked[before]))
