@@ -223,6 +223,7 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
         if stream.width * stream.height > MAX_PIXELS:
             raise ValueError(f"pictures of {stream.width}x{stream.height} are too large")
         stamps = _distinct(np.array(sorted(_shown_stamps(container, path)), dtype=np.int64))
+        cut_off = _pictures_beyond(stream, path.stat().st_size)
         first = next(_decode_from(container, int(stamps[0])), None)
         if first is None:
             raise KeyreconError(f"{path}: no picture can be decoded; the file is damaged.")
@@ -235,6 +236,11 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
         raise KeyreconError(
             f"{path} has {len(stamps)} frames, counted from 0; it cannot be used from frame "
             f"{start} {'on' if end is None else f'up to before frame {end}'}."
+        )
+    if end is None and cut_off:
+        raise KeyreconError(
+            f"{path} ends in the middle: {len(stamps)} frames are there, {cut_off} are missing. "
+            f"Copy it again, or use what is there with --end {len(stamps)}."
         )
     stamps = stamps[start:end]
     time = (stamps - stamps[0]) * seconds_per_tick / slow_motion
@@ -290,6 +296,12 @@ def _open(path: Path) -> av.container.InputContainer:
         raise KeyreconError(f"{path} is a single picture; a video is needed.")
     container.streams.video[0].thread_type = "AUTO"
     return container
+
+
+def _pictures_beyond(stream: av.VideoStream, size: int) -> int:
+    """Pictures that lie beyond the end of a file of `size` bytes by its own index."""
+    index: Any = getattr(stream, "index_entries", ())  # older versions of PyAV do not show it
+    return sum(entry.pos + entry.size > size for entry in index)
 
 
 def _shown_stamps(container: av.container.InputContainer, path: Path) -> list[int]:

@@ -176,6 +176,28 @@ def test_a_file_cut_off_while_copied_is_refused_with_one_message(write_numbered,
         list(open_video(tmp_path / "cut.mp4").frames())
 
 
+def test_a_file_that_ends_in_the_middle_says_how_much_of_it_is_there(write_numbered, tmp_path):
+    path = tmp_path / "whole.mp4"
+    source = write_numbered("whole.mp4", EVEN, {"g": "10"})
+    with (
+        av.open(str(source)) as stored,
+        av.open(str(path), "w", options={"movflags": "faststart"}) as copy,
+    ):
+        stream = copy.add_stream_from_template(stored.streams.video[0])
+        for packet in stored.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                copy.mux(packet)
+    content = path.read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat")
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(content[: int(len(content) * 0.8)])
+    with pytest.raises(KeyreconError, match=r"ends in the middle: (\d+) frames are there"):
+        open_video(cut)
+    assert len(open_video(cut, end=10)) == 10
+    assert len(open_video(path)) == len(EVEN)
+
+
 def test_damage_inside_a_file_names_the_frame(write_numbered, tmp_path):
     path = write_numbered("whole.mkv", EVEN, {"g": "60"})
     content = path.read_bytes()
