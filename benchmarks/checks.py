@@ -29,7 +29,8 @@ import numpy as np
 import real
 
 from keyrecon.annotate.assist.body_estimate import estimate_body
-from keyrecon.annotate.assist.checks import Check, find_checks, find_neighbours
+from keyrecon.annotate.assist.checks import Check, find_checks
+from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.app.console import show
 from keyrecon.body import LSP14
 from keyrecon.io.stages import StageStore

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate, estimate_body
-from keyrecon.annotate.assist.checks import Neighbours, find_neighbours
 from keyrecon.annotate.assist.flow_suggestion import nearest_marks, surer_by_flow
+from keyrecon.annotate.assist.neighbours import Neighbours, find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, choose_sources, suggest_joints
 from keyrecon.annotate.assist.preview import Strip, cut_strip
 from keyrecon.errors import KeyreconError

@@ -7,7 +7,8 @@ import pytest
 from capsule_player import marks, scene, standing, turned
 
 from keyrecon.annotate.assist.body_estimate import estimate_body
-from keyrecon.annotate.assist.checks import find_checks, find_neighbours
+from keyrecon.annotate.assist.checks import find_checks
+from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.body import LSP14
 
 ROW = 5

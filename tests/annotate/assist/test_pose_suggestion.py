@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from capsule_player import marks, scene, standing, turned
 
-from keyrecon.annotate.assist.checks import find_neighbours
+from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import choose_sources, suggest_joints, take_rows
 from keyrecon.body import LSP14
 
