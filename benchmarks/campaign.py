@@ -35,8 +35,13 @@ from mutations import READERS, make_samples, mutate
 from keyrecon import cli
 from keyrecon.app import exporting, golf, keyframing
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.option_tables import OptionRecord
+from keyrecon.io.workspace import Workspace
+from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
+from keyrecon.synthetic.marks import mark_from_truth
 
 SECONDS, MEMORY = 20.0, 4 << 30
 """Limits of a case."""
@@ -264,27 +269,25 @@ def option_names(options: OptionRecord, prefix: str = "") -> Iterator[str]:
             yield name
 
 
+STEPS = (("keyframes", "--budget", "0.1"), ("run", "--partial"))
+"""What is killed, and taken up again."""
+
+
 def attack_stages(kills: int, seed: int) -> Iterator[Outcome]:
-    """Kill `keyrecon keyframes` on a rendered clip at any moment, and let it go on."""
+    """Kill the stages on a rendered clip at any moment, from first to last, and let them go on."""
     rng = random.Random(f"{seed} kills")
     with TemporaryDirectory() as folder:
         clip = Path(folder) / "clip"
-        _keyrecon("synth", "--out", clip, "--seconds", "4", "--fps", "25", "--width", "480",
-                  "--height", "270", "--player-px", "120")  # fmt: skip
+        _keyrecon("synth", "--out", clip, "--seconds", "2", "--fps", "15", "--width", "320",
+                  "--height", "180", "--player-px", "90")  # fmt: skip
+        _mark(clip, Path(folder) / "marks")
         wanted, started = _finish(clip, Path(folder) / "whole"), time.monotonic()
         _finish(clip, Path(folder) / "again")
         lasts = time.monotonic() - started
         for number in range(kills):
             project = Path(folder) / f"p{number}"
             _begin(clip, project)
-            running = subprocess.Popen(
-                [sys.executable, "-m", "keyrecon", "keyframes", str(project), "--budget", "0.1"],
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
-            time.sleep(rng.uniform(0, lasts))
-            running.kill()
-            running.wait()
+            _kill(project, rng.uniform(0, lasts))
             found = _finish(clip, project)
             left = [*project.rglob("*.part")]
             shutil.rmtree(project)
@@ -294,22 +297,53 @@ def attack_stages(kills: int, seed: int) -> Iterator[Outcome]:
                 yield Outcome("read") if found == wanted else Outcome("changed", "other results")
 
 
+def _mark(clip: Path, project: Path) -> None:
+    """Marks of the clip's keyframes from its truth, kept beside it."""
+    _begin(clip, project)
+    _keyrecon(STEPS[0][0], project, *STEPS[0][1:])
+    workspace, truth = Workspace(project), read_truth(clip / "truth.npz")
+    video = workspace.video()
+    found = read_keyframes(workspace.keyframes_file)
+    marks = mark_from_truth(found, truth["points2d"], truth["points3d"], truth["visible"])
+    write_coco(clip / "annotations.json", marks, (video.width, video.height))
+
+
+def _kill(project: Path, seconds: float) -> None:
+    """Begin with the first step, and kill whatever runs after some seconds."""
+    end = time.monotonic() + seconds
+    for step, *options in STEPS:
+        running = subprocess.Popen(
+            [sys.executable, "-m", "keyrecon", step, str(project), *options],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            running.wait(max(0.0, end - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            running.kill()
+            running.wait()
+            return
+
+
 def _begin(clip: Path, project: Path) -> None:
     if not project.exists():
         _keyrecon("new", clip / "video.mp4", "--project", project)
-        shutil.copy(clip / "picks.json", project / "picks.json")
+        for name in ("picks.json", "annotations.json"):
+            if (clip / name).exists():
+                shutil.copy(clip / name, project / name)
 
 
 def _finish(clip: Path, project: Path) -> str:
-    """Digest of all that the automatic part makes."""
+    """Digest of all that the steps make."""
     _begin(clip, project)
-    _keyrecon("keyframes", project, "--budget", "0.1")
-    made = sorted([project / "keyframes.json", *(project / "cache").glob("*.npz")])
-    arrays = (np.load(file) for file in made if file.suffix == ".npz")
-    digest = hashlib.sha256((project / "keyframes.json").read_bytes())
-    for stored in arrays:
-        for name in stored.files:
-            digest.update(stored[name].tobytes())
+    for step, *options in STEPS:
+        _keyrecon(step, project, *options)
+    texts = [project / name for name in ("keyframes.json", "annotations.json", "project.toml")]
+    digest = hashlib.sha256(b"".join(file.read_bytes() for file in texts))
+    for file in (project / "motion.npz", *sorted((project / "cache").glob("*.npz"))):
+        with np.load(file) as stored:
+            for name in stored.files:
+                digest.update(stored[name].tobytes())
     return digest.hexdigest()
 
 
