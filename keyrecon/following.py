@@ -12,7 +12,16 @@ import numpy as np
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep
 from keyrecon.progress import Progress, silent
-from keyrecon.records import CameraPath, Colors, Edges, Pick, Shots, Track, TrackAnchors
+from keyrecon.records import (
+    CameraPath,
+    Colors,
+    Edges,
+    Pick,
+    Shots,
+    Track,
+    TrackAnchors,
+    TrackVerification,
+)
 from keyrecon.segmentation.background_model import BackgroundOptions, build_background
 from keyrecon.segmentation.color_model import picked_height
 from keyrecon.segmentation.contours import EdgeOptions, find_edges
@@ -26,6 +35,7 @@ from keyrecon.timeline import (
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.shot_sorting import ShotOptions, Sighting, sight_player, sort_shots
 from keyrecon.tracking.tracker import TrackOptions, track_player
+from keyrecon.tracking.verification import verify_track
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,8 @@ class FollowedPlayer:
     """All shots of the file."""
     track: Track
     edges: tuple[Edges, ...]
+    verification: TrackVerification
+    """What the video says of the track, in frames of the file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +110,15 @@ def follow_player(
     usable = np.flatnonzero(shots.usable).tolist()
     tracks: list[Track] = []
     edges: list[Edges] = []
+    verified: list[TrackVerification] = []
     for number in progress(usable, "Following the player in each shot", len(usable)):
-        track, own = _follow(each[number], _found(sightings[number]), options, keep, silent)
+        track, own, of_track = _follow(
+            each[number], _found(sightings[number]), options, keep, silent
+        )
         tracks.append(track)
         edges += own
-    return FollowedPlayer(shots, join_frames(tracks), tuple(edges))
+        verified.append(replace(of_track, frames=of_track.frames + shots.first[number]))
+    return FollowedPlayer(shots, join_frames(tracks), tuple(edges), join_frames(verified))
 
 
 def _found(sighting: Sighting) -> Track:
@@ -134,8 +150,8 @@ def _shot(
 
 def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
-) -> tuple[Track, tuple[Edges, ...]]:
-    """Scene, track and edges of a shot in which the player was found."""
+) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
+    """Track and edges of a shot in which the player was found, and what speaks for the track."""
     background = keep(
         f"background{shot.name}", build_background, shot.video, shot.camera, detected,
         options=options.background, progress=progress,
@@ -148,4 +164,8 @@ def _follow(
         f"edges{shot.name}", find_edges, shot.video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,
     )  # fmt: skip
-    return track, edges
+    verification = keep(
+        f"verify{shot.name}", verify_track, shot.video, track, shot.camera, background,
+        shot.colors, progress=progress,
+    )  # fmt: skip
+    return track, edges, verification

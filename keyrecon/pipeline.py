@@ -181,7 +181,9 @@ def _in_file(
             restore_frames(half, frames, count) for half in (keyframes.upper, keyframes.lower)
         )
         keyframes = replace(keyframes, upper=upper, lower=lower)
-    return Preparation(video, camera, colors, track, edges, distances, keyframes, shots)
+    return Preparation(
+        video, camera, colors, track, edges, distances, keyframes, shots, followed.verification
+    )
 
 
 def usable_part(preparation: Preparation) -> Preparation:

@@ -123,6 +123,18 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
+class TrackVerification:
+    """What some frames of the video say of the track."""
+
+    frames: Int[np.ndarray, "n"]
+    """Those looked at."""
+    truncated: Bool[np.ndarray, "n"]
+    """Whether the lower edge of the picture cuts the player off."""
+    distractor: Float[np.ndarray, "n 2"]
+    """Head of another figure that looks like the player, px; NaN where there is none."""
+
+
+@dataclass(frozen=True, eq=False)
 class TrackAnchors:
     """Where a person marked the player's head and feet: fixed points of the track."""
 
@@ -267,6 +279,8 @@ class Preparation:
     pose_distances: PoseDistances
     keyframes: Keyframes
     shots: Shots
+    verification: TrackVerification | None = None
+    """What the video says of the track; None where it was not held against it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,10 @@ from keyrecon.records import (
     Shots,
     Track,
     TrackAnchors,
+    TrackVerification,
 )
 
-PerFrame = TypeVar("PerFrame", Track, FlowTracks, JointTracks)
+PerFrame = TypeVar("PerFrame", Track, FlowTracks, JointTracks, TrackVerification)
 """Records whose every value has one entry per frame."""
 
 

@@ -180,9 +180,12 @@ def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
 
 
 def _contradictions(told: str) -> str:
-    """Of what a command tells, the cuts, clicks and marks that do not fit the rest: the page shows
-    everything else in places of its own."""
-    named = re.compile(r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+")
+    """Of what a command tells, the cuts, clicks and marks that do not fit the rest, and what speaks
+    against the track: the page shows everything else in places of its own."""
+    named = re.compile(
+        r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+|The lower edge of the picture|"
+        r"Another figure|The player found jumps"
+    )
     return "\n".join(line for line in told.splitlines() if named.match(line))
 
 

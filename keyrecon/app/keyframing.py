@@ -22,6 +22,7 @@ from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
+from keyrecon.report.drawing import draw_brackets
 from keyrecon.timeline import part_of_video
 from keyrecon.uncertainty import unsure_track
 
@@ -127,18 +128,17 @@ def write_keyframe_pictures(
     """One PNG per keyframe, named by frame number as labelling tools keep it.
 
     The video is read once from the first to the last: to seek each by itself decodes as many
-    frames before it as lie between two that stand alone, 250 in most files.
+    frames before it as lie between two that stand alone, 250 in most files. Brackets around the
+    player tell who is meant where there are several.
     """
     make_folder(workspace.pictures)
     frames = preparation.keyframes.frames
-    paths = {int(t): workspace.pictures / f"frame_{t:06d}.png" for t in frames}
-    missing = [t for t, path in paths.items() if not path.exists()]
-    if not missing:
-        return
-    pictures = part_of_video(preparation.video, np.array(missing)).frames()
-    shown = progress(pictures, "Writing keyframe pictures", len(missing))
+    pictures = part_of_video(preparation.video, frames).frames()
+    shown = progress(pictures, "Writing keyframe pictures", len(frames))
 
     def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:
-        write_picture(paths[entry[0]], entry[1])
+        frame, picture = entry
+        bracketed = draw_brackets(picture, preparation.track.box[frame])
+        write_picture(workspace.pictures / f"frame_{frame:06d}.png", bracketed)
 
-    deque(side_by_side(write, zip(missing, shown, strict=True)), maxlen=0)
+    deque(side_by_side(write, zip(frames.tolist(), shown, strict=True)), maxlen=0)

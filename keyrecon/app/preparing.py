@@ -7,7 +7,8 @@ it is as sure of the player.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,9 +18,18 @@ from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, Pick, Preparation, Shots
+from keyrecon.records import (
+    Annotations,
+    CameraPath,
+    Pick,
+    Preparation,
+    Shots,
+    Track,
+    TrackVerification,
+)
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
+from keyrecon.tracking.verification import find_jumps, find_meetings
 
 MAX_PICK_DISTANCE = 0.25
 """A click lies off its part where the track passes it farther away than this, player heights: a
@@ -27,6 +37,10 @@ head is .13 high, a shoe .15 long, and a track that is right lies within .1 of b
 AS_SURE = 0.01
 """Tracks whose confidences differ by less in the mean are equally sure of the player. One wrong
 click in eleven on a real rally: .77 with it, .99 without."""
+
+
+CUT_OFF = 0.1
+"""Share of the frames from which feet that the picture cuts off are told of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +53,23 @@ class ProjectPreparation:
     doubtful: tuple[Pick, ...] = ()
     """Clicks that lie off the track, which is no surer without them."""
     marks: Annotations | None = None
+    picks: tuple[Pick, ...] = ()
 
     def contradictions(self) -> list[str]:
         """A line for every click or mark that does not fit the rest."""
         track = self.preparation.track
-        lines = [
+        made, lines = self.preparation, []
+        if made.verification is not None:
+            lines += describe_truncation(made.verification)
+            lines += describe_identity(
+                made.track,
+                made.camera,
+                made.video.fps,
+                made.shots,
+                made.verification,
+                self._known_frames(),
+            )
+        lines += [
             f"{_named(pick)} lies {distance_to_track(track, pick):.1f} body heights from where the "
             f"player's {pick.part} was found, and was left aside: without it the player is found "
             "as surely or more so. Click it anew."
@@ -66,6 +92,64 @@ class ProjectPreparation:
                 )
             ]
         return lines
+
+    def _known_frames(self) -> list[int]:
+        """Frames in which a person told where the player is."""
+        known = {pick.frame for pick in self.picks if pick.part == "head"}
+        if self.marks is not None:
+            marked = np.isfinite(self.marks.joints).all(axis=2).mean(axis=1) > 0.5
+            known |= {*self.marks.frames[marked].tolist()}
+        return sorted(known)
+
+
+def describe_truncation(verification: TrackVerification) -> list[str]:
+    """A line where the lower edge of the picture cuts the feet off."""
+    share = float(verification.truncated.mean())
+    if share < CUT_OFF:
+        return []
+    cut, frames = verification.truncated, verification.frames
+    turns = np.flatnonzero(np.diff(cut, prepend=False, append=False)).reshape(-1, 2)
+    first, end = max(turns.tolist(), key=lambda run: run[1] - run[0])
+    return [
+        f"The lower edge of the picture cuts the player's feet off in about {share:.0%} of the "
+        f"frames (longest: {frames[first]}-{frames[end - 1]}): what was taken for feet there is "
+        "none, and legs come out wrong. Film with the feet in the picture, or use a part of the "
+        "video that shows them."
+    ]
+
+
+def describe_identity(
+    track: Track,
+    camera: CameraPath,
+    fps: float,
+    shots: Shots,
+    verification: TrackVerification,
+    known: Sequence[int],
+) -> list[str]:
+    """Lines where the track may have changed from the player to somebody alike.
+
+    Nothing where a person told who is meant (`known` frames) on both sides.
+    """
+    meetings = find_meetings(verification, track, fps)
+    jumps = find_jumps(track, camera, shots, fps)
+    turns = [0, *(round((first + last) / 2) for first, last in meetings), len(track.head)]
+    stretches = [s for s in pairwise(turns) if s[1] - s[0] > fps / 2]
+    unsure = [s for s in stretches if not any(s[0] <= frame < s[1] for frame in known)]
+    lines = []
+    if meetings and unsure:
+        where = ", ".join(f"{first}-{last}" for first, last in meetings[:8])
+        mark = ", ".join(str((first + end) // 2) for first, end in unsure[:8])
+        lines.append(
+            f"Another figure that looks like the player comes close in frames {where}: the track "
+            f"may go on with the wrong one. Mark the player's body in frame {mark} to be sure."
+        )
+    lines += [
+        f"The player found jumps to another place in frame {frame}, farther than anybody moves: "
+        "on one side of it that is not the player. Look there, and mark the player's body where "
+        "it is somebody else."
+        for frame in jumps[:4]
+    ]
+    return lines
 
 
 MOST_LISTED = 12
@@ -121,7 +205,16 @@ def prepare_project(
     if used is not None:
         size = (video.width, video.height)
         write_durably(file, coco_text(used, size).encode())
-    return ProjectPreparation(found.preparation, found.set_aside, found.doubtful, marks)
+    return _with_told(workspace, found, marks)
+
+
+def _with_told(
+    workspace: Workspace, found: ProjectPreparation, marks: Annotations | None
+) -> ProjectPreparation:
+    """With the marks and with the clicks that were not left aside."""
+    picks = workspace.picks() if workspace.picks_file.is_file() else ()
+    kept = tuple(pick for pick in picks if pick not in found.set_aside)
+    return replace(found, marks=marks, picks=kept)
 
 
 def _without_misplaced(

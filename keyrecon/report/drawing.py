@@ -148,3 +148,28 @@ def _draw_joint(
 def _fixed_point(points: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
     """Coordinates as OpenCV's fixed-point numbers, kept in the range that it can clip."""
     return np.round(np.clip(points, -30000, 30000) * 2**SUBPIXEL).astype(np.int32)
+
+
+def draw_brackets(
+    picture: UInt8[np.ndarray, "h w 3"], box: Float[np.ndarray, "4"]
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A copy of a picture with brackets at the corners of a box (x0, y0, x1, y1), px; without them
+    where the box is unknown."""
+    drawn = picture.copy()
+    if not np.isfinite(box).all():
+        return drawn
+    rows, columns = picture.shape[:2]
+    thick = max(1, round(rows / 360))
+    low, high = (thick, thick), (columns - 1 - thick, rows - 1 - thick)
+    x0, y0, x1, y1 = np.rint(np.clip(box, (*low, *low), (*high, *high))).astype(int).tolist()
+    arm = max(3, round(0.12 * min(x1 - x0, y1 - y0)))
+    for color, width in ((SEAM, 3 * thick), (TRUNK, thick)):
+        for x, y, right, down in (
+            (x0, y0, 1, 1),
+            (x1, y0, -1, 1),
+            (x0, y1, 1, -1),
+            (x1, y1, -1, -1),
+        ):
+            cv2.line(drawn, (x, y), (x + right * arm, y), color, width)
+            cv2.line(drawn, (x, y), (x, y + down * arm), color, width)
+    return drawn

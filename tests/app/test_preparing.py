@@ -1,7 +1,10 @@
-"""What the automatic part tells of the shots of a video."""
+"""What the automatic part tells of the shots of a video and of the track."""
 
-from keyrecon.app.preparing import describe_shots
-from keyrecon.records import PLAYER, Shots
+import numpy as np
+
+from keyrecon.app.annotator import _contradictions
+from keyrecon.app.preparing import describe_identity, describe_shots, describe_truncation
+from keyrecon.records import PLAYER, CameraPath, Shots, Track, TrackVerification
 
 
 def test_every_shot_is_told_with_its_frames_and_what_it_shows():
@@ -14,3 +17,50 @@ def test_every_shot_is_told_with_its_frames_and_what_it_shows():
 
 def test_a_video_of_one_shot_tells_nothing():
     assert describe_shots(Shots.between((), 100)) == []
+
+
+FRAMES = np.arange(0, 200, 4)
+
+
+def verified(truncated=(), meeting=()):
+    """What is seen of a player who stands at (100, 50), in frames of ranges."""
+    cut = np.isin(FRAMES, truncated)
+    near = np.isin(FRAMES, meeting)[:, None]
+    return TrackVerification(FRAMES, cut, np.where(near, (140.0, 50.0), np.nan))
+
+
+def identity(meeting=(), known=(), jump=None):
+    head = np.tile((100.0, 50.0), (200, 1))
+    if jump is not None:
+        head[jump:, 0] += 400
+    feet = np.repeat(head[:, None] + (0, 100), 2, axis=1)
+    track = Track(head, feet, np.full(200, 100.0), np.zeros((200, 4)), np.ones(200))
+    still = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200))
+    shots = Shots.between((), 200)
+    return describe_identity(track, still, 25.0, shots, verified(meeting=meeting), known)
+
+
+def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
+    (line,) = describe_truncation(verified(truncated=range(40, 101)))
+    assert "in about 32% of the frames (longest: 40-100)" in line
+    assert describe_truncation(verified(truncated=range(8))) == []
+
+
+def test_who_looks_like_the_player_is_told_until_the_player_is_marked_on_both_sides():
+    (line,) = identity(meeting=range(90, 111))
+    assert "comes close in frames 92-108" in line
+    assert "in frame 50, 150 to be sure" in line
+    assert "in frame 150 to be sure" in identity(meeting=range(90, 111), known=[20])[0]
+    assert identity(meeting=range(90, 111), known=[20, 180]) == []
+    assert identity() == []
+
+
+def test_a_hop_of_the_track_is_told_with_its_frame():
+    (line,) = identity(jump=120)
+    assert "in frame 12" in line
+    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+
+
+def test_what_speaks_against_the_track_is_shown_on_the_page():
+    lines = [*describe_truncation(verified(truncated=range(100))), *identity(range(90, 111))]
+    assert _contradictions("\n".join(["Player found.", *lines])) == "\n".join(lines)

@@ -10,6 +10,7 @@ from keyrecon.report.drawing import (
     LEFT,
     RIGHT,
     bone_sides,
+    draw_brackets,
     draw_pose,
     drawn_bones,
     head_bone,
@@ -165,3 +166,10 @@ def test_court_way_and_standing_feet_are_drawn_where_the_court_is_known(tmp_path
         near = slice(y - 3, y + 4), slice(x - 3, x + 4)
         assert np.abs(drawn[near] - plain[near]).max() > 40
     assert np.abs(frame(6) - frame(6, court=False)).max() > 40  # no way, but the court
+
+
+def test_brackets_stand_at_the_corners_of_a_box_and_leave_what_is_in_it_alone():
+    drawn = draw_brackets(GREY, np.array([60.0, 40.0, 180.0, 400.0]))
+    changed = (drawn != GREY).any(axis=2)
+    assert changed[40, 60] and changed[40, 180] and changed[238, 60]
+    assert not changed[60:220, 80:160].any()

@@ -1,0 +1,104 @@
+"""Films of a drawn player: alone, cut above the ankles, and with another one passing."""
+
+import numpy as np
+import pytest
+from drawn_player import HEIGHT, SIZE, corners, draw_player, heads, picks, scene
+
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.records import CameraPath, Shots, Track
+from keyrecon.segmentation.background_model import build_background
+from keyrecon.segmentation.color_model import learn_colors
+from keyrecon.tracking.scale import player_boxes
+from keyrecon.tracking.verification import find_jumps, find_meetings, verify_track
+
+COUNT = 60
+HEAD = heads(COUNT) - corners(COUNT, False)
+OTHER = np.stack([np.linspace(300, 20, COUNT), np.full(COUNT, 60.0)], axis=1)
+"""Head of another player who walks past from right to left."""
+ONE_SHOT = Shots.between((), COUNT)
+CAMERA = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
+
+
+def track_along(head, rows=SIZE[0]):
+    """A track of that head, with feet where the picture has them, or just above its lower edge."""
+    feet = head[:, None] + np.array([(-12.0, HEIGHT), (12.0, HEIGHT)])
+    feet[..., 1] = np.minimum(feet[..., 1], rows - 6)
+    height = np.full(COUNT, np.median(feet[..., 1] - head[:, None, 1]))
+    return Track(head, feet, height, player_boxes(head, feet, height), np.ones(COUNT))
+
+
+@pytest.fixture
+def verified(tmp_path):
+    """Verify the track of the player in a film, `rows` px high, maybe with another player."""
+
+    def verify(rows=SIZE[0], other=None, recolored=False):
+        def pictures():
+            for number in range(COUNT):
+                picture = scene()
+                x, y = corners(COUNT, False)[number].astype(int)
+                if other is not None:
+                    alone = scene()
+                    draw_player(alone, *(other[number] + (x, y)))
+                    drawn = (alone != picture).any(axis=2)
+                    picture[drawn] = 255 - alone[drawn] if recolored else alone[drawn]
+                draw_player(picture, *heads(COUNT)[number])
+                yield picture[y : y + rows, x : x + SIZE[1]]
+
+        write_video(tmp_path / "film.mp4", pictures(), 30.0, crf=18)
+        video = open_video(tmp_path / "film.mp4")
+        shown = [p for p in picks(COUNT) if p.y < rows]
+        colors = learn_colors(video, shown if rows == SIZE[0] else [*shown, *_shins(rows)])
+        track = track_along(HEAD, rows)
+        background = build_background(video, CAMERA, track)
+        return verify_track(video, track, CAMERA, background, colors), track
+
+    return verify
+
+
+def _shins(rows):
+    """Where a person clicks for feet that are not in the picture."""
+    foot = next(p for p in picks(COUNT) if p.part == "foot")
+    return [type(foot)(0, "foot", foot.x + dx, rows - 4.0) for dx in (2.0, 20.0)]
+
+
+def test_feet_in_the_picture_and_nobody_else(verified):
+    verification, track = verified()
+    assert not verification.truncated.any()
+    assert find_meetings(verification, track, 30.0) == []
+
+
+def test_feet_that_the_lower_edge_cuts_off_are_told(verified):
+    assert verified(rows=130)[0].truncated.mean() > 0.6
+
+
+def test_feet_just_above_the_lower_edge_are_in_the_picture(verified):
+    assert verified(rows=152)[0].truncated.mean() < 0.1
+
+
+def test_another_player_in_the_same_clothes_is_told_where_the_two_meet(verified):
+    verification, track = verified(other=OTHER)
+    closest = np.linalg.norm(HEAD - OTHER, axis=1).argmin()
+    meetings = find_meetings(verification, track, 30.0)
+    assert any(first - 10 <= closest <= last + 10 for first, last in meetings)
+
+
+def test_a_player_in_other_clothes_is_nobody_to_be_taken_for(verified):
+    verification, track = verified(other=OTHER, recolored=True)
+    assert find_meetings(verification, track, 30.0) == []
+
+
+def test_a_track_that_hops_to_somebody_else_is_told_with_the_frame():
+    hopped = np.where(np.arange(COUNT)[:, None] < 40, HEAD, HEAD + np.array([1.5 * HEIGHT, 0]))
+    (jump,) = find_jumps(track_along(hopped), CAMERA, ONE_SHOT, 30.0)
+    assert 40 <= jump <= 44
+    assert find_jumps(track_along(hopped), CAMERA, Shots.between((40,), COUNT), 30.0) == []
+    assert find_jumps(track_along(HEAD), CAMERA, ONE_SHOT, 30.0) == []
+
+
+def test_a_camera_that_turns_makes_no_jump():
+    turned = np.tile(np.eye(3), (COUNT, 1, 1))
+    turned[:, 0, 2] = 40.0 * np.arange(COUNT)
+    track = track_along(HEAD - turned[:, :2, 2])
+    assert find_jumps(track, CameraPath(turned, np.ones(COUNT)), ONE_SHOT, 30.0) == []
+    assert find_jumps(track, CAMERA, ONE_SHOT, 30.0)
