@@ -11,7 +11,12 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 TEXTS = {
     name: (ROOT / name).read_text()
-    for name in ("README.md", "annotations/README.md", "keyrecon/paper/choices.md")
+    for name in (
+        "README.md",
+        "annotations/README.md",
+        "benchmarks/results.md",
+        "keyrecon/paper/choices.md",
+    )
 }
 PATH = re.compile(r"\b(?:keyrecon|benchmarks|annotations|tests)/[\w./*-]*")
 
