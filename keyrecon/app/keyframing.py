@@ -22,7 +22,7 @@ from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
-from keyrecon.report.drawing import draw_brackets
+from keyrecon.report.drawing import point_out
 from keyrecon.timeline import part_of_video
 from keyrecon.uncertainty import unsure_track
 
@@ -128,8 +128,8 @@ def write_keyframe_pictures(
     """One PNG per keyframe, named by frame number as labelling tools keep it.
 
     The video is read once from the first to the last: to seek each by itself decodes as many
-    frames before it as lie between two that stand alone, 250 in most files. Brackets around the
-    player tell who is meant where there are several.
+    frames before it as lie between two that stand alone, 250 in most files. Brackets and an
+    arrow tell who is meant where there are several.
     """
     make_folder(workspace.pictures)
     frames = preparation.keyframes.frames
@@ -138,7 +138,7 @@ def write_keyframe_pictures(
 
     def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:
         frame, picture = entry
-        bracketed = draw_brackets(picture, preparation.track.box[frame])
-        write_picture(workspace.pictures / f"frame_{frame:06d}.png", bracketed)
+        track, path = preparation.track, workspace.pictures / f"frame_{frame:06d}.png"
+        write_picture(path, point_out(picture, track.box[frame], track.head[frame]))
 
     deque(side_by_side(write, zip(frames.tolist(), shown, strict=True)), maxlen=0)

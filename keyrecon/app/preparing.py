@@ -94,8 +94,9 @@ class ProjectPreparation:
         return lines
 
     def _known_frames(self) -> list[int]:
-        """Frames in which a person told where the player is."""
-        known = {pick.frame for pick in self.picks if pick.part == "head"}
+        """Frames in which a person told where the player is, and the track is there."""
+        off = {pick.frame for pick in self.doubtful}
+        known = {pick.frame for pick in self.picks if pick.part == "head"} - off
         if self.marks is not None:
             marked = np.isfinite(self.marks.joints).all(axis=2).mean(axis=1) > 0.5
             known |= {*self.marks.frames[marked].tolist()}

@@ -20,6 +20,8 @@ CLUB = (213, 94, 0)
 """Vermillion of Okabe and Ito."""
 SUBPIXEL = 4
 """OpenCV draws at 1 / 2**SUBPIXEL px."""
+ARROW_RISE = 0.1
+"""Of an arrow over the centre of a head, heights of the player's box: clear of the skull."""
 BONE_SHARE = 0.016
 """Thickness of a bone as a share of the player's height; a real forearm is about .04."""
 
@@ -150,11 +152,11 @@ def _fixed_point(points: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
     return np.round(np.clip(points, -30000, 30000) * 2**SUBPIXEL).astype(np.int32)
 
 
-def draw_brackets(
-    picture: UInt8[np.ndarray, "h w 3"], box: Float[np.ndarray, "4"]
+def point_out(
+    picture: UInt8[np.ndarray, "h w 3"], box: Float[np.ndarray, "4"], head: Float[np.ndarray, "2"]
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """A copy of a picture with brackets at the corners of a box (x0, y0, x1, y1), px; without them
-    where the box is unknown."""
+    """A copy of a picture with brackets at the corners of a player's box (x0, y0, x1, y1), px, and
+    an arrow head over the player's head; without them where the box is unknown."""
     drawn = picture.copy()
     if not np.isfinite(box).all():
         return drawn
@@ -163,13 +165,14 @@ def draw_brackets(
     low, high = (thick, thick), (columns - 1 - thick, rows - 1 - thick)
     x0, y0, x1, y1 = np.rint(np.clip(box, (*low, *low), (*high, *high))).astype(int).tolist()
     arm = max(3, round(0.12 * min(x1 - x0, y1 - y0)))
+    shape = arm * np.array([(0, 0), (-1 / 3, -1 / 2), (1 / 3, -1 / 2)])
+    tip = head - np.array([0, ARROW_RISE * (box[3] - box[1])])
+    arrow = np.rint(tip + shape).astype(np.int32)
+    corners = (x0, y0, 1, 1), (x1, y0, -1, 1), (x0, y1, 1, -1), (x1, y1, -1, -1)
     for color, width in ((SEAM, 3 * thick), (TRUNK, thick)):
-        for x, y, right, down in (
-            (x0, y0, 1, 1),
-            (x1, y0, -1, 1),
-            (x0, y1, 1, -1),
-            (x1, y1, -1, -1),
-        ):
+        for x, y, right, down in corners:
             cv2.line(drawn, (x, y), (x + right * arm, y), color, width)
             cv2.line(drawn, (x, y), (x, y + down * arm), color, width)
+        cv2.polylines(drawn, [arrow], True, color, width)
+    cv2.fillPoly(drawn, [arrow], TRUNK)
     return drawn

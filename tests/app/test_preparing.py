@@ -33,7 +33,7 @@ def identity(meeting=(), known=(), jump=None):
     head = np.tile((100.0, 50.0), (200, 1))
     if jump is not None:
         head[jump:, 0] += 400
-    feet = np.repeat(head[:, None] + (0, 100), 2, axis=1)
+    feet = np.repeat(head[:, None] + np.array([0, 100]), 2, axis=1)
     track = Track(head, feet, np.full(200, 100.0), np.zeros((200, 4)), np.ones(200))
     still = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200))
     shots = Shots.between((), 200)

@@ -10,10 +10,10 @@ from keyrecon.report.drawing import (
     LEFT,
     RIGHT,
     bone_sides,
-    draw_brackets,
     draw_pose,
     drawn_bones,
     head_bone,
+    point_out,
     trunk_outline,
 )
 from keyrecon.report.overlay import GROUND, PAPER, OverlayOptions, overlay_frames, write_overlay
@@ -168,8 +168,9 @@ def test_court_way_and_standing_feet_are_drawn_where_the_court_is_known(tmp_path
     assert np.abs(frame(6) - frame(6, court=False)).max() > 40  # no way, but the court
 
 
-def test_brackets_stand_at_the_corners_of_a_box_and_leave_what_is_in_it_alone():
-    drawn = draw_brackets(GREY, np.array([60.0, 40.0, 180.0, 400.0]))
+def test_brackets_and_an_arrow_point_out_a_player_and_leave_what_is_in_the_box_alone():
+    drawn = point_out(GREY, np.array([60.0, 40.0, 180.0, 240.0]), np.array([120.0, 90.0]))
     changed = (drawn != GREY).any(axis=2)
     assert changed[40, 60] and changed[40, 180] and changed[238, 60]
-    assert not changed[60:220, 80:160].any()
+    assert changed[66, 120]
+    assert not changed[80:220, 80:160].any()
