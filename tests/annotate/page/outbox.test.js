@@ -83,6 +83,15 @@ test("edits kept by a page that was closed are sent by the next one, oldest firs
   assert.deepEqual(next.sent, [["b", "a"]]);
 });
 
+test("a page that opens with kept edits never says that all is saved before it is", () => {
+  const first = createTrial(() => {
+    throw new Gone("away");
+  });
+  first.outbox.add(edit("a"));
+  const next = createTrial(() => ({}), first.storage);
+  assert.deepEqual(next.statuses, [["saving", 1]]);
+});
+
 test("one edit that the server never takes holds up no other", async () => {
   const trial = createTrial((edits) => {
     if (edits.some(({ id }) => id === "bad")) throw new Error("no such joint");

@@ -89,6 +89,8 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
     rejected(batch[0], fault.message);
   }
 
+  if (waiting.length) report(); // what an earlier page kept is not saved yet
+
   return {
     add(edit) {
       pending.keep(edit);
