@@ -93,6 +93,7 @@ def put_right(person, folder, truth):
     top, wrist = round(float(truth["keys"][1])), LSP14.index("left_wrist")
     place = truth["points2d"][top, wrist] + [1.0, 0.0]
     person.press("2")
+    person.await_text("#swing-where", r"^\S+ [1-9]")  # the address was frame 0
     assert abs(int(person.text("#swing-where").split()[1]) - top) < 8
     person.page.fill("#swing-frame", str(top))
     person.await_frame("swing", top)
