@@ -15,12 +15,11 @@ import numpy as np
 from jaxtyping import Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.following import FollowedPlayer, FollowOptions, follow_player
+from keyrecon.following import FollowOptions, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, call_stage
-from keyrecon.keyframes.absence import restore_frames, select_frames
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
 from keyrecon.keyframes.selection import (
@@ -38,14 +37,10 @@ from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import (
     SOURCES,
     Annotations,
-    CameraPath,
-    Colors,
     FlowTracks,
     JointTracks,
-    Keyframes,
     Motion,
     Pick,
-    PoseDistances,
     Preparation,
     Shots,
     TrackAnchors,
@@ -58,14 +53,9 @@ from keyrecon.timeline import (
     cut_motion,
     join_frames,
     motion_in_file,
-    part_of_keyframes,
     part_of_marks,
-    part_of_path,
     part_of_video,
     put_back,
-    spread_distances,
-    spread_edges,
-    spread_track,
     take_frames,
 )
 from keyrecon.tracking.anchors import contradicted_frames, least_sure_frames
@@ -75,6 +65,7 @@ from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
 from keyrecon.tracking.shot_sorting import ShotOptions
 from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
+from keyrecon.usable_shots import in_file, marks_in_shots, usable_part
 
 
 @dataclass(frozen=True)
@@ -159,49 +150,7 @@ def prepare(
         options=options.keyframes,
         progress=progress,
     )
-    return _in_file(video, camera, colors, followed, distances, keyframes)
-
-
-def _in_file(
-    video: Video,
-    camera: CameraPath,
-    colors: Colors,
-    followed: FollowedPlayer,
-    distances: PoseDistances,
-    keyframes: Keyframes,
-) -> Preparation:
-    """What was made of the usable shots, over the frames of the file."""
-    shots, track, edges = followed.shots, followed.track, followed.edges
-    if not all(shots.usable):
-        frames, count = shots.usable_frames, len(video)
-        track = spread_track(track, frames, count)
-        edges = spread_edges(edges, frames, count)
-        distances = spread_distances(distances, frames, count)
-        upper, lower = (
-            restore_frames(half, frames, count) for half in (keyframes.upper, keyframes.lower)
-        )
-        keyframes = replace(keyframes, upper=upper, lower=lower)
-    return Preparation(
-        video, camera, colors, track, edges, distances, keyframes, shots, followed.verification
-    )
-
-
-def usable_part(preparation: Preparation) -> Preparation:
-    """The usable shots end to end, as if the file held nothing else."""
-    shots = preparation.shots
-    if all(shots.usable):
-        return preparation
-    frames, distances = shots.usable_frames, preparation.pose_distances
-    return Preparation(
-        part_of_video(preparation.video, frames),
-        part_of_path(preparation.camera, frames),
-        preparation.colors,
-        take_frames(preparation.track, frames),
-        tuple(preparation.edges[t] for t in frames),
-        select_frames(distances, frames),
-        part_of_keyframes(preparation.keyframes, frames),
-        shots.joined(),
-    )
+    return in_file(video, camera, colors, followed, distances, keyframes)
 
 
 def with_marked_keyframes(
@@ -274,6 +223,23 @@ def reconstruct(
     if not all(shots.usable):
         preparation, used = usable_part(preparation), shots.usable_frames
         tracks, annotations = take_frames(tracks, used), part_of_marks(annotations, used)
+    lifted = _lift(preparation, tracks, annotations, models, options, keep, progress)
+    motion = assemble_motion(
+        preparation.video, annotations, tracks, lifted, options.lift.height, preparation.shots
+    )
+    return motion if len(shots.parts) == 1 else motion_in_file(motion, shots, whole.time)
+
+
+def _lift(
+    preparation: Preparation,
+    tracks: JointTracks,
+    annotations: Annotations,
+    models: Models,
+    options: Options,
+    keep: Keep,
+    progress: Progress,
+) -> LiftResult:
+    """From the picture to space, along the golf swing of the prior where there is one."""
     video, height = preparation.video, preparation.track.height
     expected = None
     if options.prior == "golf" and models.swing is not None:
@@ -288,7 +254,7 @@ def reconstruct(
             options=options.swing,
             progress=progress,
         )
-    lifted = keep(
+    return keep(
         "lift",
         lift_motion,
         tracks,
@@ -300,18 +266,6 @@ def reconstruct(
         options=options.lift,
         progress=progress,
     )
-    motion = assemble_motion(
-        video, annotations, tracks, lifted, options.lift.height, preparation.shots
-    )
-    return motion if len(shots.parts) == 1 else motion_in_file(motion, shots, whole.time)
-
-
-def marks_in_shots(marks: Annotations, shots: Shots) -> Annotations:
-    """What was marked in usable shots, by the frames of the file."""
-    used = shots.usable_frames
-    own = part_of_marks(marks, used)
-    absent = tuple((int(used[frame]), name) for frame, name in own.absent)
-    return replace(own, frames=used[own.frames], absent=absent)
 
 
 def carry_joints(

@@ -2,13 +2,12 @@
 
 import json
 import shutil
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import keyrecon
 
-from keyrecon import cli
 from keyrecon.app import running
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
@@ -30,18 +29,6 @@ from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
 
 SIZE = (480, 270)
 FRAMES = 120
-
-
-def keyrecon(*words):
-    """Run the command line in this process; returns its exit code."""
-    before, sys.argv = sys.argv, ["keyrecon", *map(str, words)]
-    try:
-        cli.main()
-    except SystemExit as stop:
-        return stop.code or 0
-    finally:
-        sys.argv = before
-    return 0
 
 
 @pytest.fixture(scope="module")

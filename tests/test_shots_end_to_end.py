@@ -1,14 +1,13 @@
 """A video of two points with a close-up, a replay and black between: from the file to exports."""
 
 import shutil
-import sys
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
+from command_line import keyrecon
 
-from keyrecon import cli
 from keyrecon.io.formats.c3d import read_points
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json
@@ -33,18 +32,6 @@ FIRST_OF_SECOND = LENGTH + CLOSE_UP + BLACK + REPLAY
 FRAMES = FIRST_OF_SECOND + LENGTH
 BUDGET = 0.1
 POINTS = slice(0, LENGTH), slice(FIRST_OF_SECOND, FRAMES)
-
-
-def keyrecon(*words):
-    """Run the command line in this process; returns its exit code."""
-    before, sys.argv = sys.argv, ["keyrecon", *map(str, words)]
-    try:
-        cli.main()
-    except SystemExit as stop:
-        return stop.code or 0
-    finally:
-        sys.argv = before
-    return 0
 
 
 def closer(picture):

@@ -140,12 +140,6 @@ def propagate_joints(
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
     tracks = _propagate_fused(preparation, annotations, flow, options, progress)
-    if flow is not None:
-        body_frame = stabilise_shots(
-            preparation.track, preparation.camera, preparation.shots, preparation.video.fps
-        )
-        bounds = bound_bones(annotations, body_frame)
-        tracks = with_flow(tracks, flow, preparation.track.height, bounds)
     return _with_marks(annotations, marked, tracks)
 
 
@@ -196,7 +190,10 @@ def _propagate_fused(
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
-    return JointTracks(body_frame.to_pixels(joints, frames[:, None]), confidence, source)
+    tracks = JointTracks(body_frame.to_pixels(joints, frames[:, None]), confidence, source)
+    if flow is None:
+        return tracks
+    return with_flow(tracks, flow, track.height, bound_bones(annotations, body_frame))
 
 
 def propagate_half(

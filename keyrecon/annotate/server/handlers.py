@@ -6,12 +6,10 @@ undone; `keep` leaves marks that contradict as they are, `replace` takes the fil
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from msgspec import Meta, Struct, to_builtins
 from starlette.responses import FileResponse, Response
 
@@ -22,6 +20,7 @@ from keyrecon.annotate.server.descriptions import (
     describe_state,
 )
 from keyrecon.annotate.server.frame_cache import encode_png
+from keyrecon.annotate.server.motion_stretch import motion_stretch
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.session import Session, describe_project
 from keyrecon.annotate.store.cells import (
@@ -48,8 +47,6 @@ from keyrecon.io.formats.annotations import read_annotations
 from keyrecon.io.formats.coco import coco_text
 from keyrecon.io.formats.cvat import cvat_text
 from keyrecon.io.formats.dlc import dlc_text
-from keyrecon.io.formats.motion_file import read_motion
-from keyrecon.records import SOURCES, Motion
 
 Json = dict[str, Any]
 REPORT_POLICY = (
@@ -277,7 +274,7 @@ def cancel_job(session: Session, request: ApiRequest) -> Json:
 
 def motion(session: Session, request: ApiRequest) -> Json:
     """A stretch of the result."""
-    return _motion_stretch(session.workspace.motion_file, request.query)
+    return motion_stretch(session.workspace.motion_file, request.query)
 
 
 def report(session: Session, request: ApiRequest) -> Response:
@@ -328,50 +325,6 @@ def import_file(session: Session, request: ApiRequest) -> Json:
 def export_file(session: Session, request: ApiRequest) -> Any:
     """The marks in another program's format."""
     return _export_marks(session, request.path["format"])
-
-
-def _motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
-    """Frames from..to-1 of the motion; {} before there is one."""
-    if not file.is_file():
-        return {}
-    motion = _read_motion(file, file.stat().st_mtime_ns)
-    first, last = _range(query, len(motion.time))
-    chosen = slice(first, last)
-    return {
-        "from": first,
-        "to": last,
-        "units": motion.units,
-        "stature": _stature(motion),
-        "points2d": np.round(motion.points2d[chosen], 1).tolist(),
-        "points3d": np.round(motion.points3d[chosen], 4).tolist(),
-        "confidence": np.round(motion.confidence[chosen], 2).tolist(),
-        "expected_error": None
-        if motion.expected_error is None
-        else np.round(motion.expected_error[chosen], 1).tolist(),
-        "source": motion.source[chosen].tolist(),
-        "source_names": list(SOURCES),
-    }
-
-
-def _stature(motion: Motion) -> float:
-    """The player's height in the motion's units, from all bones and their usual share of it."""
-    parents, children = motion.skeleton.bones.T
-    lengths = np.linalg.norm(motion.points3d[:, children] - motion.points3d[:, parents], axis=-1)
-    return round(float(np.nanmedian(lengths / motion.skeleton.lengths)), 4)
-
-
-@lru_cache(maxsize=1)
-def _read_motion(file: Path, changed: int) -> Motion:
-    """The motion; read again when the file has changed."""
-    return read_motion(file)
-
-
-def _range(query: dict[str, str], n_frames: int) -> tuple[int, int]:
-    try:
-        first, last = int(query.get("from", 0)), int(query.get("to", n_frames))
-    except ValueError as fault:
-        raise KeyreconError("'from' and 'to' are frame numbers.") from fault
-    return max(0, first), min(last, n_frames)
 
 
 WRITERS = {

@@ -1,0 +1,76 @@
+"""The usable shots end to end, as the stages after tracking take them, and back to the file."""
+
+from dataclasses import replace
+
+from keyrecon.following import FollowedPlayer
+from keyrecon.io.video import Video
+from keyrecon.keyframes.absence import restore_frames, select_frames
+from keyrecon.records import (
+    Annotations,
+    CameraPath,
+    Colors,
+    Keyframes,
+    PoseDistances,
+    Preparation,
+    Shots,
+)
+from keyrecon.timeline import (
+    part_of_keyframes,
+    part_of_marks,
+    part_of_path,
+    part_of_video,
+    spread_distances,
+    spread_edges,
+    spread_track,
+    take_frames,
+)
+
+
+def in_file(
+    video: Video,
+    camera: CameraPath,
+    colors: Colors,
+    followed: FollowedPlayer,
+    distances: PoseDistances,
+    keyframes: Keyframes,
+) -> Preparation:
+    """What was made of the usable shots, over the frames of the file."""
+    shots, track, edges = followed.shots, followed.track, followed.edges
+    if not all(shots.usable):
+        frames, count = shots.usable_frames, len(video)
+        track = spread_track(track, frames, count)
+        edges = spread_edges(edges, frames, count)
+        distances = spread_distances(distances, frames, count)
+        upper, lower = (
+            restore_frames(half, frames, count) for half in (keyframes.upper, keyframes.lower)
+        )
+        keyframes = replace(keyframes, upper=upper, lower=lower)
+    return Preparation(
+        video, camera, colors, track, edges, distances, keyframes, shots, followed.verification
+    )
+
+
+def usable_part(preparation: Preparation) -> Preparation:
+    """The usable shots end to end, as if the file held nothing else."""
+    shots = preparation.shots
+    if all(shots.usable):
+        return preparation
+    frames, distances = shots.usable_frames, preparation.pose_distances
+    return Preparation(
+        part_of_video(preparation.video, frames),
+        part_of_path(preparation.camera, frames),
+        preparation.colors,
+        take_frames(preparation.track, frames),
+        tuple(preparation.edges[t] for t in frames),
+        select_frames(distances, frames),
+        part_of_keyframes(preparation.keyframes, frames),
+        shots.joined(),
+    )
+
+
+def marks_in_shots(marks: Annotations, shots: Shots) -> Annotations:
+    """What was marked in usable shots, by the frames of the file."""
+    used = shots.usable_frames
+    own = part_of_marks(marks, used)
+    absent = tuple((int(used[frame]), name) for frame, name in own.absent)
+    return replace(own, frames=used[own.frames], absent=absent)
