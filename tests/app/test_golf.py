@@ -19,7 +19,7 @@ from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.clicks import read_clicks, write_clicks
-from keyrecon.io.formats.golf_marks import MARKS_FILE, write_golf_marks
+from keyrecon.io.formats.golf_marks import write_golf_marks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
@@ -262,7 +262,7 @@ def test_what_a_person_marked_holds(swing, decoded_at_first, tmp_path):
     shafts = np.full((3, 2, 2), np.nan)
     shafts[2] = truth["club2d"][frames[2]]
     marks = SwingMarks(frames, joints, shafts, np.array([np.nan, top, np.nan, np.nan]))
-    write_golf_marks(project / MARKS_FILE, marks, (video.width, video.height))
+    write_golf_marks(Workspace(project).golf_marks_file, marks, (video.width, video.height))
     text = fit(swing, project)
     assert f"top {top}, hit" in text
     kept = read_swing(project / "motion.npz")
@@ -277,7 +277,7 @@ def test_what_a_person_marked_holds(swing, decoded_at_first, tmp_path):
 
 def test_marks_of_another_video_are_refused(swing, decoded_at_first, tmp_path):
     project = shutil.copytree(swing / "project", tmp_path / "p")
-    write_golf_marks(project / MARKS_FILE, NO_MARKS, (64, 48))
+    write_golf_marks(Workspace(project).golf_marks_file, NO_MARKS, (64, 48))
     with pytest.raises(KeyreconError, match="marks were made on pictures of 64 x 48"):
         fit(swing, project)
 

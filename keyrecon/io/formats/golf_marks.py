@@ -29,8 +29,6 @@ from keyrecon.reading import parse_json, read_text, reading, real, whole
 __all__ = ["SwingMarks", "golf_marks_text", "read_golf_marks", "write_golf_marks"]
 FORMAT = 1
 """Version of the file."""
-MARKS_FILE = "golf_marks.json"
-"""Its name in a project folder."""
 KEY_NAMES = ("start", "top", "hit", "finish")
 
 
