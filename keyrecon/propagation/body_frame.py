@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
+from keyrecon.body import Skeleton
 from keyrecon.numerics.geometry import from_complex, to_complex, warp_points
-from keyrecon.records import CameraPath, Shots, Track
+from keyrecon.records import Annotations, CameraPath, Shots, Track
 from keyrecon.timeline import part_of_path, take_frames
 
 SMOOTHING_SECONDS = 0.05
@@ -41,6 +42,21 @@ class BodyFrame:
     ) -> Float[np.ndarray, "*n 2"]:
         """Player coordinates to pixels."""
         return from_complex(points * self.height[frames] + self.origin[frames])
+
+    def of_marks(self, annotations: Annotations) -> "PlayerMarks":
+        """Annotated joints in player coordinates."""
+        frames = annotations.frames
+        places = self.from_pixels(annotations.joints, frames[:, None])
+        return PlayerMarks(annotations.skeleton, frames, places)
+
+
+@dataclass(frozen=True, eq=False)
+class PlayerMarks:
+    """Annotated joints in player coordinates; NaN where a joint is not marked."""
+
+    skeleton: Skeleton
+    frames: Int[np.ndarray, "K"]
+    joints: Complex[np.ndarray, "K J"]
 
 
 def stabilise_shots(track: Track, camera: CameraPath, shots: Shots, fps: float) -> BodyFrame:

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.propagation.body_frame import BodyFrame
-from keyrecon.records import Annotations
+from keyrecon.numerics.geometry import to_complex
+from keyrecon.propagation.body_frame import PlayerMarks
 
 ROUNDING = 0.01
 """Share by which a bone may exceed its bound: least squares bring it there not quite."""
@@ -27,23 +27,22 @@ MIN_FRAMES = 2
 """Marked frames without which no excess is known: nothing is bounded then."""
 
 
-def bound_bones(annotations: Annotations, body_frame: BodyFrame) -> Float[np.ndarray, "J J"]:
+def bound_bones(marks: PlayerMarks) -> Float[np.ndarray, "J J"]:
     """Greatest distance in the picture of joints that a bone or the trunk joins, player heights;
     infinite for all others, and where marks do not tell."""
-    skeleton = annotations.skeleton
-    places = body_frame.from_pixels(annotations.joints, annotations.frames[:, None])
+    skeleton = marks.skeleton
     pairs = np.concatenate([skeleton.bones, _across(skeleton)])
     groups = [_alike(skeleton, pair) for pair in pairs.tolist()]
     longest = np.full(len(pairs), np.nan)
     excess = [1.0]
     for row, group in enumerate(groups):
-        lengths = _longest_of_frames(places, group)
+        lengths = _longest_of_frames(marks.joints, group)
         if len(lengths):
             longest[row] = lengths[0]
         if len(lengths) >= MIN_FRAMES and lengths[1] > 0:
             excess.append(float(lengths[0] / lengths[1]))
     bounds = np.full((len(skeleton.names),) * 2, np.inf)
-    if len(annotations.frames) < MIN_FRAMES or np.isnan(longest).any():
+    if len(marks.frames) < MIN_FRAMES or np.isnan(longest).any():
         return bounds
     bones = len(skeleton.bones)
     size = float(np.median(longest[:bones] / skeleton.lengths))
@@ -60,24 +59,21 @@ def bone_lengths(
     return np.abs(joints[..., bones[:, 1]] - joints[..., bones[:, 0]])
 
 
-def too_long(
-    joints: Complex[np.ndarray, "*n J"],
-    bones: Int[np.ndarray, "B 2"],
-    longest: Float[np.ndarray, "*m B"],
-) -> Bool[np.ndarray, "*n B"]:
-    """Which bones are longer than they can be."""
-    return bone_lengths(joints, bones) > longest * (1 + ROUNDING)
-
-
-def ends_too_long(
-    joints: Complex[np.ndarray, "T J"],
-    bones: Int[np.ndarray, "B 2"],
-    longest: Float[np.ndarray, "*m B"],
+def stretched_ends(
+    joints: Float[np.ndarray, "T J 2"],
+    height: Float[np.ndarray, "T"],
+    bounds: Float[np.ndarray, "J J"],
+    before: Float[np.ndarray, "T J 2"] | None = None,
 ) -> Bool[np.ndarray, "T J"]:
-    """Which joints are at the ends of such bones."""
-    touched = np.zeros((len(bones), joints.shape[1]), bool)
-    touched[np.arange(len(bones))[:, None], bones] = True
-    return too_long(joints, bones, longest) @ touched
+    """Which joints (px) end a bone that is longer than `bounds`, and than it was `before`."""
+    bones = np.argwhere(np.triu(np.isfinite(bounds)))
+    longest = bounds[bones[:, 0], bones[:, 1]]
+    if before is not None:
+        longest = np.maximum(longest, bone_lengths(to_complex(before) / height[:, None], bones))
+    lengths = bone_lengths(to_complex(joints) / height[:, None], bones)
+    ends = np.zeros((len(bones), joints.shape[1]), bool)
+    ends[np.arange(len(bones))[:, None], bones] = True
+    return (lengths > longest * (1 + ROUNDING)) @ ends
 
 
 def _across(skeleton: Skeleton) -> Int[np.ndarray, "n 2"]:

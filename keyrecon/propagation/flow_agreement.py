@@ -1,10 +1,11 @@
-"""Which joints optical flow from the marks has, and which edges have."""
+"""Which joints edges have, which optical flow from the marks has, and which nothing has."""
+
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from keyrecon.numerics.geometry import to_complex
-from keyrecon.propagation.bone_bounds import bone_lengths, ends_too_long
+from keyrecon.propagation.bone_bounds import stretched_ends
 from keyrecon.records import FlowTracks, JointTracks
 
 FLOW_TOLERANCE = 0.05
@@ -22,40 +23,29 @@ MIN_FLOW_CONFIDENCE = 0.1
 
 def with_flow(
     tracks: JointTracks,
-    flow: FlowTracks,
+    flow: FlowTracks | None,
     height: Float[np.ndarray, "T"],
-    bounds: Float[np.ndarray, "J J"] | None = None,
+    bounds: Float[np.ndarray, "J J"],
 ) -> JointTracks:
     """Tracks with joints where flow from both sides meets, if it is surer and they are elsewhere.
 
-    A joint that is followed from one mark alone is left to edges: of four that were sure and far
+    A joint at the end of a bone that is longer than `bounds` (player heights) has no confidence. A
+    joint that is followed from one mark alone is left to edges: of four that were sure and far
     from them, flow had stayed behind on an even shirt. Nor does flow have a joint where a bone
-    would become longer than `bounds` (player heights) and than it is.
+    would become longer than its bound and than it is.
     """
+    stretched = stretched_ends(tracks.joints, height, bounds)
+    tracks = replace(tracks, confidence=np.where(stretched, 0, tracks.confidence))
+    if flow is None:
+        return tracks
     apart = np.linalg.norm(tracks.joints - flow.joints, axis=2) / height[:, None]
     elsewhere = ~(apart < FLOW_TOLERANCE) & np.isfinite(flow.joints).all(axis=2)
     doubted = ~(tracks.confidence > SURE_EDGES) & (flow.confidence > MIN_FLOW_CONFIDENCE)
     replaced = elsewhere & flow.joined & (doubted | (flow.confidence > SURE_FLOW))
-    if bounds is not None:
-        replaced &= ~_stretched(tracks.joints, flow.joints, replaced, height, bounds)
+    places = np.where(replaced[..., None], flow.joints, tracks.joints)
+    replaced &= ~stretched_ends(places, height, bounds, tracks.joints)
     return JointTracks(
         np.where(replaced[..., None], flow.joints, tracks.joints),
         np.where(replaced, flow.confidence, tracks.confidence),
         tracks.keyframe,
     )
-
-
-def _stretched(
-    joints: Float[np.ndarray, "T J 2"],
-    others: Float[np.ndarray, "T J 2"],
-    replaced: Bool[np.ndarray, "T J"],
-    height: Float[np.ndarray, "T"],
-    bounds: Float[np.ndarray, "J J"],
-) -> Bool[np.ndarray, "T J"]:
-    """Joints that end a bone which is too long with others in the place of those `replaced`."""
-    bones = np.argwhere(np.triu(np.isfinite(bounds)))
-    longest = bounds[bones[:, 0], bones[:, 1]]
-    before = to_complex(joints) / height[:, None]
-    after = np.where(replaced, to_complex(others) / height[:, None], before)
-    longest = np.maximum(longest, bone_lengths(before, bones))
-    return ends_too_long(after, bones, longest)

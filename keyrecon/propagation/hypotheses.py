@@ -16,13 +16,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.numerics.blocks import in_blocks
-from keyrecon.propagation.correspondence import (
-    ElementIndex,
-    TemplateFits,
-    score_fits,
-    score_limb,
-)
+from keyrecon.propagation.correspondence import ElementIndex, TemplateFits, score_fits
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.registration import (
     COARSE_TO_FINE,
@@ -57,15 +51,9 @@ LIMB_SCHEDULE = (
 with it: at most 0.1 points, 0.2 mm on one clip."""
 MIN_FLOW_CONFIDENCE = 0.02
 """Flow that is less sure than this leads nowhere."""
-LIMB_DISTINCTION = 0.06
-"""Joints of limbs that count as different are this far apart, player heights. Halved or doubled,
-others with it: at most 0.0 points, 0.1 mm on one clip."""
 LIMB_HYPOTHESIS_COST = 1.0
 """Prior cost of another frame's limb: without edges that speak for it, a pose keeps its limbs.
 Halved or doubled, others with it: at most 0.0 points, 0.1 mm on one clip."""
-MAX_LIMBS = 24
-"""Limbs tried; of more, those that differ most. Halved or doubled, others with it: at most 0.0
-points, 0.1 mm on one clip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +73,16 @@ class PoseHypotheses:
     """How unlike marks joints look (`JointAppearance`); 0 where pictures were not looked at."""
     bone_unlikeness: Float[np.ndarray, "T S 2 B"]
     """The same of the middles of limbs' bones."""
+
+    @property
+    def best(self) -> Int[np.ndarray, "T"]:
+        """The hypothesis of every frame that edges fit best."""
+        return self.residual.mean(axis=2).argmin(axis=1)
+
+    @property
+    def best_joints(self) -> Complex[np.ndarray, "T J"]:
+        """Its joints."""
+        return self.joints[np.arange(len(self.joints)), self.best]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,12 +135,12 @@ def fit_hypotheses(
 ) -> PoseHypotheses:
     """Fit and score templates, the same number for each frame, one frame after the other."""
 
-    def fit(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        fits = register_templates(templates, index, start.take(part), schedule)
+    def fit(part: TemplateFits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        fits = register_templates(templates, index, part, schedule)
         scores = score_fits(templates, index, fits)
         return fits.joints, scores.residual, scores.unexplained
 
-    joints, residual, unexplained = in_blocks(fit, len(start.frames))
+    joints, residual, unexplained = start.in_blocks(fit)
     shape = (start.frames[-1] + 1, -1)
     return PoseHypotheses(
         joints.reshape(shape[0], -1, joints.shape[1]),
@@ -195,31 +193,17 @@ def track_from_keyframes(
     return replace(scored, template=np.repeat(similar[:, None], 2, axis=1), prior_cost=cost.T)
 
 
-def propose_limbs(
-    templates: EdgeTemplates, index: ElementIndex, hypotheses: PoseHypotheses, count: int
+def fit_limbs(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    hypotheses: PoseHypotheses,
+    joints: Complex[np.ndarray, "T S J"],
 ) -> PoseHypotheses:
-    """`count` hypotheses per frame: the best trunk, and on both sides the best limbs in order."""
-    frames = np.arange(len(hypotheses.template))
-    best = hypotheses.residual.mean(axis=2).argmin(axis=1)
-    trunk, row = hypotheses.joints[frames, best], hypotheses.template[frames, best]
-    library = _collect_limbs(templates)
-    joints = np.repeat(trunk[:, None], count, axis=1)
-    for side in map(np.array, templates.half.sides):
-        limbs = trunk[:, side[:1], None] + library.T[None]
-        limbs = np.moveaxis(limbs, 1, 2)
-        residual = _score_limbs(templates, index, trunk, limbs, side)
-        for rank in range(count):
-            chosen = limbs[frames, residual.argmin(axis=1)]
-            joints[:, rank, side] = chosen
-            same = (np.abs(limbs - chosen[:, None]) < LIMB_DISTINCTION).all(axis=2)
-            residual[same] += 1
-    repeated = np.repeat(frames, count)
-    average = np.full(len(repeated), templates.average)
-    start = TemplateFits(repeated, average, joints.reshape(len(repeated), -1))
-    fitted = fit_hypotheses(templates, index, start, LIMB_SCHEDULE)
+    """The best trunk with limbs of other annotated frames, fitted to edges."""
+    frames, best = np.arange(len(joints)), hypotheses.best
+    fitted = fit_poses(templates, index, joints, hypotheses.template[frames, best])
     cost = hypotheses.prior_cost[frames, best] + LIMB_HYPOTHESIS_COST
-    ones = np.ones((1, count), int)
-    return replace(fitted, template=row[:, None] * ones, prior_cost=cost[:, None] * ones)
+    return replace(fitted, prior_cost=np.repeat(cost[:, None], joints.shape[1], axis=1))
 
 
 def fit_poses(
@@ -245,38 +229,3 @@ def follow_marks(
     flow = fit_poses(templates, index, ways.joints[:, None], similar, ())
     lines = fit_poses(templates, index, ways.lines[:, None], similar)
     return join_hypotheses(flow, lines)
-
-
-def _collect_limbs(templates: EdgeTemplates) -> Complex[np.ndarray, "L j"]:
-    """Limbs of both sides, from their first joint; the first one, then whichever differs most."""
-    poses = templates.poses.joints
-    limbs = np.concatenate(
-        [poses[:, side] - poses[:, side[:1]] for side in map(list, templates.half.sides)]
-    )
-    chosen = [0]
-    distance = np.full(len(limbs), np.inf)
-    while len(chosen) < min(MAX_LIMBS, len(limbs)):
-        distance = np.minimum(distance, np.abs(limbs - limbs[chosen[-1]]).max(axis=1))
-        chosen.append(int(distance.argmax()))
-    return limbs[chosen]
-
-
-def _score_limbs(
-    templates: EdgeTemplates,
-    index: ElementIndex,
-    trunk: Complex[np.ndarray, "T J"],
-    limbs: Complex[np.ndarray, "T L j"],
-    side: Int[np.ndarray, "j"],
-) -> Float[np.ndarray, "T L"]:
-    """Residual of every limb in every frame."""
-    bones = np.flatnonzero(np.isin(templates.half.bones, side).all(axis=1))
-    count = limbs.shape[1]
-
-    def score(part: slice) -> tuple[np.ndarray]:
-        frames = np.arange(part.start, min(part.stop, len(trunk) * count)) // count
-        joints = trunk[frames]
-        joints[:, side] = limbs.reshape(-1, len(side))[part]
-        average = np.full(len(frames), templates.average)
-        return (score_limb(templates, index, TemplateFits(frames, average, joints), bones),)
-
-    return in_blocks(score, len(trunk) * count)[0].reshape(len(trunk), count)

@@ -14,11 +14,11 @@ looks propose, all evidence together chooses. Of legs other hypotheses lack noth
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float, Float32
+from jaxtyping import Complex, Float, Float32, Int
 
 from keyrecon.propagation.appearance import JointAppearance
-from keyrecon.propagation.bone_bounds import bone_lengths
-from keyrecon.propagation.edge_template import AnnotatedPoses
+from keyrecon.propagation.correspondence import ElementIndex, TemplateFits, score_limb
+from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates
 
 FORESHORTENING = 1.0, 0.75, 0.45
 """Lengths of a bone that are tried, as shares of its longest mark."""
@@ -29,7 +29,11 @@ SPACING = 0.03
 REACH = 0.48
 """How far they lie from the middle of the shoulders, player heights: a stretched arm's wrist."""
 DISTINCTION = 0.06
-"""Arms that count as different have a joint so far from the other's, player heights."""
+"""Limbs that count as different have a joint so far from the other's, player heights. For annotated
+limbs halved or doubled, others with it: at most 0.0 points, 0.1 mm on one clip."""
+MAX_LIMBS = 24
+"""Limbs tried; of more, those that differ most. Halved or doubled, others with it: at most 0.0
+points, 0.1 mm on one clip."""
 TAKEN = 9.0
 """Cost of an arm like one that was found: more than any."""
 
@@ -45,7 +49,57 @@ class _Limb:
     """Player heights."""
 
 
-def search_limbs(
+def search_by_edges(
+    templates: EdgeTemplates, index: ElementIndex, trunk: Complex[np.ndarray, "T J"], count: int
+) -> Complex[np.ndarray, "T N J"]:
+    """Poses with the trunk that is given and, on both sides, the best annotated limbs in order."""
+    frames = np.arange(len(trunk))
+    library = _collect_limbs(templates)
+    joints = np.repeat(trunk[:, None], count, axis=1)
+    for side in map(np.array, templates.half.sides):
+        limbs = trunk[:, side[:1], None] + library.T[None]
+        limbs = np.moveaxis(limbs, 1, 2)
+        residual = _score_limbs(templates, index, trunk, limbs, side)
+        for rank in range(count):
+            chosen = limbs[frames, residual.argmin(axis=1)]
+            joints[:, rank, side] = chosen
+            same = (np.abs(limbs - chosen[:, None]) < DISTINCTION).all(axis=2)
+            residual[same] += 1
+    return joints
+
+
+def _collect_limbs(templates: EdgeTemplates) -> Complex[np.ndarray, "L j"]:
+    """Limbs of both sides, from their first joint; the first one, then whichever differs most."""
+    poses = templates.poses.joints
+    limbs = np.concatenate(
+        [poses[:, side] - poses[:, side[:1]] for side in map(list, templates.half.sides)]
+    )
+    chosen = [0]
+    distance = np.full(len(limbs), np.inf)
+    while len(chosen) < min(MAX_LIMBS, len(limbs)):
+        distance = np.minimum(distance, np.abs(limbs - limbs[chosen[-1]]).max(axis=1))
+        chosen.append(int(distance.argmax()))
+    return limbs[chosen]
+
+
+def _score_limbs(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    trunk: Complex[np.ndarray, "T J"],
+    limbs: Complex[np.ndarray, "T L j"],
+    side: Int[np.ndarray, "j"],
+) -> Float[np.ndarray, "T L"]:
+    """Residual of every limb in every frame."""
+    bones = np.flatnonzero(np.isin(templates.half.bones, side).all(axis=1))
+    frames = np.repeat(np.arange(len(limbs)), limbs.shape[1])
+    joints = trunk[frames]
+    joints[:, side] = limbs.reshape(len(frames), -1)
+    fits = TemplateFits(frames, np.full(len(frames), templates.average), joints)
+    (residual,) = fits.in_blocks(lambda part: (score_limb(templates, index, part, bones),))
+    return residual.reshape(limbs.shape[:2])
+
+
+def search_by_looks(
     appearance: JointAppearance,
     poses: AnnotatedPoses,
     trunk: Complex[np.ndarray, "T J"],
@@ -88,7 +142,7 @@ def _limb_of(poses: AnnotatedPoses, side: tuple[int, ...]) -> _Limb:
     half = poses.half
     inner, middle, outer = side
     bones = [half.bones.tolist().index([a, b]) for a, b in ((inner, middle), (middle, outer))]
-    lengths = bone_lengths(poses.joints, half.bones)
+    lengths = np.abs(poses.joints[:, half.bones[:, 1]] - poses.joints[:, half.bones[:, 0]])
     lengths = np.where(poses.known[:, half.bones].all(axis=2), lengths, 0).max(axis=0)
     lengths = np.maximum(lengths, lengths[half.bone_mirror])
     turns = np.arange(DIRECTIONS)[:, None] + np.arange(len(FORESHORTENING)) / 2

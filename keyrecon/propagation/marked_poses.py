@@ -7,12 +7,11 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.propagation.body_frame import BodyFrame
-from keyrecon.propagation.bone_bounds import bound_bones
+from keyrecon.propagation.body_frame import BodyFrame, PlayerMarks
 from keyrecon.propagation.edge_template import AnnotatedPoses
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import MarkedWays
-from keyrecon.records import Annotations, FlowTracks, HalfName, PoseDistances, Preparation
+from keyrecon.records import FlowTracks, HalfName, PoseDistances, Preparation
 
 LEAST_MARKED = 0.5
 """Share of a half's joints that must be marked for a frame to serve as a template. Halved or
@@ -20,19 +19,20 @@ doubled: no change on one clip."""
 
 
 def gather_poses(
-    annotations: Annotations,
-    body_frame: BodyFrame,
+    marks: PlayerMarks,
+    bounds: Float[np.ndarray, "A A"],
     half: BodyHalf,
     fixed: Complex[np.ndarray, "T G"],
 ) -> AnnotatedPoses:
     """Annotated poses of one half: every frame on which at least half of its joints are marked.
 
-    A joint that is not marked there stands at its median place beside its parent.
+    A joint that is not marked there stands at its median place beside its parent. `bounds` has the
+    lengths that bones between any two joints of the skeleton can have.
     """
-    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
-    known = np.isfinite(marks)
+    places = marks.joints[:, half.joints]
+    known = np.isfinite(places)
     rows = np.flatnonzero(known[:, half.free].mean(axis=1) >= LEAST_MARKED)
-    frames, poses, known = annotations.frames[rows], marks[rows], known[rows]
+    frames, poses, known = marks.frames[rows], places[rows], known[rows]
     poses[:, half.fixed], known[:, half.fixed] = fixed[frames], True
     # from the joints that are there outwards, back for parents that are not, and out from these
     for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
@@ -45,8 +45,7 @@ def gather_poses(
             "frames; mark all of them on at least one keyframe."
         )
     one, other = half.joints[half.bones].T
-    longest = bound_bones(annotations, body_frame)[one, other]
-    return AnnotatedPoses(half, frames, poses, known, longest)
+    return AnnotatedPoses(half, frames, poses, known, bounds[one, other])
 
 
 def distances_to(
@@ -62,7 +61,7 @@ def distances_to(
 
 
 def find_ways(
-    annotations: Annotations,
+    marks: PlayerMarks,
     flow: FlowTracks | None,
     body_frame: BodyFrame,
     half: BodyHalf,
@@ -75,25 +74,24 @@ def find_ways(
     nothing.
     """
     frames, number = np.arange(len(fixed)), preparation.shots.number
-    marks = body_frame.from_pixels(annotations.joints[:, half.joints], annotations.frames[:, None])
     lines = np.zeros((len(frames), len(half.joints)), complex)
     seconds, followed, confidence = np.zeros(lines.shape), lines.copy(), np.zeros(lines.shape)
-    for joint, places in enumerate(marks.T):
+    for joint, places in enumerate(marks.joints[:, half.joints].T):
         known = np.isfinite(places)
-        lines[:, joint] = np.interp(frames, annotations.frames[known], places[known])
+        lines[:, joint] = np.interp(frames, marks.frames[known], places[known])
         seconds[:, joint] = np.inf
         for shot, part in enumerate(preparation.shots.parts):
-            inside = known & (number[annotations.frames] == shot)
-            at = annotations.frames[inside]
+            inside = known & (number[marks.frames] == shot)
+            at = marks.frames[inside]
             if len(at):
                 lines[part, joint] = np.interp(frames[part], at, places[inside])
                 away = nearest_distance(frames[part], at)
                 seconds[part, joint] = away / preparation.video.fps
     lines[:, half.fixed] = fixed
     if flow is not None:
-        places = body_frame.from_pixels(flow.joints[:, half.joints], frames[:, None])
-        sure = np.isfinite(places) & flow.joined[:, half.joints]
-        followed[sure] = places[sure]
+        flowed = body_frame.from_pixels(flow.joints, frames[:, None])[:, half.joints]
+        sure = np.isfinite(flowed) & flow.joined[:, half.joints]
+        followed[sure] = flowed[sure]
         confidence[sure] = flow.confidence[:, half.joints][sure]
     return MarkedWays(followed, confidence, lines, seconds)
 

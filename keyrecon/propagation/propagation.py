@@ -25,14 +25,13 @@ from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.appearance import (
-    JointAppearance,
     PlayerFeatures,
     describe_player,
     learn_appearance,
     regular_frames,
 )
 from keyrecon.propagation.body_frame import stabilise_shots
-from keyrecon.propagation.bone_bounds import bound_bones, ends_too_long
+from keyrecon.propagation.bone_bounds import bound_bones
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
     EdgeTemplates,
@@ -43,12 +42,11 @@ from keyrecon.propagation.flow_agreement import with_flow
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import (
     MarkedWays,
-    PoseHypotheses,
+    fit_limbs,
     fit_poses,
     fit_similar,
     follow_marks,
     join_hypotheses,
-    propose_limbs,
     track_from_keyframes,
 )
 from keyrecon.propagation.limb_identity import (
@@ -56,7 +54,7 @@ from keyrecon.propagation.limb_identity import (
     identify_in_shots,
     template_gain,
 )
-from keyrecon.propagation.limb_search import search_limbs
+from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
 from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
@@ -170,20 +168,22 @@ def _propagate_fused(
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
+    marks = body_frame.of_marks(annotations)
+    bounds = bound_bones(marks)
     for half in progress(halves, "Propagating joints", len(halves)):
         fixed = joints[:, half.joints[half.fixed]]
-        poses = gather_poses(annotations, body_frame, half, fixed)
+        poses = gather_poses(marks, bounds, half, fixed)
+        ways = find_ways(marks, flow, body_frame, half, fixed, preparation)
+        distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         templates = make_edge_templates(edges, body_frame, poses, options.elements)
         if half.name == "lower":
             tracked = body_frame.from_pixels(track.feet, frames[:, None])
             templates = replace(
                 templates, feet=learn_foot_offsets(half, poses.frames, poses.joints, tracked)
             )
-        distance = distances_to(preparation.pose_distances, half.name, poses.frames)
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
         shift = at[:, None] - at[poses.frames]
-        ways = find_ways(annotations, flow, body_frame, half, fixed, preparation)
         start = HalfStart(shift, distance, fixed, features, preparation.shots, ways)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
@@ -191,9 +191,7 @@ def _propagate_fused(
         confidence[:, free] = result.confidence[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
     tracks = JointTracks(body_frame.to_pixels(joints, frames[:, None]), confidence, source)
-    if flow is None:
-        return tracks
-    return with_flow(tracks, flow, track.height, bound_bones(annotations, body_frame))
+    return with_flow(tracks, flow, track.height, bounds)
 
 
 def propagate_half(
@@ -208,13 +206,16 @@ def propagate_half(
     half, poses = templates.half, templates.poses
     fitted = fit_similar(templates, index, start.distance, start.shift, similar)
     nearest = fitted.template[:, 0]
-    appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
     with ThreadPoolExecutor(1) as beside:
         tracked = beside.submit(track_from_keyframes, templates, index, nearest, start.shots, fps)
-        parts = [propose_limbs(templates, index, fitted, LIMB_HYPOTHESES)]
+        appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
+        trunk, count = fitted.best_joints, LIMB_HYPOTHESES
+        arms = search_by_looks(appearance, poses, trunk, count) if half.middle else trunk[:, :0]
+        limbs = search_by_edges(templates, index, trunk, count)
+        parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
         if half.middle:
-            parts.append(propose_arms(templates, index, fitted, appearance, nearest))
+            parts.append(fit_poses(templates, index, arms, nearest))
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
     hypotheses = replace(
         hypotheses,
@@ -229,22 +230,7 @@ def propagate_half(
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, start.shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
-    confidence[ends_too_long(joints, half.bones, poses.longest)] = 0
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
-
-
-def propose_arms(
-    templates: EdgeTemplates,
-    index: ElementIndex,
-    fitted: PoseHypotheses,
-    appearance: JointAppearance,
-    similar: Int[np.ndarray, "T"],
-) -> PoseHypotheses:
-    """The best trunk with limbs that look like marked ones, fitted to edges."""
-    best = fitted.residual.mean(axis=2).argmin(axis=1)
-    trunk = fitted.joints[np.arange(len(best)), best]
-    found = search_limbs(appearance, templates.poses, trunk, LIMB_HYPOTHESES)
-    return fit_poses(templates, index, found, similar)
 
 
 def _with_marks(

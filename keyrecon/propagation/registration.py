@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from keyrecon.numerics.blocks import in_blocks
 from keyrecon.propagation.correspondence import (
     HYPOTHESIS_SPREAD,
     ElementIndex,
@@ -46,6 +45,10 @@ DAMPING = 1e-9
 FIXED_WEIGHT, MARKED_WEIGHT = 1e5, 1e6
 """Weights of joints that are known: by the other half of the body, and by a person. Halved or
 doubled, others with it: at most 0.1 points, 0.2 mm on one clip."""
+
+BOUND_SPREAD = 0.002
+"""How firmly a bone that is too long comes to its bound, player heights: more than anything else
+but marks."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +153,8 @@ def register_templates(
     """Fit templates to their frames; `prior` counts in every step."""
     fits = start
     for step in schedule:
-        equations = edge_equations(templates, index, fits, step.radius, step.stride)
-        equations = equations + shape_equations(templates, fits.joints, start.joints, step)
+        shape = shape_equations(templates, fits.joints, start.joints, step)
+        equations = shape + edge_equations(templates, index, fits, step.radius, step.stride)
         fits = fits.moved((equations + prior if prior else equations).solve())
     return fits
 
@@ -199,11 +202,11 @@ def edge_equations_of_all(
 ) -> NormalEquations:
     """Observations of many fits, a block at a time."""
 
-    def observe(part: slice) -> tuple[np.ndarray, np.ndarray]:
-        equations = edge_equations(templates, index, fits.take(part), radius)
+    def observe(part: TemplateFits) -> tuple[np.ndarray, np.ndarray]:
+        equations = edge_equations(templates, index, part, radius)
         return equations.matrix, equations.right
 
-    return NormalEquations(*in_blocks(observe, len(fits.frames)))
+    return NormalEquations(*fits.in_blocks(observe))
 
 
 def foot_equations(
@@ -225,18 +228,37 @@ def shape_equations(
 ) -> NormalEquations:
     """Bones keep the length and, softly, the direction that they have in the model."""
     bones = templates.half.bones
-    difference = np.zeros((len(joints), len(bones), joints.shape[1]))
-    rows = np.arange(len(bones))
-    difference[:, rows, bones[:, 1]] = 1
-    difference[:, rows, bones[:, 0]] -= 1
-    present, bone = (p[:, bones[:, 1]] - p[:, bones[:, 0]] for p in (joints, model))
-    axis = present / np.maximum(np.abs(present), 1e-6)
+    weights, _, axis = _bone_rows(bones, joints)
+    bone = model[:, bones[:, 1]] - model[:, bones[:, 0]]
     # along the present direction the length is set right, across it the direction
     target = axis * (np.abs(bone) + 1j * (bone * np.conj(axis)).imag)
     ones = np.ones(axis.shape)
-    return point_equations(
-        difference, target, axis, ones / step.length_spread**2, ones / step.transverse_spread**2
-    )
+    along, across = ones / step.length_spread**2, ones / step.transverse_spread**2
+    return point_equations(weights, target, axis, along, across)
+
+
+def length_equations(
+    templates: EdgeTemplates, joints: Complex[np.ndarray, "T J"]
+) -> NormalEquations:
+    """Bones that are longer than they can be come to the length that they can have."""
+    bones, longest = templates.half.bones, templates.poses.longest
+    weights, present, axis = _bone_rows(bones, joints)
+    over = np.abs(present) > longest
+    weight = over / BOUND_SPREAD**2
+    target = axis * np.where(over, longest, 0)
+    return point_equations(weights, target, axis, weight, np.zeros(weight.shape))
+
+
+def _bone_rows(
+    bones: Int[np.ndarray, "B 2"], joints: Complex[np.ndarray, "P J"]
+) -> tuple[Float[np.ndarray, "P B J"], Complex[np.ndarray, "P B"], Complex[np.ndarray, "P B"]]:
+    """Weights of all joints that give the way from parent to child, that way, its direction."""
+    weights = np.zeros((len(joints), len(bones), joints.shape[1]))
+    rows = np.arange(len(bones))
+    weights[:, rows, bones[:, 1]] = 1
+    weights[:, rows, bones[:, 0]] -= 1
+    present = joints[:, bones[:, 1]] - joints[:, bones[:, 0]]
+    return weights, present, present / np.maximum(np.abs(present), 1e-6)
 
 
 def hypothesis_equations(

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.numerics.viterbi import find_cheapest_path
-from keyrecon.propagation.bone_bounds import too_long
+from keyrecon.propagation.bone_bounds import ROUNDING
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.evidence import SideStates, find_evidence, weigh_evidence
 from keyrecon.propagation.half_body import BodyHalf
@@ -80,13 +80,12 @@ def choose_limbs(
     unlikeness = hypotheses.unlikeness[:, 0].copy()
     trunk = _choose_trunk(templates, hypotheses, shots, fps)
     middle = half.middle
-    joints[:, middle] = _with_annotations(templates, hypotheses.joints[:, :, middle], middle)[
-        frames, trunk
-    ]
-    unlikeness[..., middle] = hypotheses.unlikeness[frames, trunk][..., middle]
-    template[:, middle] = hypotheses.template[frames, trunk][:, None]
     evidence = find_evidence(templates, hypotheses, trunk, ways)
     costs = weigh_evidence(half.name, evidence)
+    joints[:, middle] = hypotheses.joints[frames, trunk][:, middle]
+    joints[templates.poses.frames[:, None], middle] = templates.poses.joints[:, middle]
+    unlikeness[..., middle] = hypotheses.unlikeness[frames, trunk][..., middle]
+    template[:, middle] = hypotheses.template[frames, trunk][:, None]
     one, other = (
         _limb_states(templates, hypotheses, joints, side, cost, shots, fps)
         for side, cost in zip(evidence.sides, costs.sides, strict=True)
@@ -176,7 +175,9 @@ def _count_too_long(
     bones = templates.half.bones
     inside = np.flatnonzero(np.isin(bones, members).all(axis=1))
     ends = np.array([[place[a], place[b]] for a, b in bones[inside].tolist()], int)
-    return too_long(joints, ends.reshape(-1, 2), templates.poses.longest[inside]).sum(axis=2)
+    start, stop = ends.reshape(-1, 2).T
+    length = np.abs(joints[:, :, stop] - joints[:, :, start])
+    return (length > templates.poses.longest[inside] * (1 + ROUNDING)).sum(axis=2)
 
 
 def _joining_costs(

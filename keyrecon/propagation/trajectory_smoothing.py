@@ -27,7 +27,7 @@ from keyrecon.propagation.registration import (
     edge_equations_of_all,
     hypothesis_equations,
     joints_from_unknowns,
-    point_equations,
+    length_equations,
     shape_equations,
 )
 from keyrecon.records import Shots
@@ -38,9 +38,6 @@ with it: at most 0.4 points, 0.5 mm on one clip."""
 SHAPE_PRIOR = RegistrationStep(radius=0.0, length_spread=0.03, transverse_spread=0.10)
 """How firmly bones keep the shape of the chosen hypothesis. Halved or doubled, others with it: at
 most 0.3 points, 0.5 mm on one clip."""
-BOUND_SPREAD = 0.002
-"""How firmly a bone that is too long comes to its bound, player heights: more than anything else
-but marks."""
 ACCELERATION_SPREAD = 0.002
 """Standard deviation of a root joint's second difference over 1/50 s, player heights; it doubles
 with every bone outwards. Strokes of the tennis motion capture lie at half of this for the trunk and
@@ -75,23 +72,6 @@ def smooth_trajectories(
             equations.right,
         )
     return joints
-
-
-def length_equations(
-    templates: EdgeTemplates, joints: Complex[np.ndarray, "T J"]
-) -> NormalEquations:
-    """Bones that are longer than they can be come to the length that they can have."""
-    bones, longest = templates.half.bones, templates.poses.longest
-    difference = np.zeros((len(joints), len(bones), joints.shape[1]))
-    rows = np.arange(len(bones))
-    difference[:, rows, bones[:, 1]] = 1
-    difference[:, rows, bones[:, 0]] -= 1
-    present = joints[:, bones[:, 1]] - joints[:, bones[:, 0]]
-    axis = present / np.maximum(np.abs(present), 1e-6)
-    over = np.abs(present) > longest
-    weight = over / BOUND_SPREAD**2
-    target = axis * np.where(over, longest, 0)
-    return point_equations(difference, target, axis, weight, np.zeros(weight.shape))
 
 
 def solve_smooth(

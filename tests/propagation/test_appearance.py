@@ -14,7 +14,7 @@ from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.edge_template import AnnotatedPoses
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import appearance_gain
-from keyrecon.propagation.limb_search import search_limbs
+from keyrecon.propagation.limb_search import search_by_looks
 
 LEGS = split_body(LSP14)[0]
 ONE, OTHER = map(list, LEGS.sides)
@@ -98,7 +98,7 @@ def test_the_middle_of_a_bone_looks_like_that_of_a_marked_one(appearance):
 def test_limbs_are_found_where_they_look_like_marked_ones(appearance):
     trunk = JOINTS.copy()
     trunk[:, [*ONE[1:], *OTHER[1:]]] = 9
-    found = search_limbs(appearance, marked_poses(), trunk, 3)
+    found = search_by_looks(appearance, marked_poses(), trunk, 3)
     away = np.abs(found - JOINTS[:, None])[..., [*ONE, *OTHER]].max(axis=2)
     apart = np.abs(JOINTS[:, ONE[0]] - JOINTS[:, OTHER[0]]) > 0.15
     assert (away.min(axis=1)[apart] < 0.08).all()

@@ -18,7 +18,7 @@ ELBOW, WRIST = LSP14.index("right_elbow"), LSP14.index("right_wrist")
 
 def bounds_of(preparation, annotations):
     body_frame = stabilise_player(preparation.track, preparation.camera, preparation.video.fps)
-    return bound_bones(annotations, body_frame)
+    return bound_bones(body_frame.of_marks(annotations))
 
 
 def foreshortened(share):

@@ -122,7 +122,7 @@ def fused(edges, followed, joined=True, shift=40.0):
     joints = np.zeros((1, 1, 2))
     tracks = JointTracks(joints, np.full((1, 1), edges), np.zeros((1, 1), dtype=np.int64))
     flow = FlowTracks(joints + shift, np.full((1, 1), followed), np.full((1, 1), joined))
-    result = with_flow(tracks, flow, np.full(1, 100.0))
+    result = with_flow(tracks, flow, np.full(1, 100.0), np.full((1, 1), np.inf))
     return float(result.joints[0, 0, 0]), float(result.confidence[0, 0])
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.propagation.body_frame import BodyFrame, stabilise_shots
+from keyrecon.propagation.bone_bounds import bound_bones
 from keyrecon.propagation.correspondence import (
     HYPOTHESIS_SPREAD,
     ElementIndex,
@@ -30,10 +31,11 @@ from keyrecon.propagation.edge_template import (
 from keyrecon.propagation.half_body import BodyHalf, split_body
 from keyrecon.propagation.hypotheses import (
     PoseHypotheses,
+    fit_limbs,
     fit_similar,
     join_hypotheses,
-    propose_limbs,
 )
+from keyrecon.propagation.limb_search import search_by_edges
 from keyrecon.propagation.marked_poses import LEAST_MARKED, distances_to, gather_poses
 from keyrecon.propagation.propagation import LIMB_HYPOTHESES, PropagateOptions
 from keyrecon.propagation.registration import (
@@ -105,7 +107,8 @@ def prepare_fitting(
 ) -> Fitting:
     """Edge templates of a half; `joints` has what the other half gives to it."""
     preparation, body_frame = scene.preparation, scene.body_frame
-    poses = gather_poses(scene.sources, body_frame, half, joints[:, half.joints[half.fixed]])
+    marks = body_frame.of_marks(scene.sources)
+    poses = gather_poses(marks, bound_bones(marks), half, joints[:, half.joints[half.fixed]])
     edges = tuple(preparation.edges[t] for t in frames)
     index = index_elements(edges, _select_frames(body_frame, frames))
     distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
@@ -250,7 +253,8 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     """Joints of one half; those that are `known` stay."""
     templates, index = fitting.templates, fitting.index
     fitted = fit_similar(templates, index, fitting.distance, fitting.shift, OPTIONS.similar)
-    hypotheses = join_hypotheses(fitted, propose_limbs(templates, index, fitted, LIMB_HYPOTHESES))
+    found = search_by_edges(templates, index, fitted.best_joints, LIMB_HYPOTHESES)
+    hypotheses = join_hypotheses(fitted, fit_limbs(templates, index, fitted, found))
     limbs = _choose_each(templates, hypotheses, fitting.fps)
     chosen = np.where(np.isfinite(known), known, limbs.joints)
     weight = np.where(np.isfinite(known), FIXED_WEIGHT, HYPOTHESIS_WEIGHT)
