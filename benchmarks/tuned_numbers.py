@@ -36,7 +36,7 @@ FORMS = (
     "lifting/priors/depth_model.py:TERMS",
     "lifting/priors/depth_model.py:_INPUTS",
     "numerics/banded_least_squares.py:STENCIL",
-    "numerics/blocks.py:WORKERS",
+    "propagation/correspondence.py:WORKERS",
 )
 """Formulas and what a file says of itself: there is nothing to tune."""
 SHAPES = ("dtype", "axis", "shape")
@@ -107,16 +107,15 @@ def rewrite(tree: ast.Module, new: dict[Place, float]) -> ast.Module:
 
 def find_stages(trees: dict[str, ast.Module]) -> dict[str, str]:
     """The pipeline's stages in order, each with the file that its function is imported from."""
-    pipeline = trees["pipeline.py"]
-    source = {
-        alias.asname or alias.name: _file_of(node.module)
-        for node in pipeline.body
-        if isinstance(node, ast.ImportFrom) and node.module
-        for alias in node.names
-    }
-    functions = {n.name: n for n in pipeline.body if isinstance(n, ast.FunctionDef)}
-    calls = [c for name in ("prepare", "reconstruct") for c in _keep_calls(name, functions)]
-    return {_stage_name(call.args[0]): source[call.args[1].id] for call in calls}
+    calls = [
+        found
+        for name in ("prepare", "reconstruct")
+        for found in _keep_calls("pipeline.py", name, trees)
+    ]
+    stages: dict[str, str] = {}
+    for source, call in calls:
+        stages.setdefault(_stage_name(call.args[0]), source[call.args[1].id])
+    return stages
 
 
 def _stage_name(name: ast.expr) -> str:
@@ -126,15 +125,37 @@ def _stage_name(name: ast.expr) -> str:
     return name.value.removesuffix("@")
 
 
-def _keep_calls(name: str, functions: dict[str, ast.FunctionDef]) -> Iterator[ast.Call]:
-    """Calls of `keep` in the order in which a function of the recipe comes to them."""
+def _keep_calls(
+    module: str, name: str, trees: dict[str, ast.Module]
+) -> Iterator[tuple[dict[str, str], ast.Call]]:
+    """Calls of `keep` in the order in which a function of a recipe comes to them, each with the
+    files that the names around it are imported from."""
+    functions = {n.name: n for n in trees[module].body if isinstance(n, ast.FunctionDef)}
+    source = {
+        alias.asname or alias.name: _file_of(node.module)
+        for node in trees[module].body
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
     calls = [node for node in ast.walk(functions[name]) if isinstance(node, ast.Call)]
     for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset)):
         called = getattr(call.func, "id", "")
+        home = module if called in functions else source.get(called, "")
         if called == "keep":
-            yield call
-        elif called in functions and called != name:
-            yield from _keep_calls(called, functions)
+            yield source, call
+        elif called != name and _is_recipe(home, called, trees):
+            yield from _keep_calls(home, called, trees)
+
+
+def _is_recipe(module: str, function: str, trees: dict[str, ast.Module]) -> bool:
+    """Whether a function keeps what stages find: it is handed `keep`."""
+    if module not in trees:
+        return False
+    defined = (n for n in trees[module].body if isinstance(n, ast.FunctionDef))
+    return any(
+        node.name == function and any(argument.arg == "keep" for argument in node.args.args)
+        for node in defined
+    )
 
 
 def stages_using(

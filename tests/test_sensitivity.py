@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -152,6 +153,8 @@ def test_the_package_itself_has_stages_and_numbers_for_all_of_them(numbers):
     trees = numbers.read_package()
     names = list(numbers.find_stages(trees))
     assert (names[0], names[-1]) == ("camera", "lift")
+    recipes = "\n".join(file.read_text() for file in numbers.PACKAGE.glob("*.py"))
+    assert set(names) == set(re.findall(r'keep\(\s*f?"(\w+)', recipes))
     found = numbers.find_numbers(trees)
     assert len({number.key for number in found}) == len(found) > 200
     for number in found:
