@@ -87,13 +87,13 @@ def _run(words: Sequence[str]) -> None:
     app = SubcommandApp()
     for name, command in COMMANDS.items():
         if whole or name == typed:
-            found = getattr(import_module(f"{command.package}.{command.module}"), command.name)
+            handler = getattr(import_module(f"{command.package}.{command.module}"), command.name)
         else:
-            found = _stand_in(_first_line(command))
-        if isinstance(found, SubcommandApp):
-            app.command(found, name=name, help=_first_line(command))
+            handler = _stand_in(_first_line(command))
+        if isinstance(handler, SubcommandApp):
+            app.command(handler, name=name, help=_first_line(command))
         else:
-            app.command(name=name)(found)
+            app.command(name=name)(handler)
     app.cli(prog="keyrecon", description=DESCRIPTION, args=list(words))
 
 

@@ -162,7 +162,7 @@ def uncertain_stretches(
     done = np.setdiff1d(np.array([] if marked is None else marked, int), motion.keyframes)
     doubt = _doubt_by_part(motion)
     least = LEAST_SECONDS * motion.fps
-    found, open_runs = [], _runs(_is_uncertain(doubt), round(MERGED_SECONDS * motion.fps))
+    stretches, open_runs = [], _runs(_is_uncertain(doubt), round(MERGED_SECONDS * motion.fps))
     while open_runs:
         first, last = open_runs.pop()
         if last - first + 1 < least:
@@ -170,8 +170,8 @@ def uncertain_stretches(
         stretch, weight = _worst_stretch(motion, doubt, first, last)
         open_runs += [(first, stretch.first - 1), (stretch.last + 1, last)]
         if stretch.frame not in done:
-            found.append((weight, stretch))
-    worst = sorted(found, key=lambda row: -row[0])[:count]
+            stretches.append((weight, stretch))
+    worst = sorted(stretches, key=lambda row: -row[0])[:count]
     return sorted((stretch for _, stretch in worst), key=lambda s: s.first)
 
 
@@ -245,14 +245,14 @@ def worst_frames(motion: Motion, count: int = 10) -> list[tuple[int, list[tuple[
         return []
     left = motion.expected_error.mean(axis=1)
     apart = round(TAUGHT_SECONDS * motion.fps)
-    found: list[tuple[int, list[tuple[str, float]]]] = []
-    while len(found) < count and np.isfinite(left).any():
+    asked: list[tuple[int, list[tuple[str, float]]]] = []
+    while len(asked) < count and np.isfinite(left).any():
         frame = int(np.nanargmax(left))
         errors = motion.expected_error[frame]
         worst = np.argsort(-errors)[:3]
-        found.append((frame, [(motion.skeleton.names[j], float(errors[j])) for j in worst]))
+        asked.append((frame, [(motion.skeleton.names[j], float(errors[j])) for j in worst]))
         left[max(0, frame - apart) : frame + apart + 1] = np.nan
-    return found
+    return asked
 
 
 def body_parts(skeleton: Skeleton) -> dict[str, Int[np.ndarray, "_"]]:

@@ -43,8 +43,8 @@ class HeldVideo(Video):
 
 def hold_frames(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> HeldVideo:
     """The same video, decoded only once."""
-    own = {field.name: getattr(video, field.name) for field in fields(Video)}
-    return HeldVideo(**own, most_in_memory=most_in_memory)
+    inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
+    return HeldVideo(**inherited, most_in_memory=most_in_memory)
 
 
 def mirror_video(video: Video) -> Video:

@@ -97,12 +97,12 @@ def flat_options(tables: object, prefix: str = "") -> dict[str, Any]:
 
 def former_names(name: str) -> list[str]:
     """Names under which older project files may set an option."""
-    found: list[str] = []
+    formers: list[str] = []
     for former, current in reversed(FORMER_NAMES.items()):
-        for known in (name, *found):
+        for known in (name, *formers):
             if known == current or known.startswith(f"{current}."):
-                found.append(former + known.removeprefix(current))
-    return found
+                formers.append(former + known.removeprefix(current))
+    return formers
 
 
 def with_current_names(changes: object) -> object:

@@ -68,16 +68,16 @@ def _checked(project: Project, path: Path) -> Project:
     return project
 
 
-def _check_video(told: Any) -> None:
+def _check_video(table: Any) -> None:
     """Raise KeyError or TypeError where project.toml does not tell the video as we write it."""
-    if not isinstance(told, dict):
+    if not isinstance(table, dict):
         raise TypeError("video must be a table")
     for name, kinds in VIDEO_FIELDS.items():
-        value = told[name] if name in ("path", "fingerprint") else told.get(name)
+        value = table[name] if name in ("path", "fingerprint") else table.get(name)
         if value is not None and type(value) not in kinds:
             raise TypeError(f"video.{name} cannot be {value!r}")
-    if not 0 < told.get("slow_motion", 1) < float("inf"):
-        raise ValueError(f"video.slow_motion cannot be {told['slow_motion']!r}")
+    if not 0 < table.get("slow_motion", 1) < float("inf"):
+        raise ValueError(f"video.slow_motion cannot be {table['slow_motion']!r}")
 
 
 def new_project(

@@ -101,17 +101,17 @@ class StageStore:
         named: Mapping[str, object],
     ) -> tuple[str, Path]:
         """What tells this result from others, and its file. How progress is shown changes none."""
-        told = tuple(item for item in sorted(named.items()) if item[0] != "progress")
-        key = self._key((_code_of(stage), name, told, *inputs))
+        arguments = tuple(item for item in sorted(named.items()) if item[0] != "progress")
+        key = self._key((_code_of(stage), name, arguments, *inputs))
         return key, self.folder / f"{name}-{key}.npz"
 
     def _forget(self, name: str, made: Path) -> None:
         """Drop all but the latest few results of a stage; another process may do the same."""
-        found: list[tuple[float, Path]] = []
+        results: list[tuple[float, Path]] = []
         for path in self.folder.glob(f"{name}-*.npz"):
             with suppress(FileNotFoundError):
-                found.append((path.stat().st_mtime, path))
-        for _, old in sorted(found)[:-KEPT_RESULTS]:
+                results.append((path.stat().st_mtime, path))
+        for _, old in sorted(results)[:-KEPT_RESULTS]:
             if old != made:
                 old.unlink(missing_ok=True)
 
@@ -159,7 +159,7 @@ def _stored(path: Path) -> Any:
 
 def _code_of(stage: Callable[..., Any]) -> str:
     """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    own = Path(inspect.getfile(stage)).parent.rglob("*.py")
+    stage_code = Path(inspect.getfile(stage)).parent.rglob("*.py")
     shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
-    sources = sorted({*own, *shared})
+    sources = sorted({*stage_code, *shared})
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()

@@ -116,11 +116,11 @@ def steady_video(
 ) -> SteadyVideo:
     """Some frames of a video at their times in the world, warped into pictures of some size."""
     source = video if isinstance(video, HeldVideo) else hold_frames(video)
-    own = {field.name: getattr(video, field.name) for field in fields(Video)}
+    inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else video.fps
-    own |= {"width": size[0], "height": size[1], "stamps": video.stamps[numbers]}
-    own |= {"time": time, "fps": fps}
-    return SteadyVideo(**own, source=source, numbers=numbers, warps=warps)
+    inherited |= {"width": size[0], "height": size[1], "stamps": video.stamps[numbers]}
+    inherited |= {"time": time, "fps": fps}
+    return SteadyVideo(**inherited, source=source, numbers=numbers, warps=warps)
 
 
 def _warped(

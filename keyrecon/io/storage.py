@@ -113,7 +113,7 @@ def _record_type(name: str) -> type:
     module, _, kind = name.partition(":")
     if module.split(".")[0] != "keyrecon":
         raise ValueError(f"unknown record '{name}'")
-    found = vars(import_module(module)).get(kind)
-    if not (isinstance(found, type) and is_dataclass(found)):
+    record_type = vars(import_module(module)).get(kind)
+    if not (isinstance(record_type, type) and is_dataclass(record_type)):
         raise ValueError(f"unknown record '{name}'")
-    return found
+    return record_type

@@ -124,25 +124,25 @@ class Video:
     def _decoded_run(self, start: int, stop: int) -> Iterator[av.VideoFrame]:
         """Frames that are decoded one after the other, those between them too."""
         wanted = self.stamps[start:stop]
-        found = 0
+        position = 0
         with _open(self.path) as container:
             for frame in _decode_from(container, int(wanted[0])):
-                if frame.pts is None or frame.pts < wanted[found]:
+                if frame.pts is None or frame.pts < wanted[position]:
                     continue
-                if frame.pts != wanted[found]:
+                if frame.pts != wanted[position]:
                     break
                 if {frame.width, frame.height} != {self.width, self.height}:
                     raise KeyreconError(
-                        f"{self.path}: from frame {start + found} on the pictures are "
+                        f"{self.path}: from frame {start + position} on the pictures are "
                         f"{frame.width}x{frame.height}; use a part of one size by --start and "
                         "--end, or re-encode the video."
                     )
                 yield frame
-                found += 1
-                if found == len(wanted):
+                position += 1
+                if position == len(wanted):
                     return
         raise KeyreconError(
-            f"{self.path}: frame {start + found} of {len(self)} cannot be decoded; the file is "
+            f"{self.path}: frame {start + position} of {len(self)} cannot be decoded; the file is "
             "damaged there. Trim the project before it with --end, or repair the file."
         )
 
@@ -269,7 +269,7 @@ def _find_orientation(frame: av.VideoFrame, stream: av.VideoStream) -> tuple[int
     told_with_frame: Any = frame.side_data  # PyAV's stubs know motion vectors alone
     matrix = told_with_frame.get(Type.DISPLAYMATRIX)
     if matrix is None:
-        tag = {name.lower(): told for name, told in stream.metadata.items()}.get("rotate", "0")
+        tag = {name.lower(): value for name, value in stream.metadata.items()}.get("rotate", "0")
         return (-round(int(tag) / 90) % 4 if tag.lstrip("-").isdigit() else 0), False
     a, b, _, c, d = np.frombuffer(bytes(matrix)[:20], np.int32).astype(float)
     mirrored = bool(a * d - b * c < 0)

@@ -161,12 +161,12 @@ class Workspace:
 
     def golf_evidence(self) -> str:
         """A digest of all that a person told a golf fit."""
-        told = [
+        facts = [
             _parts_of(self.golf_clicks_file, CLICK_PARTS),
             _parts_of(self.golf_marks_file, ("keys", "frames")),
             _parts_of(self.annotations_file, ("annotations",)),
         ]
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
     def note_fitted(self, evidence: str) -> None:
         """Remember from what the last golf fit was made."""
@@ -190,8 +190,8 @@ class Workspace:
 
     def exported_files(self) -> list[Path]:
         """What stands in that folder."""
-        found = self.exports.iterdir() if self.exports.is_dir() else ()
-        return sorted(f for f in found if f.is_file() and not f.name.startswith("."))
+        files = self.exports.iterdir() if self.exports.is_dir() else ()
+        return sorted(f for f in files if f.is_file() and not f.name.startswith("."))
 
     @property
     def skeleton(self) -> Skeleton:
@@ -212,8 +212,8 @@ class Workspace:
         file = folder / "project.toml"
         if file.exists():
             raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
-        told = {"path": _relative(video_file, folder), "fingerprint": video.fingerprint, **trim}
-        text = new_project(file, told, kind)
+        table = {"path": _relative(video_file, folder), "fingerprint": video.fingerprint, **trim}
+        text = new_project(file, table, kind)
         make_folder(folder)
         write_durably(file, text)
         return cls(folder)
@@ -320,10 +320,10 @@ class Workspace:
     def kept_files(self) -> list[Path]:
         """Files there are that hold a person's work, or from which the rest is made."""
         names = ("*.toml", "*.json", "*.sqlite*", self.motion_file.name, self.report_file.name)
-        own = [file for name in names for file in self.folder.glob(name)]
+        files = [file for name in names for file in self.folder.glob(name)]
         video = Path(self.project["video"]["path"])
         places = [self.folder / video, *(place / video.name for place in self._places_of_video())]
-        return own + [file for file in places if file.is_file()]
+        return files + [file for file in places if file.is_file()]
 
     def needs(self, file: Path) -> bool:
         """Whether a file's place is one of the project's own, whether there is a file or not."""
@@ -346,10 +346,10 @@ class Workspace:
         `section` names the table of options that are not those of the pipeline.
         """
         check_options(given)
-        told = with_current_names(self.project.get("options", {}))
-        if isinstance(told, dict):
-            told = told.get(section, {}) if section else _without_sections(told)
-        kept = with_changes(defaults, told)
+        table = with_current_names(self.project.get("options", {}))
+        if isinstance(table, dict):
+            table = table.get(section, {}) if section else _without_sections(table)
+        kept = with_changes(defaults, table)
         return with_changes(kept, nested_tables(changed_options(given, defaults)))
 
     def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:
@@ -358,9 +358,9 @@ class Workspace:
         Raises KeyreconError, and writes nothing, for values that an option cannot have.
         """
         check_options(options)
-        told = flat_options(with_current_names(self.project.get("options", {})))
+        kept = flat_options(with_current_names(self.project.get("options", {})))
         changed = changed_options(options, defaults, f"{section}." if section else "")
-        others = {name: value for name, value in told.items() if _section_of(name) != section}
+        others = {name: value for name, value in kept.items() if _section_of(name) != section}
         changed = others | changed
         if with_options(self.project_file, changed) == read_text(self.project_file):
             return
@@ -375,8 +375,8 @@ def _section_of(name: str) -> str | None:
     return first if first in SECTIONS else None
 
 
-def _without_sections(told: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in told.items() if name not in SECTIONS}
+def _without_sections(options: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if name not in SECTIONS}
 
 
 def _parts_of(file: Path, names: Sequence[str]) -> list:
@@ -385,8 +385,8 @@ def _parts_of(file: Path, names: Sequence[str]) -> list:
     if file.is_file():
         with suppress(ValueError):  # who reads the file says what is wrong with it
             content = parse_json(read_text(file))
-    told = content if isinstance(content, dict) else {}
-    return [told.get(name) or None for name in names]
+    table = content if isinstance(content, dict) else {}
+    return [table.get(name) or None for name in names]
 
 
 def _relative(path: Path, folder: Path) -> str:

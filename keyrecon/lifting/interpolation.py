@@ -54,14 +54,14 @@ def interpolate_poses(
     ):
         key = _key_index(half, key_frames)
         residual = reprojection_residual(flat[key][:, member], joints[:, member])
-        own: list[Int[np.ndarray, "_"]] = []
+        of_shots: list[Int[np.ndarray, "_"]] = []
         for shot in shots.parts:
             control = drop_controls(half, residual, keyframes.reach, shot)
             poses = key_directions[key[control]][:, bones]
             count = shot.stop - shot.start
             directions[shot, bones] = slerp_between(poses, control - shot.start, count)
-            own.append(control)
-        controls.append(np.concatenate(own))
+            of_shots.append(control)
+        controls.append(np.concatenate(of_shots))
     return Interpolation(directions, *controls)
 
 

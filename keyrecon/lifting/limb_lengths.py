@@ -244,14 +244,14 @@ def _fit(
         slope = np.concatenate([by_group, [pull.sum()], at_observation.T @ pull])
         return float(-value + 0.5 * off @ off), slope + prior.T @ off
 
-    found = minimize(cost, start, jac=True, method="L-BFGS-B")
-    best = found.x
-    if not found.success:
-        if not found.fun < cost(start)[0]:
+    optimum = minimize(cost, start, jac=True, method="L-BFGS-B")
+    best = optimum.x
+    if not optimum.success:
+        if not optimum.fun < cost(start)[0]:
             best = start
         logger.warning(
             "The search for bone lengths did not converge (%s); %s.",
-            found.message,
+            optimum.message,
             "the table's proportions are used" if best is start else "its last step is used",
         )
     return _LengthFit(best[:groups], log_height + best[groups] + blend @ best[groups + 1 :])

@@ -240,10 +240,10 @@ def _smoothness(
 
 def _median_size(seen: Float[np.ndarray, "S B 2"]) -> Float[np.ndarray, "B 1"]:
     """Usual size of a bone's values per axis, as a standard deviation; 0 where all are NaN."""
-    found = np.zeros((seen.shape[1], 1))
+    deviation = np.zeros((seen.shape[1], 1))
     known = np.isfinite(seen).any(axis=(0, 2))
-    found[known, 0] = MAD_TO_SIGMA * np.nanmedian(np.abs(seen[:, known]), axis=(0, 2))
-    return found
+    deviation[known, 0] = MAD_TO_SIGMA * np.nanmedian(np.abs(seen[:, known]), axis=(0, 2))
+    return deviation
 
 
 def _balance_terms(

@@ -78,10 +78,10 @@ def in_words(length: float, units: str) -> str:
 
 def _error_cards(motion: Motion) -> list[tuple[str, str, str]]:
     missing = float(missing_shares(motion).mean())
-    found = ("Found in the picture", f"{1 - missing:.1%}", "of joints; the rest is filled in")
+    located = ("Found in the picture", f"{1 - missing:.1%}", "of joints; the rest is filled in")
     error = expected_length(motion)
     if error is None:
-        return [found]
+        return [located]
     value, _, of = in_words(error, motion.units).partition(" of ")
     return [
         (
@@ -95,7 +95,7 @@ def _error_cards(motion: Motion) -> list[tuple[str, str, str]]:
             f"{uncertain_share(motion):.0%}",
             "of the frames have arms, legs or head that may be off",
         ),
-        found,
+        located,
     ]
 
 

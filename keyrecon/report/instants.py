@@ -44,13 +44,13 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
         return []
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
-    peaks, told = find_peaks(
+    peaks, properties = find_peaks(
         np.pad(fastest, 1),
         height=LEAST_SPEED * stature(motion),
         distance=max(1, round(APART_SECONDS * motion.fps)),
         prominence=STANDS_OUT * float(fastest.max()),
     )
-    chosen = sorted(peaks[np.argsort(-told["peak_heights"])[:MOST]] - 1)
+    chosen = sorted(peaks[np.argsort(-properties["peak_heights"])[:MOST]] - 1)
     return [
         KeyInstant(int(t), hands[int(np.nanargmax(speeds[:, t]))].replace("_wrist", ""), float(v))
         for t in chosen

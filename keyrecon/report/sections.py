@@ -211,12 +211,12 @@ def reference_views(material: ReportMaterial, frames: list[int]) -> str:
     """The motion seen from elsewhere, beside the truth where it is known (Fig. 11)."""
     motion = material.motion
     root, height = motion.skeleton.root, stature(motion)
-    found = center_on_root(motion.points3d, root)
+    points = center_on_root(motion.points3d, root)
     rows = [("video", [f'<img data-copy="still-{frame}" alt="Frame {frame}">' for frame in frames])]
     truth = material.true_joints
     true = None if truth is None else scale_truth(motion, truth.points3d)
     for view in VIEWS:
-        rows.append((view, _drawings(found, frames, motion.skeleton, view, height)))
+        rows.append((view, _drawings(points, frames, motion.skeleton, view, height)))
         if true is not None:
             truth_row = _drawings(true, frames, motion.skeleton, view, height)
             rows.append(("truth", truth_row))

@@ -46,16 +46,16 @@ def center_on_root(points3d: Float[np.ndarray, "T J 3"], root: int) -> Float[np.
 def scale_truth(motion: Motion, truth3d: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T J 3"]:
     """Truth around the root in the units of the motion: one scale for the whole sequence."""
     root = motion.skeleton.root
-    true, found = center_on_root(truth3d, root), center_on_root(motion.points3d, root)
-    both = np.isfinite(true) & np.isfinite(found)
-    scale = (true[both] @ found[both]) / max(float(true[both] @ true[both]), 1e-12)
+    true, estimated = center_on_root(truth3d, root), center_on_root(motion.points3d, root)
+    both = np.isfinite(true) & np.isfinite(estimated)
+    scale = (true[both] @ estimated[both]) / max(float(true[both] @ true[both]), 1e-12)
     return true * scale
 
 
 def error_per_frame(motion: Motion, truth: Truth) -> Float[np.ndarray, "T"]:
     """Mean distance of the joints to the true ones around the root, in units of the motion."""
-    found = center_on_root(motion.points3d, motion.skeleton.root)
-    distance = np.linalg.norm(found - scale_truth(motion, truth.points3d), axis=-1)
+    estimated = center_on_root(motion.points3d, motion.skeleton.root)
+    distance = np.linalg.norm(estimated - scale_truth(motion, truth.points3d), axis=-1)
     known = np.isfinite(distance)
     total = np.where(known, distance, 0).sum(axis=1)
     return np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan)

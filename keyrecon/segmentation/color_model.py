@@ -136,13 +136,13 @@ def _shoe_patch(
     """
     if len(patches[0]) < MIN_FLOOR * circle:
         return patches[0]
-    own = [-float(np.log(known[patch] + MIN_DENSITY).mean()) for patch in patches]
+    unlikeness = [-float(np.log(known[patch] + MIN_DENSITY).mean()) for patch in patches]
     better = [
         at
         for at in range(1, len(patches))
-        if own[at] > own[0] + MIN_GAIN and len(patches[at]) >= MIN_SHOE * circle
+        if unlikeness[at] > unlikeness[0] + MIN_GAIN and len(patches[at]) >= MIN_SHOE * circle
     ]
-    return patches[max(better, key=lambda at: own[at]) if better else 0]
+    return patches[max(better, key=lambda at: unlikeness[at]) if better else 0]
 
 
 def picked_height(picks: Sequence[Pick]) -> float:

@@ -54,16 +54,16 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
     names = annotations.skeleton.names
     if not {"neck", "head_top", *LEG_JOINTS} <= set(names):
         return TrackAnchors.none()
-    own = _anchors(names, annotations.frames, annotations.joints, marked=True)
+    marked = _anchors(names, annotations.frames, annotations.joints, marked=True)
     if flow is None:
-        return own
+        return marked
     sure = np.where(flow.confidence[..., None] > SURE_FLOW, flow.joints, np.nan)
     between = _anchors(names, np.arange(len(sure)), sure, marked=False)
-    new = ~np.isin(between.frames, own.frames)
-    order = np.argsort(np.concatenate([own.frames, between.frames[new]]), kind="stable")
+    new = ~np.isin(between.frames, marked.frames)
+    order = np.argsort(np.concatenate([marked.frames, between.frames[new]]), kind="stable")
     return TrackAnchors(
         *(
-            np.concatenate([getattr(own, f.name), getattr(between, f.name)[new]])[order]
+            np.concatenate([getattr(marked, f.name), getattr(between, f.name)[new]])[order]
             for f in fields(TrackAnchors)
         )
     )

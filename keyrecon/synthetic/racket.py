@@ -135,12 +135,12 @@ def _draw_strokes(
     lines, net = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
     first = 0
     for stroke in implement.strokes:
-        own = points[first : first + len(stroke.points)]
-        first += len(own)
+        outline = points[first : first + len(stroke.points)]
+        first += len(outline)
         if stroke.strung:
-            cv2.fillPoly(net, [own], 70, cv2.LINE_AA, 4)
+            cv2.fillPoly(net, [outline], 70, cv2.LINE_AA, 4)
         width = max(1, round(stroke.width * scale))
-        cv2.polylines(lines, [own], stroke.closed, 255, width, cv2.LINE_AA, 4)
+        cv2.polylines(lines, [outline], stroke.closed, 255, width, cv2.LINE_AA, 4)
     return lines, net
 
 

@@ -213,9 +213,9 @@ def _draw_one(
     y = (np.arange(y0, y1) + (origin[1] - start[1])).astype(np.float32)[:, None]
     ray, place = _meet(forms, index, (x, y), open_end)
     region = (slice(y0, y1), slice(x0, x1))
-    found = ray / np.float32(forms.ray[index, 3]) + np.float32(start[2])
-    nearer = (ray < FAR) & (found < depth[region])
-    np.copyto(depth[region], found, where=nearer)
+    surface = ray / np.float32(forms.ray[index, 3]) + np.float32(start[2])
+    nearer = (ray < FAR) & (surface < depth[region])
+    np.copyto(depth[region], surface, where=nearer)
     np.copyto(owner[region], np.int16(index), where=nearer)
     np.copyto(along[region], place, where=nearer)
 

@@ -111,9 +111,10 @@ def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, 
         raise ValueError("only a person's marks contradict a track")
     limit = CONTRADICTION * track.height[anchors.frames]
     head = np.linalg.norm(track.head[anchors.frames] - anchors.head, axis=-1)
-    own = track.feet[anchors.frames]
+    tracked = track.feet[anchors.frames]
     straight, crossed = (
-        np.linalg.norm(feet - anchors.feet, axis=-1).max(axis=1) for feet in (own, own[:, ::-1])
+        np.linalg.norm(feet - anchors.feet, axis=-1).max(axis=1)
+        for feet in (tracked, tracked[:, ::-1])
     )
     # comparisons with NaN are false: what is not marked contradicts nothing
     return anchors.frames[(head > limit) | (np.minimum(straight, crossed) > limit)]
@@ -168,7 +169,7 @@ def misplaced_marks(
     """Marked heads and feet to which the track would have to jump, and back again."""
     shot = (shots or Shots.between((), len(track.height))).number
     step = max(1, round(WAY_SECONDS * fps))
-    found: list[MisplacedMark] = []
+    misplaced: list[MisplacedMark] = []
     for row in np.flatnonzero(anchors.marked):
         frame = int(anchors.frames[row])
         if not step <= frame < len(track.height) - step:
@@ -184,5 +185,5 @@ def misplaced_marks(
         for part, far, most in zip(("head", "feet"), (head, feet), MAX_WAY_DISTANCE, strict=True):
             distance = float(far / track.height[frame])
             if distance > most:  # not where nothing is marked, which is NaN
-                found.append(MisplacedMark(frame, part, distance))
-    return found
+                misplaced.append(MisplacedMark(frame, part, distance))
+    return misplaced

@@ -229,8 +229,8 @@ class _Follower:
         there = np.empty_like(places)
         here = places.astype(np.float32)[:, None]
         if alone.any():
-            found, off, _ = track_there_and_back(before, after, here[alone], side)
-            there[alone], returned[alone] = found[:, 0], off / self.height
+            moved, off, _ = track_there_and_back(before, after, here[alone], side)
+            there[alone], returned[alone] = moved[:, 0], off / self.height
         if not alone.all():
             there[~alone] = track_points(before, after, here[~alone], side)[0][:, 0]
         return there, returned

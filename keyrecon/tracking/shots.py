@@ -99,9 +99,9 @@ class CutDetector:
         now = find_blend(self._recent)
         if now is not None:
             length, weight = now
-            found = _Blend(self._count - length + 1, self._count, abs(weight - 0.5))
-            if self._blend is None or found.uneven < self._blend.uneven:
-                self._blend = found
+            blend = _Blend(self._count - length + 1, self._count, abs(weight - 0.5))
+            if self._blend is None or blend.uneven < self._blend.uneven:
+                self._blend = blend
         elif self._blend is not None:
             self._end_blend()
 

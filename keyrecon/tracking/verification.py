@@ -150,12 +150,12 @@ def _find_distractors(
     """The figure most like the player, away from the player; NaN where none is like enough."""
     height = float(np.median([view.height for view in views]))
     template = _mean_player(views, confidence, height)
-    found = [_best_places(view, template, height) for view in views]
-    usual = float(np.median([own for own, _, _ in found]))
+    places = [_best_places(view, template, height) for view in views]
+    usual = float(np.median([own for own, _, _ in places]))
     colors = np.array([view.stripes(view.head, view.height) for view in views])
     mean = np.array([_known_median(stripe) for stripe in np.swapaxes(colors, 0, 1)])
     distractors = np.full((len(views), 2), np.nan)
-    for row, (view, (_, response, place)) in enumerate(zip(views, found, strict=True)):
+    for row, (view, (_, response, place)) in enumerate(zip(views, places, strict=True)):
         if response >= LOOKS_LIKE * usual > 0:
             difference = (view.stripes(place, height) - mean) * (0.5, 1, 1)
             distance = np.linalg.norm(difference, axis=1)
@@ -214,8 +214,8 @@ def _best_places(
     if not away.any():
         return 0.0, 0.0, np.zeros(2)
     best = int(np.where(away, response, -np.inf).argmax())
-    own = float(response[near].max()) if near.any() else 0.0
-    return own, float(response.flat[best]), np.array([best % columns, best // columns], float)
+    at_player = float(response[near].max()) if near.any() else 0.0
+    return at_player, float(response.flat[best]), np.array([best % columns, best // columns], float)
 
 
 def find_meetings(

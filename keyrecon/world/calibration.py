@@ -259,10 +259,10 @@ def _fit_together(
         fit = fit_lines(grey, guess, court, free=FIXED_CENTRE, spread=LOOSE)
         if not is_seen(fit) and anew:
             anew -= 1
-            found = find_in_picture(grey, court, frame)
-            if found.fit is None or found.doubt or _elsewhere(found.camera, view.camera):
+            located = find_in_picture(grey, court, frame)
+            if located.fit is None or located.doubt or _elsewhere(located.camera, view.camera):
                 continue
-            fit = found.fit
+            fit = located.fit
         if is_seen(fit):
             frames, greys, cameras = [*frames, frame], [*greys, grey], [*cameras, fit.camera]
     return frames, fit_views(greys, cameras, court)

@@ -116,20 +116,22 @@ def tennis_court(options: CourtOptions = CourtOptions()) -> CourtModel:
 def _empty_stretches() -> Float[np.ndarray, "E 2 3"]:
     """Beyond the ends of the lines: what tells a service line from a baseline."""
     gap, reach = 0.25, 1.2
-    found = []
+    stretches = []
     for side in (-1, 1):
         for half in (HALF_SINGLES, HALF_DOUBLES):
             start, end = HALF_LENGTH + gap, HALF_LENGTH + reach
-            found += [((half * side, start * way), (half * side, end * way)) for way in (-1, 1)]
+            stretches += [((half * side, start * way), (half * side, end * way)) for way in (-1, 1)]
         for way in (-1, 1):
-            found += [
+            stretches += [
                 ((side * (HALF_DOUBLES + gap), way * HALF_LENGTH),
                  (side * (HALF_DOUBLES + reach), way * HALF_LENGTH)),
                 ((side * (HALF_SINGLES + gap), way * SERVICE),
                  (side * (HALF_DOUBLES - gap), way * SERVICE)),
             ]  # fmt: skip
-    found += [((0.0, way * (SERVICE + gap)), (0.0, way * (HALF_LENGTH - 0.6))) for way in (-1, 1)]
-    return np.array([[(*a, 0.0), (*b, 0.0)] for a, b in found])
+    stretches += [
+        ((0.0, way * (SERVICE + gap)), (0.0, way * (HALF_LENGTH - 0.6))) for way in (-1, 1)
+    ]
+    return np.array([[(*a, 0.0), (*b, 0.0)] for a, b in stretches])
 
 
 POINTS: dict[str, tuple[float, float, float]] = {

@@ -72,17 +72,17 @@ def guess_cameras(
     order = np.argsort(-scores)[: 12 * count]
     finer = score_homographies(homographies[order], pixels, court, 2)
     order = order[np.argsort(-finer)]
-    found: list[Guess] = []
+    guesses: list[Guess] = []
     for k, score in zip(order, -np.sort(-finer), strict=True):
         camera = pinhole_from_homography(homographies[k], principal, float(focal[k]))
         away = float(np.linalg.norm(camera.centre[:2]))
         if not (0.3 < camera.centre[2] < HIGHEST and away < FARTHEST):
             continue
-        if all(views_differ(camera, other.camera, shape) for other in found):
-            found.append(Guess(camera, float(score)))
-        if len(found) == count:
+        if all(views_differ(camera, other.camera, shape) for other in guesses):
+            guesses.append(Guess(camera, float(score)))
+        if len(guesses) == count:
             break
-    return found
+    return guesses
 
 
 def views_differ(one: Pinhole, other: Pinhole, shape: tuple[int, int], share: float = 0.01) -> bool:
@@ -168,12 +168,12 @@ def _unit_homographies(quads: Float[np.ndarray, "Q 4 2"]) -> Float[np.ndarray, "
         down = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
         g = (s[:, 0] * d2[:, 1] - s[:, 1] * d2[:, 0]) / down
         h = (d1[:, 0] * s[:, 1] - d1[:, 1] * s[:, 0]) / down
-    found = np.empty((len(quads), 3, 3))
-    found[:, :2, 0] = p1 - p0 + g[:, None] * p1
-    found[:, :2, 1] = p3 - p0 + h[:, None] * p3
-    found[:, :2, 2] = p0
-    found[:, 2] = np.column_stack([g, h, np.ones(len(g))])
-    return found
+    homographies = np.empty((len(quads), 3, 3))
+    homographies[:, :2, 0] = p1 - p0 + g[:, None] * p1
+    homographies[:, :2, 1] = p3 - p0 + h[:, None] * p3
+    homographies[:, :2, 2] = p0
+    homographies[:, 2] = np.column_stack([g, h, np.ones(len(g))])
+    return homographies
 
 
 def _match(

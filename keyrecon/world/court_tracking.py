@@ -61,8 +61,8 @@ def carried(camera: Pinhole, homography: Float[np.ndarray, "3 3"]) -> Pinhole:
 
 def between(path: CameraPath, start: int, end: int) -> Float[np.ndarray, "3 3"]:
     """Homography from the pixels of one frame to those of another."""
-    found = np.linalg.solve(path.to_reference[end], path.to_reference[start])
-    return found / found[2, 2]
+    homography = np.linalg.solve(path.to_reference[end], path.to_reference[start])
+    return homography / homography[2, 2]
 
 
 def track_court(

@@ -72,15 +72,15 @@ class _Residuals:
     def jacobian(self, x: Float[np.ndarray, "n"]) -> Float[np.ndarray, "m n"]:
         """Their derivative."""
         counts = [len(rows) for rows in self.chosen]
-        found = np.zeros((sum(counts), len(x)))
+        jacobian = np.zeros((sum(counts), len(x)))
         start = 0
         views = zip(self.moved(x), self.fits, self.chosen, strict=True)
         for k, (camera, fit, rows) in enumerate(views):
             part = image_motion(camera, fit.samples.points[rows], fit.samples.normals[rows])
-            found[start : start + len(rows), :3] = part[:, :3]
-            found[start : start + len(rows), 3 + 4 * k : 7 + 4 * k] = part[:, 3:]
+            jacobian[start : start + len(rows), :3] = part[:, :3]
+            jacobian[start : start + len(rows), 3 + 4 * k : 7 + 4 * k] = part[:, 3:]
             start += len(rows)
-        return found
+        return jacobian
 
 
 def fit_views(
@@ -136,8 +136,8 @@ def _spread(
     thinned = max(1.0, sum(np.isfinite(f.residual).sum() for f, _ in views) / len(line))
     middle = normal * max(1.0, SHARED / thinned)
     for number in np.unique(line):
-        own = line == number
-        pull = rows[own].T @ (weight[own] * pixels[own])
+        on_line = line == number
+        pull = rows[on_line].T @ (weight[on_line] * pixels[on_line])
         middle = middle + np.outer(pull, pull)
     spread = np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse), 0))
     return spread[:3], float(np.median(spread[6::4]))

@@ -92,14 +92,14 @@ def fit_lines(
     step = np.zeros(7)
     for search in searches:
         samples = choose_samples(camera, court, grey.shape[:2], spacing)
-        found = measure_offsets(grey, samples, search)
-        if found.seen.sum() < 6:
+        offsets = measure_offsets(grey, samples, search)
+        if offsets.seen.sum() < 6:
             break
-        chosen = np.flatnonzero(found.seen)
+        chosen = np.flatnonzero(offsets.seen)
         rows = image_motion(camera, samples.points[chosen], samples.normals[chosen])[:, free]
-        change = solve_robustly(rows, found.offset[chosen], spread[free], step[free])
-        residual = np.full(len(found.seen), np.nan)
-        residual[chosen] = found.offset[chosen] - rows @ change
+        change = solve_robustly(rows, offsets.offset[chosen], spread[free], step[free])
+        residual = np.full(len(offsets.seen), np.nan)
+        residual[chosen] = offsets.offset[chosen] - rows @ change
         step = step.copy()
         step[free] += change
         camera = first.moved(step)
@@ -114,8 +114,8 @@ def evaluate(
 ) -> LineFit:
     """How well a camera fits a picture, as it is."""
     samples = choose_samples(camera, court, grey.shape[:2], spacing)
-    found = measure_offsets(grey, samples, SEARCHES[-1])
-    return LineFit(camera, samples, np.where(found.seen, found.offset, np.nan))
+    offsets = measure_offsets(grey, samples, SEARCHES[-1])
+    return LineFit(camera, samples, np.where(offsets.seen, offsets.offset, np.nan))
 
 
 def solve_robustly(

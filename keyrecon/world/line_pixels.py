@@ -145,8 +145,8 @@ def find_lines(pixels: LinePixels, shape: tuple[int, int], most: int) -> list[Im
     cells, size = _cells(pixels, offset), (ANGLES, 2 * offset + 1)
     left = np.ones(len(pixels.points), dtype=bool)
     votes = _count(cells, size)
-    found: list[ImageLine] = []
-    while len(found) < most:
+    lines: list[ImageLine] = []
+    while len(lines) < most:
         soft = cv2.blur(votes.astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
         peak = int(soft.argmax())
         a, r = divmod(peak, votes.shape[1])
@@ -160,8 +160,8 @@ def find_lines(pixels: LinePixels, shape: tuple[int, int], most: int) -> list[Im
         if line is None or not taken.any():
             votes[max(a - 1, 0) : a + 2, max(r - 1, 0) : r + 2] = 0
         elif line.pixels >= max(least, MIN_COVER * line.length):
-            found.append(line)
-    return found
+            lines.append(line)
+    return lines
 
 
 def _cells(pixels: LinePixels, offset: int) -> Int[np.ndarray, "P turns"]:

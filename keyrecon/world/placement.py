@@ -187,12 +187,12 @@ def _spells(contact: Bool[np.ndarray, "T 2"]) -> _Stances:
     """Number every spell of standing."""
     frames, feet, spells, count = [], [], [], 0
     for foot in range(2):
-        own = np.flatnonzero(contact[:, foot])
-        number = np.cumsum(np.diff(own, prepend=-9) > 1) - 1 + count
-        frames.append(own)
-        feet.append(np.full(len(own), foot))
+        standing = np.flatnonzero(contact[:, foot])
+        number = np.cumsum(np.diff(standing, prepend=-9) > 1) - 1 + count
+        frames.append(standing)
+        feet.append(np.full(len(standing), foot))
         spells.append(number)
-        count = int(number[-1]) + 1 if len(own) else count
+        count = int(number[-1]) + 1 if len(standing) else count
     return _Stances(np.concatenate(frames), np.concatenate(feet), np.concatenate(spells), count)
 
 

@@ -152,8 +152,8 @@ def refine_placed(
     points = np.zeros((count, len(placed.motion.skeleton.names), 3))
     sizes = []
     for frames, weight in _windows(count):
-        own = Standing(standing.still[frames], standing.flat[frames])
-        part, size = _refine_window(placed.part(frames), body.part(frames), own, log_size)
+        part_standing = Standing(standing.still[frames], standing.flat[frames])
+        part, size = _refine_window(placed.part(frames), body.part(frames), part_standing, log_size)
         points[frames] += weight[:, None, None] * part
         sizes.append(size)
     return points, float(np.median(sizes))

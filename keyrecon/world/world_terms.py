@@ -27,9 +27,11 @@ def reprojection(
         depth = np.maximum(local[..., 2:], NEAREST)
         flat = local[..., :2] / depth
         slope = np.zeros((frames, joints, 2, joints, 3))
-        own = np.arange(joints)
+        index = np.arange(joints)
         toward = rotation[:, None, :2] - flat[..., None] * rotation[:, None, 2:]
-        slope[:, own, :, own] = (weight[..., None, None] * toward / depth[..., None]).swapaxes(0, 1)
+        slope[:, index, :, index] = (weight[..., None, None] * toward / depth[..., None]).swapaxes(
+            0, 1
+        )
         residual = weight[..., None] * (flat - target)
         return JointRows(
             residual.reshape(frames, -1), {0: slope.reshape(frames, 2 * joints, joints, 3)}
@@ -145,11 +147,11 @@ def joint_masses(names: tuple[str, ...]) -> Float[np.ndarray, "J"]:
     masses = np.zeros(len(names))
 
     def put(name: str, mass: float) -> None:
-        found: Int[np.ndarray, "n"] = np.array(
+        bearers: Int[np.ndarray, "n"] = np.array(
             [j for j, known in enumerate(names) if known in (name, f"right_{name}", f"left_{name}")]
         )
-        if len(found):
-            masses[found] += mass / len(found)
+        if len(bearers):
+            masses[bearers] += mass / len(bearers)
 
     for name, (mass, near, far, where) in SEGMENTS.items():
         both = mass if name in ("head", "trunk") else 2 * mass

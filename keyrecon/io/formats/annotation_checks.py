@@ -177,12 +177,12 @@ def implausible_bones(annotations: Annotations, stretch: float = STRETCH) -> lis
 def _scale_nearby(scale: Float[np.ndarray, "K B"]) -> Float[np.ndarray, "K"]:
     """Third largest scale of each frame, median over the neighbouring ones; NaN if unknown."""
     ranked = np.sort(np.where(np.isfinite(scale), scale, -np.inf), axis=1)
-    own = np.where(np.isfinite(ranked[:, -3]), ranked[:, -3], np.nan)
-    known = np.flatnonzero(np.isfinite(own))
-    nearby = np.full(len(own), np.nan)
+    sizes = np.where(np.isfinite(ranked[:, -3]), ranked[:, -3], np.nan)
+    known = np.flatnonzero(np.isfinite(sizes))
+    nearby = np.full(len(sizes), np.nan)
     for row in known:
         closest = known[np.argsort(np.abs(known - row), kind="stable")[:NEIGHBOURS]]
-        nearby[row] = np.median(own[closest])
+        nearby[row] = np.median(sizes[closest])
     return nearby
 
 

@@ -79,8 +79,8 @@ def _read_property(node: _ReadNode, words: list[str], i: int) -> int:
         end = i + 2 + int(words[i + 1])
         node.channels = [_channel(word) for word in words[i + 2 : end]]
         if end < i + 2 or len(set(node.channels)) < len(node.channels):
-            told = " ".join(words[i : max(end, i + 2)])
-            raise ValueError(f"the joint {node.name} cannot have '{told}'")
+            line = " ".join(words[i : max(end, i + 2)])
+            raise ValueError(f"the joint {node.name} cannot have '{line}'")
         return end
     raise ValueError(f"'{words[i]}' in the hierarchy is not understood")
 
@@ -122,17 +122,17 @@ def place_joints(
     rotations = np.empty((frames, len(nodes), 3, 3))
     column = 0
     for j, node in enumerate(nodes):
-        own = values[:, column : column + len(node.channels)]
+        channels = values[:, column : column + len(node.channels)]
         column += len(node.channels)
         shift = np.tile(np.array(node.offset), (frames, 1))
         for k, channel in enumerate(node.channels):
             if channel[1] == "p":
-                shift[:, "XYZ".index(channel[0])] = own[:, k]
+                shift[:, "XYZ".index(channel[0])] = channels[:, k]
         turns = [k for k, channel in enumerate(node.channels) if channel[1] == "r"]
         local = np.broadcast_to(np.eye(3), (frames, 3, 3))
         if turns:
             order = "".join(node.channels[k][0] for k in turns)
-            local = Rotation.from_euler(order, own[:, turns], degrees=True).as_matrix()
+            local = Rotation.from_euler(order, channels[:, turns], degrees=True).as_matrix()
         if node.parent < 0:
             positions[:, j], rotations[:, j] = shift, local
         else:

@@ -138,16 +138,16 @@ def read_points(path: Path) -> tuple[dict[str, Points], float]:
 
 def _first_frame(reader: Any) -> int:
     """The number of the first frame; c3d itself counts its second word as 65535 frames each."""
-    told = reader.get("TRIAL:ACTUAL_START_FIELD")
-    if told is None:
+    parameter = reader.get("TRIAL:ACTUAL_START_FIELD")
+    if parameter is None:
         return int(reader.header.first_frame)
-    low, high = (int(word) for word in told.uint16_array[:2])
+    low, high = (int(word) for word in parameter.uint16_array[:2])
     return low + 65536 * high
 
 
 def _metres_per_unit(reader: Any) -> float:
-    told = reader.get("POINT:UNITS")
-    unit = "mm" if told is None else told.string_value.strip(" \0").lower() or "mm"
+    parameter = reader.get("POINT:UNITS")
+    unit = "mm" if parameter is None else parameter.string_value.strip(" \0").lower() or "mm"
     metres = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(unit)
     if metres is None:
         raise ValueError(f"it is in '{unit}'; millimetres, centimetres or metres work")

@@ -91,32 +91,32 @@ def clicks_text(clicks: GolfClicks) -> str:
 
 
 def clicks_from_parts(
-    told: Mapping[str, Any], places: Mapping[str, Sequence[int | float]], size: tuple[int, int]
+    settings: Mapping[str, Any], places: Mapping[str, Sequence[int | float]], size: tuple[int, int]
 ) -> GolfClicks:
     """Clicks from what was told by name, and from x, y (px) and 2 (visible) or 1 of each joint."""
-    principal = told.get("principal")
+    principal = settings.get("principal")
     return GolfClicks(
-        frame=told.get("frame", 0),
+        frame=settings.get("frame", 0),
         size=size,
         joints={name: (float(x), float(y)) for name, (x, y, _) in places.items()},
         hidden=tuple(name for name, (*_, visible) in places.items() if visible == 1),
-        left_handed=told.get("left_handed", False),
-        stature=float(told.get("stature", STATURE)),
-        focal=told.get("focal"),
+        left_handed=settings.get("left_handed", False),
+        stature=float(settings.get("stature", STATURE)),
+        focal=settings.get("focal"),
         principal=principal and (float(principal[0]), float(principal[1])),
     )
 
 
 def parts_of_clicks(clicks: GolfClicks) -> tuple[dict[str, Any], dict[str, list[int | float]]]:
     """What `clicks_from_parts` makes them from, without what is as it is for everybody."""
-    told = {
+    settings = {
         "frame": clicks.frame,
         "stature": clicks.stature if clicks.stature != STATURE else None,
         "left_handed": clicks.left_handed or None,
         "focal": clicks.focal,
         "principal": None if clicks.principal is None else [*clicks.principal],
     }
-    return {name: value for name, value in told.items() if value is not None}, {
+    return {name: value for name, value in settings.items() if value is not None}, {
         name: [x, y, 1 if name in clicks.hidden else 2] for name, (x, y) in clicks.joints.items()
     }
 

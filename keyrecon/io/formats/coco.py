@@ -168,7 +168,7 @@ def _frame_rows(annotations: Annotations, size: tuple[int, int]) -> dict[int, tu
     places = np.concatenate([joints, v[..., None]], axis=2)
     nothing = np.zeros((len(skeleton.names), 3)), np.zeros(len(skeleton.bones), dtype=np.int64)
     pairs = zip(places, annotations.nearer, strict=True)
-    told: dict[int, tuple[np.ndarray, np.ndarray]] = dict(
+    marked: dict[int, tuple[np.ndarray, np.ndarray]] = dict(
         zip(annotations.frames.tolist(), pairs, strict=True)
     )
     absent: dict[int, list[str]] = {}
@@ -177,9 +177,9 @@ def _frame_rows(annotations: Annotations, size: tuple[int, int]) -> dict[int, tu
     return {
         frame: (
             _image(frame, size),
-            _annotation(frame, *told.get(frame, nothing), absent.get(frame, [])),
+            _annotation(frame, *marked.get(frame, nothing), absent.get(frame, [])),
         )
-        for frame in sorted({*told, *absent})
+        for frame in sorted({*marked, *absent})
     }
 
 
@@ -221,10 +221,10 @@ def coco_lines(annotations: Annotations, size: tuple[int, int]) -> dict[int, Lin
 
 def text_of_lines(lines: Mapping[int, Lines], skeleton: Skeleton) -> str:
     """The text of a COCO file, one annotation to a line."""
-    told = [lines[frame] for frame in sorted(lines)]
+    entries = [lines[frame] for frame in sorted(lines)]
     parts = {
-        "images": [image for image, _ in told],
-        "annotations": [annotation for _, annotation in told],
+        "images": [image for image, _ in entries],
+        "annotations": [annotation for _, annotation in entries],
         "categories": [_line(_category(skeleton))],
     }
     lists = [f' "{key}": [\n  ' + ",\n  ".join(rows) + "\n ]" for key, rows in parts.items()]

@@ -129,12 +129,12 @@ def _stand_in_shots(
 ) -> StandingMotion:
     """Each stretch of frames as `_stand` places it; NaN in the frames between."""
     _check_whole(motion)
-    own = [
+    placed = [
         _stand(cut_motion(motion, part), False, None if world is None else world[part])
         for part in parts
     ]
     points = np.full(motion.points3d.shape, np.nan)
-    for part, standing in zip(parts, own, strict=True):
+    for part, standing in zip(parts, placed, strict=True):
         points[part] = standing.points
     time, fps = motion.time - motion.time[0], motion.fps
     if not is_uneven(motion):
@@ -148,16 +148,16 @@ def _stand_in_shots(
             even[inside] = _resample(points[part], uneven[part], time[inside], motion.skeleton)
         points = even
     longest = max(range(len(parts)), key=lambda k: parts[k].stop - parts[k].start)
-    units = {standing.units for standing in own}
+    units = {standing.units for standing in placed}
     if len(units) > 1:
         return _stand_in_shots(motion, parts, even_times, None)
     gaps = f", {(~motion.known).sum()} of them without a figure" if not motion.known.all() else ""
     return replace(
-        own[longest],
+        placed[longest],
         points=points,
         time=time,
         fps=fps,
-        placing=f"{own[longest].placing}; each of {len(parts)} shots by itself",
+        placing=f"{placed[longest].placing}; each of {len(parts)} shots by itself",
         timing=describe_times(motion, even_times) + gaps,
     )
 

@@ -77,9 +77,9 @@ def cvat_text(annotations: Annotations, size: tuple[int, int]) -> str:
     root = Element("annotations")
     SubElement(root, "version").text = "1.1"
     for row, frame in enumerate(annotations.frames.tolist()):
-        told = {"id": str(row), "name": f"frame_{frame:06d}.png"}
-        told |= {"width": str(size[0]), "height": str(size[1])}
-        image = SubElement(root, "image", told)
+        attributes = {"id": str(row), "name": f"frame_{frame:06d}.png"}
+        attributes |= {"width": str(size[0]), "height": str(size[1])}
+        image = SubElement(root, "image", attributes)
         _add_points(SubElement(image, "skeleton", {"label": "person"}), annotations, row)
     indent(root)
     return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
@@ -90,5 +90,5 @@ def _add_points(figure: Element, annotations: Annotations, row: int) -> None:
         place = annotations.joints[row, joint]
         absent, hidden = bool(np.isnan(place).any()), not annotations.visible[row, joint]
         x, y = np.nan_to_num(place).tolist()
-        told = {"label": name, "outside": str(int(absent)), "occluded": str(int(hidden))}
-        SubElement(figure, "points", {**told, "points": f"{x:.2f},{y:.2f}"})
+        attributes = {"label": name, "outside": str(int(absent)), "occluded": str(int(hidden))}
+        SubElement(figure, "points", {**attributes, "points": f"{x:.2f},{y:.2f}"})

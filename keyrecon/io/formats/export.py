@@ -61,8 +61,8 @@ def export_motion(
     """
     check_suffix(path)
     suffix = path.suffix.lower()
-    found = (further or {}).get("points3d_world")
-    world = None if found is None else found.astype(np.float64)
+    on_court = (further or {}).get("points3d_world")
+    world = None if on_court is None else on_court.astype(np.float64)
     if suffix in WRITERS:
         return WRITERS[suffix](path, motion, world)
     if suffix == ".trc":

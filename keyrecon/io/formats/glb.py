@@ -96,16 +96,16 @@ def write_glb(path: Path, motion: Motion, world: World = None) -> str:
     nodes, skin = _joint_nodes(buffer, figure)
     mesh, materials = _mesh(buffer, figure)
     nodes.append({"name": "Body", "mesh": 0, "skin": 0})
-    told = {
+    extras = {
         "units": standing.units,
         "axes": "Y up, x to the right of the picture, z towards the camera",
         "placing": standing.placing,
         "times": standing.timing,
     }
     document = {
-        "asset": {"version": "2.0", "generator": f"keyrecon {__version__}", "extras": told},
+        "asset": {"version": "2.0", "generator": f"keyrecon {__version__}", "extras": extras},
         "scene": 0,
-        "scenes": [{"nodes": [0, len(nodes) - 1], "extras": told}],
+        "scenes": [{"nodes": [0, len(nodes) - 1], "extras": extras}],
         "nodes": nodes,
         "skins": [skin],
         "meshes": [mesh],
@@ -187,12 +187,12 @@ def _mesh(buffer: _Buffer, figure: _Figure) -> tuple[Json, list[Json]]:
     primitives: list[Json] = []
     materials: list[Json] = []
     for name, colour in (("middle", MIDDLE), ("left", LEFT), ("right", RIGHT)):
-        own = [k for k, side in enumerate(sides) if side == name]
-        if not own:
+        members = [k for k, side in enumerate(sides) if side == name]
+        if not members:
             continue
-        parts = [figure.parts[k] for k in own]
+        parts = [figure.parts[k] for k in members]
         starts = np.cumsum([0, *(len(part.vertices) for part in parts)])[:-1]
-        joint = np.concatenate([figure.weights[k] for k in own])
+        joint = np.concatenate([figure.weights[k] for k in members])
         joints = np.stack([joint, *np.zeros((3, len(joint)), dtype=np.int64)], axis=1)
         weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(joint), 1))
         vertices = np.concatenate([part.vertices for part in parts])

@@ -135,7 +135,7 @@ def read_on_court(path: Path) -> tuple[WorldMotion, CourtCamera] | None:
     with reading(path, "a motion on the court", "make it with keyrecon court"):
         unknown = np.full(data["camera_t"].shape, np.nan)
         inner, turn, shift = (data[f"camera_{name}"].astype(float) for name in "KRt")
-        found = np.isfinite(inner).all(axis=(1, 2))
+        known = np.isfinite(inner).all(axis=(1, 2))
         return (
             WorldMotion(
                 data["points3d_world"].astype(float),
@@ -143,7 +143,7 @@ def read_on_court(path: Path) -> tuple[WorldMotion, CourtCamera] | None:
                 data["contact"].astype(bool),
                 float("nan"),
             ),
-            CourtCamera(inner, turn, shift, found, unknown, unknown[:, 0]),
+            CourtCamera(inner, turn, shift, known, unknown, unknown[:, 0]),
         )
 
 

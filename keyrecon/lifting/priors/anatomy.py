@@ -218,8 +218,8 @@ def sideways_spread(
     from the side, it is in the picture, and a bend in depth is none that a knee can make.
     """
     bend = shank - thigh
-    own = bend - (bend * hips).sum(-1, keepdims=True) * hips
-    return np.hypot(_STRAIGHT_SIDEWAYS, _BENT_SIDEWAYS * np.linalg.norm(own, axis=-1))
+    hinged = bend - (bend * hips).sum(-1, keepdims=True) * hips
+    return np.hypot(_STRAIGHT_SIDEWAYS, _BENT_SIDEWAYS * np.linalg.norm(hinged, axis=-1))
 
 
 def limb_axes(
