@@ -8,11 +8,12 @@ all of them into one line that names the file; the fault itself stays its cause.
 
 import json
 import math
+import mmap
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -23,6 +24,8 @@ MAX_DIGITS = 18
 MAX_ARRAY_BYTES = 1 << 31
 """Arrays of one file may take so much where they are compressed: those of a motion of two hours
 take 0.4 GB. Uncompressed ones are as large as their file."""
+CHUNK_BYTES = 1 << 20
+"""Read at a time where nothing is kept."""
 KINDS = "biufUS"
 """Of NumPy's types: truth values, numbers and texts."""
 
@@ -99,20 +102,59 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         }
 
 
+def map_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The same of a file that `keyrecon.io.storage` wrote, left on the disk until they are used.
+
+    They take address space, no memory that the system could not take back, and cannot be written
+    to. All bytes are held against the file's checksums first.
+    """
+    with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+        whole_file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        return {
+            member.filename.removesuffix(".npy"): _map_array(archive, member, whole_file)
+            for member in archive.infolist()
+        }
+
+
+def _map_array(
+    archive: zipfile.ZipFile, member: zipfile.ZipInfo, whole_file: mmap.mmap
+) -> np.ndarray:
+    with archive.open(member) as stream:
+        shape, fortran, dtype = _read_header(member, stream)
+        header = stream.tell()
+        while stream.read(CHUNK_BYTES):
+            pass  # the checksum is held against what was read at the end
+    names = whole_file[member.header_offset + 26 : member.header_offset + 30]
+    lengths = int.from_bytes(names[:2], "little") + int.from_bytes(names[2:], "little")
+    start = member.header_offset + 30 + lengths + header
+    if member.compress_type != zipfile.ZIP_STORED or fortran or start % dtype.alignment:
+        return _read_array(archive, member)
+    count = math.prod(shape)
+    return np.frombuffer(whole_file, dtype, count, start if count else 0).reshape(shape)
+
+
 def _read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
     with archive.open(member) as stream:
-        version = np.lib.format.read_magic(stream)
-        read_header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, _, dtype = read_header(stream)
-        if dtype.kind not in KINDS or dtype.hasobject:
-            raise ValueError(f"{member.filename} holds neither numbers nor texts")
-        if math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
-            raise ValueError(f"{member.filename} is not as long as it says")
+        _read_header(member, stream)
         stream.seek(0)
         return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def _read_header(
+    member: zipfile.ZipInfo, stream: zipfile.ZipExtFile | IO[bytes] | IO[bytes]
+) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, order and type of an array; ValueError where they do not fit its bytes."""
+    version = np.lib.format.read_magic(stream)
+    read_header = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }[version]
+    shape, fortran, dtype = read_header(stream)
+    if dtype.kind not in KINDS or dtype.hasobject:
+        raise ValueError(f"{member.filename} holds neither numbers nor texts")
+    if math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
+        raise ValueError(f"{member.filename} is not as long as it says")
+    return shape, fortran, dtype
 
 
 def check_numbers(name: str, values: np.ndarray, gaps: bool = False) -> np.ndarray:

@@ -18,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from keyrecon.errors import KeyreconError
-from keyrecon.io.storage import load_record, save_record
+from keyrecon.io.storage import is_mapped, load_record, save_record
 from keyrecon.io.video import Video
 from keyrecon.numerics.threads import one_order_of_sums
 
@@ -75,6 +75,7 @@ class StageStore:
             self.seconds[stage_of_shot[0]] = before + time.perf_counter() - started
             save_record(path, result)
             self._forget(name, path)
+            result = _left_on_disk(path, result)
         self._keys[id(result)] = (result, key)
         return result
 
@@ -113,7 +114,8 @@ class StageStore:
                 results.append((path.stat().st_mtime, path))
         for _, old in sorted(results)[:-KEPT_RESULTS]:
             if old != made:
-                old.unlink(missing_ok=True)
+                with suppress(PermissionError):  # Windows keeps what is mapped
+                    old.unlink(missing_ok=True)
 
     def _key(self, value: object) -> str:
         digest = hashlib.sha256()
@@ -155,6 +157,14 @@ def _stored(path: Path) -> Any:
         return load_record(path) if path.is_file() else _NOTHING
     except KeyreconError:
         return _NOTHING
+
+
+def _left_on_disk(path: Path, result: Any) -> Any:
+    """The same result without the memory that it took, where it is large."""
+    with suppress(FileNotFoundError, KeyreconError):  # other processes may have dropped it again
+        if is_mapped(path):
+            return load_record(path)
+    return result
 
 
 def _code_of(stage: Callable[..., Any]) -> str:

@@ -3,9 +3,15 @@
 A record (a frozen dataclass of this package) is taken apart into arrays and a tree that says
 where they belong. Tuples of records of one kind (one per frame) are stored end to end with their
 lengths, so that a long video costs a handful of arrays, not thousands.
+
+What hours of video give is larger than memory may be: such tuples are written part by part, and
+large files are not read but mapped, so that the system fetches what is used and lets go of the
+rest. Arrays begin at places in the file that suit their numbers.
 """
 
 import json
+import zipfile
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,10 +20,17 @@ from typing import Any
 import numpy as np
 
 from keyrecon.io.durable import make_folder, replacing
-from keyrecon.reading import read_arrays, reading
+from keyrecon.reading import map_arrays, read_arrays, reading
 
 Tree = dict[str, Any]
-Arrays = dict[str, np.ndarray]
+Arrays = dict[str, list[np.ndarray]]
+"""Parts of each array that is stored, which lie end to end."""
+MAPPED_BYTES = 1 << 22
+"""Files from this size on are mapped: below it, opening costs as much as reading."""
+ALIGNMENT = 64
+"""Bytes: where arrays begin in a file."""
+HEADER_BYTES = 10
+"""Before the text that describes an array: a magic word, a version and the length of the text."""
 
 
 def save_record(path: Path, value: object) -> None:
@@ -26,20 +39,42 @@ def save_record(path: Path, value: object) -> None:
     tree = _take_apart(value, arrays)
     text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     make_folder(path.parent)
-    with replacing(path, durably=False) as file:
-        np.savez(file, tree=text, **arrays)  # type: ignore[arg-type]  # no name is a flag of savez
+    with replacing(path, durably=False) as file, zipfile.ZipFile(file, "w") as archive:
+        for name, parts in {"tree": [text], **arrays}.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                stream.write(_header(parts, file.tell()))
+                for part in parts:
+                    stream.write(part.tobytes())
+
+
+def _header(parts: Sequence[np.ndarray], at: int) -> bytes:
+    """What NumPy's format says of arrays end to end, at a place in a file."""
+    shape = (sum(len(part) for part in parts), *parts[0].shape[1:]) if parts[0].ndim else ()
+    described = {"descr": parts[0].dtype.str, "fortran_order": False, "shape": shape}
+    text = repr(described).encode("latin1")
+    room = -(at + HEADER_BYTES + len(text) + 1) % ALIGNMENT
+    text += b" " * room + b"\n"
+    return np.lib.format.magic(1, 0) + len(text).to_bytes(2, "little") + text
+
+
+def is_mapped(path: Path) -> bool:
+    """Whether a stored result is so large that `load_record` leaves it on the disk."""
+    return path.stat().st_size >= MAPPED_BYTES
 
 
 def load_record(path: Path) -> Any:
-    """Read what `save_record` wrote; raises KeyreconError for a file of another kind."""
+    """Read what `save_record` wrote; raises KeyreconError for a file of another kind.
+
+    Arrays of a large file cannot be written to.
+    """
     with reading(path, "a stored result", "delete it and run again"):
-        stored = read_arrays(path)
+        stored = map_arrays(path) if is_mapped(path) else read_arrays(path)
         return _put_together(json.loads(stored["tree"].tobytes()), stored)
 
 
 def _take_apart(value: object, arrays: Arrays) -> Tree:
     if isinstance(value, np.ndarray):
-        return {"array": _store(value, arrays)}
+        return {"array": _store([value], arrays)}
     if is_dataclass(value):
         parts = {f.name: _take_apart(getattr(value, f.name), arrays) for f in fields(value)}
         return {"record": _name_type(value), "fields": parts}
@@ -71,15 +106,15 @@ def _take_apart_ragged(parts: tuple, arrays: Arrays) -> Tree:
     for field in fields(parts[0]):
         columns = [getattr(part, field.name) for part in parts]
         stored[field.name] = {
-            "data": _store(np.concatenate(columns), arrays),
-            "lengths": _store(np.array([len(c) for c in columns]), arrays),
+            "data": _store(columns, arrays),
+            "lengths": _store([np.array([len(c) for c in columns])], arrays),
         }
     return {"ragged": _name_type(parts[0]), "count": len(parts), "fields": stored}
 
 
-def _store(array: np.ndarray, arrays: Arrays) -> str:
+def _store(parts: list[np.ndarray], arrays: Arrays) -> str:
     name = f"a{len(arrays)}"
-    arrays[name] = array
+    arrays[name] = parts
     return name
 
 

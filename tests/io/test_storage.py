@@ -3,7 +3,7 @@ import pytest
 
 from keyrecon import KeyreconError
 from keyrecon.body import LSP14
-from keyrecon.io.storage import load_record, save_record
+from keyrecon.io.storage import is_mapped, load_record, save_record
 from keyrecon.records import Annotations, Edges, Pick
 
 
@@ -54,3 +54,51 @@ def test_a_pickle_is_never_loaded(tmp_path):
     np.savez(tmp_path / "r.npz", tree=np.array([{"a": 1}], dtype=object))
     with pytest.raises(KeyreconError, match="not a stored result"):
         load_record(tmp_path / "r.npz")
+
+
+def many_edges(frames=600):
+    return tuple(edges(400, seed) for seed in range(frames))
+
+
+def test_a_large_result_is_mapped_and_the_same_as_it_was(tmp_path):
+    frames = (*many_edges(), edges(0, 0))
+    save_record(tmp_path / "r.npz", frames)
+    back = load_record(tmp_path / "r.npz")
+    assert is_mapped(tmp_path / "r.npz")
+    assert not back[0].points.flags.owndata
+    assert not back[0].points.flags.writeable
+    assert len(back[-1].points) == 0
+    for one, other in zip(frames, back, strict=True):
+        for name in ("points", "tangent", "color", "upper", "lower"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+            assert getattr(one, name).dtype == getattr(other, name).dtype
+            assert getattr(other, name).flags.aligned
+
+
+def test_a_mapped_result_outlives_its_file(tmp_path):
+    save_record(tmp_path / "r.npz", many_edges())
+    back = load_record(tmp_path / "r.npz")
+    (tmp_path / "r.npz").unlink()
+    np.testing.assert_array_equal(back[7].points, edges(400, 7).points)
+
+
+@pytest.mark.parametrize("place", [0.02, 0.3, 0.7, 0.999])
+def test_a_large_result_with_a_wrong_byte_or_without_its_end_is_refused(tmp_path, place):
+    file = tmp_path / "r.npz"
+    save_record(file, many_edges())
+    data = bytearray(file.read_bytes())
+    at = int(place * len(data))
+    (tmp_path / "torn.npz").write_bytes(data[:at] + bytes(6 << 20) * (at > 5 << 20))
+    data[at] ^= 1
+    file.write_bytes(data)
+    for damaged in (file, tmp_path / "torn.npz"):
+        with pytest.raises(KeyreconError, match="delete it and run again"):
+            load_record(damaged)
+
+
+def test_what_numpy_reads_is_what_was_stored(tmp_path):
+    save_record(tmp_path / "r.npz", (np.arange(6.0).reshape(2, 3), np.array(3.5), np.zeros((0, 4))))
+    with np.load(tmp_path / "r.npz") as stored:
+        np.testing.assert_array_equal(stored["a0"], np.arange(6.0).reshape(2, 3))
+        assert stored["a1"] == 3.5
+        assert stored["a2"].shape == (0, 4)
