@@ -18,6 +18,11 @@ def usual_budget(n_frames: int, fps: float) -> float:
     return min(max(min(share, SHORT_SHARE), 1 / n_frames), 1.0)
 
 
+def least_labels(fps: float) -> int:
+    """Half-body labels of half a minute: a longer video is not asked for fewer."""
+    return int(2 * LONG_SHARE * LONG_SECONDS * fps)
+
+
 def annotation_cost(keyframes: Keyframes, frames: int) -> float:
     """Share of frames that a person marked; one half of the body counts half, as in the paper."""
     return (len(keyframes.upper.frames) + len(keyframes.lower.frames)) / 2 / frames

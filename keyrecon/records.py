@@ -228,6 +228,20 @@ class PoseDistances:
 
 
 @dataclass(frozen=True, eq=False)
+class MarkGains:
+    """What each mark is worth: a person may stop at any of them."""
+
+    beta: float
+    """Distance within which a keyframe stands for a frame here, player heights."""
+    order: Int[np.ndarray, "K"]
+    """The keyframes, the one that covers most first."""
+    coverage: Float[np.ndarray, "K"]
+    """Share of frames covered (Eq. 1) by each and those before it."""
+    next_gain: float
+    """What the best further mark would add to the coverage."""
+
+
+@dataclass(frozen=True, eq=False)
 class HalfKeyframes:
     """Keyframes of one half of the body."""
 
@@ -245,6 +259,8 @@ class HalfKeyframes:
     """D between each frame and its keyframe, player heights."""
     printed_count: int
     """Keyframes that Eq. 2-4 as printed would take at this beta and coverage."""
+    gains: MarkGains | None = None
+    """What each of them is worth; None in files of older versions."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -169,6 +169,8 @@ def part_of_keyframes(keyframes: Keyframes, frames: Int[np.ndarray, "n"]) -> Key
             nearest=np.searchsorted(frames, half.nearest[frames]),
             represented=half.represented[frames],
             distance=half.distance[frames],
+            gains=half.gains
+            and replace(half.gains, order=np.searchsorted(frames, half.gains.order)),
         )
         for half in (keyframes.upper, keyframes.lower)
     )

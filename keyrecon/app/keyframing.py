@@ -93,6 +93,7 @@ def describe_keyframes(
             *_describe_absence(preparation),
             *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
             *halves,
+            *_describe_gains(found),
             f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
             f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
             f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
@@ -105,6 +106,23 @@ def _compare_with_printed(found: Keyframes, half: HalfKeyframes) -> str:
     if found.method == "paper":
         return "chosen by Eq. 2-4 as printed"
     return f"as printed in the paper it would take {half.printed_count}"
+
+
+def _describe_gains(found: Keyframes) -> list[str]:
+    """What a person who stops early has, and what one mark more would bring."""
+    lines = []
+    for name, half in (("Upper", found.upper), ("Lower", found.lower)):
+        gains = half.gains
+        if gains is None:
+            continue
+        first, middle = gains.order[:3].tolist(), (len(gains.order) + 1) // 2
+        lines.append(
+            f"{name} body, within {gains.beta:.3g} body heights: the {middle} most useful marks "
+            f"(first {', '.join(map(str, first))}; all in order in keyframes.json) cover "
+            f"{gains.coverage[middle - 1]:.1%}, all {gains.coverage[-1]:.1%}, one more would "
+            f"bring {gains.next_gain:+.2%}."
+        )
+    return lines
 
 
 def _describe_absence(preparation: Preparation) -> list[str]:

@@ -29,8 +29,8 @@ def keyframes(
     Args:
         project: Project folder.
         budget: Share of frames that a person will mark; a half body is half a frame
-            (default 0.015 from half a minute on; a shorter video takes as many as half a minute,
-            up to 0.06).
+            (default: what the coverage needs, as many as half a minute takes at least, and at
+            most 0.015 from half a minute on, up to 0.06 in a shorter video).
         coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
         reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
         method: 'paper' tracks, compares and chooses as the paper prints it (Eq. 2-4), for

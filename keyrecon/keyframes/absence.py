@@ -61,9 +61,11 @@ def restore_frames(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int)
     before = frames_before(kept, frames)
     represented = np.zeros(frames, dtype=bool)
     represented[kept] = half.represented
+    gains = half.gains and replace(half.gains, order=kept[half.gains.order])
     return replace(
         half,
         frames=kept[half.frames],
+        gains=gains,
         nearest=kept[half.nearest][before],
         represented=represented,
         distance=half.distance[before],

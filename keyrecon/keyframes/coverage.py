@@ -65,6 +65,12 @@ class Neighborhoods:
         """Frames that one candidate represents."""
         return self.frame[self.first[candidate] : self.first[candidate + 1]]
 
+    def only(self, candidates: Int[np.ndarray, "m"]) -> "Neighborhoods":
+        """Those of some candidates, numbered anew."""
+        count = self.first[candidates + 1] - self.first[candidates]
+        frame = self.frame[ranges(self.first[candidates], count)]
+        return Neighborhoods(np.concatenate([[0], np.cumsum(count)]), frame, self.n_frames)
+
     def union(self, candidates: list[int]) -> Bool[np.ndarray, "T"]:
         """W: frames that any of the candidates represents."""
         represented = np.zeros(self.n_frames, dtype=bool)

@@ -1,9 +1,13 @@
 """Choose the few frames that a person annotates (Section 4.3).
 
 A keyframe represents the frames whose pose is within beta of its own. The number of keyframes
-is given (the annotation budget), so beta is what is searched for: the smallest with which so
+is limited (the annotation budget), so beta is what is searched for: the smallest with which so
 many keyframes represent, or bridge by gaps of at most T frames, a share alpha of all frames
 (Eq. 1). Upper and lower body are chosen apart.
+
+A long video repeats itself, and a share of its frames would buy keyframes that nobody needs. Where
+no budget is asked for, no more keyframes are chosen than reach the coverage at a distance that
+is small enough (`sufficient_beta`).
 
 method='paper' is the choice as printed: Eq. 2-4, distances smoothed with the same beta.
 method='coverage' maximises the coverage of Eq. 1 itself, for a share alpha of the frames and of the
@@ -19,11 +23,12 @@ from typing import Annotated, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.annotation_budget import usual_budget
+from keyrecon.annotation_budget import least_labels, usual_budget
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
 from keyrecon.keyframes.coverage import TIME_UNIT, choose_greedily
+from keyrecon.keyframes.mark_gains import order_by_gain
 from keyrecon.keyframes.pose_time import elapsed_time
 from keyrecon.keyframes.smoothing import smooth_distances
 from keyrecon.keyframes.swaps import (
@@ -48,6 +53,13 @@ BETA_FACTOR = 0.96
 MAX_SWAP_SIZE = 100_000
 """Keyframes times candidates up to which keyframes are reconsidered one by one: 50 keyframes of
 a 2000-frame video. Larger choices stay as the greedy choice has them, for the sake of time."""
+SUFFICIENT_BETA = 0.02
+"""Pose distance that is near enough, player heights. On eight rendered sequences of 36 s, joints
+of two frames .018 to .022 apart lie .031 player heights apart in the median (the mean of the upper
+body's joints; .021 of the lower body's), and 86 % (99 %) of them within a fifth of the trunk,
+before anything is carried or fitted; at .026 to .030 it is .045 (.032) and 73 % (91 %), at .010
+to .014 .020 (.012). With 1.5 % of their frames the same sequences reach .020 to .029 (.022 to
+.037): what is asked of videos of up to 36 s stays as it was."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +67,12 @@ class KeyframeOptions:
     """How many frames a person is asked to annotate, and what they must stand for."""
 
     budget: Annotated[float, within(1e-06, 1)] | None = None
-    """Annotation cost at most: (upper + lower keyframes) / 2 per frame of the video; None takes
-    what is usual for its length (`usual_budget`)."""
+    """Annotation cost: (upper + lower keyframes) / 2 per frame of the video; None takes as many as
+    reach the coverage at `sufficient_beta`, no fewer than half a minute would, and no more
+    than is usual for its length (`usual_budget`)."""
+    sufficient_beta: Annotated[float, within(0.001, 1)] = SUFFICIENT_BETA
+    """Pose distance that is near enough: without a budget, keyframes that reach the coverage with
+    it are not added to. Player heights."""
     coverage: Annotated[float, within(0.01, 1)] = 0.95
     """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
     reach: Annotated[int, within(1, 1000)] = 10
@@ -154,12 +170,15 @@ def choose_keyframes(
     kept = np.flatnonzero(~absent_frames(comparison.visibility_score, reach))
     comparison = select_frames(comparison, kept)
     halves: list[HalfKeyframes] = []
-    wanted = ((labels + 1) // 2, options.beta_upper), (labels // 2, options.beta_lower)
+    flexible = options.budget is None and options.method == "coverage"
+    least = min(least_labels(fps), labels) if flexible else labels
+    betas = options.beta_upper, options.beta_lower
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
-    for index, (name, (max_keyframes, beta)) in enumerate(zip(names, wanted, strict=True)):
+    for index, (name, beta) in enumerate(zip(names, betas, strict=True)):
         half = _half(comparison, getattr(comparison, name), index, reach, options)
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
-        halves.append(_choose_half(half, max_keyframes, beta, also))
+        few, many = ((count + 1 - index) // 2 for count in (least, labels))
+        halves.append(_choose_half(half, few, many, beta, also))
     upper, lower = (restore_frames(half, kept, frames) for half in halves)
     return Keyframes(upper, lower, reach=reach, alpha=options.coverage, method=options.method)
 
@@ -187,21 +206,41 @@ def _half(
 
 
 def _choose_half(
-    half: HalfDistances, max_keyframes: int, beta: float | None, also: Int[np.ndarray, "K"]
+    half: HalfDistances,
+    least: int,
+    most: int,
+    beta: float | None,
+    also: Int[np.ndarray, "K"],
 ) -> HalfKeyframes:
-    """Keyframes of one half; `also` are frames that are annotated for the other half anyway."""
-    searched = beta is None
+    """Keyframes of one half, `least` to `most` of them where no beta is given.
+
+    `also` are frames that are annotated for the other half anyway.
+    """
     if beta is None:
-        beta, chosen = _smallest_beta(half, max_keyframes)
+        count = _sufficient_count(half, least, most) if least < most else most
+        beta, chosen = _smallest_beta(half, count)
     else:
-        goal = half.goal(beta)
-        chosen = _choose(half, goal, len(goal.visibility_score))
-        if half.options.method == "coverage" and len(chosen) * len(half.matched) <= MAX_SWAP_SIZE:
-            chosen = shrink_by_swaps(goal, chosen)
+        count, chosen = 0, _fewest(half, half.goal(beta), len(half.matched))
     goal = half.goal(beta)
     if half.options.method == "coverage":
-        chosen = _move_to_medoids(half, goal, chosen, max_keyframes if searched else 0, also)
-    return _record(half, goal, beta, half.pose_distances.frames[np.sort(chosen)])
+        chosen = _move_to_medoids(half, goal, chosen, count, also)
+    return _record(half, beta, half.pose_distances.frames[np.sort(chosen)])
+
+
+def _sufficient_count(half: HalfDistances, least: int, most: int) -> int:
+    """Keyframes that reach the coverage at the distance that is near enough, within bounds."""
+    goal = half.goal(half.options.sufficient_beta)
+    chosen = _fewest(half, goal, most)
+    return max(least, len(chosen)) if goal.reached(chosen) else most
+
+
+def _fewest(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
+    """Keyframes that reach the goal, if `most` of them do."""
+    chosen = _choose(half, goal, most)
+    few = len(chosen) * len(half.matched) <= MAX_SWAP_SIZE
+    if few and half.options.method == "coverage" and goal.reached(chosen):
+        chosen = shrink_by_swaps(goal, chosen)
+    return chosen
 
 
 def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list[int]:
@@ -285,9 +324,8 @@ def _move_to_medoids(
     return swap_medoids(goal, chosen, distance, weight)
 
 
-def _record(
-    half: HalfDistances, goal: CoverageGoal, beta: float, keyframes: Int[np.ndarray, "K"]
-) -> HalfKeyframes:
+def _record(half: HalfDistances, beta: float, keyframes: Int[np.ndarray, "K"]) -> HalfKeyframes:
+    goal = half.goal(beta)
     comparison, exemplar_distance = half.pose_distances, half.exemplar_distance
     nearest, distance = assign_frames(
         half.distances(beta), comparison, exemplar_distance, keyframes
@@ -296,6 +334,7 @@ def _record(
         goal.hoods, comparison, exemplar_distance[keyframes] < beta, keyframes
     )
     printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
+    enough = half.options.sufficient_beta if half.options.method == "coverage" else beta
     return HalfKeyframes(
         frames=keyframes,
         nearest=nearest,
@@ -304,6 +343,7 @@ def _record(
         beta=beta,
         distance=distance,
         printed_count=len(printed),
+        gains=order_by_gain(half.goal(enough), enough, comparison, keyframes),
     )
 
 
@@ -329,7 +369,7 @@ def adopt_keyframes(
         half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
         beta = getattr(asked, name).beta
         chosen = np.searchsorted(kept, np.unique(frames))
-        adopted = _record(half, half.goal(beta), beta, chosen)
+        adopted = _record(half, beta, chosen)
         halves.append(restore_frames(adopted, kept, everyone))
     upper, lower = halves
     return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
 
-from keyrecon.annotation_budget import usual_budget
+from keyrecon.annotation_budget import least_labels, usual_budget
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json, read_keyframes
 from keyrecon.keyframes.assignment import find_neighborhoods
@@ -222,6 +222,54 @@ def test_a_short_video_takes_as_many_marks_as_half_a_minute_up_to_six_percent(se
     assert usual_budget(frames, fps) == pytest.approx(share)
     labels = count_labels(KeyframeOptions(), frames, fps)
     assert labels <= 2 * share * frames + 1e-6
+
+
+@pytest.fixture(scope="module")
+def repeated():
+    """Strokes that come back, a minute of them at 25 frames a second."""
+    return comparison_of(sporting_poses(1500, seed=4))
+
+
+def test_what_repeats_itself_is_not_marked_again_however_long_it_lasts(repeated):
+    limit, least = count_labels(KeyframeOptions(), 1500, 25.0), least_labels(25.0)
+    found = choose_keyframes(repeated, 25.0)
+    labels = len(found.upper.frames) + len(found.lower.frames)
+    assert least <= labels < limit
+    for half in (found.upper, found.lower):
+        assert half.coverage >= 0.95
+        assert half.beta <= KeyframeOptions().sufficient_beta
+
+
+def test_no_more_is_asked_for_than_the_limit_however_near_it_must_be(repeated):
+    found = choose_keyframes(repeated, 25.0, KeyframeOptions(sufficient_beta=0.001))
+    labels = len(found.upper.frames) + len(found.lower.frames)
+    assert labels == count_labels(KeyframeOptions(), 1500, 25.0)
+
+
+def test_marks_come_with_what_they_bring_the_best_first(comparison):
+    half = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.02, smoothing=0.0)).upper
+    gains = half.gains
+    assert gains is not None
+    assert set(gains.order) == set(half.frames)
+    steps = np.diff(gains.coverage, prepend=0)
+    assert (steps >= 0).all()
+    assert steps[0] == steps.max()
+    near = comparison.upper < 0.02
+    alone = [
+        1 - CoverageGoal(find_neighborhoods(comparison.upper, comparison, np.zeros(400), 0.02), 10,
+                         0, np.ones(400)).left_over(near[frame] | (np.arange(400) == frame)) / 400
+        for frame in half.frames
+    ]  # fmt: skip
+    assert gains.coverage[0] == pytest.approx(max(alone), abs=0.005)
+
+
+def test_the_next_mark_brings_what_one_more_keyframe_adds(comparison):
+    few = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.01)).upper
+    assert few.gains is not None
+    assert few.gains.next_gain > 0
+    every = choose_keyframes(comparison, 50.0, KeyframeOptions(beta_upper=0.0005, beta_lower=0.05))
+    assert every.upper.gains is not None
+    assert every.upper.gains.next_gain < few.gains.next_gain
 
 
 def test_a_video_of_a_few_frames_can_be_marked_without_naming_a_budget():

@@ -3,13 +3,16 @@
     {"n_frames": 1800, "upper": [..], "lower": [..], "frames": [union, sorted],
      "beta": {"upper": .., "lower": ..}, "T": 10, "alpha": 0.95,
      "method": "coverage", "coverage": {..}, "cost": 0.015, "printed_count": {..},
+     "gains": {"upper": {"beta": .., "order": [..], "coverage": [..], "next_gain": ..}, ..},
      "nearest": {..}, "distance": {..}, "represented": {..}}
 
 `method` tells how they were chosen, "paper" by Eq. 2-4 as printed; older files are without it.
 `cost` is the share of frames to mark, a half body counted half, `printed_count` the keyframes
 that the choice as printed (Eq. 2-4) would take at the same beta. `nearest` has the keyframe of
 every frame, `distance` how far it is (player heights), `represented` the frames closer than beta,
-as [first, end) stretches.
+as [first, end) stretches. `gains` lists the keyframes by what they bring, the best first, with the
+coverage that each and those before it reach at the distance `beta`, and what one more would add;
+older files are without it.
 """
 
 import json
@@ -17,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from keyrecon.reading import parse_json, read_text, reading, real, whole
-from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.records import HalfKeyframes, Keyframes, MarkGains
 
 HALVES = ("upper", "lower")
 METHODS = ("coverage", "paper")
@@ -44,6 +47,7 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
         "coverage": {name: float(half.coverage) for name, half in halves.items()},
         "cost": labels / 2 / n_frames,
         "printed_count": {name: half.printed_count for name, half in halves.items()},
+        "gains": {name: _gains_to_json(half.gains) for name, half in halves.items() if half.gains},
         "nearest": {name: half.nearest.tolist() for name, half in halves.items()},
         "distance": {
             name: np.round(half.distance.astype(float), 5).tolist() for name, half in halves.items()
@@ -52,6 +56,15 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
     }
     lines = (f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _gains_to_json(gains: MarkGains) -> dict[str, Any]:
+    return {
+        "beta": gains.beta,
+        "order": gains.order.tolist(),
+        "coverage": np.round(gains.coverage, 5).tolist(),
+        "next_gain": round(gains.next_gain, 5),
+    }
 
 
 def read_keyframes(path: Path) -> Keyframes:
@@ -113,7 +126,21 @@ def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
         beta=real(data["beta"][name]),
         distance=distance,
         printed_count=_at_least(0, whole(data["printed_count"][name]), "printed_count"),
+        gains=_gains(data.get("gains", {}).get(name), frames, name),
     )
+
+
+def _gains(
+    data: dict[str, Any] | None, frames: Int[np.ndarray, "K"], name: str
+) -> MarkGains | None:
+    if data is None:
+        return None
+    order = np.array([whole(frame) for frame in data["order"]], dtype=np.int64)
+    coverage = np.array([_share(value, "coverage") for value in data["coverage"]])
+    if not np.array_equal(np.sort(order), frames) or len(coverage) != len(order):
+        raise ValueError(f"'gains' of {name} must list each keyframe once, with its coverage")
+    next_gain = _share(data["next_gain"], "next_gain")
+    return MarkGains(real(data["beta"]), order, coverage, next_gain)
 
 
 def _stretches(flags: Bool[np.ndarray, "T"]) -> list[list[int]]:

@@ -151,3 +151,10 @@ test("the turn of the chest is asked for where both sides are likely, not where 
   assert.equal(undecidedTurn([chest(0.01, 0), chest(-0.01, 0)]), null);
   assert.equal(undecidedTurn(undefined), null);
 });
+
+test("a share that nobody changed is a limit, and one that was typed is asked for", () => {
+  const project = { settings: { budget: null }, usual_budget: 0.015 };
+  assert.equal(workflow.budgetIn(1.5, project), null);
+  assert.equal(workflow.budgetIn(3, project), 0.03);
+  assert.equal(workflow.budgetIn(2, { ...project, settings: { budget: 0.02 } }), 0.02);
+});

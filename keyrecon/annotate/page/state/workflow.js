@@ -173,6 +173,13 @@ export const nextPart = (parts) =>
 export const budgetText = ({ settings, usual_budget: usual }) =>
   String(Math.round(10000 * (settings.budget ?? usual)) / 100);
 
+// The share that is asked for by per cent in a field; null, as much as is needed, where the field says
+// what is usual and the project was not set to a share.
+export function budgetIn(percent, project) {
+  const unchanged = String(percent) === budgetText(project);
+  return unchanged ? project.settings.budget : percent / 100;
+}
+
 // Frames spread over the video, to see how well the picks do elsewhere.
 export function spreadFrames(count, n) {
   const even = Array.from({ length: n }, (_, k) => Math.floor(((k + 0.5) * count) / n));

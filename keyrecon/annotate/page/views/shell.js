@@ -4,7 +4,7 @@ import * as api from "../state/api.js";
 import { byId, counted, make, numberIn, setText } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
 import { CLICKS } from "../state/swing.js";
-import { stepsOf } from "../state/workflow.js";
+import { budgetIn, stepsOf } from "../state/workflow.js";
 
 const SAVING = {
   saved: () => "All saved",
@@ -205,10 +205,10 @@ function createJobs(model) {
 
   // Has the keyframes chosen, as many as a field for the share of the frames says.
   function chooseKeyframes(field) {
-    const wanted = (numberIn(field) ?? NaN) / 100;
-    if (!(wanted > 0))
+    const percent = numberIn(field) ?? NaN;
+    if (!(percent > 0))
       model.notify("The share of frames to mark is a number of per cent, such as 1.5.");
-    else if (!runningJob()) startJob("keyframes", { budget: wanted });
+    else if (!runningJob()) startJob("keyframes", { budget: budgetIn(percent, model.project) });
   }
 
   return { startJob, refreshJobs, noteEnds, runningJob, chooseKeyframes };
