@@ -67,7 +67,7 @@ def collect(name: str, work: Path) -> Sample:
     result = real.solve(clip, 0.06, work)
     motion, frames = result.motion, clip.truth.frames
     height = player_height(motion)[:, None]
-    used = real.held_out(result) & clip.seen
+    used = real.held_out(clip, result.marks) & clip.seen
     rows, joints = np.nonzero(used)
     at = frames[rows], joints
     error = np.linalg.norm(motion.points2d[frames] - clip.truth.joints, axis=2) / height[frames]

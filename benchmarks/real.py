@@ -246,12 +246,12 @@ def track_flow(marks: Annotations, video: Video) -> np.ndarray:
     return joints / np.where(weights > 0, weights, np.nan)
 
 
-def held_out(result: Result) -> np.ndarray:
+def held_out(clip: Clip, marks: Annotations) -> np.ndarray:
     """(K, J): truth that nobody marked for the program."""
-    known = np.isfinite(result.clip.truth.joints[..., 0])
-    for row, frame in enumerate(result.marks.frames):
-        at = np.flatnonzero(result.clip.truth.frames == frame)[0]
-        known[at] &= ~np.isfinite(result.marks.joints[row, :, 0])
+    known = np.isfinite(clip.truth.joints[..., 0])
+    for row, frame in enumerate(marks.frames):
+        at = np.flatnonzero(clip.truth.frames == frame)[0]
+        known[at] &= ~np.isfinite(marks.joints[row, :, 0])
     return known
 
 
@@ -304,7 +304,7 @@ COLUMNS = (
 def describe(result: Result) -> tuple[str, dict[str, float]]:
     """One row of the table."""
     clip, joints = result.clip, result.motion.points2d_propagated
-    unknown = held_out(result)
+    unknown = held_out(clip, result.marks)
     seen, hidden = unknown & clip.seen, unknown & ~clip.seen
     action = seen & clip.action[:, None]
     lines = interpolate_lines(result.marks, len(clip.video))
@@ -335,10 +335,9 @@ def describe(result: Result) -> tuple[str, dict[str, float]]:
     return text, figures
 
 
-def tiles(result: Result) -> Iterator[np.ndarray]:
+def tiles(clip: Clip, marks: Annotations, joints: np.ndarray) -> Iterator[np.ndarray]:
     """The held-out frames with the propagated joints, those that are off ringed in red."""
-    clip, joints = result.clip, result.motion.points2d_propagated
-    unknown, near = held_out(result), hits(joints, clip, 0.2)
+    unknown, near = held_out(clip, marks), hits(joints, clip, 0.2)
     tall = 3.4 * clip.torso
     for row, frame in enumerate(clip.truth.frames):
         if not (unknown[row] & clip.seen[row]).any():
@@ -357,12 +356,12 @@ def tiles(result: Result) -> Iterator[np.ndarray]:
         yield tile
 
 
-def write_sheet(result: Result, work: Path) -> None:
+def write_sheet(clip: Clip, marks: Annotations, joints: np.ndarray, file: Path) -> None:
     """A contact sheet of all held-out frames."""
-    made = list(tiles(result))
+    made = list(tiles(clip, marks, joints))
     made += [np.zeros_like(made[0])] * (-len(made) % 8)
     rows = [np.hstack(made[i : i + 8]) for i in range(0, len(made), 8)]
-    cv2.imwrite(str(work / f"{result.clip.name}.jpg"), np.vstack(rows)[..., ::-1])
+    cv2.imwrite(str(file), np.vstack(rows)[..., ::-1])
 
 
 def summarise(table: list[dict[str, float]]) -> str:
@@ -404,7 +403,8 @@ def main() -> None:
         table.append(figures)
         print(text, flush=True)
         if words.sheets:
-            write_sheet(result, words.work)
+            joints = result.motion.points2d_propagated
+            write_sheet(result.clip, result.marks, joints, words.work / f"{name}.jpg")
     if table:
         print(summarise(table))
 
