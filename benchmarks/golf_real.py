@@ -34,6 +34,7 @@ from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.report.golf_pictures import draw_golfer
 
+KEY_NAMES = ("start", "top", "hit", "finish")
 CLICKED = ("head_top", "right_knee", "left_knee", "right_ankle", "left_ankle")
 TOUR_DOWNSWING = 0.25
 """Seconds from the top to the hit, by which slow motion's factor is told."""
@@ -122,27 +123,40 @@ COLUMNS = (
 )
 
 
-def describe(swing: Swing, found: GolfFit, seconds: float) -> str:
-    """One row of the table."""
+def measure(swing: Swing, found: GolfFit) -> dict[str, float]:
+    """The figures of a row; NaN where nothing was marked."""
     clip, fitted = swing.clip, found.fitted
     points = fitted.motion.points2d[clip.truth.frames]
     off = np.linalg.norm(points - clip.truth.joints, axis=2)[clip.seen]
-    height = found.observations.height
-    on = figure_distance(points, clip.truth.joints) < LIMB * height
+    on = figure_distance(points, clip.truth.joints) < LIMB * found.observations.height
     angles = club_angles(swing, fitted.club2d)
     usual = 30 / (clip.video.fps * swing.slow_motion)
-    apart = "".join(
-        f"{(key - marked) * usual:>{width}.1f}" if marked is not None else " " * (width - 1) + "-"
-        for key, marked, width in zip(
-            fitted.keys, (swing.events[k] for k in ("start", "top", "hit", "finish")),
-            (7, 6, 6, 7), strict=True,
+    apart = {
+        name: np.nan if marked is None else float(key - marked) * usual
+        for key, (name, marked) in zip(
+            fitted.keys, ((k, swing.events[k]) for k in KEY_NAMES), strict=True
         )
-    )  # fmt: skip
-    start, top, hit, _ = fitted.keys
+    }
+    return apart | {
+        "pck": float((off < 0.2 * clip.torso).mean()),
+        "body": float(on.mean()),
+        "club5": float((angles < 5).mean()),
+        "club15": float((angles < 15).mean()),
+    }
+
+
+def describe(swing: Swing, found: GolfFit, seconds: float) -> str:
+    """One row of the table."""
+    clip, figures = swing.clip, measure(swing, found)
+    apart = "".join(
+        f"{figures[k]:>{width}.1f}" if np.isfinite(figures[k]) else " " * (width - 1) + "-"
+        for k, width in zip(KEY_NAMES, (7, 6, 6, 7), strict=True)
+    )
+    start, top, hit, _ = found.fitted.keys
     doubts = found.doubts
     return (
-        f"{clip.name:<21}{(off < 0.2 * clip.torso).mean():6.0%}{on.mean():6.0%}"
-        f"{(angles < 5).mean():6.0%}{(angles < 15).mean():7.0%}{apart}"
+        f"{clip.name:<21}{figures['pck']:6.0%}{figures['body']:6.0%}"
+        f"{figures['club5']:6.0%}{figures['club15']:7.0%}{apart}"
         f"{(top - start) / (hit - top):6.1f}{seconds / len(clip.video):6.2f}  "
         + "; ".join(f"{d.text} ({d.frame})" for d in doubts)
         + (f"  [{'; '.join(found.notes)[:120]}]" if found.notes else "")

@@ -174,7 +174,7 @@ def swing_found(
     doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
     notes = tuple(_describe_film(observed, len(video)))
     if not film.is_whole(video):
-        fitted = swing_in_file(fitted, observations, film, video, model)
+        fitted = swing_in_file(fitted, observations, film, video.time, model)
         observations = replace(observations_in_file(observations, film), marks=marks)
     fitted = hold_joints(fitted, marks, observations.camera.focal)
     fitted = replace(fitted, keys=hold_keys(fitted.keys, marks))

@@ -26,8 +26,7 @@ from keyrecon.golf.records import (
     SwingFit,
     SwingState,
 )
-from keyrecon.io.video import Video
-from keyrecon.numerics.geometry import warp_points
+from keyrecon.numerics.geometry import unit_vectors, warp_points
 
 
 def observations_in_file(observations: Observations, film: Film) -> Observations:
@@ -62,13 +61,17 @@ def _warp(
 
 
 def swing_in_file(
-    fitted: FittedSwing, observations: Observations, film: Film, video: Video, model: MotionModel
+    fitted: FittedSwing,
+    observations: Observations,
+    film: Film,
+    time: Float[np.ndarray, "F"],
+    model: MotionModel,
 ) -> FittedSwing:
-    """A fitted swing in every frame of the file."""
+    """A fitted swing in every frame of the file; `time` is that of each, seconds of the world."""
     fit = SwingFit(model, fitted.body, _state_at(fitted.state, film.place))
     real = observations_in_file(observations, film)
     # Described before the camera of the film first, whose principal point the fit has.
-    described = describe_fit(fit, replace(real, camera=observations.camera), video.time)
+    described = describe_fit(fit, replace(real, camera=observations.camera), time)
     described = replace(described, keys=film.keys_in_file(fitted.keys))
     turned = _follow_camera(described, film, observations.camera, real.camera)
     confidence = turned.motion.confidence * film.shows[:, None]
@@ -99,7 +102,8 @@ def _follow_camera(
     fitted: FittedSwing, film: Film, standing: Camera, moving: Camera
 ) -> FittedSwing:
     """The swing in the axes of the camera as it turned and zoomed."""
-    turn, zoom = _camera_turns(film, standing, moving)
+    joints = fitted.motion.points3d
+    turn, zoom = _camera_turns(np.linalg.inv(film.warps), joints, standing, moving)
     pelvis = np.einsum("tij,tj->ti", turn, fitted.pose.origins[:, 0])
     nearer = pelvis / zoom[:, None] - pelvis
 
@@ -108,7 +112,7 @@ def _follow_camera(
         return moved
 
     pose = RootPose(follow(fitted.pose.origins), turn[:, None] @ fitted.pose.rotations)
-    joints, club = follow(fitted.motion.points3d), follow(fitted.club)
+    joints, club = follow(joints), follow(fitted.club)
     pixels, ends = (
         project(p.reshape(-1, 3), moving)[0].reshape(*p.shape[:2], 2) for p in (joints, club)
     )
@@ -118,19 +122,29 @@ def _follow_camera(
 
 
 def _camera_turns(
-    film: Film, standing: Camera, moving: Camera
+    back: Float[np.ndarray, "F 3 3"],
+    joints: Float[np.ndarray, "F n 3"],
+    standing: Camera,
+    moving: Camera,
 ) -> tuple[Float[np.ndarray, "F 3 3"], Float[np.ndarray, "F"]]:
-    """Turn of every frame's camera from the film's, and its zoom."""
-    back = np.linalg.inv(film.warps)
-    back = back / back[:, 2:, 2:]
-    zoom = np.sqrt(np.abs(np.linalg.det(back[:, :2, :2])))
-    rays = np.linalg.inv(_matrix(moving)) @ back @ _matrix(standing)
-    rays[:, :2] /= zoom[:, None, None]
-    u, _, v = np.linalg.svd(rays)
-    turn = u @ v
-    return turn * np.sign(np.linalg.det(turn))[:, None, None], zoom
+    """Turn of every frame's camera from the film's, and its zoom, as the player shows them.
+
+    `back` are homographies from the film's picture. A path that was fitted as a similarity is not
+    that of any turn: the turn closest to its matrix shifts the picture by half of what it does. So
+    the lines of sight to the player's joints are turned to where the homography has them.
+    """
+    pixels = project(joints.reshape(-1, 3), standing)[0].reshape(*joints.shape[:2], 2)
+    there = warp_points(back[:, None], pixels)
+    middle, new_middle = pixels.mean(axis=1, keepdims=True), there.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(pixels - middle, axis=(1, 2))
+    zoom = np.linalg.norm(there - new_middle, axis=(1, 2)) / np.maximum(size, 1e-9)
+    unzoomed = new_middle + (there - new_middle) / zoom[:, None, None]
+    product = np.swapaxes(_sight(unzoomed, moving), 1, 2) @ _sight(pixels, standing)
+    u, _, v = np.linalg.svd(product)
+    u[..., 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+    return u @ v, zoom
 
 
-def _matrix(camera: Camera) -> Float[np.ndarray, "3 3"]:
-    x, y = camera.principal
-    return np.array([[camera.focal, 0, x], [0, camera.focal, y], [0, 0, 1]])
+def _sight(pixels: Float[np.ndarray, "F n 2"], camera: Camera) -> Float[np.ndarray, "F n 3"]:
+    """Lines of sight through pixels."""
+    return unit_vectors(np.insert((pixels - camera.principal) / camera.focal, 2, 1.0, axis=2))

@@ -1,0 +1,269 @@
+"""Real golf clips made harder in ways that are known: what breaks a fit, and whether it says so.
+
+Run: python benchmarks/golf_variants.py [--variant NAME ...] [--only CLIP ...] [--work DIR]
+
+The clips are those of `golf_real.py` that may be looked at, and so are the columns. Variants, all
+from fixed seeds:
+
+    shake     the camera drifts by 4 % of the width and is held by hand, up to 13 px at 720 rows
+    clicks    the clicks are of another frame, each off by 5 px at 720 rows (clicks2: once more)
+    crowd     people of other colours sway close beside the player, on either side
+    half      half the size, compressed hard
+    rate      every other frame
+    dark      a third of the light, and noise
+    mirror    mirrored, with the player's hand told: the same swing to the digit
+
+The last line counts warnings: `missed` are fits with fewer than LEAST_BODY of the joints on the
+marked figure, or top or hit more than FARTHEST_KEY frames off, that say nothing; `false` are
+warnings of right ones.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from golf_real import COLUMNS, Swing, click, describe, load_swing, measure, write_sheet
+from real import DEVELOP, TRUTH, mirror_clip
+
+from keyrecon.app.golf import GolfFit, fit_video
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.clicks import GolfClicks
+from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
+from keyrecon.io.held_video import hold_frames
+from keyrecon.io.stages import StageStore
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+
+LEAST_BODY, FARTHEST_KEY = 0.85, 3.0
+"""Of a right fit: share of the joints on the marked figure, and frames of top and hit."""
+ROWS = 720.0
+"""Rows of the picture for which lengths are told."""
+Picture = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How a variant differs from its clip."""
+
+    picture: Callable[[int, Picture], Picture]
+    warp: Callable[[int], np.ndarray]
+    """(2, 3): where pixels of a frame go."""
+    step: int = 1
+    """Every how manieth frame is shown."""
+    crf: int = 20
+
+
+def same_place(_: int) -> np.ndarray:
+    """No pixel moves."""
+    return np.eye(2, 3)
+
+
+def shake(swing: Swing) -> Change:
+    """A camera that drifts and is held by hand."""
+    video, random = swing.clip.video, np.random.default_rng(1)
+    seconds = np.arange(len(video)) / video.fps
+    path = np.zeros((len(video), 2))
+    for hertz in (0.4, 0.9, 1.7, 3.1):
+        for axis in (0, 1):
+            path[:, axis] += np.sin(2 * np.pi * (hertz * seconds + random.random())) / hertz**0.5
+    path *= 13 * video.height / ROWS / np.abs(path).max()
+    path[:, 0] += 0.04 * video.width * np.linspace(-0.5, 0.5, len(video))
+    turn = np.radians(0.4) * np.sin(2 * np.pi * 0.7 * seconds)
+
+    def warp(t: int) -> np.ndarray:
+        c, s = np.cos(turn[t]), np.sin(turn[t])
+        middle = np.array([video.width, video.height]) / 2
+        rotation = np.array([[c, -s], [s, c]])
+        return np.column_stack([rotation, middle - rotation @ middle + path[t]])
+
+    def picture(t: int, shown: Picture) -> Picture:
+        size = video.width, video.height
+        return cv2.warpAffine(shown, warp(t), size, borderMode=cv2.BORDER_REPLICATE)
+
+    return Change(picture, warp)
+
+
+def crowd(swing: Swing) -> Change:
+    """People who sway close beside the player."""
+    video, random = swing.clip.video, np.random.default_rng(2)
+    marked = swing.clip.truth.joints.reshape(-1, 2)
+    low, high = np.nanmin(marked, axis=0), np.nanmax(marked, axis=0)
+    tall = high[1] - low[1]
+    people = []
+    for side, edge in ((-1, low[0]), (1, high[0])):
+        for away in (0.22, 0.5, 0.8):
+            people.append(
+                (edge + side * away * tall, random.random(), random.integers(30, 226, (3, 3)))
+            )
+
+    def picture(t: int, shown: Picture) -> Picture:
+        out, second = shown.copy(), t / video.fps
+        for x, phase, colours in people:
+            sway = 0.03 * tall * np.sin(2 * np.pi * (0.5 * second + phase))
+            at = np.array([x + sway, high[1] - 0.02 * tall])
+            parts = (
+                ((0, -0.24), (0.07, 0.24)),
+                ((0, -0.62), (0.1, 0.18)),
+                ((0, -0.88), (0.05, 0.07)),
+            )
+            for (middle, axes), colour in zip(parts, colours.tolist(), strict=True):
+                centre = np.rint(at + tall * np.array(middle)).astype(int)
+                size = np.rint(tall * np.array(axes)).astype(int)
+                cv2.ellipse(out, centre.tolist(), size.tolist(), 0, 0, 360, colour, -1, cv2.LINE_AA)
+        return out
+
+    return Change(picture, same_place)
+
+
+def half(swing: Swing) -> Change:
+    """Half the size, compressed hard."""
+    size = tuple(n // 4 * 2 for n in (swing.clip.video.width, swing.clip.video.height))
+
+    def picture(_: int, shown: Picture) -> Picture:
+        return cv2.resize(shown, size, interpolation=cv2.INTER_AREA)
+
+    scale = size[0] / swing.clip.video.width
+    reduced = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2]])
+    return Change(picture, lambda _: reduced, crf=32)
+
+
+def rate(_: Swing) -> Change:
+    """Every other frame."""
+    return Change(lambda _, shown: shown, same_place, step=2)
+
+
+def dark(_: Swing) -> Change:
+    """A third of the light, and noise."""
+    random = np.random.default_rng(3)
+
+    def picture(_: int, shown: Picture) -> Picture:
+        noise = random.normal(0, 6, shown.shape[:2])[..., None]
+        return np.clip(shown / 3 + noise, 0, 255).astype(np.uint8)
+
+    return Change(picture, same_place)
+
+
+CHANGES: dict[str, Callable[[Swing], Change]] = {
+    "shake": shake, "crowd": crowd, "half": half, "rate": rate, "dark": dark,
+}  # fmt: skip
+VARIANTS = ("plain", *CHANGES, "clicks", "clicks2", "mirror")
+
+
+def change_swing(swing: Swing, change: Change, path: Path) -> Swing:
+    """A clip with its truth as a variant shows it; the file is written once."""
+    clip, step = swing.clip, change.step
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shown = (change.picture(t, p) for t, p in enumerate(clip.video.frames()) if t % step == 0)
+        write_video(path, shown, clip.video.fps / step, crf=change.crf)
+
+    def moved(frame: int, points: np.ndarray) -> np.ndarray:
+        warp = change.warp(frame)
+        return points @ warp[:, :2].T + warp[:, 2]
+
+    truth, video = clip.truth, open_video(path)
+    rows = np.flatnonzero(truth.frames % step == 0)
+    joints = np.stack([moved(int(truth.frames[k]), truth.joints[k]) for k in rows])
+    marks = replace(
+        truth, frames=truth.frames[rows] // step, joints=joints, visible=truth.visible[rows],
+        nearer=truth.nearer[rows], absent=(),
+    )  # fmt: skip
+    clubs = {t // step: moved(t, ends) for t, ends in swing.clubs.items() if t % step == 0}
+    events = {k: None if t is None else t / step for k, t in swing.events.items()}
+    scale = float(np.linalg.norm(change.warp(0)[:, 0]))
+    clip = replace(
+        clip, video=video, truth=marks, seen=clip.seen[rows], action=clip.action[rows],
+        torso=scale * clip.torso,
+    )  # fmt: skip
+    return Swing(clip, events, clubs, swing.left_handed)
+
+
+def mirror_swing(swing: Swing) -> Swing:
+    """A clip in a mirror."""
+    last = swing.clip.video.width - 1
+    clubs = {t: ends * [-1, 1] + [last, 0] for t, ends in swing.clubs.items()}
+    return Swing(mirror_clip(swing.clip), swing.events, clubs, not swing.left_handed)
+
+
+def click_elsewhere(swing: Swing, seed: int) -> GolfClicks:
+    """Six clicks of another marked frame of the address or the finish, each of them off."""
+    usual, clip = click(swing), swing.clip
+    random = np.random.default_rng(seed)
+    frames = clip.truth.frames
+    still = (frames < swing.events["start"]) | (frames == usual.frame)
+    names = [LSP14.index(n) for n in usual.joints if n != "root"]
+    hips = [LSP14.index("right_hip"), LSP14.index("left_hip")]
+    whole = np.isfinite(clip.truth.joints[:, names + hips]).all(axis=(1, 2))
+    row = int(random.choice(np.flatnonzero(still & whole)))
+    noise = 5 * clip.video.height / ROWS
+    places = {
+        n: clip.truth.joints[row, hips].mean(axis=0) if n == "root"
+        else clip.truth.joints[row, LSP14.index(n)] for n in usual.joints
+    }  # fmt: skip
+    joints = {n: tuple((p + random.normal(0, noise, 2)).tolist()) for n, p in places.items()}
+    seen = clip.seen[row]
+    hidden = tuple(n for n in joints if n != "root" and not seen[LSP14.index(n)])
+    return replace(usual, frame=int(frames[row]), joints=joints, hidden=hidden)
+
+
+def show_variant(name: str, variant: str, work: Path) -> tuple[Swing, GolfClicks]:
+    """A variant of a clip, and its clicks."""
+    swing = load_swing(name)
+    if variant in CHANGES:
+        file = work / "videos" / f"{name}-{variant}.mp4"
+        swing = change_swing(swing, CHANGES[variant](swing), file)
+    elif variant == "mirror":
+        swing = mirror_swing(swing)
+    if variant.startswith("clicks"):
+        return swing, click_elsewhere(swing, len(variant))
+    return swing, click(swing)
+
+
+def verdict(swing: Swing, found: GolfFit) -> tuple[bool, bool]:
+    """Whether a fit is right, and whether it is warned of."""
+    figures = measure(swing, found)
+    keys = [figures["top"], figures["hit"]]
+    right = figures["body"] >= LEAST_BODY and not (np.abs(keys) > FARTHEST_KEY).any()
+    return right, bool(found.doubts)
+
+
+def fit_variants(names: list[str], variants: list[str], work: Path) -> Iterator[tuple[bool, bool]]:
+    """Fit every variant of every clip; prints a row for each."""
+    model = read_motion_model(BUILT_IN_SWING_PRIOR)
+    for variant in variants:
+        for name in names:
+            swing, clicks = show_variant(name, variant, work)
+            store = StageStore(work / f"{name}-{variant}" / "cache")
+            try:
+                found = fit_video(hold_frames(swing.clip.video), clicks, model, keep=store.keep)
+            except KeyreconError as fault:
+                print(f"{variant:<8}{name:<21}{fault}", flush=True)
+                continue
+            seconds = sum(store.seconds.values())
+            print(f"{variant:<8}{describe(swing, found, seconds)}", flush=True)
+            write_sheet(swing, found, work / f"{name}-{variant}.png")
+            yield verdict(swing, found)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--variant", nargs="*", choices=VARIANTS, default=list(VARIANTS[:-1]))
+    parser.add_argument("--only", nargs="*", help="names of clips")
+    parser.add_argument("--work", type=Path, default=Path("benchmarks/work/golf_variants"))
+    words = parser.parse_args()
+    clips = [f.stem for f in sorted(TRUTH.glob("golf*.json")) if f.stem in DEVELOP]
+    clips = [n for n in clips if n in (words.only or clips)]
+    print(f"{'':<8}{COLUMNS}")
+    rows = list(fit_variants(clips, words.variant, words.work))
+    missed = sum(not right and not warned for right, warned in rows)
+    false = sum(right and warned for right, warned in rows)
+    print(f"{len(rows)} fits, {sum(r for r, _ in rows)} right; missed {missed}, false {false}")
+
+
+if __name__ == "__main__":
+    main()

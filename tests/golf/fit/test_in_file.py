@@ -1,0 +1,75 @@
+"""A swing that was fitted to a film, before the camera as it moved."""
+
+import numpy as np
+import pytest
+
+from keyrecon.golf.fit.in_file import swing_in_file
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.film import Film
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, SwingFit, SwingState
+from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
+from keyrecon.numerics.geometry import warp_points
+from tests.support.golf_truth import camera_before, even_times, observe
+
+FRAMES = 12
+CAMERA = Camera(900.0, np.array([359.5, 249.5]))
+CORNER = np.array([40.0, 10.0])
+
+
+TIME = np.arange(FRAMES) / 30.0
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    model, body = read_motion_model(BUILT_IN_SWING_PRIOR), size_body(1.8)
+    rotation, position = camera_before(180.0)
+    state = SwingState(
+        np.zeros(2), even_times(FRAMES), np.tile(rotation, (FRAMES, 1, 1)),
+        np.tile(position, (FRAMES, 1)),
+    )  # fmt: skip
+    fit = SwingFit(model, body, state)
+    pose = fitted_pose(fit)
+    observations = observe(find_joints(body, pose), find_club(body, pose), CAMERA, 0.0)
+    return describe_fit(fit, observations, TIME), observations, model
+
+
+def film_seen_by(back):
+    """A film whose frames were warped from a file by the inverses of `back`."""
+    place = np.arange(FRAMES, dtype=float)
+    whole = (0, FRAMES - 1)
+    return Film(
+        np.arange(FRAMES), TIME, place, np.linalg.inv(back), (720, 500), CORNER, False,
+        whole, 0.0, whole,
+    )  # fmt: skip
+
+
+def pan_and_roll(t):
+    """Where a camera that was shifted, rolled and zoomed a little shows what the film shows."""
+    c, s = 1.02 * np.cos(0.01 * t), 1.02 * np.sin(0.01 * t)
+    x, y = -CORNER + (6.0 * t, -3.0 * t)
+    return np.array([[c, -s, x], [s, c, y], [0, 0, 1.0]])
+
+
+def test_joints_lie_where_the_camera_that_was_shifted_shows_them(fitted):
+    swing, observations, model = fitted
+    back = np.stack([pan_and_roll(t) for t in range(FRAMES)])
+    inside = swing_in_file(swing, observations, film_seen_by(back), TIME, model)
+    expected = warp_points(back[:, None], swing.motion.points2d)
+    off = np.linalg.norm(inside.motion.points2d - expected, axis=2)
+    assert off.max() < 2.5 and off.mean() < 0.7
+    club = warp_points(back[:, None], swing.club2d)
+    assert np.linalg.norm(inside.club2d - club, axis=2).max() < 4
+
+
+def test_joints_lie_where_the_camera_that_turned_shows_them(fitted):
+    swing, observations, model = fitted
+    a = 0.08
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    standing, moving = np.diag([900.0, 900, 1]), np.diag([900.0, 900, 1])
+    standing[:2, 2], moving[:2, 2] = CAMERA.principal, CAMERA.principal - CORNER
+    back = np.tile(moving @ turn @ np.linalg.inv(standing), (FRAMES, 1, 1))
+    inside = swing_in_file(swing, observations, film_seen_by(back), TIME, model)
+    expected = warp_points(back[:, None], swing.motion.points2d)
+    assert np.linalg.norm(inside.motion.points2d - expected, axis=2).max() < 2.5
