@@ -41,6 +41,11 @@ class Assistant:
     "last", "text", "frame", "half"}: the frame to mark and which half of the body there."""
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
     """Head and feet found on a few frames with these picks."""
+    shots: Callable[[], list[Json]] | None = None
+    """Shots as {"number", "first", "last", "shows", "used", "wanted"}: what each shows, whether it
+    is used now, and in the next run; none where there is but one."""
+    choose_shot: Callable[[int, bool], list[Json]] | None = None
+    """Keeps by its number whether a shot is used in the next run; the shots anew."""
     court: Callable[[], Json] | None = None
     """The court's map, what was clicked of it, and how much of the video the camera is known in."""
     court_view: Callable[[tuple[int, int], int], Json] | None = None

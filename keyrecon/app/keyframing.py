@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from keyrecon.annotation_budget import annotation_cost
-from keyrecon.app.preparing import describe_shots, prepare_project
+from keyrecon.app.preparing import describe_shots, prepare_project, with_chosen_shots
 from keyrecon.app.project import counted, load_annotations
 from keyrecon.errors import quoted
 from keyrecon.io.durable import make_folder, write_durably
@@ -57,7 +57,8 @@ def find_keyframes(
     `printed` takes the forms that the paper prints. The project remembers its options without
     them, so that a run by the same forms finds the same stages, and one by ours is not bound.
     """
-    options = workspace.options(options, Options())
+    choices = workspace.shot_choices()
+    options = with_chosen_shots(workspace.options(options, Options()), choices)
     options = replace(options, keyframes=chosen.over(options.keyframes))
     check_options(options)
     forms = as_printed(options) if printed else options
@@ -68,6 +69,7 @@ def find_keyframes(
     if marks is not None and not printed:
         preparation = with_marked_keyframes(preparation, marks, options, progress)
     workspace.remember(options, Options())
+    workspace.forget_shot_choices(choices)
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
     return describe_keyframes(workspace, preparation, found.contradictions())

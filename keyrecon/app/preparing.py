@@ -14,6 +14,7 @@ import numpy as np
 
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.coco import coco_text, read_coco
+from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, frames_off_marks, prepare
@@ -101,6 +102,23 @@ class ProjectPreparation:
             marked = np.isfinite(self.marks.joints).all(axis=2).mean(axis=1) > 0.5
             known |= {*self.marks.frames[marked].tolist()}
         return sorted(known)
+
+
+def with_chosen_shots(options: Options, choices: ShotChoices) -> Options:
+    """Options with the shots that a person chose on the page; these stand over former ones."""
+    if choices == ShotChoices():
+        return options
+    told = options.shots
+    use, skip = ({*text.replace(",", " ").split()} for text in (told.use, told.skip))
+    used, skipped = ({str(number) for number in part} for part in (choices.use, choices.skip))
+    return replace(
+        options,
+        shots=replace(told, use=_listed(use - skipped | used), skip=_listed(skip - used | skipped)),
+    )
+
+
+def _listed(numbers: set[str]) -> str:
+    return ",".join(sorted(numbers, key=lambda word: (len(word), word)))
 
 
 def describe_truncation(verification: TrackVerification) -> list[str]:

@@ -10,6 +10,7 @@ from keyrecon.app.court import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
@@ -74,6 +75,7 @@ def run(
             *describe_shots(preparation.shots),
             *found.contradictions(),
             *_describe_doubt(motion),
+            *_waiting_choices(workspace),
             *_other_choice(workspace, options, preparation.keyframes),
             f"Took {time.perf_counter() - started:.0f} s.",
         ]
@@ -89,6 +91,16 @@ def _describe_doubt(motion: Motion) -> list[str]:
         f"Arms, legs or head are uncertain in {uncertain_share(motion):.0%} of the frames. Worst:"
     )
     return [share, *(stretch.text for stretch in stretches)]
+
+
+def _waiting_choices(workspace: Workspace) -> list[str]:
+    """That shots were chosen since the keyframes were."""
+    if workspace.shot_choices() == ShotChoices():
+        return []
+    return [
+        "Shots were chosen on the page that the keyframes do not know yet: "
+        f"keyrecon keyframes {quoted(workspace.folder)}"
+    ]
 
 
 def _other_choice(workspace: Workspace, options: Options, asked: Keyframes) -> list[str]:

@@ -8,6 +8,7 @@
     golf_clicks.json   of a golf swing: six joints of the address
     golf_marks.json    of a golf swing: what a person put right in a fit
     court_points.json  points of the court that a person clicked
+    shots.json         shots that a person said to use or to leave out, until the next run
     camera.npz         the camera of every frame, where the court was found
     motion.npz, report.html
     exports/           files for other programs that the page wrote
@@ -33,6 +34,11 @@ from keyrecon.io.formats.court_points import (
     write_court_points,
 )
 from keyrecon.io.formats.picks import read_picks, write_picks
+from keyrecon.io.formats.shot_choices import (
+    ShotChoices,
+    read_shot_choices,
+    write_shot_choices,
+)
 from keyrecon.io.option_tables import (
     Record,
     changed_options,
@@ -58,7 +64,7 @@ from keyrecon.world.records import CourtClick
 OWN_NAMES = (
     *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
     *("annotate.sqlite", "motion.npz", "report.html", "golf_clicks.json", "golf_marks.json"),
-    *("camera.npz", "court_points.json"),
+    *("camera.npz", "court_points.json", "shots.json"),
 )
 """Files that a project has or may come to have."""
 GOLF = "golf"
@@ -288,6 +294,27 @@ class Workspace:
             together = tuple(dict.fromkeys((*old, *picks)))
             write_picks(self.picks_file, together)
         return together
+
+    @property
+    def shots_file(self) -> Path:
+        """shots.json"""
+        return self.folder / "shots.json"
+
+    def shot_choices(self) -> ShotChoices:
+        """What a person said of shots since the last run."""
+        file = self.shots_file
+        return read_shot_choices(file) if file.is_file() else ShotChoices()
+
+    def choose_shot(self, number: int, used: bool | None) -> None:
+        """Keep what a person says of a shot; None takes back what was said."""
+        with self.exclusive():
+            write_shot_choices(self.shots_file, self.shot_choices().with_choice(number, used))
+
+    def forget_shot_choices(self, taken: ShotChoices) -> None:
+        """Drop choices that the project's options have taken over; later ones stay."""
+        with self.exclusive():
+            if self.shot_choices() == taken:
+                self.shots_file.unlink(missing_ok=True)
 
     def court_clicks(self) -> tuple[CourtClick, ...]:
         """Points of the court that a person clicked, in one order."""

@@ -9,6 +9,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath, Shots, Track
 from keyrecon.segmentation.background_model import build_background
 from keyrecon.segmentation.color_model import learn_colors
+from keyrecon.tracking import verification as verification_module
 from keyrecon.tracking.scale import player_boxes
 from keyrecon.tracking.verification import find_jumps, find_meetings, verify_track
 
@@ -102,3 +103,12 @@ def test_a_camera_that_turns_makes_no_jump():
     track = track_along(HEAD - turned[:, :2, 2])
     assert find_jumps(track, CameraPath(turned, np.ones(COUNT)), ONE_SHOT, 30.0) == []
     assert find_jumps(track, CAMERA, ONE_SHOT, 30.0)
+
+
+def test_a_long_shot_is_looked_at_part_by_part(verified, monkeypatch):
+    monkeypatch.setattr(verification_module, "MOST_VIEWS", 5)
+    verification, track = verified(other=OTHER)
+    assert len(verification.frames) == len(verification.truncated) == len(verification.distractor)
+    closest = np.linalg.norm(HEAD - OTHER, axis=1).argmin()
+    meetings = find_meetings(verification, track, 30.0)
+    assert any(first - 10 <= closest <= last + 10 for first, last in meetings)

@@ -28,6 +28,7 @@ from keyrecon.annotate.assist.pose_estimate import (
 )
 from keyrecon.annotate.assist.preview import find_player, tint_part
 from keyrecon.annotate.assist.project_cache import ProjectCache
+from keyrecon.annotate.assist.shot_strip import choose_shot, describe_shots
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
@@ -52,6 +53,8 @@ def make_assistant(workspace: Workspace) -> Assistant:
         stretches=partial(describe_stretches, cache),
         preview=partial(describe_preview, cache),
         backprojection=partial(show_part, cache),
+        shots=partial(describe_shots, cache, workspace),
+        choose_shot=partial(choose_shot, cache, workspace),
         court=partial(describe_court, workspace),
         court_view=partial(describe_court_view, workspace),
         court_point=partial(keep_court_point, workspace),

@@ -114,6 +114,13 @@ class JobRequest(Struct, forbid_unknown_fields=True):
     options: JobOptions = JobOptions()
 
 
+class ShotRequest(Struct, forbid_unknown_fields=True):
+    """Whether a shot is to be used."""
+
+    number: Annotated[int, Meta(ge=1)]
+    used: bool
+
+
 class CourtPointRequest(Struct, forbid_unknown_fields=True):
     """A named point of the court in a frame; without a place its click is taken away."""
 
@@ -234,6 +241,12 @@ def backprojection(session: Session, request: ApiRequest) -> Response:
         return Response(status_code=204)
     picture = tint(tuple(picks), request.path["frame"], request.query.get("part", "head"))
     return Response(encode_png(picture), media_type="image/png")
+
+
+def shot(session: Session, request: ApiRequest) -> list[Json]:
+    """Keep whether a shot is used in the next run."""
+    choose, body = session.assistant.choose_shot, request.body
+    return choose(body.number, body.used) if choose else []
 
 
 def court(session: Session, request: ApiRequest) -> Json:

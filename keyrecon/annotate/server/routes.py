@@ -65,6 +65,7 @@ ROUTES = (
     ApiRoute("GET", "/api/jobs", handlers.jobs),
     ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
     ApiRoute("DELETE", "/api/jobs/{job:int}", handlers.cancel_job),
+    ApiRoute("POST", "/api/shots", handlers.shot, handlers.ShotRequest, alone=True),
     ApiRoute("GET", "/api/court", handlers.court),
     ApiRoute("GET", "/api/court/{frame:int}", handlers.court_view, alone=True),
     ApiRoute("POST", "/api/court", handlers.court_point, handlers.CourtPointRequest),

@@ -92,6 +92,7 @@ def describe_project(session: Session) -> Json:
         "bodies": None if bodies is None else [body["frame"] for body in bodies],
         "height_px": explained.get("height_px"),
         "boxes": explained.get("boxes"),
+        "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder)),
         "has": {

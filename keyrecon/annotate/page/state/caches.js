@@ -72,6 +72,7 @@ export function createFrameCache(project, ready, failed) {
   }
 
   return {
+    address,
     // The picture if it is here; asks for it before all others if not.
     get(frame, width) {
       const name = key(frame, width),

@@ -6,6 +6,7 @@ import { jointWords } from "../state/joint_words.js";
 import { budgetText, label, nextBeginning } from "../state/workflow.js";
 import { byId, make, setText } from "./dom.js";
 import { createGuide } from "./guide.js";
+import { createShots } from "./shots.js";
 
 const SMALL_WIDTH = 960; // of a frame until the sharp one is here, px
 const GENERAL =
@@ -17,6 +18,11 @@ export function createBodies(model, { frames, shell, actions, colors }) {
     root = byId("bodies-picture");
   const viewer = createViewer({ root, project, frames, redraw: model.redraw });
   const guide = createGuide(byId("guide"), model);
+  const shots = createShots(model, {
+    address: frames.address,
+    show,
+    isBusy: () => Boolean(shell.runningJob()),
+  });
   const boxes = new Map(); // frame -> what was in sight when it was chosen
   let frame = Math.round(last / 2);
 
@@ -145,6 +151,7 @@ export function createBodies(model, { frames, shell, actions, colors }) {
     slider.value = frame;
     setText(byId("bodies-where"), `frame ${frame} of ${project.n_frames}`);
     drawList();
+    shots.draw();
     guide.show(null);
     viewer.drawPicture(frame, [undefined, SMALL_WIDTH]);
     drawMarks();

@@ -1,0 +1,56 @@
+// The shots of a video as a strip of pictures: a click says whether one shows the player. It is kept, and
+// known when the keyframes are chosen next.
+import * as api from "../state/api.js";
+import { byId, make, setText } from "./dom.js";
+
+const WIDTH = 160; // of a picture, px
+
+export function createShots(model, { address, show, isBusy }) {
+  const strip = byId("shots");
+
+  async function choose({ number, wanted }) {
+    try {
+      model.project.shots = await api.send("shots", { number, used: !wanted });
+    } catch (fault) {
+      model.notify(fault.message || "The server does not answer.");
+    }
+    model.redraw();
+  }
+
+  function tile(shot) {
+    const middle = Math.round((shot.first + shot.last) / 2);
+    const picture = make("img", { alt: "", loading: "lazy", src: address(middle, WIDTH) });
+    const words = `${shot.number} · ${shot.first}-${shot.last}`;
+    const button = make("button", { className: "shot" }, picture, make("b", {}, words), make("small", {}, saying(shot)));
+    button.setAttribute("aria-pressed", shot.wanted);
+    button.title = shot.wanted ? "Leave this shot out" : "Use this shot";
+    button.addEventListener("click", () => {
+      show(middle);
+      if (!isBusy()) choose(shot);
+    });
+    return button;
+  }
+
+  function saying({ shows, used, wanted }) {
+    if (used === wanted) return used ? "used" : shows;
+    return wanted ? "to be used" : "to be left out";
+  }
+
+  function draw() {
+    const shots = model.project.shots ?? [],
+      content = JSON.stringify(shots);
+    byId("shots-row").hidden = !shots.length;
+    if (strip.dataset.content === content) return;
+    strip.dataset.content = content;
+    strip.replaceChildren(...shots.map(tile));
+    const changed = shots.some(({ used, wanted }) => used !== wanted);
+    setText(
+      byId("shots-note"),
+      changed
+        ? "Choose the keyframes again, and they know this."
+        : "Click a shot that shows the player and is not used, or one that is used and does not.",
+    );
+  }
+
+  return { draw };
+}

@@ -1,0 +1,101 @@
+"""Shots of a video on the page: told by pictures, corrected by a click, known by the next run."""
+
+import time
+from functools import partial
+
+import pytest
+from page_driver import CHROMIUM, SOON, Person, serving
+from page_project import FRAMES, make_project, write_numbered_video
+
+from keyrecon.annotate.assist.shot_strip import list_shots
+from keyrecon.annotate.assistant import Assistant
+from keyrecon.app.preparing import with_chosen_shots
+from keyrecon.io.formats.shot_choices import ShotChoices
+from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
+from keyrecon.records import PLAYER, Shots
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+)
+SHOTS = Shots((0, 40, 60), FRAMES, (PLAYER, "somebody else", PLAYER))
+
+
+def keep(workspace, number, used):
+    """As the assistant of a project, whose shots are these."""
+    now = SHOTS.usable[number - 1]
+    workspace.choose_shot(number, None if now == used else used)
+    return list_shots(SHOTS, workspace)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return make_project(tmp_path / "match", write_numbered_video(tmp_path / "numbered.mp4"))
+
+
+def open_page(chromium, server):
+    person = Person(chromium.new_context(), server.credentials.address)
+    person.press("Alt+1")
+    person.page.wait_for_selector("#shots .shot")
+    return person
+
+
+def until(holds):
+    """Wait for what the page does by and by."""
+    ends = time.monotonic() + SOON / 1000
+    while not holds():
+        assert time.monotonic() < ends
+        time.sleep(0.05)
+
+
+def words(person):
+    return [text.split("\n") for text in person.page.locator("#shots .shot").all_inner_texts()]
+
+
+def pressed(person):
+    shots = person.page.locator("#shots .shot")
+    return [shots.nth(n).get_attribute("aria-pressed") for n in range(shots.count())]
+
+
+def test_a_click_says_which_shots_show_the_player_and_outlives_the_page(chromium, folder):
+    workspace = Workspace(folder)
+    told = Assistant(
+        shots=partial(list_shots, SHOTS, workspace), choose_shot=partial(keep, workspace)
+    )
+    with serving(folder, told) as server:
+        person = open_page(chromium, server)
+        assert [row[0] for row in words(person)] == ["1 · 0-39", "2 · 40-59", "3 · 60-99"]
+        assert [row[-1] for row in words(person)] == ["used", "somebody else", "used"]
+        assert pressed(person) == ["true", "false", "true"]
+        loaded = "[...document.querySelectorAll('.shot img')].every((one) => one.naturalWidth > 0)"
+        until(lambda: person.page.evaluate(loaded))
+        person.page.click("#shots .shot:nth-child(2)")
+        person.page.wait_for_selector(".shot:nth-child(2)[aria-pressed=true]")
+        person.page.click("#shots .shot:nth-child(3)")
+        person.page.wait_for_selector(".shot:nth-child(3)[aria-pressed=false]")
+        assert words(person)[1][-1] == "to be used"
+        assert "again" in person.page.inner_text("#shots-note")
+        person.page.reload()
+        person.page.wait_for_selector("#saving[data-status]", state="attached")
+        person.press("Alt+1")
+        person.page.wait_for_selector(".shot:nth-child(2)[aria-pressed=true]")
+        assert pressed(person) == ["true", "true", "false"]
+        person.page.click("#shots .shot:nth-child(3)")
+        person.page.wait_for_selector(".shot:nth-child(3)[aria-pressed=true]")
+    assert Workspace(folder).shot_choices() == ShotChoices(use=(2,))
+
+
+def test_a_video_of_one_shot_has_no_strip(chromium, folder):
+    with serving(folder) as server:
+        person = Person(chromium.new_context(), server.credentials.address)
+        person.press("Alt+1")
+        person.page.wait_for_selector("#bodies:not([hidden])")
+        assert not person.page.is_visible("#shots-row")
+
+
+def test_what_was_clicked_stands_over_what_was_set_before():
+    options = with_chosen_shots(Options(), ShotChoices(use=(3, 12), skip=(2,)))
+    assert (options.shots.use, options.shots.skip) == ("3,12", "2")
+    again = with_chosen_shots(options, ShotChoices(use=(2,), skip=(3,)))
+    assert (again.shots.use, again.shots.skip) == ("2,12", "3")
+    assert with_chosen_shots(again, ShotChoices()) is again
