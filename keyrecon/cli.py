@@ -5,14 +5,15 @@ Exit codes: 0 success, 1 with one line on stderr for what a user can mend, 2 for
 whoever read the output has gone.
 
 Only the module of the command that was typed is imported; the others show up in the help by the
-first line of their docstrings, which is read from their source.
+first line of their docstrings, which is read from their source. `--help` shows what is used
+daily, `--help-all` the options of every stage too.
 """
 
 import ast
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.resources import files
 from types import FrameType
@@ -21,6 +22,7 @@ from typing import Any, NamedTuple, NoReturn
 from tyro.extras import SubcommandApp
 
 from keyrecon.errors import KeyreconError
+from keyrecon.option_help import described_options
 
 DESCRIPTION = "3D motion of an athlete from one ordinary camera and a few keyframes."
 INTERRUPTED, READER_GONE = 130, 141
@@ -32,10 +34,10 @@ class Command(NamedTuple):
     package: str
     module: str
     name: str
-    """Of the function, or of an app of commands of its own."""
+    """Of the function."""
 
 
-COMMANDS = {
+COMMANDS: dict[str, Command | dict[str, Command]] = {
     "demo": Command("keyrecon.commands", "projects", "demo"),
     "new": Command("keyrecon.commands", "projects", "new"),
     "pick": Command("keyrecon.commands", "projects", "pick"),
@@ -49,9 +51,16 @@ COMMANDS = {
     "court": Command("keyrecon.commands", "court", "court"),
     "relink": Command("keyrecon.commands", "projects", "relink"),
     "depths": Command("keyrecon.commands", "captures", "depths"),
-    "golf": Command("keyrecon.app", "golf_commands", "golf"),
+    "golf": {
+        "fit": Command("keyrecon.commands", "golf", "fit"),
+        "compare": Command("keyrecon.commands", "golf", "compare"),
+        "train": Command("keyrecon.commands", "golf", "train"),
+    },
 }
-"""In the order of the help."""
+"""In the order of the help; a table of commands has a name in front of theirs."""
+SUMMARIES = {"golf": "A model of whole golf swings: fit it to a video, compare, train it."}
+"""Of tables of commands."""
+HELP, HELP_ALL = ("-h", "--help"), "--help-all"
 
 
 def main() -> None:
@@ -82,19 +91,35 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _run(words: Sequence[str]) -> None:
+    told = HELP_ALL in words or not {*HELP} & {*words}
+    words = ["--help" if word == HELP_ALL else word for word in words]
+    app = _app(COMMANDS, words)
+    app.cli(prog="keyrecon", description=DESCRIPTION, args=words, registry=described_options(told))
+
+
+def _app(commands: Mapping[str, Any], words: Sequence[str]) -> SubcommandApp:
+    """Commands of which the one that was typed is there, the others by their summaries."""
     typed = words[0] if words else ""
     whole = typed.startswith("--tyro")  # completions for a shell tell every option
     app = SubcommandApp()
-    for name, command in COMMANDS.items():
-        if whole or name == typed:
-            handler = getattr(import_module(f"{command.package}.{command.module}"), command.name)
+    for name, command in commands.items():
+        named = whole or name == typed
+        if isinstance(command, Command):
+            found = _function(command) if named else _stand_in(_first_line(command))
+            app.command(name=name)(found)
+        elif named:
+            below = words if whole else words[1:]
+            app.command(_app(command, below), name=name, help=SUMMARIES[name])
         else:
-            handler = _stand_in(_first_line(command))
-        if isinstance(handler, SubcommandApp):
-            app.command(handler, name=name, help=_first_line(command))
-        else:
-            app.command(name=name)(handler)
-    app.cli(prog="keyrecon", description=DESCRIPTION, args=list(words))
+            app.command(name=name)(_stand_in(SUMMARIES[name]))
+    return app
+
+
+def _function(command: Command) -> Callable[..., None]:
+    found: Callable[..., None] = getattr(
+        import_module(f"{command.package}.{command.module}"), command.name
+    )
+    return found
 
 
 def _stand_in(summary: str) -> Callable[[], None]:
@@ -108,11 +133,10 @@ def _stand_in(summary: str) -> Callable[[], None]:
 
 
 def _first_line(command: Command) -> str:
-    """The first line of a command's docstring; of an app of commands, of its module's."""
+    """The first line of a command's docstring."""
     source = (files(command.package) / f"{command.module}.py").read_text("utf-8")
-    tree = ast.parse(source)
-    functions = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == command.name]
-    described: Any = functions[0] if functions else tree
+    functions = (n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef))
+    described = next(n for n in functions if n.name == command.name)
     return (ast.get_docstring(described) or "").partition("\n")[0]
 
 

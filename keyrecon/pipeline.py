@@ -84,10 +84,13 @@ class Options:
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     propagate: PropagateOptions = field(default_factory=PropagateOptions)
     depths: str = "built-in"
-    """What helps with depth signs that nobody gave: 'built-in', 'none', or a file that
-    `keyrecon depths` wrote."""
+    """What helps where nobody said which end of a limb is nearer: 'built-in', 'none', or a file of
+    `keyrecon depths`."""
     prior: Literal["none", "golf"] = "none"
-    """'golf' lets the swing prior tell depth signs and what nobody saw between keyframes."""
+    """'golf': a model of golf swings helps with depth and between the keyframes.
+
+    It tells depth signs and what nobody saw between keyframes.
+    """
     swing: SwingPriorOptions = field(default_factory=SwingPriorOptions)
     """How the golf prior is fitted, where it is asked for."""
     lift: LiftOptions = field(default_factory=LiftOptions)

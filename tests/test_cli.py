@@ -302,10 +302,11 @@ def test_the_help_shows_every_command_by_the_first_line_of_its_docstring(keyreco
     _, out, _ = keyrecon("--help")
     shown = " ".join(re.sub(r"[│•]", " ", out).split())
     for name, command in cli.COMMANDS.items():
-        module = import_module(f"{command.package}.{command.module}")
-        found = getattr(module, command.name)
-        first = ((found if callable(found) else module).__doc__ or "").splitlines()[0]
-        assert f"{name} {first}" in shown
+        if isinstance(command, dict):
+            assert f"{name} {cli.SUMMARIES[name]}" in shown
+        else:
+            module = import_module(f"{command.package}.{command.module}")
+            assert f"{name} {getattr(module, command.name).__doc__.splitlines()[0]}" in shown
 
 
 def test_a_reader_who_goes_away_is_no_fault():

@@ -3,32 +3,33 @@
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from keyrecon.app import depth_training as depth_job
 from keyrecon.app.console import show
+from keyrecon.commands.arguments import Files
 from keyrecon.lifting.priors.depth_model import DepthTrainingOptions
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
 
 def synth(
-    out: Path,
-    mocap: UseAppendAction[tuple[Path, ...]] = (),
+    out: Annotated[Path, arg(metavar="FOLDER")],
+    mocap: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="FILE")] = (),
     options: OmitArgPrefixes[Annotated[SynthOptions, arg(name="")]] = SynthOptions(),
 ) -> None:
     """Render a sequence whose truth is known, from motion capture or built-in tennis.
 
     Args:
         out: Folder for video.mp4, truth.npz, picks.json and scene.json.
-        mocap: A .bvh, .amc (with its .asf) or .c3d file; repeat to join several.
+        mocap: A .bvh, .amc (with its .asf) or .c3d file; repeat to join; else built-in tennis.
     """
     synthesize(out, mocap, options, show)
     print(f"Wrote {out}/video.mp4, truth.npz and picks.json.")
 
 
 def depths(
-    captures: Positional[tuple[Path, ...]],
-    out: Path = Path("depths.npz"),
+    captures: Files,
+    out: Annotated[Path, arg(metavar="FILE")] = Path("depths.npz"),
     options: OmitArgPrefixes[
         Annotated[DepthTrainingOptions, arg(name="")]
     ] = DepthTrainingOptions(),

@@ -1,21 +1,21 @@
 """The command that calibrates the camera on a tennis court."""
 
-from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from keyrecon.app.console import show
 from keyrecon.app.court import calibrate, court_click
+from keyrecon.commands.arguments import Project, Switch
 from keyrecon.io.workspace import Workspace
 from keyrecon.world.calibration import CalibrationOptions
 
 
 def court(
-    project: Positional[Path],
+    project: Project,
     point: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME:FRAME:X,Y")] = (),
     forget: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
-    force: bool = False,
+    force: Switch = False,
     options: OmitArgPrefixes[Annotated[CalibrationOptions, arg(name="")]] = CalibrationOptions(),
 ) -> None:
     """Find the tennis court in the picture, and with it the camera of every frame.

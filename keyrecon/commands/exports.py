@@ -1,20 +1,20 @@
 """The command that writes files for other programs."""
 
-from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from keyrecon.app.console import show
 from keyrecon.app.exporting import export as export_files
+from keyrecon.commands.arguments import Files, Project
 from keyrecon.io.workspace import Workspace
 from keyrecon.report.overlay import OverlayOptions
 
 
 def export(
-    project: Positional[Path],
-    files: Positional[tuple[Path, ...]],
-    frames: Annotated[str | None, arg(metavar="A-B")] = None,
+    project: Project,
+    files: Files,
+    frames: Annotated[str | None, arg(metavar="A-B", help_behavior_hint="")] = None,
     overlay: Annotated[OverlayOptions, arg(name="")] = OverlayOptions(),
 ) -> None:
     """Write the motion in other formats, told by suffix.
@@ -24,8 +24,8 @@ def export(
 
     Args:
         project: Project folder.
-        files: Files to write.
-        frames: First and last frame to write; all by default.
+        files: One file or several; existing ones are replaced.
+        frames: First and last frame to write, such as 120-180; all by default.
         overlay: How the overlay video shows the motion.
     """
     for line in export_files(Workspace(project), files, show, frames, overlay):

@@ -5,11 +5,16 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from keyrecon.commands.arguments import MaybeFile, MaybeWhole, Project, Switch, VideoFile
+
 Points = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="X,Y")]
 Regions = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME:X,Y")]
 
 
-def demo(name: Positional[Literal["tennis", "golf"]] = "tennis", out: Path = Path("demo")) -> None:
+def demo(
+    name: Positional[Literal["tennis", "golf"]] = "tennis",
+    out: Annotated[Path, arg(metavar="FOLDER")] = Path("demo"),
+) -> None:
     """Run the whole job on the built-in synthetic sequence and print its accuracy.
 
     Tennis renders 36 s whose truth is known, finds the player, chooses keyframes, takes the marks
@@ -33,13 +38,13 @@ def demo(name: Positional[Literal["tennis", "golf"]] = "tennis", out: Path = Pat
 
 
 def new(
-    video: Positional[Path],
-    project: Path,
+    video: VideoFile,
+    project: Annotated[Path, arg(metavar="FOLDER")],
     start: int = 0,
-    end: int | None = None,
+    end: MaybeWhole = None,
     slowmo: float = 1.0,
-    skeleton: Path | None = None,
-    golf: bool = False,
+    skeleton: MaybeFile = None,
+    golf: Switch = False,
 ) -> None:
     """Start a project for a video.
 
@@ -49,9 +54,9 @@ def new(
         video: An mp4, mov, mkv or avi file.
         project: Folder to make.
         start: First frame to use.
-        end: Frame after the last one to use.
+        end: Frame after the last one to use; all to the end by default.
         slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
-        skeleton: A JSON file with joints and bones of your own.
+        skeleton: A JSON file with joints and bones of your own instead of the usual 14 joints.
         golf: The video shows a golf swing, which the page asks six clicks for.
     """
     from keyrecon.app.project import start as start_project
@@ -60,7 +65,7 @@ def new(
 
 
 def pick(
-    project: Positional[Path],
+    project: Project,
     frame: int,
     head: Points = (),
     foot: Points = (),
@@ -91,7 +96,7 @@ def pick(
 
 
 def annotate(
-    project: Positional[Path],
+    project: Project,
     port: int = 0,
     host: str = "127.0.0.1",
     browser: bool = True,
@@ -116,7 +121,11 @@ def annotate(
     serve_annotator(Workspace(project), host, port, browser, say)
 
 
-def import_(project: Positional[Path], file: Positional[Path], replace: bool = False) -> None:
+def import_(
+    project: Project,
+    file: Positional[Annotated[Path, arg(metavar="FILE")]],
+    replace: Switch = False,
+) -> None:
     """Take joints from a COCO keypoints JSON, DeepLabCut CSV or CVAT XML file.
 
     Adds to the annotations there are; marks that differ from those in the project are refused
@@ -133,7 +142,10 @@ def import_(project: Positional[Path], file: Positional[Path], replace: bool = F
     print(import_annotations(Workspace(project), file, replace))
 
 
-def evaluate(motion: Positional[Path], truth: Path) -> None:
+def evaluate(
+    motion: Positional[Annotated[Path, arg(metavar="PROJECT")]],
+    truth: Annotated[Path, arg(metavar="FILE")],
+) -> None:
     """Print the accuracy of a motion against a known truth.
 
     Args:
@@ -145,7 +157,7 @@ def evaluate(motion: Positional[Path], truth: Path) -> None:
     print(describe_accuracy(motion, truth))
 
 
-def relink(project: Positional[Path], video: Positional[Path]) -> None:
+def relink(project: Project, video: VideoFile) -> None:
     """Tell a project where its video has moved to.
 
     Args:

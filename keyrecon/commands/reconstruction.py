@@ -1,12 +1,12 @@
 """The commands that take the options of every stage."""
 
-from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from keyrecon.app import keyframing, running
 from keyrecon.app.console import show
+from keyrecon.commands.arguments import MaybeNumber, MaybeWhole, Project, Switch
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 
@@ -14,27 +14,25 @@ Advanced = Annotated[Options, arg(name="")]
 
 
 def keyframes(
-    project: Positional[Path],
-    budget: float | None = None,
-    coverage: float | None = None,
-    reach: int | None = None,
-    method: Literal["best", "paper"] | None = None,
-    force: bool = False,
+    project: Project,
+    budget: MaybeNumber = None,
+    coverage: MaybeNumber = None,
+    reach: MaybeWhole = None,
+    method: Literal["best", "paper"] = "best",
+    force: Switch = False,
     options: Advanced = Options(),
 ) -> None:
-    """Find the player and choose the keyframes to annotate.
+    """Find the player and choose the keyframes to mark.
 
-    Writes keyframes.json and a picture of every keyframe to annotate into keyframes/.
+    Writes keyframes.json and a picture of every keyframe to mark into keyframes/. The options of
+    every stage are listed by `keyrecon keyframes --help-all`; few people ever need them.
 
     Args:
         project: Project folder.
-        budget: Share of frames that a person will mark; a half body is half a frame
-            (default: what the coverage needs, as many as half a minute takes at least, and at
-            most 0.015 from half a minute on, up to 0.06 in a shorter video).
-        coverage: Share of frames that keyframes must stand for, alpha of Eq. 1 (default 0.95).
-        reach: Longest gap to interpolate, T of Eq. 1, in frames at 50 fps (default 10).
-        method: 'paper' tracks, compares and chooses as the paper prints it (Eq. 2-4), for
-            keyrecon run --method paper; 'best' is ours (default).
+        budget: Share of frames that you will mark (default: what the coverage needs, 0.015 at most).
+        coverage: Share of frames that the keyframes must stand for (default: 0.95).
+        reach: Longest gap to interpolate, in frames at 50 frames a second (default: 10).
+        method: 'paper' does it as printed, for `keyrecon run --method paper`.
         force: Make every stage again.
     """
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
@@ -46,22 +44,23 @@ def keyframes(
 
 
 def run(
-    project: Positional[Path],
-    height: float | None = None,
-    method: Literal["best", "paper"] | None = None,
-    partial: bool = False,
-    force: bool = False,
+    project: Project,
+    height: Annotated[float | None, arg(metavar="METRES", help_behavior_hint="")] = None,
+    method: Literal["best", "paper"] = "best",
+    partial: Switch = False,
+    force: Switch = False,
     options: Advanced = Options(),
 ) -> None:
-    """Carry the annotated joints to every frame, lift them to 3D and refine the motion.
+    """Carry the marked joints to every frame, lift them to 3D and refine the motion.
 
-    Writes motion.npz and report.html. An interrupted run goes on where it stopped.
+    Writes motion.npz and report.html. An interrupted run goes on where it stopped. The options of
+    every stage are listed by `keyrecon run --help-all`; few people ever need them.
 
     Args:
         project: Project folder.
-        height: The athlete's height in metres; without it lengths are in body heights.
-        method: 'paper' uses the forms printed in the paper, 'best' ours (default).
-        partial: Go on although keyframes are not annotated yet.
+        height: The player's height, such as 1.80; without it lengths are in body heights.
+        method: 'paper' uses the forms printed in the paper.
+        partial: Go on although keyframes are not marked yet.
         force: Make every stage again.
     """
     workspace = Workspace(project, force)

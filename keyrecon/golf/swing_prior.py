@@ -43,11 +43,12 @@ class SwingPriorOptions:
     left_handed: bool = False
     """The player swings left-handed."""
     stature: Annotated[float, within(0.5, 2.6)] = 1.75
-    """Metres; only for the perspective of a camera close by."""
+    """Height of the player, metres; only for the perspective of a camera close by."""
     focal: Annotated[float, within(0.2, 20)] = 1.2
     """Focal length in picture widths, where nobody knows it."""
     spread: Annotated[float, within(0.001, 0.4)] = 0.02
-    """Standard deviation of a joint of full confidence, player heights."""
+    """How exactly surely placed joints are followed, player heights, as a standard deviation;
+    smaller follows them more."""
     fit: FitOptions = field(default_factory=FitOptions)
     """How the swing is fitted."""
     timing: TimingOptions = field(default_factory=TimingOptions)

@@ -46,23 +46,30 @@ FRAMES_PER_BLOCK = 16
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """How pose distances are measured."""
+    """How poses are compared."""
 
     reach: Annotated[float, within(0.01, 1)] = MAX_MATCH_DISTANCE
-    """Farthest match of two edge elements, player heights; an element without a match counts
-    as much. Larger values let wilder poses match."""
+    """Farthest match of two edge elements, player heights; larger lets wilder poses match.
+
+    An element without a match counts as much.
+    """
     largest: Literal["reach", "observed"] = "reach"
-    """What stands for max B of Section 4.2: the bound `reach`, the same for every video, or the
-    largest mean distance that any two frames of this video have, as printed."""
+    """Distances are shares of the largest there can be ('reach', the same for every video) or of
+    the largest in this video ('observed', as the paper prints it).
+
+    What stands for max B of Section 4.2: the bound `reach`, or the largest mean distance that any
+    two frames of this video have.
+    """
     symmetry: Literal["mean", "max"] = "mean"
-    """How the distances from i to j and from j to i become one."""
+    """How the distances from one frame to another and back become one."""
     cell: Annotated[float, within(0.005, 0.5)] = 1 / 40
-    """Width of a position cell, player heights; smaller is slower and closer to exact."""
+    """Width of the cells in which edge elements are compared, player heights; smaller is slower and
+    closer to exact."""
     directions: Annotated[int, within(4, 360)] = 24
-    """Number of direction cells in a full turn."""
+    """Directions that edge elements are sorted into, in a full turn."""
     most: Annotated[int, within(10, 20_000)] = 4000
-    """Frames compared with one another at most: memory and time of the matrix grow with the
-    square. A longer video is compared by exemplars that stand for their neighbours in time."""
+    """Frames compared with one another at most; a longer video is compared by frames that stand for
+    their neighbours. Memory and time grow with the square."""
 
 
 def compare_frames(

@@ -67,33 +67,51 @@ class KeyframeOptions:
     """How many frames a person is asked to annotate, and what they must stand for."""
 
     budget: Annotated[float, within(1e-06, 1)] | None = None
-    """Annotation cost: (upper + lower keyframes) / 2 per frame of the video; None takes as many as
+    """The same as --budget.
+
+    Annotation cost: (upper + lower keyframes) / 2 per frame of the video; None takes as many as
     reach the coverage at `sufficient_beta`, no fewer than half a minute would, and no more
-    than is usual for its length (`usual_budget`)."""
+    than is usual for its length (`usual_budget`).
+    """
     sufficient_beta: Annotated[float, within(0.001, 1)] = SUFFICIENT_BETA
-    """Pose distance that is near enough: without a budget, keyframes that reach the coverage with
-    it are not added to. Player heights."""
+    """Pose distance that is near enough, player heights: without a budget, keyframes that reach
+    the coverage with it are not added to. Smaller asks for more keyframes."""
     coverage: Annotated[float, within(0.01, 1)] = 0.95
-    """alpha of Eq. 1: share of frames that are represented, or bridged by interpolation."""
+    """The same as --coverage.
+
+    alpha of Eq. 1: share of frames that are represented, or bridged by interpolation.
+    """
     reach: Annotated[int, within(1, 1000)] = 10
-    """T of Eq. 1: longest gap to interpolate, in frames at 50 frames per second; other rates
-    get as much time."""
+    """The same as --reach.
+
+    T of Eq. 1: longest gap to interpolate, in frames at 50 frames per second; other rates get as
+    much time.
+    """
     beta_upper: Annotated[float, within(0, 10)] | None = None
-    """Pose distance up to which a keyframe represents a frame, upper body, player heights; None
-    finds the smallest that the budget allows. With a value the budget does not count."""
+    """How much the upper body may differ from the keyframe that stands for it, player heights. Set,
+    it decides how many keyframes there are, instead of the budget.
+
+    beta of Eq. 1; None finds the smallest that the budget allows.
+    """
     beta_lower: Annotated[float, within(0, 10)] | None = None
     """The same for the lower body."""
     smoothing: Annotated[float, within(0, 1)] = 0.6
-    """Share of consecutive frames whose distance lies below the beta of smoothing; 0 hardly
-    smooths. method='paper' smooths with the beta of the choice instead."""
+    """How strongly pose distances are smoothed over time, 0 to 1; 0 hardly smooths.
+
+    Share of consecutive frames whose distance lies below the beta of smoothing. method='paper'
+    smooths with the beta of the choice instead.
+    """
     pose_time: Annotated[float, within(0, 1)] = 0.2
-    """Share of time that is measured in pose change, 0-1: a frame counts as 1 less this, and this
-    times how much faster than on average its pose changes. So strokes are covered as well as
-    waiting; 0 counts frames alone, as method='paper' does."""
+    """How much fast motion counts for more than waiting, 0 to 1; 0 counts every frame alike, as the
+    paper does.
+
+    Share of time that is measured in pose change: a frame counts as 1 less this, and this times how
+    much faster than on average its pose changes. So strokes are covered as well as waiting.
+    """
     form: Literal["both", "mean"] = "both"
-    """Smoothed distances: rows then columns averaged, or the mean of both averages."""
+    """Smoothed distances: rows then columns averaged ('both'), or the mean of both averages."""
     method: Literal["coverage", "paper"] = "coverage"
-    """'paper': Eq. 2-4 as printed. 'coverage': fewer keyframes for the same coverage."""
+    """'coverage' needs fewer keyframes for the same coverage; 'paper' is the printed form."""
 
 
 @dataclass(frozen=True, eq=False)

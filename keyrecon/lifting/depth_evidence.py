@@ -12,27 +12,50 @@ from keyrecon.ranges import within
 
 @dataclass(frozen=True)
 class DepthSignOptions:
-    """Weights of the evidence for a sign; per frame at 50 frames a second.
+    """What decides which end of a limb is nearer, and how much; per frame at 50 frames a second."""
 
-    Chosen on rendered sequences; see benchmarks/sensitivity.py.
-    """
+    # Values chosen on rendered sequences; see benchmarks/sensitivity.py.
 
     annotated: Annotated[float, within(0, 200)] = 8.0
-    """Cost of contradicting the annotated sign of a bone, nats."""
+    """What it costs to contradict a depth sign that a person gave.
+
+    In nats.
+    """
     joint_limits: Annotated[float, within(0, 3)] = 0.15
-    """Weight of joint limits per frame; errors stay alike over several frames."""
+    """Weight of joints that would bend the wrong way.
+
+    Per frame; errors stay alike over several frames.
+    """
     exemplars: Annotated[float, within(0, 6)] = 0.3
-    """Weight, per frame, of the key poses that are alike in the picture."""
+    """Weight of marked poses that look alike in the picture.
+
+    Per frame.
+    """
     initial_motion: Annotated[float, within(0, 20)] = 1.0
-    """Weight of the slerped key poses per frame."""
+    """Weight of the motion interpolated between marked poses.
+
+    Slerped key poses, per frame.
+    """
     expected_depth: Annotated[float, within(0, 10)] = 0.7
-    """Weight, per frame, of the depth model's expectation."""
+    """Weight of what is usual in motion capture (`--depths`).
+
+    Per frame, of the depth model's expectation.
+    """
     exemplar_spread: Annotated[float, within(0.004, 2)] = 0.08
-    """Standard deviation of bone vectors in the picture between alike poses, statures."""
+    """How much poses that look alike may differ in the picture, body heights.
+
+    Standard deviation of bone vectors.
+    """
     acceleration: Annotated[float, within(0.005, 2)] = 0.1
-    """Standard deviation of the second difference of depth over 1/50 s, statures."""
+    """How much the depth of a bone may change its speed within 1/50 s, body heights.
+
+    Standard deviation of the second difference of depth.
+    """
     max_jump_cost: Annotated[float, within(0, 100)] = 6.0
-    """Largest cost of one jump, nats."""
+    """What a sudden change of depth costs at most.
+
+    In nats.
+    """
 
 
 def at_rate(options: DepthSignOptions, fps: float) -> DepthSignOptions:

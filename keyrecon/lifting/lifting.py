@@ -53,9 +53,13 @@ class LiftOptions:
     """From the picture to space."""
 
     height: Annotated[float, within(0.5, 2.6)] | None = None
-    """Stature of the player, metres; None gives a motion in body heights."""
+    """The same as --height.
+
+    Stature of the player, metres; None gives a motion in body heights.
+    """
     method: Literal["trajectory", "paper"] = "trajectory"
-    """'trajectory': robust fit of bone directions; 'paper': projected gradient descent (Fig. 9)."""
+    """'trajectory' fits the whole motion robustly; 'paper' is projected gradient descent (Fig. 9).
+    """
     lengths: LengthOptions = field(default_factory=LengthOptions)
     depth_signs: DepthSignOptions = field(default_factory=DepthSignOptions)
     refine: RefineOptions = field(default_factory=RefineOptions)

@@ -36,21 +36,28 @@ class LengthOptions:
     """How far the body may differ from the table, and how well joints are known."""
 
     spread: Annotated[float, within(0.006, 2)] = 0.12
-    """Standard deviation of a bone length about the table, relative."""
+    """How far a bone may differ from the table of body proportions, as a share (standard
+    deviation)."""
     tie_spread: Annotated[float, within(0.004, 1)] = 0.07
     """The same for the ratio of thigh to shank and of shoulder bone to shoulder breadth."""
     scale_spread: Annotated[float, within(0.002, 0.6)] = 0.03
-    """Standard deviation of the scale about the tracked height, relative."""
+    """How far the size may differ from the tracked height, as a share (standard deviation)."""
     knot: Annotated[float, within(0.03, 10)] = 0.5
-    """Seconds between the knots of the scale's deviation from the tracked height."""
+    """Seconds between which that difference may change.
+
+    Between the knots of the scale's deviation from the tracked height.
+    """
     click_noise: Annotated[float, within(0.0003, 0.1)] = 0.007
-    """Standard deviation of an annotated joint, in player heights."""
+    """How exact marks are, player heights (standard deviation); more for careless marks."""
     track_noise: Annotated[float, within(0.0004, 0.2)] = 0.009
-    """Standard deviation of a propagated joint of full confidence, in player heights; it grows
-    with the inverse root of the confidence. A quarter more or less: at most 1.2 mm with signs on
-    three of four clips, 3.9 on one. Errors of tracks last, so no video shows them as roughness."""
+    """How exact surely propagated joints are, player heights (standard deviation).
+
+    Of full confidence; it grows with the inverse root of the confidence. A quarter more or less: at
+    most 1.2 mm with signs on three of four clips, 3.9 on one. Errors of tracks last, so no video
+    shows them as roughness.
+    """
     correlation: Annotated[float, within(0, 5)] = 0.15
-    """Seconds over which errors of propagated joints stay alike; they count once."""
+    """Seconds over which errors of propagated joints stay alike and count once."""
 
 
 @dataclass(frozen=True, eq=False)

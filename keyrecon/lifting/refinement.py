@@ -52,50 +52,84 @@ asked how fast the body is. Where one frame in ten jumps, 0.43 of its accelerati
 
 @dataclass(frozen=True)
 class RefineOptions:
-    """How the motion is fitted to the observed joints.
+    """How the motion is fitted to the observed joints."""
 
-    Chosen on rendered sequences; see benchmarks/sensitivity.py.
-    """
+    # Values chosen on rendered sequences; see benchmarks/sensitivity.py.
 
     rounds: Annotated[int, within(1, 1000)] = 12
-    """Steps of the trajectory solver at most."""
+    """Steps of the fit at most; fewer are faster.
+
+    Of the trajectory solver.
+    """
     tolerance: Annotated[float, within(0, 0.1)] = 1e-3
-    """Relative gain below which the trajectory solver stops."""
+    """The fit stops when a step gains less than this share."""
     acceleration: Annotated[float, within(0.0002, 0.08)] = 0.004
-    """Second difference of a bone's end in 1/50 s where the tracks show the bone at rest, body
-    heights."""
+    """How much a resting bone's end may change its speed within 1/50 s, body heights; smaller is
+    smoother.
+
+    Second difference where the tracks show the bone at rest.
+    """
     root_acceleration: Annotated[float, within(0.0003, 0.1)] = 0.006
-    """Expected second difference of the root in 1/50 s, body heights."""
+    """The same for the middle of the hips.
+
+    Expected second difference of the root in 1/50 s.
+    """
     acceleration_window: Annotated[float, within(0.002, 0.6)] = 0.03
-    """Seconds around a frame, as a standard deviation, from which its accelerations are read."""
+    """Seconds around a frame from which it is read how fast it moves.
+
+    As a standard deviation.
+    """
     depth_freedom: Annotated[float, within(0.2, 80)] = 4.0
-    """Variance of accelerations in depth, in those that the picture shows per axis: a limb that
-    swings turns out of the picture. Tried: 1 takes more speed from strokes, 16 gives 2 % more and
-    costs a millimetre."""
+    """How much more a limb may move in depth than in the picture; 1 as much.
+
+    Variance of accelerations in depth, in those that the picture shows per axis: a limb that swings
+    turns out of the picture. Tried: 1 takes more speed from strokes, 16 gives 2 % more and costs a
+    millimetre.
+    """
     breadth_spread: Annotated[float, within(0.002, 0.6)] = 0.03
-    """How far hip and shoulder breadth may stray, body heights."""
+    """How far the breadth of hips and shoulders may change, body heights."""
     head_spread: Annotated[float, within(0.02, 7)] = 0.35
     """How far the head may lean out of the trunk's line, radians."""
     balance_spread: Annotated[float, within(0.003, 1)] = 0.055
-    """How far the middle of the trunk may be from above the feet along the line of sight, body
-    heights; 0.03-0.08 in every activity."""
+    """How far the trunk may be from above the feet along the line of sight, body heights.
+
+    0.03-0.08 in every activity.
+    """
     balance_correlation: Annotated[float, within(0, 5)] = 0.15
-    """Seconds over which a lack of balance lasts; it counts once."""
+    """Seconds over which a lack of balance lasts and counts once."""
     bend_noise: Annotated[float, within(0.006, 2)] = 0.12
-    """Error of a limb's bend in the picture, as a difference of unit directions: two eyes place
-    hips 2.2 % of the height apart per axis, knees and ankles 1 %, and a thigh is 24 % long."""
+    """How exact the bend of a limb in the picture is, as a difference of directions.
+
+    Of unit directions: two eyes place hips 2.2 % of the height apart per axis, knees and ankles 1
+    %, and a thigh is 24 % long.
+    """
     bend_correlation: Annotated[float, within(0, 5)] = 0.15
-    """Seconds over which a bend lasts; it counts once."""
+    """Seconds over which a bend lasts and counts once."""
     expectation: Annotated[float, within(0, 5)] = 0.15
-    """Seconds over which errors of a depth model stay alike; they count once."""
+    """Seconds over which errors of `--depths` stay alike and count once.
+
+    Of a depth model.
+    """
     key_spread: Annotated[float, within(0.02, 8)] = 0.4
-    """How far a bone may turn away from the slerped key poses at no great cost, radians."""
+    """How far a bone may turn away from the motion between marked poses, radians.
+
+    At no great cost; the slerped key poses.
+    """
     step: Annotated[float, within(0.001, 2)] = 0.2
-    """lambda of Fig. 9."""
+    """With method 'paper': step of the descent.
+
+    lambda of Fig. 9.
+    """
     descents: Annotated[int, within(1, 100_000)] = 3000
-    """Iterations of Fig. 9 at most; it stops where it has converged."""
+    """With method 'paper': steps at most; it stops where it has converged.
+
+    Of Fig. 9.
+    """
     sigma: Annotated[float, within(0.01, 50)] = 0.5
-    """Standard deviation of the low-pass of Fig. 9, frames."""
+    """With method 'paper': how strongly the motion is smoothed, frames.
+
+    Standard deviation of the low-pass of Fig. 9.
+    """
 
 
 def refine_motion(

@@ -78,17 +78,27 @@ class PropagateOptions:
     """How joints are propagated to the frames that nobody annotated."""
 
     method: Literal["fused", "paper"] = "fused"
-    """'paper': from the assigned keyframe alone; joints hidden there are missing. 'fused': from
-    several keyframes and both neighbours in time; every joint gets a place and a confidence."""
+    """'fused' carries joints from several keyframes and both neighbours in time; 'paper' from the
+    assigned keyframe alone, without what is hidden there.
+
+    'fused' gives every joint a place and a confidence.
+    """
     similar: Annotated[int, within(1, 40)] = 3
-    """Keyframes fitted to each frame; more take longer. Halved or doubled, others with it: at most
-    0.1 points, 0.3 mm on one clip."""
+    """Keyframes fitted to each frame; more take longer.
+
+    Halved or doubled, others with it: at most 0.1 points, 0.3 mm on one clip.
+    """
     elements: Annotated[int, within(8, 2000)] = 96
-    """Edge elements per frame and half of the body at most; more take longer. A quarter more or
-    less: at most 0.4 points, 0.4 mm on one clip."""
+    """Edge elements per frame and half of the body at most; more take longer.
+
+    A quarter more or less: at most 0.4 points, 0.4 mm on one clip.
+    """
     rounds: Annotated[int, within(1, 100)] = 3
-    """Times that edges are matched anew in the final least squares. Two or four: at most 0.6 mm on
-    three of four clips, 3.9 on one, which other clicks change as much."""
+    """Times that edges are matched anew in the last fit; more take longer.
+
+    Two or four: at most 0.6 mm on three of four clips, 3.9 on one, which other clicks change as
+    much.
+    """
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,11 +73,12 @@ class BackgroundOptions:
     """How the scene is sampled."""
 
     samples: Annotated[int, within(3, 1000)] = 48
-    """Frames that the median is taken over."""
+    """Frames from which the scene without the player is made; more are slower."""
     player: Annotated[float, within(24, 1000)] = 128.0
-    """Height of the player in the background, px."""
+    """Height of the player in the pictures of the scene, px."""
     sure: Annotated[float, within(0.3, 30)] = 3.0
-    """A pixel this many deviations off is as likely the player as not."""
+    """A pixel that differs from the scene by this many standard deviations is as likely the player
+    as not."""
 
 
 def build_background(

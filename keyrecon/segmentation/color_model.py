@@ -68,7 +68,11 @@ class ColorOptions:
     """How colours are weighed."""
 
     surroundings: Annotated[float, within(0.01, 100)] = 1.0
-    """k: weight of the surroundings against a part; higher finds less and is surer."""
+    """How much the colours around a part count against it; higher finds less of the player and is
+    surer.
+
+    k of the log ratio.
+    """
 
 
 def learn_colors(

@@ -44,9 +44,10 @@ class EdgeOptions:
     """How regions and edges are traced."""
 
     player: Annotated[int, within(24, 1000)] = 112
-    """Player height in the crops, px; smaller is faster and coarser."""
+    """Height of the player in the crops, px; smaller is faster and coarser."""
     step: Annotated[float, within(0.004, 0.2)] = 0.018
-    """Distance between edge elements along a contour, player heights."""
+    """Distance between edge elements along an outline, player heights; larger is faster and
+    coarser."""
     most: Annotated[int, within(20, 10_000)] = 400
     """Edge elements of one frame at most."""
 

@@ -94,9 +94,9 @@ class CameraPlanOptions:
     pan: bool = False
     """Follow the player instead of standing still."""
     width: Annotated[int, within(64, 7680)] = 1280
-    """px"""
+    """Width of the video, px."""
     height: Annotated[int, within(64, 4320)] = 720
-    """px"""
+    """Height of the video, px."""
     player_px: Annotated[float, within(20, 4000)] = 320.0
     """Stature of the standing player in the picture; a static camera shrinks it to keep everything
     in the picture."""

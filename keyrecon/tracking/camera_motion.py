@@ -66,10 +66,11 @@ class CameraMotionOptions:
     width: Annotated[int, within(64, 4096)] = 480
     """Pictures are reduced to this width, px; smaller is faster and less exact."""
     static: Annotated[float, within(0, 20)] = 0.6
-    """If background corners stay within this of their place in 95 % of the frames, the camera is
-    static, px of the reduced picture."""
+    """The camera is taken to stand still if the background stays within this of its place in 95 %
+    of the frames, px of the reduced picture."""
     leave: Annotated[float, within(0.02, 1)] = 0.3
-    """A new key picture is taken when the view has moved by this share of the picture."""
+    """A new picture to compare with is taken when the view has moved by this share of the picture.
+    """
 
 
 @dataclass(frozen=True, eq=False)

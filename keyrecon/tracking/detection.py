@@ -67,23 +67,35 @@ class FindOptions:
     """How the player is detected."""
 
     player: Annotated[float, within(24, 600)] = 96.0
-    """Height of the player in the searched pictures, px; smaller is faster and less exact. Halved,
-    others with it: at most 0.8 points, 0.6 mm on one clip."""
+    """Height of the player in the searched pictures, px; smaller is faster and less exact.
+
+    Halved, others with it: at most 0.8 points, 0.6 mm on one clip.
+    """
     pace: Annotated[float, within(1, 10_000)] = 12.5
-    """Pictures searched per second of the video; between them the player is interpolated. Halved,
-    others with it: at most 0.8 points, 0.6 mm on one clip."""
+    """Pictures searched per second of the video; the player is interpolated between them. More
+    for very fast motion; slower.
+
+    Halved, others with it: at most 0.8 points, 0.6 mm on one clip.
+    """
     head_speed: Annotated[float, within(0.1, 60)] = 3.0
-    """Usual speed of the head, player heights per second. Halved, others with it: at most 0.8
-    points, 0.6 mm on one clip."""
+    """Usual speed of the head, player heights per second; higher for wilder motion.
+
+    Halved, others with it: at most 0.8 points, 0.6 mm on one clip.
+    """
     foot_speed: Annotated[float, within(0.2, 100)] = 5.0
-    """Usual speed of the feet, player heights per second. Halved, others with it: at most 0.8
-    points, 0.6 mm on one clip."""
+    """Usual speed of the feet, player heights per second; higher for wilder motion.
+
+    Halved, others with it: at most 0.8 points, 0.6 mm on one clip.
+    """
     envelope: Annotated[float, within(0.2, 100)] = 5.0
-    """The standing height may change over this time, seconds. Halved, others with it: at most 0.8
-    points, 0.6 mm on one clip."""
+    """Seconds in which the player may come nearer or go away by much; less for a camera that zooms
+    fast.
+
+    Halved, others with it: at most 0.8 points, 0.6 mm on one clip.
+    """
     detected: Annotated[float, within(0, 1)] = 0.4
-    """Share of the searched frames in which a head must be detected for a track to be believed;
-    lower it for a player who is out of the picture most of the time."""
+    """Share of the searched frames in which a head must be found for a track to be believed; lower
+    it for a player who is out of the picture most of the time."""
 
 
 def find_player(

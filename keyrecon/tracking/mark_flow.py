@@ -39,20 +39,31 @@ class FlowOptions:
     """How marked joints are followed."""
 
     player: Annotated[float, within(24, 1000)] = 160.0
-    """Height of the player in the pictures, px; smaller is faster. Tried on a rendered and three
-    real videos: 240 and 120 have as many joints right (within half a point)."""
+    """Height of the player in the pictures, px; smaller is faster.
+
+    Tried on a rendered and three real videos: 240 and 120 have as many joints right (within half a
+    point).
+    """
     window: Annotated[float, within(0.03, 1)] = 0.13
-    """Side of the window that is matched, player heights: a forearm's length, two wrists. Tried:
-    with .1, of the joints that flow is sure of, 1-4 of a hundred more are wrong."""
+    """Side of the patch about a joint that is followed, player heights; larger holds longer and is
+    less exact.
+
+    A forearm's length, two wrists. Tried: with .1, of the joints that flow is sure of, 1-4 of a
+    hundred more are wrong.
+    """
     longest: Annotated[float, within(0, 60)] = 3.0
-    """Marks farther apart than this are not joined, seconds."""
+    """Joints are followed between marks that lie no farther apart than this, seconds."""
     gap: Annotated[float, within(0.002, 0.6)] = 0.03
-    """Distance of the two ways at which they begin to disagree, player heights: two eyes mark the
-    same joint .016 apart in the median, .042 in the worst tenth."""
+    """Distance, in player heights, at which what is followed from the mark before and from the mark
+    after begin to disagree.
+
+    Two eyes mark the same joint .016 apart in the median, .042 in the worst tenth.
+    """
     likeness: Annotated[float, within(0, 1)] = 0.5
-    """Correlation with the better of both marks' patches at which a place is half believed."""
+    """How much a place must look like the better of both marks to be half believed, a correlation
+    from 0 to 1."""
     lone_likeness: Annotated[float, within(0, 1)] = 0.7
-    """The same with the only mark's, where there is one way only."""
+    """The same where there is a mark on one side only."""
 
     def side(self, height: float) -> int:
         """Side of the window for a player of some px, odd."""

@@ -47,14 +47,22 @@ class ShotOptions:
     """Which shots are worked on, where a video has several."""
 
     shortest: Annotated[float, within(0, 60)] = 0.5
-    """Shots of less are left out, seconds: no stroke is that short."""
+    """Shorter shots are left out, seconds.
+
+    No stroke is that short.
+    """
     alike: Annotated[float, within(0, 1)] = 0.5
-    """Correlation of the player's colours with those of the shots with clicks or marks, as a share
-    of what frames of these have with one another, from which a shot shows the player."""
+    """How alike the colours must be for a shot to show the player, from 0 to 1; lower it where
+    shots are left out that show the player.
+
+    Correlation of the player's colours with those of the shots with clicks or marks, as a share of
+    what frames of these have with one another.
+    """
     use: str = ""
-    """Numbers of shots that are used whatever they seem to show, such as '3,5'; the first is 1."""
+    """Shots that are used whatever they seem to show, by number: '3,5'. `keyrecon keyframes` lists
+    them; the first is 1."""
     skip: str = ""
-    """Numbers of shots that are left out."""
+    """Shots that are left out, by number: '2'."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,25 +92,39 @@ class TrackOptions:
     """How the player is tracked."""
 
     method: Literal["filters", "paper"] = "filters"
-    """'filters': trained on the clear frames; 'paper': colour and radial symmetry alone."""
+    """'filters' learn the player's looks from the clear frames; 'paper' has colour and radial
+    symmetry alone."""
     player: Annotated[float, within(24, 600)] = 56.0
-    """Height of the player in the crops, px; smaller is faster and less exact. Halved, others with
-    it: at most 0.5 points, 0.8 mm on one clip."""
+    """Height of the player in the crops, px; smaller is faster and less exact.
+
+    Halved, others with it: at most 0.5 points, 0.8 mm on one clip.
+    """
     examples: Annotated[int, within(4, 5000)] = 160
-    """Frames that the filters are trained on, at most. Halved, others with it: at most 1.0 points,
-    0.2 mm on one clip."""
+    """Frames that the filters learn from, at most; fewer are faster.
+
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip.
+    """
     head_speed: Annotated[float, within(0.1, 60)] = 3.0
-    """Usual speed of the head, player heights per second. Halved, others with it: at most 1.0
-    points, 0.2 mm on one clip."""
+    """Usual speed of the head, player heights per second; higher for wilder motion.
+
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip.
+    """
     foot_speed: Annotated[float, within(0.1, 40)] = 2.0
     """Usual speed of the feet, player heights per second; a step is faster, a stance slower.
-    Halved, others with it: at most 1.0 points, 0.2 mm on one clip."""
+
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip.
+    """
     foot_rate: Annotated[float, within(0.2, 80)] = 4.0
-    """Feet that move to and fro more often than this are smoothed, times per second. Halved, others
-    with it: at most 1.0 points, 0.2 mm on one clip."""
+    """Feet that move to and fro more often than this are smoothed, times per second.
+
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip.
+    """
     envelope: Annotated[float, within(0.2, 100)] = 5.0
-    """The standing height may change over this time, seconds. Halved, others with it: at most 1.0
-    points, 0.2 mm on one clip."""
+    """Seconds in which the player may come nearer or go away by much; less for a camera that zooms
+    fast.
+
+    Halved, others with it: at most 1.0 points, 0.2 mm on one clip.
+    """
 
 
 def track_player(

@@ -2,7 +2,7 @@
 
 ITF Rules of Tennis 2024, rule 1 and appendix VIII: 23.77 m by 10.97 m, singles 8.23 m wide, service
 lines 6.40 m from the net, the net 0.914 m high in the middle and 1.07 m at its posts, which stand
-0.914 m outside the court. Distances are measured to the outside of the lines, so that the middle of
+0.914 m outside the court. Courts are laid out to the outside of the lines, so that the middle of
 a line lies half its width further in.
 
 World axes, the same everywhere: origin on the ground at the middle of the net, x along the net to
@@ -29,8 +29,8 @@ class CourtOptions:
     """How the lines are painted."""
 
     line_width: float = 0.05
-    """Width of all lines but the baselines, metres. Distances are measured to the outside of the
-    lines; 0 where they are measured to their middles."""
+    """Width of all lines but the baselines, metres. Courts are laid out to the outside of the
+    lines; 0 where to their middles."""
     baseline_width: float = 0.10
     """Width of the baselines, metres: up to 0.10 by the rules, and so on most courts."""
 

@@ -1,13 +1,13 @@
 """report.html in windows of several widths."""
 
 import pytest
-from page_driver import CHROMIUM
+from page_driver import BROWSER
 from report_material import make_material, on_court
 
 from keyrecon.report.page import write_report
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE REPORT IS NOT OPENED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE REPORT IS NOT OPENED: there is no browser at {BROWSER}"
 )
 TOPS = """
 [...document.querySelectorAll(".still")].map((still) => [

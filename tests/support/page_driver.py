@@ -3,6 +3,7 @@
 import asyncio
 import json
 import math
+import os
 import re
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,8 @@ from keyrecon.app.annotator import listen, make_credentials
 from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
 
-CHROMIUM = Path("/usr/bin/chromium")
+BROWSER = Path(os.environ.get("KEYRECON_BROWSER", "/usr/bin/chromium"))
+"""The program that shows the page; one with `firefox` in its name is driven as Firefox is."""
 SCREEN = {"width": 1366, "height": 768}
 SELECTED = "document.querySelector('.joint.selected')?.dataset.joint"
 SOON = 60_000
@@ -70,11 +72,14 @@ def serving(folder, assistant=Assistant(), commands=None):
 
 @contextmanager
 def browser():
-    """Chromium from the system; nothing is downloaded."""
+    """A browser of the system; nothing is downloaded."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
-        opened = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        if "firefox" in BROWSER.name:
+            opened = play.firefox.launch(executable_path=str(BROWSER), channel="moz-firefox")
+        else:
+            opened = play.chromium.launch(executable_path=str(BROWSER), args=["--no-sandbox"])
         yield opened
         opened.close()
 

@@ -60,17 +60,35 @@ class WeightOptions:
     """How much each type of observation counts against the joints; 0 leaves it out."""
 
     joints: Annotated[float, within(0, 20)] = 1.0
-    """Tracked joints; their residuals are in standard deviations."""
+    """Weight of tracked joints.
+
+    Their residuals are in standard deviations.
+    """
     club: Annotated[float, within(0, 20)] = 1.0
-    """Ends of the club, in standard deviations."""
+    """Weight of the ends of the club.
+
+    In standard deviations.
+    """
     marks: Annotated[float, within(0, 20)] = 1.0
-    """Joints that a person marked; every marked frame counts as independent of all others."""
+    """Weight of joints that a person marked.
+
+    Every marked frame counts as independent of all others.
+    """
     foreground: Annotated[float, within(0, 10)] = 0.5
-    """Lines of sight through the player's mask, made commensurate with the joints."""
+    """Weight of filling the player's outline.
+
+    Lines of sight through the player's mask, made commensurate with the joints.
+    """
     silhouette: Annotated[float, within(0, 3)] = 0.15
-    """Limbs that project outside of the mask, made commensurate with the joints."""
+    """Weight of keeping limbs within the player's outline.
+
+    Limbs that project outside of the mask, made commensurate with the joints.
+    """
     matches: Annotated[float, within(0, 10)] = 0.5
-    """Surface points matched between consecutive frames, made commensurate with the joints."""
+    """Weight of points of the player that are followed from frame to frame.
+
+    Surface points matched between consecutive frames, made commensurate with the joints.
+    """
 
 
 @dataclass(frozen=True)
@@ -78,19 +96,26 @@ class FitOptions:
     """How a swing is fitted."""
 
     components: Annotated[int, within(1, 1000)] = 40
-    """Components used at most; the paper used 4 of its 10 swings."""
+    """Components of the prior used at most; fewer keep nearer to its mean swing.
+
+    The paper used 4 of its 10 swings.
+    """
     weights: WeightOptions = field(default_factory=WeightOptions)
-    """Observations."""
+    """What the fit looks at."""
     priors: PriorOptions = field(default_factory=PriorOptions)
-    """Regularisation."""
+    """What is expected of a swing."""
     follow: bool = True
-    """Segments turn away from the motion model where the picture departs from it."""
+    """The body may depart from the model of swings where the picture does."""
     robust: Annotated[float, within(0.1, 60)] = 3.0
-    """Standard deviations beyond which a joint or club end counts less."""
+    """A joint or an end of the club that is farther off than this many standard deviations counts
+    less."""
     time_knots: Annotated[float, within(0.005, 2)] = 0.1
-    """Seconds between knots of the normalised time."""
+    """Seconds between which the pace of the swing may change; more is smoother.
+
+    Between knots of the normalised time.
+    """
     root_knots: Annotated[float, within(0.02, 8)] = 0.4
-    """Seconds between knots of the player's place and turn."""
+    """Seconds between which the player's place and turn may change; more is smoother."""
     steps: Annotated[int, within(1, 1000)] = 25
     """Steps of the solver at most."""
 

@@ -21,26 +21,48 @@ from keyrecon.ranges import within
 
 @dataclass(frozen=True)
 class PriorOptions:
-    """Standard deviations of what is expected; chosen on rendered swings (benchmarks/golf.py)."""
+    """Standard deviations of what is expected of a swing."""
+
+    # Values chosen on rendered swings (benchmarks/golf.py).
 
     coefficients: Annotated[float, within(0.05, 20)] = 1.0
-    """Of every coefficient; 1 is the spread of the database."""
+    """How far the swing may differ from the mean one, in standard deviations of the captured
+    swings.
+
+    Of every coefficient; 1 is the spread of the database.
+    """
     timing: Annotated[float, within(0.004, 2)] = 0.08
-    """Seconds by which the first guess of the normalised time is early or late."""
+    """Seconds by which the first guess of the timing is early or late."""
     rest: Annotated[float, within(0.0003, 0.1)] = 0.005
-    """Of the normalised time where the player stands still by that guess."""
+    """How far the swing may go on where the player stands still by that guess, as a share of the
+    swing.
+
+    Of the normalised time.
+    """
     relax: Annotated[float, within(0.003, 1)] = 0.05
-    """Of the normalised time after the finish: many let the arms sink the way they came."""
+    """The same after the finish.
+
+    Of the normalised time: many let the arms sink the way they came.
+    """
     pace: Annotated[float, within(0.07, 30)] = 1.5
-    """Of the change of pace, normalised time per second squared, from what was guessed."""
+    """How fast the pace may change from what was guessed, swings per second squared.
+
+    Of the change of pace, normalised time per second squared.
+    """
     turn: Annotated[float, within(0.004, 1)] = 0.07
-    """Radians that G turns in a second beyond the learnt motion."""
+    """How far the player may turn beyond the learnt swing, radians per second.
+
+    Of G.
+    """
     shift: Annotated[float, within(0.002, 0.8)] = 0.04
-    """Metres that G shifts in a second beyond the learnt motion."""
+    """How far the player may shift beyond the learnt swing, metres per second.
+
+    Of G.
+    """
     roll: Annotated[float, within(0.002, 0.6)] = 0.03
-    """Radians by which the camera leans sideways."""
+    """How far the camera may lean sideways, radians."""
     pitch: Annotated[float, within(0.003, 1)] = 0.06
-    """Radians by which the camera looks up or down."""
+    """How far the camera may look up or down, radians."""
 
 
 NOWHERE = np.zeros(0, np.int64)

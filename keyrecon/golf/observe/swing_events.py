@@ -49,21 +49,33 @@ class TimingOptions:
     """How a swing is recognised; lengths in player heights, times in seconds."""
 
     upswing: Annotated[float, within(0.06, 20)] = 1.2
-    """Longest time from the top to the hit, slowed down threefold at most."""
+    """Longest time from the top to the hit, seconds.
+
+    Slowed down threefold at most.
+    """
     finish: Annotated[float, within(0.08, 30)] = 1.6
-    """Longest time from the hit to the highest hands of the finish."""
+    """Longest time from the hit to the highest hands of the finish, seconds."""
     rise: Annotated[float, within(0, 3)] = 0.15
-    """The hands must rise by this before and after the hit."""
+    """Height by which the hands must rise before and after the hit, player heights."""
     valley: Annotated[float, within(0, 1)] = 0.05
-    """Hands lower than the highest ones by less still are at the top."""
+    """Hands no more than this below the highest ones are still at the top, player heights."""
     smooth: Annotated[float, within(0.001, 1)] = 0.03
-    """Standard deviation of the low-pass."""
+    """How strongly the path of the hands is smoothed, seconds.
+
+    Standard deviation of the low-pass.
+    """
     address: Annotated[float, within(0, 0.6)] = 0.03
-    """Movement of hands and head together by which a club has left its address."""
+    """Movement of hands and head together from which the swing has begun, player heights."""
     rest: Annotated[float, within(0.001, 1)] = 0.1
-    """Speed at the finish, where the club sways on behind resting hands, as a share of its peak."""
+    """Speed at which the swing is finished, as a share of its fastest.
+
+    The club sways on behind resting hands.
+    """
     pause: Annotated[float, within(0, 5)] = 0.05
-    """Time for which it must rest there: many let it sink at once."""
+    """Seconds for which it must rest there.
+
+    Many let it sink at once.
+    """
 
 
 def find_key_frames(

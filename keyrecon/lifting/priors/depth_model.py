@@ -145,27 +145,46 @@ class DepthTrainingOptions:
     """How a depth model is learnt."""
 
     poses: Annotated[int, within(1, 100_000_000)] = 400_000
-    """Poses drawn, rounded up to batches of 20000."""
+    """Poses drawn from the captures; more take longer.
+
+    Rounded up to batches of 20000.
+    """
     ridge: Annotated[float, within(1e-09, 10)] = 1e-4
-    """What a squared coefficient costs, in mean squared errors."""
+    """How strongly the polynomial is kept small.
+
+    What a squared coefficient costs, in mean squared errors.
+    """
     limb_turn: Annotated[float, within(0, 2)] = 0.2
-    """Standard deviation by which limbs are turned, radians per axis; half of it within limbs
-    and for the body above the hips."""
+    """How far limbs are turned to make further poses, radians.
+
+    Standard deviation per axis; half of it within limbs and for the body above the hips.
+    """
     camera_up: tuple[Annotated[float, within(-90, 90)], Annotated[float, within(-90, 90)]] = (
         -3.0,
         20.0,
     )
-    """Range of the angle by which the camera looks down, degrees: from a tripod to a stand. Tried:
-    up to 32, where volleys filmed from 29 degrees above are 1 mm better, and ground strokes filmed
-    from a tripod, without signs from the person, 6 mm worse."""
+    """Least and greatest angle by which the camera looks down, degrees.
+
+    From a tripod to a stand. Tried: up to 32, where volleys filmed from 29 degrees above are 1 mm
+    better, and ground strokes filmed from a tripod, without signs from the person, 6 mm worse.
+    """
     camera_roll: Annotated[float, within(0, 90)] = 1.5
-    """Standard deviation of the camera's roll, degrees."""
+    """How far the camera leans sideways, degrees.
+
+    Standard deviation.
+    """
     length_error: Annotated[float, within(0, 1)] = 0.06
-    """Standard deviation of bone lengths, as shares."""
+    """How far bone lengths are wrong, as a share.
+
+    Standard deviation.
+    """
     joint_error: Annotated[float, within(0, 1)] = 0.04
-    """Standard deviation of a bone's vector in the picture, in lengths of the bone."""
+    """How far joints are wrong in the picture, in lengths of the bone.
+
+    Standard deviation of a bone's vector.
+    """
     seed: Annotated[int, SEEDS] = 0
-    """Of the poses drawn."""
+    """Number from which the poses are drawn; another one gives others."""
 
 
 def train_depth_model(

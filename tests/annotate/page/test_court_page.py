@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_driver import CHROMIUM, Person, serving
+from page_driver import BROWSER, Person, serving
 from painted_court import camera_at, paint
 
 from keyrecon.annotate.assist.answers import make_assistant
@@ -13,7 +13,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.world.court import POINTS
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 CAMERA = camera_at((0.4, -32, 9), (0, -2, 0), 1.5)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from golfer import Golfer
-from page_driver import CHROMIUM, serving
+from page_driver import BROWSER, serving
 
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.app.annotator import job_commands
@@ -22,7 +22,7 @@ from keyrecon.metrics import read_truth
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 ORDER = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")

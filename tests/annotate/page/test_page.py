@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from page_driver import CHROMIUM, SCREEN, Person, far, serving
+from page_driver import BROWSER, SCREEN, Person, far, serving
 from page_project import (
     FPS,
     FRAMES,
@@ -30,7 +30,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.formats.coco import read_coco
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 POINTS3D, POINTS2D = truth()
 

@@ -2,13 +2,13 @@
 
 import pytest
 from numbered_videos import turn
-from page_driver import CHROMIUM, SCREEN, Person, serving
+from page_driver import BROWSER, SCREEN, Person, serving
 from page_project import make_project, write_numbered_video
 
 from keyrecon import KeyreconError
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 UPRIGHT = """
 () => {

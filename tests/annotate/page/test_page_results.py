@@ -6,7 +6,7 @@ from typing import get_args
 
 import av
 import pytest
-from page_driver import CHROMIUM, Person, serving
+from page_driver import BROWSER, Person, serving
 from page_project import (
     FPS,
     SIZE,
@@ -24,7 +24,7 @@ from keyrecon.io.formats.export import SUFFIXES
 from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 SCREENS = ((1440, 900), (1920, 1080))
 POINTS2D = truth()[1]

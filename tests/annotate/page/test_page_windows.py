@@ -2,11 +2,11 @@
 
 import pytest
 from overlaps import OVERLAPS, PARTS
-from page_driver import CHROMIUM, Person, serving
+from page_driver import BROWSER, Person, serving
 from page_project import make_project, write_numbered_video
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 WINDOWS = ((1920, 1080), (1366, 768), (1100, 500), (1024, 768), (768, 1024), (600, 900), (390, 800))
 

@@ -5,7 +5,7 @@ import json
 import pytest
 from golfer import Golfer
 from overlaps import OVERLAPS, PARTS
-from page_driver import CHROMIUM, serving
+from page_driver import BROWSER, serving
 from page_project import CLUB, FRAMES, make_golf_project, truth, write_numbered_video
 
 from keyrecon.annotate.assist.answers import make_assistant
@@ -13,7 +13,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 DOUBTS = ("the downswing takes 0.62 s (frame 40)", "both hands lie off the player (frame 47)")
 WRIST = LSP14.index("left_wrist")

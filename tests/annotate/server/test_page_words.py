@@ -11,7 +11,7 @@ from keyrecon.annotate.server.page_words import in_page_words
 
 PACKAGE = Path(keyrecon.__file__).parent
 ELSEWHERE = (
-    *("cli.py", "cli_commands", "demo.py", "golf_commands.py", "golf_demo.py"),
+    *("cli.py", "commands", "demo.py", "golf_demo.py"),
     *("golf_training.py", "golf_page.py", "depth_training.py", "model_file.py", "synthetic"),
     *("paper", "annotator.py", "page_words.py", "address.py", "security.py"),
 )

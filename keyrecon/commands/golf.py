@@ -7,26 +7,23 @@ the options records of the stages, for programs, with the evidence for each valu
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
-from tyro.extras import SubcommandApp
+from tyro.conf import arg
 
 from keyrecon.app import golf as golf_job
 from keyrecon.app import golf_comparing
 from keyrecon.app import golf_training as mocap_swings
 from keyrecon.app.console import show
+from keyrecon.commands.arguments import Files, MaybeFile, Project, Switch, VideoFile
 from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.prior.training import TrainOptions
 from keyrecon.golf.prior.variation import VariationOptions
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR
 
-golf = SubcommandApp()
 
-
-@golf.command(name="train")
-def train_(
-    swings: Positional[tuple[Path, ...]],
-    out: Path = Path("prior.npz"),
+def train(
+    swings: Files,
+    out: Annotated[Path, arg(metavar="FILE")] = Path("prior.npz"),
     components: int = TrainOptions().components,
     variations: int = VariationOptions().count,
     seed: int = VariationOptions().seed,
@@ -40,22 +37,23 @@ def train_(
         out: File to write.
         components: Components kept at most; a fit may use fewer still.
         variations: Plausible variations that join each capture; 0 for captures alone.
-        seed: Of the variations.
+        seed: Number from which the variations are drawn; another one gives others.
     """
     options = TrainOptions(components, VariationOptions(variations, seed))
     print(mocap_swings.train(swings, out, options, show))
 
 
-@golf.command
 def fit(
-    video: Positional[Path],
-    clicks: Path | None = None,
-    out: Path = Path("swing"),
-    prior: Annotated[Path, arg(help_behavior_hint="(default: built-in)")] = BUILT_IN_SWING_PRIOR,
+    video: VideoFile,
+    clicks: MaybeFile = None,
+    out: Annotated[Path, arg(metavar="FOLDER")] = Path("swing"),
+    prior: Annotated[
+        Path, arg(metavar="FILE", help_behavior_hint="(default: built-in)")
+    ] = BUILT_IN_SWING_PRIOR,
     slowmo: float = 1.0,
     method: Literal["swing", "windows"] = "swing",
     components: int = FitOptions().components,
-    force: bool = False,
+    force: Switch = False,
 ) -> None:
     """Fit the swing prior to a video of one swing, filmed from one place.
 
@@ -90,9 +88,10 @@ def fit(
     print(golf_job.fit_file(video, clicks, out, prior, slowmo, force, options, show))
 
 
-@golf.command
 def compare(
-    first: Positional[Path], second: Positional[Path], out: Path = Path("compare.html")
+    first: Project,
+    second: Project,
+    out: Annotated[Path, arg(metavar="FILE")] = Path("compare.html"),
 ) -> None:
     """Two fitted swings side by side, aligned at address, top, hit and finish.
 
