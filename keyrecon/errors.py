@@ -41,3 +41,8 @@ def explain(fault: Exception) -> str:
 def quoted(path: Path) -> str:
     """A path as it is typed on a command line that a message proposes."""
     return shlex.quote(str(path))
+
+
+def counted(number: int, what: str) -> str:
+    """1 frame, 2 frames."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

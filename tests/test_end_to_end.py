@@ -159,10 +159,10 @@ def test_keyframes_without_marks_are_named(clip, solved):
     workspace.annotations_file.rename(clip / "aside.json")
     try:
         workspace.annotations_file.write_text(json.dumps(data))
-        with pytest.raises(KeyreconError, match=rf"1 of .* not annotated: frame {gone} "):
+        with pytest.raises(KeyreconError, match=rf"1 of .* not marked yet: frame {gone} "):
             running.run(workspace, workspace.options(Options(), Options()), silent)
         workspace.annotations_file.unlink()
-        with pytest.raises(KeyreconError, match="not annotated"):
+        with pytest.raises(KeyreconError, match="not marked yet"):
             running.run(workspace, workspace.options(Options(), Options()), silent)
     finally:
         (clip / "aside.json").rename(workspace.annotations_file)

@@ -9,8 +9,8 @@ from jaxtyping import UInt8
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.app.preparing import describe_shots, prepare_project, with_chosen_shots
-from keyrecon.app.project import counted, load_annotations
-from keyrecon.errors import quoted
+from keyrecon.app.project import load_annotations
+from keyrecon.errors import counted, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.frame_reader import side_by_side

@@ -12,7 +12,7 @@ from keyrecon.annotate.store.cells import (
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
-from keyrecon.errors import KeyreconError, quoted
+from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
@@ -61,11 +61,6 @@ def start(
         f"mark it in another tool, then keyrecon import {quoted(folder)} FILE and keyrecon "
         f"keyframes {quoted(folder)}; keyrecon pick teaches the colours by clicks instead."
     )
-
-
-def counted(number: int, what: str) -> str:
-    """1 frame, 2 frames."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def point(text: str, flag: str) -> tuple[float, float]:
@@ -136,7 +131,7 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
     warnings = [*joints_outside(merged, size), *implausible_bones(merged)]
     return "\n".join(
         [
-            f"{workspace.annotations_file}: marks on {len(merged.frames)} frames.",
+            f"{workspace.annotations_file}: marks on {counted(len(merged.frames), 'frame')}.",
             *(f"Warning: {text}" for text in warnings),
             f"Next: keyrecon run {quoted(workspace.folder)}",
         ]
@@ -146,7 +141,8 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
 def _conflict_error(conflicts: list[str]) -> KeyreconError:
     listed = ", ".join(conflicts[:5]) + (" ..." if len(conflicts) > 5 else "")
     return KeyreconError(
-        f"{len(conflicts)} marks differ from those in the project ({listed}); nothing was "
+        f"{counted(len(conflicts), 'mark')} {'differs' if len(conflicts) == 1 else 'differ'} from "
+        f"what the project has ({listed}); nothing was "
         "changed. Add --replace to take the new ones and keep the old file beside them."
     )
 
@@ -184,7 +180,7 @@ def annotated(workspace: Workspace, partial: bool = False) -> Annotations:
         named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
         listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
         raise KeyreconError(
-            f"{len(missing)} of {len(found.frames)} keyframes are not annotated: frame {listed}. "
+            f"{len(missing)} of {len(found.frames)} keyframes are not marked yet: frame {listed}. "
             f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
             f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
         )

@@ -215,14 +215,15 @@ def _check_posture(pose: ClickedPose, origin: str) -> None:
     aside, down = np.abs(pose.feet - pose.place("head_top"))
     if aside > down:
         raise KeyreconError(
-            f"{origin}: the player lies on his side from head to ankles; turn the video upright "
+            f"{origin}: the player lies on the side from head to ankles; turn the video upright "
             "and click again."
         )
     head, root, feet = pose.place("head_top")[1], pose.place("root")[1], pose.feet[1]
     if not head < root < feet:
         raise KeyreconError(
-            f"{origin}: the head, the root and the ankles must be clicked from top to bottom, but "
-            f"they are at y = {head:g}, {root:g} and {feet:g}; click the address posture again."
+            f"{origin}: head, middle of the hips (root) and ankles must be clicked "
+            f"from top to bottom, but they are at y = {head:g}, {root:g} and {feet:g}; click the "
+            "address posture again."
         )
     for first, second, (least, most) in _LIMB_BOUNDS:
         length = float(np.linalg.norm(pose.place(first) - pose.place(second))) / pose.height

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, counted
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
@@ -239,8 +239,9 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
         )
     if end is None and cut_off:
         raise KeyreconError(
-            f"{path} ends in the middle: {len(stamps)} frames are there, {cut_off} are missing. "
-            f"Copy it again, or use what is there with --end {len(stamps)}."
+            f"{path} ends in the middle: {len(stamps)} frames are there, "
+            f"{counted(cut_off, 'frame')} missing. Copy it again, or use what is there with "
+            f"--end {len(stamps)}."
         )
     stamps = stamps[start:end]
     time = (stamps - stamps[0]) * seconds_per_tick / slow_motion

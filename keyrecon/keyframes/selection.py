@@ -164,8 +164,8 @@ def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
     labels = int(2 * budget * n_frames + 1e-9)
     if labels < 2 and None in (options.beta_upper, options.beta_lower):
         raise KeyreconError(
-            f"A budget of {budget:.2%} of {n_frames} frames is {labels} half-body "
-            f"label(s), and each half of the body needs one; --budget {1 / n_frames:.3f} or more "
+            f"A budget of {budget:.2%} of {n_frames} frames is {labels or 'no'} half of the body, "
+            f"and the upper and the lower half each need one; --budget {1 / n_frames:.3f} or more "
             "allows that."
         )
     return labels

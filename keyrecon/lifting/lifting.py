@@ -218,7 +218,7 @@ def _align_rotation(
 
 def _check(tracks: JointTracks, annotations: Annotations) -> None:
     if len(annotations.frames) == 0 or not np.isfinite(annotations.joints).any():
-        raise KeyreconError("No keyframe is annotated; mark joints with `keyrecon annotate` first.")
+        raise KeyreconError("No keyframe is marked; mark joints with `keyrecon annotate` first.")
     if annotations.frames[-1] >= len(tracks.joints):
         raise KeyreconError(
             f"Frame {annotations.frames[-1]} is annotated, the video has {len(tracks.joints)}; "

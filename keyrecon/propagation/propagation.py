@@ -156,7 +156,7 @@ def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
     if len(missing):
         names = ", ".join(skeleton.names[joint] for joint in missing)
         raise KeyreconError(
-            f"No annotated frame has {names}; mark each joint on at least one keyframe, "
+            f"No marked frame has {names}; mark each joint on at least one keyframe, "
             "where it is hidden by the best guess."
         )
 

@@ -146,6 +146,10 @@ function drawText(pen, text, [x, y], align) {
   pen.font = LABEL_FONT;
   pen.textAlign = align;
   pen.textBaseline = "middle";
+  pen.strokeStyle = cssColor("card"); // what lies below does not strike the letters through
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  pen.strokeText(text, x, y);
   pen.fillStyle = cssColor("muted");
   pen.fillText(text, x, y);
 }

@@ -5,6 +5,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.body import Skeleton
+from keyrecon.errors import counted
 from keyrecon.io.formats.conventions import stature
 from keyrecon.records import HalfKeyframes, Motion
 from keyrecon.report.headline import in_words, marked_frames
@@ -123,7 +124,7 @@ def keyframe_pictures(material: ReportMaterial, pictures: Pictures) -> str:
     cards = []
     for frame in marked:
         badges = "".join(
-            f"<li>{name} body, stands for {count} frames</li>"
+            f"<li>{name} body, stands for {counted(count, 'frame')}</li>"
             for name, half in (("upper", keyframes.upper), ("lower", keyframes.lower))
             if (count := stands_for(half, frame)) is not None
         )

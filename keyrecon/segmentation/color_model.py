@@ -178,11 +178,9 @@ def _check_picks(video: "Video", picks: Sequence[Pick]) -> None:
                 f"outside the picture of {video.width} x {video.height} px; pick it again."
             )
     if "head" not in {p.part for p in picks}:
-        raise KeyreconError(
-            f"None of the {len(picks)} picks is of the head; pick the centre of the head."
-        )
+        raise KeyreconError("The head is not picked in any frame; pick its centre.")
     if "foot" not in {p.part for p in picks}:
-        raise KeyreconError(f"None of the {len(picks)} picks is of a foot; pick both shoes.")
+        raise KeyreconError("No foot is picked in any frame; pick both shoes.")
 
 
 def to_lab(picture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:

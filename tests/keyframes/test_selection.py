@@ -94,7 +94,7 @@ def test_a_larger_budget_brings_frames_nearer_to_their_keyframes(comparison):
 
 def test_a_budget_below_one_keyframe_for_each_half_is_refused():
     short = comparison_of(sporting_poses(60))
-    with pytest.raises(KeyreconError, match=r"60 frames is 1 half-body.*0\.017 or more"):
+    with pytest.raises(KeyreconError, match=r"60 frames is 1 half of the body.*0\.017 or more"):
         choose_keyframes(short, 50.0, KeyframeOptions(budget=0.015))
     chosen = choose_keyframes(short, 50.0, KeyframeOptions(budget=0.017))
     assert len(chosen.upper.frames) == len(chosen.lower.frames) == 1

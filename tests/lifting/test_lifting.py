@@ -336,5 +336,5 @@ def test_missing_annotations_are_reported():
     nothing = Annotations(
         LSP14, marks.frames[:0], marks.joints[:0], marks.visible[:0], marks.nearer[:0]
     )
-    with pytest.raises(KeyreconError, match="No keyframe is annotated"):
+    with pytest.raises(KeyreconError, match="No keyframe is marked"):
         lift_motion(tracks, nothing, keys, np.full(60, 350.0), 50.0)

@@ -53,6 +53,7 @@ def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
     for kind in ("time", "heat", "speed"):
         page.click(f"[data-map={kind}]")
     assert "2.1 m behind the baseline" in page.inner_text("#court-now")
+    page.locator("#court-map").scroll_into_view_if_needed()
     box = page.locator("#court-map").bounding_box()
     way = box["x"] + 0.5 * box["width"], box["y"] + box["height"] * 15.1 / 16.6
     page.mouse.click(*way)

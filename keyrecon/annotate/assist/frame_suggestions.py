@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from keyrecon.errors import counted
 from keyrecon.propagation.marked_poses import LEAST_MARKED, distances_to
 from keyrecon.records import Annotations, HalfName, Keyframes, Motion, PoseDistances
 
@@ -85,7 +86,7 @@ def _describe(half: HalfName, nearest: Bool[np.ndarray, "T"], alone: int) -> str
     where = f"frame {first}" if first == last else f"frames {first}-{last}"
     count = int(nearest.sum())
     frames = "1 frame" if count == 1 else f"{count} frames"
-    text = f"Shows the {half} body of {frames} best, most in a row {where}"
+    text = f"Shows the {half} body of {frames} best, the longest run {where}"
     return f"{text}; {alone} of them no other keyframe covers." if alone else f"{text}."
 
 
@@ -216,7 +217,9 @@ def _explain_gain(
         uncertainty[members] = (1 - motion.confidence[frames][:, members]).sum(axis=0)
         helped |= frames
     worst = [motion.skeleton.names[j].replace("_", " ") for j in np.argsort(-uncertainty)[:2]]
+    count = int(helped.sum())
+    verb = "looks" if count == 1 else "look"
     return (
-        f"{int(helped.sum())} frames look more like this one than like any annotated one; "
+        f"{counted(count, 'frame')} {verb} more like this one than like any marked one; "
         f"{worst[0]} and {worst[1]} are the least sure there."
     )

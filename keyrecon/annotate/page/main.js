@@ -151,6 +151,7 @@ document.addEventListener("keydown", (event) => {
   const key = interpret(event, ui.view);
   if (!key || belongsTo(event.target, event.key)) return;
   event.preventDefault();
+  if (event.target.matches("input[type=text]")) event.target.blur(); // takes what was typed
   execute(commands[ui.view][key.action] ?? commands.any[key.action], key);
 });
 document.addEventListener(

@@ -60,7 +60,9 @@ class Jobs:
             raise KeyreconError(f"There is no job '{kind}'; there are {', '.join(self._commands)}.")
         with self._lock:
             if any(job.state == "running" for job in self._jobs.values()):
-                raise KeyreconError("Another job is running; wait for it or cancel it.")
+                raise KeyreconError(
+                    "The program is at work already; wait until it has ended, or cancel it."
+                )
             job = Job(next(self._numbers), kind)
             self._jobs[job.id] = job
             ours, theirs = _spawning.Pipe(duplex=False)

@@ -335,6 +335,6 @@ def _check_player(mask: Bool[np.ndarray, "h w"], pose: ClickedPose) -> None:
     area = float(mask.sum() / height**2)
     if not SMALLEST_PLAYER < area < LARGEST_PLAYER:
         raise KeyreconError(
-            f"Around the clicks of frame {pose.frame} no player stands out from the scene "
-            f"(an area of {area:.2f} squared heights); check that the clicks lie on the player."
+            f"Around the clicks of frame {pose.frame} no player stands out from the scene; "
+            "check that the clicks lie on the player."
         )

@@ -74,7 +74,7 @@ def test_from_the_first_click_to_the_exported_file(person, folder, film):
     truth = film[1]
     person.await_text("#address-text", "Find the address")
     click_address(person, click_first_frame(truth).joints)
-    person.page.fill("#stature", "183")
+    person.page.type("#stature", "183")
     person.await_text("#stature-said", "taken as 1.83 m")
     person.page.keyboard.press("Tab")
     person.await_text("#address-text", "All six joints are clicked")

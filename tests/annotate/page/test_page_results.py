@@ -73,8 +73,25 @@ def mark_and_run(person, height=""):
     person.press("Alt+3")
     person.await_text("#motion-text", "Make the motion")
     person.page.fill("#height", height)
-    person.page.click("#motion-primary")
+    person.page.press("#height", "Enter")
     person.await_text("#motion-text", "The motion is made")
+
+
+def run_and_tell(folder, options, progress):
+    run_at_once(folder, options, progress)
+    return "Joints placed in 99 % of the frames."
+
+
+def test_what_work_ended_with_goes_when_whoever_had_the_time_to_read_it_goes_on(folder, visit):
+    with serving(folder, commands={"run": partial(run_and_tell, folder)}) as server:
+        person = visit(server)
+        mark_and_run(person)
+        person.await_text("#notice-text", "99 %")
+        person.press("Alt+4")
+        assert person.page.is_visible("#notice")  # nobody has read it yet
+        person.page.wait_for_timeout(3100)
+        person.press("Alt+3")
+        person.page.wait_for_selector("#notice", state="hidden")
 
 
 NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}

@@ -36,7 +36,7 @@ def test_a_job_tells_how_far_it_is_and_what_came_of_it(jobs):
 def test_a_job_can_be_cancelled_and_begun_again(jobs):
     jobs, heard = jobs
     first = jobs.start("count", {"steps": 1000, "seconds": 0.1})
-    with pytest.raises(KeyreconError, match="Another job is running"):
+    with pytest.raises(KeyreconError, match="at work already"):
         jobs.start("count", {})
     until(lambda: heard)
     assert jobs.cancel(first.id).state == "cancelled"

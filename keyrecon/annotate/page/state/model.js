@@ -29,6 +29,7 @@ export async function createModel() {
     notice: null,
     jobs: new Map(),
     swing: null, // of a golf swing: what the server says of clicks and fit
+    checks: [], // marks that look wrong
     stretches: [], // where the program is least sure of itself: {first, last, text, frame, half}
   };
   const drawers = [],
@@ -136,8 +137,14 @@ export async function createModel() {
     }
   }
 
+  // Work begins with what is on the disk; a server that is gone says so itself.
+  model.whenSaved = async () => {
+    for (let n = 0; n < 50 && outbox.waiting().length; n++)
+      await new Promise((done) => setTimeout(done, 100));
+  };
+
   model.notify = (text, offer = null) => {
-    model.notice = { text, offer };
+    model.notice = { text, offer, since: performance.now() };
     clearTimeout(noticeTimer);
     if (text && !offer) noticeTimer = setTimeout(model.notify, NOTICE_MS, null);
     model.redraw();

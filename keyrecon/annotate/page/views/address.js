@@ -199,7 +199,7 @@ export function createAddress(model, { frames, shell, colors }) {
     const { stature } = model.state.golf;
     if (document.activeElement !== height) height.value = stature ?? "";
     const { said, wrong } = heightIn(height.value);
-    setText(byId("stature-said"), height.value.trim() ? said : "1.75 where it is not known");
+    setText(byId("stature-said"), height.value.trim() ? said : "metres; left empty, 1.75");
     toggle(byId("stature-said"), "wrong", wrong);
   }
 

@@ -100,7 +100,7 @@ export function createBodies(model, { frames, shell, actions, colors }) {
           }
         : {
             text: "The player is known",
-            more: "It now chooses the frames to mark.",
+            more: "The program now chooses the frames to mark.",
             button: "Choose the keyframes",
           },
   };

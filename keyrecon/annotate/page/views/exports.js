@@ -125,7 +125,7 @@ export function createExports(model, shell) {
     list.dataset.content = content;
     list.replaceChildren(...files.map(fileRow));
     const place = files[0]?.place;
-    setText(byId("export-note"), place ? `They lie in ${place}.` : "Nothing yet.");
+    setText(byId("export-note"), place ? `They lie in the folder ${place}.` : "Nothing yet.");
   }
 
   function draw() {

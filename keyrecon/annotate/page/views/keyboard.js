@@ -139,6 +139,7 @@ export function interpret(event, page) {
 
 // Keys that belong to the element that has the focus: text, lists, sliders, buttons.
 export function belongsTo(element, key) {
+  if (element.closest("input[type=text]:not(form *)") && key === "Enter") return false;
   if (element.closest("input[type=text], textarea, select")) return true;
   if (element.closest("input[type=range], [role=listbox], [data-turns]"))
     return key.startsWith("Arrow");

@@ -1,6 +1,6 @@
 // The lists beside the picture: keyframes, checks by suspicion, and what would help next.
 import * as api from "../state/api.js";
-import { byId, make, setText, toggle } from "./dom.js";
+import { byId, counted, make, setText, toggle } from "./dom.js";
 import { label, requiredJoints, whyNoAssistant } from "../state/workflow.js";
 
 const HALF = { upper: "upper body", lower: "lower body", both: "whole body" };
@@ -25,7 +25,7 @@ function keyframeRow(model, element, keyframe) {
   const count = joints.filter((joint) => marks[joint]).length,
     done = count === joints.length;
   const stands = keyframe.stands_for
-    ? `stands for ${keyframe.stands_for}`
+    ? `stands for ${counted(keyframe.stands_for, "frame")}`
     : keyframe.own
       ? "added by you"
       : "";
@@ -99,7 +99,6 @@ function suspicionMeter(share) {
 
 export function createLists(model, actions) {
   let tab = "frames",
-    checks = [],
     suggestions = [];
   const frames = createVirtualList(byId("frame-list"), {
     height: 44,
@@ -115,7 +114,7 @@ export function createLists(model, actions) {
   // Number of the check whose place is open, -1 if none is.
   function openCheck() {
     const { frame, joint } = model.ui;
-    return checks.findIndex((check) => {
+    return model.checks.findIndex((check) => {
       return check.frame === frame && (check.joint ?? check.limb ?? null) === joint;
     });
   }
@@ -129,7 +128,7 @@ export function createLists(model, actions) {
       model.stretches = await api.read("stretches");
       suggestions = await api.read("next_frames");
       model.redraw();
-      checks = await api.read("checks");
+      model.checks = await api.read("checks");
       model.redraw();
     },
     (fault) => model.notify(fault.message),
@@ -149,8 +148,8 @@ export function createLists(model, actions) {
       unavailable = whyNoAssistant(model.project);
     if (tab !== "frames" && unavailable) return unavailable;
     if (tab === "checks")
-      return checks.length
-        ? checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
+      return model.checks.length
+        ? model.checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
         : "Nothing looks wrong.";
     if (tab === "next") {
       if (model.stretches.length && !suggestions.length)
@@ -168,21 +167,21 @@ export function createLists(model, actions) {
     document.querySelectorAll("[data-tab]").forEach((button) => {
       button.setAttribute("aria-selected", button.dataset.tab === tab);
     });
-    setText(byId("check-count"), checks.length ? String(checks.length) : "");
+    setText(byId("check-count"), model.checks.length ? String(model.checks.length) : "");
     setText(byId("explanation"), explanation());
     if (tab === "frames")
       frames.show(
         keyframes,
         keyframes.findIndex(({ frame }) => frame === model.ui.frame),
       );
-    if (tab === "checks") checkList.show(checks, openCheck());
+    if (tab === "checks") checkList.show(model.checks, openCheck());
     if (tab === "next") nextList.show([...model.stretches, ...suggestions], -1);
   }
 
   return {
     draw,
     refresh,
-    nextCheck: () => goTo(checks[(openCheck() + 1) % checks.length]),
+    nextCheck: () => goTo(model.checks[(openCheck() + 1) % model.checks.length]),
     firstSuggestion: () => add(model.stretches[0] ?? suggestions[0]),
   };
 }

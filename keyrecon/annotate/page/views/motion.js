@@ -40,8 +40,14 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   });
 
   const exists = () => model.project.has.motion;
+  let asked = null, // the state of the marks that a run was asked for
+    made = null; // that of the marks which the motion shows
   const points = (kind, at = frame) => (exists() ? motion.points(at, kind) : null);
-  model.onProject(motion.forget); // a new run makes new motion
+  model.onProject(() => {
+    motion.forget(); // a new run makes new motion
+    if (exists()) made = asked ?? made;
+    asked = null;
+  });
 
   function show(number) {
     const next = Math.max(0, Math.min(last, number));
@@ -61,10 +67,25 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     show(number);
   }
 
-  function primary() {
+  async function makeMotion() {
     const { metres, wrong } = heightIn(byId("height").value);
     if (wrong) byId("height").focus();
-    else if (!shell.runningJob()) shell.startJob("run", metres === null ? {} : { height: metres });
+    if (wrong || shell.runningJob()) return;
+    await model.whenSaved();
+    asked = model.state.revision;
+    shell.startJob("run", metres === null ? {} : { height: metres });
+  }
+
+  // Whether there is anything to make anew: marks or the height changed since the motion was made.
+  function isMade() {
+    made ??= exists() ? model.state.revision : null;
+    const { metres } = heightIn(byId("height").value);
+    return exists() && made === model.state.revision && metres === (model.project.settings.height ?? null);
+  }
+
+  function primary() {
+    if (isMade()) byId("motion-files").click();
+    else makeMotion();
   }
 
   byId("height").value = project.settings.height ?? "";
@@ -72,7 +93,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);
-  byId("motion-primary").addEventListener("click", primary);
+  byId("motion-primary").addEventListener("click", makeMotion);
   viewer.listen({ grab: () => null, drag() {}, drop() {}, click() {}, hover() {} });
 
   function drawSkeleton() {
@@ -154,6 +175,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     byId("motion-primary").disabled = Boolean(wrong);
     byId("motion-report").hidden = !model.project.has.report;
     byId("motion-files").hidden = !exists();
+    toggle(byId("motion-files"), "primary", isMade());
+    toggle(byId("motion-primary"), "primary", !isMade());
     setText(byId("motion-primary"), exists() ? "Make it anew" : "Make the motion");
     setText(
       byId("motion-note"),

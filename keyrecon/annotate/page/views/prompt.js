@@ -46,12 +46,23 @@ function leastCertain(model, limbs) {
   return `Least sure: ${listed}. Click a limb to turn it, or try 1, 2, 3.`;
 }
 
+// Enter alone, pressed to the end, would take what the program itself finds wrong.
+function doubted(checks) {
+  if (!checks) return "";
+  return `${counted(checks, "mark")} ${checks > 1 ? "look" : "looks"} wrong: G goes there. `;
+}
+
+function framesNamed(frames) {
+  if (frames.length === 1) return `frame ${frames[0]}`;
+  return `frames ${frames.slice(0, -1).join(", ")} and ${frames.at(-1)}`;
+}
+
 const PROMPTS = {
   accept(model, { joints, joint }) {
-    const from = model.poses.suggestion().from?.slice(0, 3).join(", ");
+    const from = model.poses.suggestion().from?.slice(0, 3) ?? [];
     return {
       text: `Take the suggestion for ${counted(joints.length, "joint")}?`,
-      more: `${from ? `From frame ${from}. ` : ""}Drag what is wrong, or click ${named(model, joint)}.`,
+      more: `${from.length ? `From ${framesNamed(from)}. ` : ""}Drag what is wrong, or click ${named(model, joint)}.`,
       button: "Take it",
     };
   },
@@ -87,7 +98,7 @@ const PROMPTS = {
         }
       : {
           text: "All keyframes are done",
-          more: "The motion can be made.",
+          more: `${doubted(model.checks.length)}The motion can be made.`,
           button: "Go to the motion",
         };
   },

@@ -11,7 +11,8 @@ const SAVING = {
   saving: () => "Saving …",
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
-const LASTING = {}; // an offer of nothing: the notice stays until it is closed
+const LASTING = {}; // an offer of nothing: the notice stays until it is read
+const READ_MS = 3000; // after which whoever goes on working has read it
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
 
 function keyElements(keys) {
@@ -79,6 +80,7 @@ export function createShell(model, go) {
     panel.addEventListener("click", (event) => event.target === panel && panel.close());
   }
   byId("notice-close").addEventListener("click", () => model.notify(null));
+  for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, leaveRead, true);
   byId("notice-offer").addEventListener("click", () => {
     const { offer } = model.notice;
     model.notify(null);
@@ -99,6 +101,14 @@ export function createShell(model, go) {
     setText(byId("job-text"), job.text || "Starting");
     if (job.total) byId("job-progress").value = job.done / job.total;
     else byId("job-progress").removeAttribute("value");
+  }
+
+  // What long work ended with stays until it is closed, or until somebody who had the time to read
+  // it goes on.
+  function leaveRead(event) {
+    const { offer, since } = model.notice ?? {};
+    const here = event.target instanceof Node && byId("notice").contains(event.target);
+    if (offer === LASTING && !here && performance.now() - since > READ_MS) model.notify(null);
   }
 
   function drawNotice() {
@@ -163,6 +173,7 @@ function createJobs(model) {
 
   async function startJob(kind, options = {}) {
     try {
+      await model.whenSaved();
       await api.send("jobs", { kind, options });
       await refreshJobs();
     } catch (fault) {
