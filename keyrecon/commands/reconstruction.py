@@ -29,7 +29,7 @@ def keyframes(
 
     Args:
         project: Project folder.
-        budget: Share of frames that you will mark (default: what the coverage needs, 0.015 at most).
+        budget: Share of frames that you will mark (default: as many as the coverage needs).
         coverage: Share of frames that the keyframes must stand for (default: 0.95).
         reach: Longest gap to interpolate, in frames at 50 frames a second (default: 10).
         method: 'paper' does it as printed, for `keyrecon run --method paper`.

@@ -49,7 +49,7 @@ def test_the_root_lies_between_both_hips(tmp_path):
         ({"joints": {**JOINTS, "root": (float("nan"), 160)}}, "NaN is not a number"),
         ({"joints": {**JOINTS, "left_ankle": (199, 298)}}, "left_knee and left_ankle are 0."),
         ({"joints": {**JOINTS, "right_knee": (0, 240)}}, "root and right_knee are 0."),
-        ({"joints": {k: (30 + y / 2, 60 + x / 2) for k, (x, y) in JOINTS.items()}}, "on his side"),
+        ({"joints": {k: (30 + y / 2, 60 + x / 2) for k, (x, y) in JOINTS.items()}}, "on the side"),
         ({"joints": {k: (x, 299 - y) for k, (x, y) in JOINTS.items()}}, "from top to bottom"),
         ({"hidden": ["left_wrist"]}, "'left_wrist' is hidden but was not clicked"),
         ({"stature": -1}, "the stature is -1, but it is the player's height in metres"),
