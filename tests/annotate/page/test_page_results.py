@@ -77,13 +77,20 @@ def mark_and_run(person, height=""):
     person.await_text("#motion-text", "The motion is made")
 
 
-def run_and_tell(folder, options, progress):
+def run_and_tell(folder, text, options, progress):
     run_at_once(folder, options, progress)
-    return "Joints placed in 99 % of the frames."
+    return text
 
 
-def test_what_work_ended_with_goes_when_whoever_had_the_time_to_read_it_goes_on(folder, visit):
-    with serving(folder, commands={"run": partial(run_and_tell, folder)}) as server:
+@pytest.mark.parametrize(
+    ("more", "stays"),
+    [("", False), ("\nThe lower edge of the picture cuts the feet off in frames 3 to 9.", True)],
+)
+def test_good_news_go_when_they_were_read_and_doubts_stay_until_they_are_closed(
+    folder, visit, more, stays
+):
+    run = partial(run_and_tell, folder, f"Player found in 99 % of 100 frames.{more}")
+    with serving(folder, commands={"run": run}) as server:
         person = visit(server)
         mark_and_run(person)
         person.await_text("#notice-text", "99 %")
@@ -91,7 +98,11 @@ def test_what_work_ended_with_goes_when_whoever_had_the_time_to_read_it_goes_on(
         assert person.page.is_visible("#notice")  # nobody has read it yet
         person.page.wait_for_timeout(3100)
         person.press("Alt+3")
-        person.page.wait_for_selector("#notice", state="hidden")
+        person.await_drawn()
+        assert person.page.is_visible("#notice") == stays
+        if stays:
+            person.page.click("#notice-close")
+            person.page.wait_for_selector("#notice", state="hidden")
 
 
 NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}

@@ -12,6 +12,8 @@ const SAVING = {
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
 const LASTING = {}; // an offer of nothing: the notice stays until it is read
+const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
+const GOOD_NEWS = /^(Player found in|Note: )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
 
@@ -195,7 +197,8 @@ function createJobs(model) {
     if (job.state === "cancelled")
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
-    if (job.text) model.notify(job.text, LASTING);
+    const news = job.text?.split("\n") ?? [];
+    if (job.text) model.notify(job.text, news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT);
     model.readProject().then(() => {
       if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });
