@@ -8,7 +8,8 @@ and forearms of a few lengths and directions are compared, two links of a pictor
 
 With them a hypothesis has the wrist right in 87, 81, 81 and 87 % of the frames marked by eye of
 four real clips, without in 71, 63, 70 and 73 %; with the best of them alone 66, 31, 27 and 40 %:
-looks propose, all evidence together chooses. Of legs other hypotheses lack nothing (99.5 % right).
+looks propose, all evidence together chooses. Of legs other hypotheses lack nothing (99.5 % right);
+where no keyframe has the kick of a serve it is 93.5 %, and with legs looked for likewise 94.2.
 """
 
 from dataclasses import dataclass
