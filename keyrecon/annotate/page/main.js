@@ -22,7 +22,7 @@ import { createShell } from "./views/shell.js";
 import { createAddress } from "./views/address.js";
 import { createSwing } from "./views/swing.js";
 import { nextClick } from "./state/swing.js";
-import { stepsOf } from "./state/workflow.js";
+import { nextOpen, stepsOf } from "./state/workflow.js";
 
 const model = await createModel();
 const { ui } = model;
@@ -88,7 +88,7 @@ function addressed() {
 function drawKeyframes() {
   if (ui.frame === null && model.keyframes().length) {
     const all = model.keyframes();
-    actions.open(addressed() ?? (all.find((keyframe) => !model.isDone(keyframe)) ?? all[0]).frame);
+    actions.open(addressed() ?? nextOpen(all, -1, model.isDone) ?? all[0].frame);
     return;
   }
   for (const panel of panels) panel.draw();

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from keyrecon.annotate.server.jobs import Job
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.store.cells import Cells, Change, by_frame, of_body, of_kind, picks_of
@@ -103,12 +105,13 @@ def describe_keyframes(
         details = {**details, body["frame"]: {"why": WHY_A_BODY, "box": body["box"]}}
     added = {int(key[1]): half for key, half in of_kind(cells, "own").items()}
     listed = marked | chosen
-    counts = _represented(keyframes)
+    counts, gains = _represented(keyframes), gains_of_frames(keyframes)
     return [
         {
             "frame": frame,
             "half": join_halves(listed.get(frame), added.get(frame)),
             "stands_for": counts.get(frame, 0),
+            "brings": gains.get(frame),
             "why": "",
             "own": frame in added,
             "locked": ("lock", frame) in cells,
@@ -128,6 +131,18 @@ def _represented(keyframes: Keyframes | None) -> dict[int, int]:
             ((keyframes.upper.nearest == frame) | (keyframes.lower.nearest == frame)).sum()
         )
     return counts
+
+
+def gains_of_frames(keyframes: Keyframes | None) -> dict[int, float]:
+    """What each keyframe adds to the coverage of those that bring more, mean of both halves."""
+    gains: dict[int, float] = {}
+    halves = [keyframes.upper.gains, keyframes.lower.gains] if keyframes else []
+    for half in halves:
+        if half is not None:
+            added = np.diff(half.coverage, prepend=0.0)
+            for frame, gain in zip(half.order.tolist(), added.tolist(), strict=True):
+                gains[frame] = gains.get(frame, 0.0) + gain / 2
+    return gains
 
 
 def describe_settings(workspace: Workspace) -> Json:

@@ -49,6 +49,10 @@ test("joints and keyframes are asked for going round", () => {
   const keyframes = [10, 30, 50].map((frame) => ({ frame }));
   assert.equal(workflow.nextOpen(keyframes, 30, ({ frame }) => frame === 50), 10);
   assert.equal(workflow.nextOpen(keyframes, 30, () => true), null);
+  const worth = [10, 30, 50].map((frame, row) => ({ frame, brings: [0.2, 0.1, 0.2][row] }));
+  assert.equal(workflow.nextOpen(worth, 30, () => false), 50);
+  assert.equal(workflow.nextOpen(worth, 30, ({ frame }) => frame === 50), 10);
+  assert.equal(workflow.nextOpen(worth, 10, ({ frame }) => frame !== 30), 30);
 });
 
 test("keyframes that a person added stand among those that were chosen", () => {

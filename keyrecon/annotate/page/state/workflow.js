@@ -54,11 +54,14 @@ export function isDone(project, keyframe, marks) {
   return unmarked(requiredJoints(project, keyframe.half), marks).length === 0;
 }
 
-// The next keyframe that is not done after a frame, going round; null when all are.
+// The next keyframe that is not done: the one that brings most; among equals, and where that is not
+// known, the first after a frame, going round. Null when all are done.
 export function nextOpen(keyframes, frame, done) {
   const after = keyframes.filter((keyframe) => keyframe.frame > frame);
   const before = keyframes.filter((keyframe) => keyframe.frame < frame);
-  return [...after, ...before].find((keyframe) => !done(keyframe))?.frame ?? null;
+  const open = [...after, ...before].filter((keyframe) => !done(keyframe)),
+    most = Math.max(...open.map(({ brings }) => brings ?? 0));
+  return open.find(({ brings }) => (brings ?? 0) === most)?.frame ?? null;
 }
 
 // What is to be done before there are keyframes: a whole body in a clear frame, more of them where the

@@ -19,13 +19,16 @@ function fillRow(element, content, parts) {
   element.replaceChildren(...parts());
 }
 
+// What a keyframe adds to the share of the video that is covered.
+const bringing = ({ brings }) => (brings >= 0.0005 ? `, +${(100 * brings).toFixed(1)} %` : "");
+
 function keyframeRow(model, element, keyframe) {
   const marks = model.marks(keyframe.frame),
     joints = requiredJoints(model.project, keyframe.half);
   const count = joints.filter((joint) => marks[joint]).length,
     done = count === joints.length;
   const stands = keyframe.stands_for
-    ? `stands for ${counted(keyframe.stands_for, "frame")}`
+    ? `stands for ${counted(keyframe.stands_for, "frame")}${bringing(keyframe)}`
     : keyframe.own
       ? "added by you"
       : "";
