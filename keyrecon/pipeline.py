@@ -33,7 +33,7 @@ from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_m
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.marked_poses import LEAST_MARKED
-from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
+from keyrecon.propagation.propagation import PropagateOptions
 from keyrecon.records import (
     SOURCES,
     Annotations,
@@ -49,6 +49,7 @@ from keyrecon.segmentation.background_model import BackgroundOptions
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
 from keyrecon.segmentation.contours import EdgeOptions
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
+from keyrecon.shot_groups import propagate_in_groups
 from keyrecon.timeline import (
     cut_motion,
     join_frames,
@@ -286,14 +287,8 @@ def carry_joints(
     if not all(shots.usable):
         flow = flow and take_frames(flow, used)
         annotations = part_of_marks(annotations, used)
-    tracks = keep(
-        "propagate",
-        propagate_joints,
-        usable_part(preparation),
-        annotations,
-        flow,
-        options=options.propagate,
-        progress=progress,
+    tracks = propagate_in_groups(
+        usable_part(preparation), annotations, flow, options.propagate, keep, progress
     )
     return tracks if all(shots.usable) else put_back(tracks, used, shots.n_frames)
 

@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
+from jaxtyping import Int
+
 from keyrecon.following import FollowedPlayer
 from keyrecon.io.video import Video
 from keyrecon.keyframes.absence import restore_frames, select_frames
@@ -55,16 +58,25 @@ def usable_part(preparation: Preparation) -> Preparation:
     shots = preparation.shots
     if all(shots.usable):
         return preparation
-    frames, distances = shots.usable_frames, preparation.pose_distances
+    return part_of_preparation(preparation, shots.usable_frames)
+
+
+def part_of_preparation(preparation: Preparation, frames: Int[np.ndarray, "n"]) -> Preparation:
+    """Some frames of usable shots end to end, all keyframes among them.
+
+    Frames that do not follow one another in the file belong to different shots.
+    """
+    number = preparation.shots.number[frames]
+    cuts = np.flatnonzero((np.diff(frames) > 1) | (np.diff(number) > 0)) + 1
     return Preparation(
         part_of_video(preparation.video, frames),
         part_of_path(preparation.camera, frames),
         preparation.colors,
         take_frames(preparation.track, frames),
         tuple(preparation.edges[t] for t in frames),
-        select_frames(distances, frames),
+        select_frames(preparation.pose_distances, frames),
         part_of_keyframes(preparation.keyframes, frames),
-        shots.joined(),
+        Shots.between(tuple(cuts.tolist()), len(frames)),
     )
 
 
