@@ -4,7 +4,7 @@ import time
 from functools import partial
 
 import pytest
-from page_driver import CHROMIUM, SOON, Person, serving
+from page_driver import BROWSER, SOON, Person, serving
 from page_project import FRAMES, make_project, write_numbered_video
 
 from keyrecon.annotate.assist.shot_strip import list_shots
@@ -16,7 +16,7 @@ from keyrecon.pipeline import Options
 from keyrecon.records import PLAYER, Shots
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason=f"THE PAGE IS NOT TESTED: there is no Chromium at {CHROMIUM}"
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
 SHOTS = Shots((0, 40, 60), FRAMES, (PLAYER, "somebody else", PLAYER))
 
