@@ -27,7 +27,13 @@ def draw(angle, shade=30, thickness=2, ground=120, length=100):
         cv2.line(target, *club, value, thickness, cv2.LINE_AA, 4)
         cv2.rectangle(target, (80, 60), (120, 240), int(min(255, value + 40)), -1)
         cv2.line(target, (110, 90), (140, 150), int(min(255, value + 40)), 10)
-    return picture, FrameForeground(0, mask, np.ones(mask.shape, bool), 1.0, HEIGHT), head
+    return (
+        picture,
+        FrameForeground(
+            0, mask, np.ones(mask.shape, bool), 1.0, HEIGHT, np.zeros(mask.shape, np.uint8)
+        ),
+        head,
+    )
 
 
 def direction(ends):

@@ -80,6 +80,16 @@ def test_what_is_thinner_than_a_limb_is_no_part_of_the_body(video):
     assert (body & true_mask(5)).sum() > 0.85 * true_mask(5).sum()
 
 
+def test_people_beside_the_player_are_not_the_player(video):
+    foreground = separate_player(video, clicks())
+    likely = foreground.likely.copy()
+    cv2.rectangle(likely[3], (12, 20), (70, 190), 255, -1)  # larger than he is
+    cv2.rectangle(likely[3], (160, 60), (175, 185), 255, -1)  # near
+    player, true = replace(foreground, likely=likely).frame(3).player(), true_mask(3)
+    assert not player[:, :75].any() and not player[100:, 155:].any()
+    assert (player & true).sum() > 0.85 * true.sum()
+
+
 def test_clicks_on_nothing_say_so(video):
     joints = clicks().joints
     heights = zip(joints.names, joints.places[:, 1].tolist(), strict=True)
