@@ -71,7 +71,7 @@ class PointTrack:
     turns: Float[np.ndarray, "T"]
     """Radians from the first frame."""
     confidence: Float[np.ndarray, "T"]
-    """Share of the patch that is not lost, 0-1."""
+    """Share of the patch that is not lost, 0-1; a patch that slides off the player loses pixels."""
 
 
 def track_patch(
@@ -88,7 +88,8 @@ def track_patch(
     """
     pixel = options.size * height / PATCH_SIDE
     pose = np.array([*start, 0.0, np.log(pixel)])
-    colors, _ = _cut(pictures[0], weights[0], pose)
+    colors, inside = _cut(pictures[0], weights[0], pose)
+    whole = float(inside.sum())
     shares = np.tile([0.4, 0.4, 0.2], (len(colors), 1))
     model = _Model(colors, np.full(len(colors), 100.0), colors, shares)
     rate = 1 / max(2.0, options.memory * fps)
@@ -103,9 +104,8 @@ def track_patch(
         model = _learn(model, colors, responsibility, rate)
         speed = np.array([*(pose - before)[:2], 0.0, 0.0])
         poses.append(pose)
-        confidence.append(
-            float((inside * (1 - responsibility[:, 2])).sum() / max(inside.sum(), 1e-9))
-        )
+        found = float((inside * (1 - responsibility[:, 2])).sum())
+        confidence.append(found / max(float(inside.sum()), whole, 1e-9))
     path = np.array(poses)
     return PointTrack(path[:, :2], path[:, 2], np.array(confidence))
 

@@ -58,3 +58,12 @@ def test_the_scene_around_the_player_does_not_count():
         weights.append(weight)
     path = track(pictures, weights)
     assert np.abs(path.places[:, 0] - 120 - np.arange(20)).max() < 1
+
+
+def test_a_patch_that_slides_off_the_player_is_unsure():
+    pictures = [moved(cloth(), (3 * t, 0)) for t in range(15)]
+    weights = [np.full(p.shape[:2], 255, np.uint8) for p in pictures]
+    for weight in weights:
+        weight[:, 140:] = 0
+    assert track(pictures).confidence[-1] > 0.8
+    assert track(pictures, weights).confidence[-1] < 0.4
