@@ -9,10 +9,16 @@ where it was detected, the joints that a person placed.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from keyrecon.body import LSP14
-from keyrecon.golf.fit.residuals import sample_distance
+from keyrecon.golf.fit.residuals import (
+    SightLines,
+    pass_capsules,
+    place_capsules,
+    sample_distance,
+    sight_directions,
+)
 from keyrecon.golf.records import FittedSwing, Observations
 
 DOWNSWING_SECONDS = (0.15, 0.5)
@@ -28,6 +34,18 @@ three real swings, where masks lose a hand or a foot, .79 in a wrong one."""
 HANDS_OFF_SECONDS = 0.1
 """Both hands lie off the figure for no longer: a mask loses blurred hands for a frame or two. In
 right fits of five real swings they never do, by not a single frame."""
+BESIDE = 0.04
+"""A part of the player's figure so far from the fitted body does not belong to it, body heights: an
+upper arm's breadth, more than clothes stand off."""
+MOST_BESIDE = 0.04
+"""Share of the figure beside the fitted body, from the start to the finish, at most: 0 to .026 in
+40 right fits (five real swings, also before a shaking camera, with people drawn beside the player,
+at half the size or rate, in bad light, with other clicks), .022 to .33, mostly above .05, in these
+fits made wrong (turned by 30 degrees, shifted by .05 body heights, the mean swing)."""
+TRACK_SPREAD, FARTHEST_TRACKED = 0.05, 0.06
+"""A joint that was tracked to so many body heights is known there; of ten such joints no more than
+one is farther from the fit than this: .012 to .037 in those right fits, .06 to .22 in all those
+made wrong but where time alone was shifted."""
 CLUB_ANGLE = np.radians(15)
 """A fitted club this far from the detected one is another one."""
 LEAST_CLUB_AGREED, LEAST_CLUB_SEEN = 0.8, 0.25
@@ -60,6 +78,8 @@ def find_doubts(fitted: FittedSwing, observations: Observations) -> list[SwingDo
     return [
         *_doubt_order(fitted),
         *_doubt_figure(fitted, observations),
+        *_doubt_rest(fitted, observations),
+        *_doubt_tracks(fitted, observations),
         *_doubt_club(fitted, observations),
         *_doubt_clicks(fitted, observations),
         *_doubt_marks(fitted, observations),
@@ -136,6 +156,39 @@ def _doubt_figure(fitted: FittedSwing, observations: Observations) -> list[Swing
     middle = start + int(begins[longest] + ends[longest]) // 2
     told = f"both hands lie off the player for {seconds[longest]:.2f} s"
     return [SwingDoubt(told, middle)]
+
+
+def _doubt_rest(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """All of the player's mask is some part of the fitted body."""
+    during = _swing(fitted, 3)
+    samples = observations.foreground[during]
+    counts = np.array([len(points) for points in samples])
+    if not counts.any():
+        return []
+    frame = np.repeat(np.arange(during.start, during.stop), counts)
+    lines = SightLines(sight_directions(np.concatenate(samples), observations.camera), frame)
+    passing = pass_capsules(lines, place_capsules(fitted.capsules, fitted.pose))
+    beside = passing.distance.min(axis=1) > BESIDE * observations.stature
+    if beside.mean() <= MOST_BESIDE:
+        return []
+    worst = int(np.bincount(frame, beside).argmax())
+    return [SwingDoubt(f"{beside.mean():.0%} of the player's figure lies beside the body", worst)]
+
+
+def _doubt_tracks(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """Joints that were tracked well are where they were tracked."""
+    during = _swing(fitted, 3)
+    tracked, spread = observations.joints[during], observations.spread[during]
+    away: Float[np.ndarray, "n J"] = (
+        np.linalg.norm(fitted.motion.points2d[during] - tracked, axis=2) / observations.height
+    )
+    known = np.isfinite(away) & (spread < TRACK_SPREAD * observations.height)
+    if not known.any() or (far := float(np.percentile(away[known], 90))) <= FARTHEST_TRACKED:
+        return []
+    row, joint = np.unravel_index(np.where(known, away, 0).argmax(), away.shape)
+    name = LSP14.names[joint]
+    text = f"tracked joints are up to {far:.0%} of the body height away, {name} most"
+    return [SwingDoubt(text, during.start + int(row))]
 
 
 def _doubt_club(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:

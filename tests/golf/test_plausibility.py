@@ -82,6 +82,33 @@ def test_a_body_beside_the_figure_is_told_with_a_frame(played):
     assert 0 <= doubt.frame < FRAMES
 
 
+def on_trunk_and_beside(fitted, observations, beside):
+    """Samples of a mask: on the spine, and a share of them at the player's side."""
+    spine = fitted.motion.points2d[:, [LSP14.index("neck")]]
+    hips = fitted.motion.points2d[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]]
+    way = hips.mean(axis=1, keepdims=True) - spine
+    on = spine + np.linspace(0.3, 0.9, 100)[None, :, None] * way
+    on[:, : round(100 * beside), 0] += 1.2 * observations.height
+    return replace(observations, foreground=tuple(on))
+
+
+@pytest.mark.parametrize(("beside", "told"), [(0.0, False), (0.15, True)])
+def test_a_figure_that_is_more_than_the_body_is_told(played, beside, told):
+    fitted, observations = played
+    seen = on_trunk_and_beside(fitted, observations, beside)
+    assert ("15% of the player's figure lies beside" in texts(fitted, seen)) == told
+
+
+def test_joints_tracked_elsewhere_are_told_unless_the_track_is_unsure(played):
+    fitted, observations = played
+    joints, spread = observations.joints.copy(), observations.spread.copy()
+    knee = LSP14.index("left_knee")
+    joints[:, knee, 0] += 0.1 * observations.height
+    assert "left_knee most" in texts(fitted, replace(observations, joints=joints))
+    spread[:, knee] = 0.2 * observations.height
+    assert texts(fitted, replace(observations, joints=joints, spread=spread)) == ""
+
+
 @pytest.mark.parametrize(("frames", "told"), [(2, False), (6, True)])
 def test_hands_that_leave_the_figure_are_told_unless_for_a_moment_only(played, frames, told):
     fitted, observations = played
