@@ -1,11 +1,11 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from keyrecon.golf.candidates import find_candidates, place_in_film
 from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.observation import ObservedSwing, observe_swing
+from keyrecon.golf.observation import ObservedSwing, observe_swing, retime
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
@@ -45,26 +45,57 @@ def find_swing(
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
     candidates = keep("search", find_candidates, scene, pose, marks, model)
-    tried: list[tuple[FittedSwing, Observations, list[SwingDoubt], ObservedSwing]] = []
+    tried: list[_Tried] = []
     for number, candidate in enumerate(candidates[: options.candidates], 1):
         observed = keep(
             f"observe_{number}", observe_swing, video, scene, candidate, pose, marks, model,
             options=options.observation, progress=progress,
         )  # fmt: skip
-        first, shown = observed.observations, observed.film.open(video)
         if number == 1:
-            check_direction(first, place_in_film(told, observed.film), model, "The clicks")
-        fitted, observations = fit_candidate(
-            first, shown, model, options, keep, progress, suffix=f"_{number}"
-        )
-        doubts = find_doubts(fitted, first)
-        tried.append((fitted, observations, doubts, observed))
-        if not doubts or options.method == "windows":
+            in_film = place_in_film(told, observed.film)
+            check_direction(observed.observations, in_film, model, "The clicks")
+        tried.append(_try(observed, video, model, options, keep, progress, f"_{number}"))
+        retimed = retime(candidate, tried[-1].fitted.keys, observed, scene)
+        if retimed is not None and options.method == "swing":
+            observed = keep(
+                f"observe_{number}s", observe_swing, video, scene, retimed, pose, marks, model,
+                options=options.observation, progress=progress,
+            )  # fmt: skip
+            tried.append(_try(observed, video, model, options, keep, progress, f"_{number}s"))
+        if not tried[-1].doubts or options.method == "windows":
             break
-    fitted, observations, doubts, observed = min(tried, key=lambda t: len(t[2]))
+    best = min(tried, key=lambda t: len(t.doubts))
     return keep(
-        "found", swing_found, fitted, observations, tuple(doubts), observed, marks, video, model
+        "found", swing_found, best.fitted, best.observations, best.doubts, best.observed, marks,
+        video, model,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A candidate that was fitted, and what speaks against it."""
+
+    fitted: FittedSwing
+    observations: Observations
+    observed: ObservedSwing
+    doubts: tuple[SwingDoubt, ...]
+
+
+def _try(
+    observed: ObservedSwing,
+    video: Video,
+    model: MotionModel,
+    options: GolfOptions,
+    keep: Keep,
+    progress: Progress,
+    suffix: str,
+) -> _Tried:
+    """One candidate fitted."""
+    first = observed.observations
+    fitted, observations = fit_candidate(
+        first, observed.film.open(video), model, options, keep, progress, suffix
     )
+    return _Tried(fitted, observations, observed, tuple(find_doubts(fitted, first)))
 
 
 def fit_candidate(
