@@ -8,6 +8,7 @@ from fixed seeds:
     shake     the camera drifts by 4 % of the width and is held by hand, up to 13 px at 720 rows
     clicks    the clicks are of another frame, each off by 5 px at 720 rows (clicks2: once more)
     crowd     people of other colours sway close beside the player, on either side
+    double    a second golfer swings beside the player, mirrored
     half      half the size, compressed hard
     rate      every other frame
     dark      a third of the light, and noise
@@ -119,6 +120,30 @@ def crowd(swing: Swing) -> Change:
     return Change(picture, same_place)
 
 
+def double(swing: Swing) -> Change:
+    """A second golfer swings beside the player: he himself, mirrored, three quarters as tall."""
+    marked = swing.clip.truth.joints.reshape(-1, 2)
+    low, high = np.nanmin(marked, axis=0), np.nanmax(marked, axis=0)
+    tall, width = high[1] - low[1], swing.clip.video.width
+    middle = float((low[0] + high[0]) / 2)
+    side = 1 if width - 1 - high[0] > low[0] else -1
+
+    def picture(_: int, shown: Picture) -> Picture:
+        reach = int(0.45 * tall)
+        left, right = (int(np.clip(middle + k * reach, 0, width)) for k in (-1, 1))
+        rows = slice(max(0, int(low[1] - 0.1 * tall)), int(high[1] + 0.05 * tall))
+        other = np.ascontiguousarray(shown[rows, left:right][:, ::-1])
+        other = cv2.resize(other, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA)
+        out = shown.copy()
+        bottom, start = rows.stop, int(middle + side * 0.9 * tall - other.shape[1] / 2)
+        first, last = max(0, start), min(width, start + other.shape[1])
+        if last > first:
+            out[bottom - len(other) : bottom, first:last] = other[:, first - start : last - start]
+        return out
+
+    return Change(picture, same_place)
+
+
 def half(swing: Swing) -> Change:
     """Half the size, compressed hard."""
     size = tuple(n // 4 * 2 for n in (swing.clip.video.width, swing.clip.video.height))
@@ -148,7 +173,7 @@ def dark(_: Swing) -> Change:
 
 
 CHANGES: dict[str, Callable[[Swing], Change]] = {
-    "shake": shake, "crowd": crowd, "half": half, "rate": rate, "dark": dark,
+    "shake": shake, "crowd": crowd, "double": double, "half": half, "rate": rate, "dark": dark,
 }  # fmt: skip
 VARIANTS = ("plain", *CHANGES, "clicks", "clicks2", "mirror")
 
