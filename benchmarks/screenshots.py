@@ -21,7 +21,7 @@ from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Annotations
 
-QUALITY = 82
+QUALITY = 70
 """Of the JPEGs."""
 
 
