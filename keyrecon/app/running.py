@@ -1,5 +1,6 @@
 """`keyrecon run`: from marks to motion and report, in a project folder."""
 
+import json
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,6 +11,7 @@ from keyrecon.app.court import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
@@ -66,6 +68,7 @@ def run(
         shots=describe_shots(preparation.shots),
     )
     write_report(workspace.report_file, material, progress)
+    write_durably(workspace.doubts_file, json.dumps(list(material.contradictions)))
     workspace.remember(told, Options())
     return "\n".join(
         [

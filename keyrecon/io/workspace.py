@@ -119,6 +119,11 @@ class Workspace:
         return self.folder / "cache" / "prepared_marks.json"
 
     @property
+    def doubts_file(self) -> Path:
+        """What spoke against the track when the motion was made, a list of lines."""
+        return self.folder / "cache" / "doubts.json"
+
+    @property
     def motion_file(self) -> Path:
         """motion.npz"""
         return self.folder / "motion.npz"

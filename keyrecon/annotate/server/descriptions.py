@@ -1,5 +1,6 @@
 """A project as JSON for the page: video, skeleton, keyframes, marks, edits and jobs."""
 
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any
@@ -152,6 +153,15 @@ def describe_settings(workspace: Workspace) -> Json:
         "budget": options.get("keyframes", {}).get("budget"),
         "height": options.get("lift", {}).get("height"),
     }
+
+
+def describe_doubts(workspace: Workspace) -> list[str]:
+    """What spoke against the track when the motion was made, in the words of the page."""
+    try:
+        lines = json.loads(workspace.doubts_file.read_text("utf-8"))
+    except (OSError, ValueError):  # a motion of a golf fit or of an older version; a torn file
+        return []
+    return [in_page_words(str(line)) for line in lines] if isinstance(lines, list) else []
 
 
 def describe_state(state: JournalState) -> Json:

@@ -79,6 +79,8 @@ def mark_and_run(person, height=""):
 
 def run_and_tell(folder, text, options, progress):
     run_at_once(folder, options, progress)
+    (folder / "cache").mkdir(exist_ok=True)
+    (folder / "cache" / "doubts.json").write_text(json.dumps(text.splitlines()[1:]))
     return text
 
 
@@ -103,6 +105,11 @@ def test_good_news_go_when_they_were_read_and_doubts_stay_until_they_are_closed(
         if stays:
             person.page.click("#notice-close")
             person.page.wait_for_selector("#notice", state="hidden")
+            person.page.reload()
+            person.press("Alt+3")
+            person.await_text("#motion-doubts", "cuts the feet off in frames 3 to 9")
+        else:
+            assert not person.page.is_visible("#motion-doubts")
 
 
 NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}

@@ -123,6 +123,16 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     return `Expected error here: ${mean.toFixed(0)} px; least sure: ${named.join(", ")}. Discs show it.`;
   }
 
+  // What spoke against the track when the motion was made; it stays true when its notice is closed.
+  function drawDoubts() {
+    const list = byId("motion-doubts"),
+      doubts = exists() ? model.project.doubts : [];
+    list.hidden = !doubts.length;
+    if (list.dataset.content === doubts.join("\n")) return;
+    list.dataset.content = doubts.join("\n");
+    list.replaceChildren(...doubts.map((text) => make("p", { className: "note wrong" }, text)));
+  }
+
   function drawStretches() {
     const list = byId("stretches"),
       content = JSON.stringify(model.stretches);
@@ -185,6 +195,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
         : "",
     );
     setText(byId("motion-errors"), leastSure());
+    drawDoubts();
     drawStretches();
     slider.value = frame;
     setText(byId("motion-where"), `frame ${frame} of ${project.n_frames}, ${seconds.toFixed(2)} s`);
