@@ -178,19 +178,19 @@ def fit_video(
         seen, pose = mirror_video(video), mirror_clicks(pose)
         own_marks = mirror_marks(marks, video.width)
     camera = keep("camera", estimate_camera_motion, seen, progress=progress)
-    found = find_swing(seen, camera, pose, model, options, keep, progress, own_marks)
+    swing = find_swing(seen, camera, pose, model, options, keep, progress, own_marks)
     if clicks.left_handed:
-        found = keep("mirrored", mirror_found, found, video.width)
-    return GolfFit(found.fitted, found.observations, found.doubts, found.notes)
+        swing = keep("mirrored", mirror_found, swing, video.width)
+    return GolfFit(swing.fitted, swing.observations, swing.doubts, swing.notes)
 
 
 def check_length(video: Video, slow_motion: float) -> None:
     """Raises KeyreconError where a video is too short for a swing."""
     seconds = float(video.time[-1])
     if seconds < SHORTEST_SWING:
-        told = f" ({slow_motion:g} times slower than life)" if slow_motion != 1 else ""
+        slowed = f" ({slow_motion:g} times slower than life)" if slow_motion != 1 else ""
         raise KeyreconError(
-            f"{video.path} lasts {seconds:.2f} s{told}, but from the upswing to the hit alone a "
+            f"{video.path} lasts {seconds:.2f} s{slowed}, but from the upswing to the hit alone a "
             f"swing takes {SHORTEST_SWING:g} s or more; use the whole clip, and see to --slowmo."
         )
 
@@ -271,8 +271,8 @@ def write_results(
 
 def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:
     """Whether the results of this very fit lie in the project already."""
-    own = (workspace.folder / name for name in (OVERLAY_FILE, TABLE_FILE))
-    files = (workspace.motion_file, workspace.report_file, *own)
+    exports = (workspace.folder / name for name in (OVERLAY_FILE, TABLE_FILE))
+    files = (workspace.motion_file, workspace.report_file, *exports)
     return all(file.is_file() for file in files) and np.array_equal(
         read_motion(workspace.motion_file).points3d, fitted.motion.points3d
     )
@@ -283,14 +283,14 @@ def describe_tempo(swing: RecordedSwing) -> str:
     start, top, hit, finish = swing.keys
     measures = measure_swing(swing)
     up, down, tempo = (measures.key(name) for name in ("upswing", "downswing", "tempo"))
-    told = (
+    events = (
         f"tempo {tempo.value:.1f} : 1 (give or take {tempo.doubt:.1f})"
         if np.isfinite(tempo.value)
         else "no tempo"
     )
     return (
         f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}; "
-        f"{up.value:.2f} s up, {down.value:.2f} s down, {told}."
+        f"{up.value:.2f} s up, {down.value:.2f} s down, {events}."
     )
 
 

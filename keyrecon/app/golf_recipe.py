@@ -38,7 +38,7 @@ def find_swing(
 
     Raises KeyreconError where no player or no swing is observed.
     """
-    told, pose = pose, replace(pose, mirrored=False)
+    clicked, pose = pose, replace(pose, mirrored=False)
     film = keep("film", choose_frames, video, camera, pose.frame)
     scene = keep(
         "scene", observe_scene, video, film, place_in_film(pose, film),
@@ -52,7 +52,7 @@ def find_swing(
             options=options.observation, progress=progress,
         )  # fmt: skip
         if number == 1:
-            in_film = place_in_film(told, observed.film)
+            in_film = place_in_film(clicked, observed.film)
             check_direction(observed.observations, in_film, model, "The clicks")
         tried.append(_try(observed, video, model, options, keep, progress, f"_{number}"))
         retimed = retime(candidate, tried[-1].fitted.keys, observed, scene)

@@ -83,18 +83,18 @@ def find_candidates(
         joints, marks = mirror_initial(joints, width), mirror_marks(marks, width)
         camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
     body = size_body(pose.stature)
-    found = search_swing(evidence, joints, camera, model, body, marks=marks)
-    if not found and np.isfinite(marks.keys).any():
+    hypotheses = search_swing(evidence, joints, camera, model, body, marks=marks)
+    if not hypotheses and np.isfinite(marks.keys).any():
         raise KeyreconError(
             "No swing of a pace that golfers have passes start, top, hit and finish where they "
             f"were marked (frames {', '.join(f'{k:.0f}' for k in marks.keys if np.isfinite(k))} of "
             "the fitted ones); correct these marks, or take some back."
         )
-    if not found:
+    if not hypotheses:
         raise KeyreconError(
             f"There is no swing in this video: its {len(evidence.players)} frames are too few for "
             "one. Give a video with a whole swing, from the address to the finish."
         )
     if pose.left_handed:
-        found = [replace(h, club=mirror_pixels(h.club, width)) for h in found]
-    return tuple(found)
+        hypotheses = [replace(h, club=mirror_pixels(h.club, width)) for h in hypotheses]
+    return tuple(hypotheses)

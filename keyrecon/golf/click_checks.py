@@ -69,8 +69,8 @@ def check_pose(pose: ClickedPose, model: MotionModel, origin: str) -> None:
 
     `origin` names the file that the clicks come from.
     """
-    told = measure_misfit(pose, model)
-    if told.total <= USUAL_MISFIT:
+    misfit = measure_misfit(pose, model)
+    if misfit.total <= USUAL_MISFIT:
         return
     exchanges = {
         words: measure_misfit(_exchanged(pose, names), model).total
@@ -79,15 +79,15 @@ def check_pose(pose: ClickedPose, model: MotionModel, origin: str) -> None:
         )
     }  # fmt: skip
     words = min(exchanges, key=lambda name: exchanges[name])
-    if exchanges[words] < EXCHANGE_GAIN * told.total:
+    if exchanges[words] < EXCHANGE_GAIN * misfit.total:
         raise KeyreconError(
             f"{origin}: left and right of {words} seem to be exchanged: nobody stands as clicked, "
             f"with {words} exchanged a golfer does. right_ is the player's own right, which is on "
             "the left of a picture from the front; mend the names, or click again."
         )
-    if told.total > LARGEST_MISFIT:
+    if misfit.total > LARGEST_MISFIT:
         raise KeyreconError(
-            f"{origin}: no golfer stands as clicked: {told.worst} is {told.away:.0%} of the "
+            f"{origin}: no golfer stands as clicked: {misfit.worst} is {misfit.away:.0%} of the "
             "player's height from where the other clicks would have it. Click all joints of one "
             "player in an upright picture, as near to the address as it shows him whole."
         )
@@ -105,8 +105,8 @@ def measure_misfit(pose: ClickedPose, model: MotionModel) -> ClickMisfit:
     scale = NORMAL_HEIGHT / pose.height
     joints = replace(joints, places=joints.places * scale)
     camera = Camera(camera.focal * scale, camera.principal * scale)
-    found = [_misfit_at(joints, camera, float(phase), model) for phase in model.keys]
-    return min(found, key=lambda misfit: misfit.total)
+    misfits = [_misfit_at(joints, camera, float(phase), model) for phase in model.keys]
+    return min(misfits, key=lambda misfit: misfit.total)
 
 
 def _misfit_at(

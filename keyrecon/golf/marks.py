@@ -37,14 +37,14 @@ def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
     first, last = film.window
     inside = (marks.frames >= first) & (marks.frames <= last)
     frames = marks.frames[inside]
-    own = np.rint(film.place[frames]).astype(int)
-    _, latest = np.unique(own[::-1], return_index=True)
-    rows = len(own) - 1 - latest
+    pictures = np.rint(film.place[frames]).astype(int)
+    _, latest = np.unique(pictures[::-1], return_index=True)
+    rows = len(pictures) - 1 - latest
     warps = film.warps[frames[rows]][:, None]
     keys = np.clip(np.nan_to_num(marks.keys), 0, len(film.place) - 1)
     places = np.interp(keys, np.arange(len(film.place)), film.place)
     return SwingMarks(
-        own[rows], warp_points(warps, marks.joints[inside][rows]),
+        pictures[rows], warp_points(warps, marks.joints[inside][rows]),
         warp_points(warps, marks.shafts[inside][rows]),
         np.where(np.isfinite(marks.keys), places, np.nan),
     )  # fmt: skip

@@ -37,13 +37,13 @@ def mirror_clicks(pose: ClickedPose) -> ClickedPose:
     )  # fmt: skip
 
 
-def mirror_found(found: FoundSwing, width: int) -> FoundSwing:
+def mirror_found(swing: FoundSwing, width: int) -> FoundSwing:
     """A swing found in mirrored pictures of some width, in the pictures as they are."""
-    observations = mirror_observations(found.observations, width)
-    observations = replace(observations, left_handed=not found.observations.left_handed)
-    fitted = _mirror_fitted(found.fitted, width)
+    observations = mirror_observations(swing.observations, width)
+    observations = replace(observations, left_handed=not swing.observations.left_handed)
+    fitted = _mirror_fitted(swing.fitted, width)
     return FoundSwing(
-        fitted, observations, tuple(_mirror_doubt(d) for d in found.doubts), found.notes
+        fitted, observations, tuple(_mirror_doubt(d) for d in swing.doubts), swing.notes
     )
 
 

@@ -128,15 +128,15 @@ def observe_swing(
     slow_motion = find_slow_motion(hypothesis.keys, film.fps)
     chosen = choose_swing_frames(hypothesis.keys, film, slow_motion)
     reach = _reach_to(round(float(film.place[pose.frame])), chosen)
-    own, tracked = film.take(chosen, slow_motion), film.take(reach, slow_motion)
-    placed = place_in_film(pose, own)
-    seen = _Seen(own, scene, chosen, reach, place_marks(marks, own), placed)
+    window, tracked = film.take(chosen, slow_motion), film.take(reach, slow_motion)
+    placed = place_in_film(pose, window)
+    seen = _Seen(window, scene, chosen, reach, place_marks(marks, window), placed)
     shown = tracked.open(video)
     small = read_small(shown, scene.foreground.likely.shape[2])
     pictures = [to_lab(p) for p in progress(small, "Reading", len(shown))]
     foreground = replace(scene.foreground, likely=scene.foreground.likely[reach])
     tracks = track_joints(
-        pictures, foreground, place_in_film(pose, tracked), own.fps, options.appearance, progress
+        pictures, foreground, place_in_film(pose, tracked), window.fps, options.appearance, progress
     )
     rows = np.searchsorted(reach, chosen)
     inside = TrackedJoints(tracks.joints[rows], tracks.spread[rows])
@@ -144,7 +144,7 @@ def observe_swing(
         seen = replace(seen, pose=_carry(placed, inside))
     swing = _time_swing(hypothesis, seen, model, options)
     observations = _observe([pictures[row] for row in rows], seen, inside, swing, options)
-    return ObservedSwing(own, slow_motion, observations)
+    return ObservedSwing(window, slow_motion, observations)
 
 
 def retime(

@@ -154,8 +154,8 @@ def _doubt_figure(fitted: FittedSwing, observations: Observations) -> list[Swing
         return []
     longest = int(seconds.argmax())
     middle = start + int(begins[longest] + ends[longest]) // 2
-    told = f"both hands lie off the player for {seconds[longest]:.2f} s"
-    return [SwingDoubt(told, middle)]
+    reason = f"both hands lie off the player for {seconds[longest]:.2f} s"
+    return [SwingDoubt(reason, middle)]
 
 
 def _doubt_rest(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:

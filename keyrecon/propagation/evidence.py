@@ -128,8 +128,8 @@ def weigh_evidence(half: str, evidence: LimbEvidence) -> LimbCosts:
     """Costs of states and of pairs of states."""
     weights = WEIGHTS[half]
     one, other = (
-        np.sum([weights.get(name, 0.0) * values for name, values in found.items()], axis=0)
-        for found in evidence.of_sides
+        np.sum([weights.get(name, 0.0) * values for name, values in side.items()], axis=0)
+        for side in evidence.of_sides
     )
     pairs = np.zeros((*one.shape, one.shape[1]))
     for name, values in evidence.of_pairs:

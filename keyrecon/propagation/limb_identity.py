@@ -72,9 +72,9 @@ def template_gain(
 ) -> Float[np.ndarray, "T"]:
     """What similar annotated poses, fitted to each frame, say for the sides as they are and against
     the exchanged, nats."""
-    own = np.concatenate(half.sides)
-    direct = np.abs(joints[:, None, own] - poses[..., own])
-    crossed = np.abs(joints[:, None, half.mirror[own]] - poses[..., own])
+    sides = np.concatenate(half.sides)
+    direct = np.abs(joints[:, None, sides] - poses[..., sides])
+    crossed = np.abs(joints[:, None, half.mirror[sides]] - poses[..., sides])
     gain = np.clip((crossed - direct) / DISTINCTION, -1, 1)
     return TEMPLATE_RATE / fps * gain.mean(axis=(1, 2))
 
@@ -83,8 +83,8 @@ def appearance_gain(
     half: BodyHalf, unlikeness: Float[np.ndarray, "T 2 J"], fps: float
 ) -> Float[np.ndarray, "T"]:
     """What joints that look like marks of their own side, or of the other, say likewise."""
-    own = np.concatenate(half.sides)
-    return APPEARANCE_RATE / fps * (unlikeness[:, 1, own] - unlikeness[:, 0, own]).mean(axis=1)
+    sides = np.concatenate(half.sides)
+    return APPEARANCE_RATE / fps * (unlikeness[:, 1, sides] - unlikeness[:, 0, sides]).mean(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +112,13 @@ def identify_in_shots(
     fps: float,
 ) -> LimbIdentity:
     """Where the sides of one half of the body are exchanged, in every shot by itself."""
-    found = []
+    identities = []
     for part in shots.parts:
         inside = marked[(marked >= part.start) & (marked < part.stop)] - part.start
-        found.append(identify_limbs(half, joints[part], gain[part], inside, fps))
+        identities.append(identify_limbs(half, joints[part], gain[part], inside, fps))
     return LimbIdentity(
-        np.concatenate([one.exchanged for one in found]),
-        np.concatenate([one.probability for one in found]),
+        np.concatenate([one.exchanged for one in identities]),
+        np.concatenate([one.probability for one in identities]),
     )
 
 

@@ -168,13 +168,13 @@ def _find_limbs(
     cost = cost + _unlike(looks, appearance.bones[limb.bones[0]], start + one / 2)
     total = cost[:, None] + _unlike(looks, appearance.marks[limb.joints[2]], outer)
     total += _unlike(looks, appearance.bones[limb.bones[1]], middle[:, None] + other / 2)
-    found = np.zeros((count, 2), complex)
+    limbs = np.zeros((count, 2), complex)
     for rank in range(count):
         a, b = np.unravel_index(total.argmin(), total.shape)
-        found[rank] = middle[a], outer[a, b]
+        limbs[rank] = middle[a], outer[a, b]
         near = np.abs(middle - middle[a]) < DISTINCTION
         total[near[:, None] & (np.abs(outer - outer[a, b]) < DISTINCTION)] = TAKEN
-    return found - start
+    return limbs - start
 
 
 def _unlike(

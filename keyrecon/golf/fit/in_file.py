@@ -85,7 +85,7 @@ def _state_at(state: SwingState, place: Float[np.ndarray, "F"]) -> SwingState:
     turns = Slerp(frames, Rotation.from_matrix(state.rotation))(place).as_matrix()
     position = np.stack([np.interp(place, frames, c) for c in state.position.T], axis=1)
     nearest = np.rint(place).astype(int)
-    each, own = state.frame_coefficients, state.deviation
+    each, deviation = state.frame_coefficients, state.deviation
     low = np.minimum(place.astype(int), len(frames) - 2)
     share = (place - low)[:, None, None]
     return replace(
@@ -94,7 +94,9 @@ def _state_at(state: SwingState, place: Float[np.ndarray, "F"]) -> SwingState:
         rotation=turns,
         position=position,
         frame_coefficients=None if each is None else each[nearest],
-        deviation=None if own is None else (1 - share) * own[low] + share * own[low + 1],
+        deviation=None
+        if deviation is None
+        else (1 - share) * deviation[low] + share * deviation[low + 1],
     )
 
 

@@ -81,7 +81,7 @@ def best_paths(
             lengths[part, length] = _line_sums(costs, rows[part], rows[part + 1], length)
         return lengths[part, length]
 
-    found: list[SwingPath] = []
+    paths: list[SwingPath] = []
     for down in downs:
         ups = _durations(limits.tempo[0] * down, limits.tempo[1] * down, frames)
         throughs = _durations(limits.follow[0] * down, limits.follow[1] * down, 10 * frames)
@@ -96,8 +96,8 @@ def best_paths(
         for top in _local_minima(total, max(1, down // 2)):
             hit = tops[top] + down
             keys = np.array([tops[top] - up_of[top], tops[top], hit, hit + through_of[top]], float)
-            found.append(SwingPath(keys, float(total[top])))
-    return [path for path, _ in distinct_paths([(p, None) for p in found], limits.most)]
+            paths.append(SwingPath(keys, float(total[top])))
+    return [path for path, _ in distinct_paths([(p, None) for p in paths], limits.most)]
 
 
 def _durations(shortest: float, longest: float, most: float | int) -> list[int]:
@@ -170,10 +170,10 @@ def _local_minima(total: Float[np.ndarray, "n"], reach: int) -> Int[np.ndarray, 
     return np.flatnonzero(np.isfinite(total) & (total <= windows.min(axis=1)))
 
 
-def distinct_paths(found: list[tuple[SwingPath, Of]], most: int) -> list[tuple[SwingPath, Of]]:
+def distinct_paths(candidates: list[tuple[SwingPath, Of]], most: int) -> list[tuple[SwingPath, Of]]:
     """The best ones of which no two have about the same top and hit."""
     kept: list[tuple[SwingPath, Of]] = []
-    for path, more in sorted(found, key=lambda f: f[0].cost):
+    for path, more in sorted(candidates, key=lambda f: f[0].cost):
         down = path.keys[2] - path.keys[1]
         if all(np.abs(path.keys[1:3] - p.keys[1:3]).max() > SAME * down for p, _ in kept):
             kept.append((path, more))

@@ -112,7 +112,7 @@ def search_swing(
     """
     placement = estimate_initial_pose(clicked, 0.0, camera, model, body)
     phases = _phases(model)
-    found: list[tuple[SwingPath, SwingHypothesis]] = []
+    hypotheses: list[tuple[SwingPath, SwingHypothesis]] = []
     for style in _styles(model):
         drawn = draw_swing(model, body, style, phases, placement, camera)
         costs = frame_costs(evidence, drawn)
@@ -120,8 +120,8 @@ def search_swing(
             costs[t] += MARKED_SECONDS * evidence.fps * _mark_costs(marks, row, drawn, evidence)
         for path in best_paths(costs, model.keys, phases, evidence.fps, limits, marks.keys):
             club = drawn.club[_phase_rows(path.keys, phases, model.keys, len(costs))]
-            found.append((path, SwingHypothesis(path.keys, path.cost, placement, club)))
-    return [hypothesis for _, hypothesis in distinct_paths(found, limits.most)]
+            hypotheses.append((path, SwingHypothesis(path.keys, path.cost, placement, club)))
+    return [hypothesis for _, hypothesis in distinct_paths(hypotheses, limits.most)]
 
 
 def _phases(model: MotionModel) -> Float[np.ndarray, "P"]:
@@ -295,9 +295,9 @@ def _turns(
     clubs: Float[np.ndarray, "P 2 2"], ends: Float[np.ndarray, "n 2 2"]
 ) -> Float[np.ndarray, "P n"]:
     """Angles between drawn clubs and shafts, rad."""
-    expected, found = clubs[:, 1] - clubs[:, 0], ends[:, 1] - ends[:, 0]
-    cross = expected[:, None, 0] * found[:, 1] - expected[:, None, 1] * found[:, 0]
-    return np.abs(np.arctan2(cross, expected @ found.T))
+    expected, observed = clubs[:, 1] - clubs[:, 0], ends[:, 1] - ends[:, 0]
+    cross = expected[:, None, 0] * observed[:, 1] - expected[:, None, 1] * observed[:, 0]
+    return np.abs(np.arctan2(cross, expected @ observed.T))
 
 
 def _phase_rows(

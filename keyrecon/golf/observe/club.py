@@ -236,9 +236,9 @@ def _surprise(
     height: float,
 ) -> Float[np.ndarray, "n"]:
     """What shafts pay for lying elsewhere than a hypothesis about the swing has the club."""
-    way, found = expected[1] - expected[0], shafts.ends[:, 1] - shafts.ends[:, 0]
-    cross = way[0] * found[:, 1] - way[1] * found[:, 0]
-    turn = np.arctan2(cross, found @ way) / np.radians(USUAL_TURN)
+    way, observed = expected[1] - expected[0], shafts.ends[:, 1] - shafts.ends[:, 0]
+    cross = way[0] * observed[:, 1] - way[1] * observed[:, 0]
+    turn = np.arctan2(cross, observed @ way) / np.radians(USUAL_TURN)
     turn = turn * min(1.0, 4 * float(np.linalg.norm(way)) / height)
     off = np.linalg.norm(shafts.ends[:, 0] - expected[0], axis=1) / (USUAL_OFFSET * height)
     surprise: Float[np.ndarray, "n"] = 0.5 * (turn**2 + off**2)

@@ -88,15 +88,15 @@ class Film:
 
     def keys_in_file(self, keys: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         """Frames of the file for places among these frames; the middle of repeated ones."""
-        own = np.arange(len(self.numbers))
-        first = np.searchsorted(self.place, own, side="left")
-        last = np.searchsorted(self.place, own, side="right") - 1
+        pictures = np.arange(len(self.numbers))
+        first = np.searchsorted(self.place, pictures, side="left")
+        last = np.searchsorted(self.place, pictures, side="right") - 1
         middles = (first + np.maximum(last, first)) / 2
         # The first and last frame stand for all before and after them, but are not among these.
         begin, end = self.window
         middles[0] = (begin + min(last[0], end)) / 2
         middles[-1] = (max(first[-1], begin) + end) / 2
-        return np.interp(keys, own, middles)
+        return np.interp(keys, pictures, middles)
 
     def frame_in_file(self, frame: int) -> int:
         """The frame of the file that is a frame of these."""
@@ -128,9 +128,9 @@ def choose_frames(video: Video, camera: CameraPath, clicked: int) -> Film:
     inside = np.arange(first, last + 1)
     kept = inside[~repeats[inside]]
     kept = np.unique(np.append(kept, first))
-    own = np.searchsorted(kept, inside, side="right") - 1  # the picture that each frame shows
-    time = _times(video.time[inside], own, float(repeats[inside].mean()))
-    place = np.interp(np.arange(len(video)), inside, own)
+    picture = np.searchsorted(kept, inside, side="right") - 1  # the picture that each frame shows
+    time = _times(video.time[inside], picture, float(repeats[inside].mean()))
+    place = np.interp(np.arange(len(video)), inside, picture)
     steady = _steady(video, camera, clicked, inside)
     shot, repeated = (int(first), int(last)), float(repeats.mean())
     film = Film(
@@ -150,13 +150,13 @@ def _shot(whole: Float[np.ndarray, "F"], clicked: int) -> tuple[int, int]:
 
 
 def _times(
-    shown: Float[np.ndarray, "n"], own: Int[np.ndarray, "n"], repeated: float
+    shown: Float[np.ndarray, "n"], picture: Int[np.ndarray, "n"], repeated: float
 ) -> Float[np.ndarray, "m"]:
     """When the pictures were taken, seconds."""
-    _, firsts = np.unique(own, return_index=True)
+    _, firsts = np.unique(picture, return_index=True)
     if repeated < OFTEN_REPEATED:
         return shown[firsts]
-    middles = np.array([shown[own == k].mean() for k in range(len(firsts))])
+    middles = np.array([shown[picture == k].mean() for k in range(len(firsts))])
     steps = gaussian_filter1d(np.diff(middles), 4.0, mode="nearest")
     return middles[0] + np.append(0.0, np.cumsum(steps))
 
