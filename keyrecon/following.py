@@ -71,7 +71,7 @@ class _Shot:
     camera: CameraPath
     colors: Colors
     anchors: TrackAnchors
-    told: bool
+    picked: bool
     """Whether a person clicked or marked in it."""
 
 
@@ -105,18 +105,18 @@ def follow_player(
         )
         for shot in progress(each, "Looking for the player in each shot", len(each))
     ]  # fmt: skip
-    told = np.array([shot.told for shot in each])
-    shots = sort_shots(shots, sightings, told, video.fps, options.shots, camera.dissolves)
+    picked = np.array([shot.picked for shot in each])
+    shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
     tracks: list[Track] = []
     edges: list[Edges] = []
     verified: list[TrackVerification] = []
     for number in progress(usable, "Following the player in each shot", len(usable)):
-        track, own, of_track = _follow(
+        track, followed, of_track = _follow(
             each[number], _found(sightings[number]), options, keep, silent
         )
         tracks.append(track)
-        edges += own
+        edges += followed
         verified.append(replace(of_track, frames=of_track.frames + shots.first[number]))
     return FollowedPlayer(shots, join_frames(tracks), tuple(edges), join_frames(verified))
 
@@ -135,16 +135,16 @@ def _shot(
     anchors: TrackAnchors,
 ) -> _Shot:
     """One of several shots; a player who is clicked or marked in it has the size that is told."""
-    own = part_of_picks(clicks, part)
-    sized = {pick.frame for pick in own if pick.part == "head"}
-    sized &= {pick.frame for pick in own if pick.part == "foot"}
+    picks = part_of_picks(clicks, part)
+    sized = {pick.frame for pick in picks if pick.part == "head"}
+    sized &= {pick.frame for pick in picks if pick.part == "foot"}
     return _Shot(
         f"@{part.start}",
         part_of_video(video, part),
         part_of_path(camera, part),
-        replace(colors, height=picked_height(own)) if sized else colors,
+        replace(colors, height=picked_height(picks)) if sized else colors,
         part_of_anchors(anchors, part),
-        bool(own),
+        bool(picks),
     )
 
 

@@ -134,10 +134,10 @@ def prepare(
         flow = follow_marks(video, marks, shots, options, keep, progress)
         anchors = anchors_from_bodies(marks, flow)
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
-    told = FollowOptions(
+    follow_options = FollowOptions(
         options.shots, options.find, options.background, options.track, options.edges
     )
-    followed = follow_player(video, camera, colors, clicks, anchors, told, keep, progress)
+    followed = follow_player(video, camera, colors, clicks, anchors, follow_options, keep, progress)
     distances = keep(
         "compare",
         compare_frames,
@@ -306,19 +306,19 @@ def follow_marks(
         return keep(
             "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
         )
-    frames, found = [], []
+    frames, flows = [], []
     for part in shots.parts:
         inside = np.arange(part.start, part.stop)
-        own = part_of_marks(marks, inside)
-        if np.isfinite(own.joints).any():
+        shot_marks = part_of_marks(marks, inside)
+        if np.isfinite(shot_marks.joints).any():
             frames.append(inside)
-            found.append(
+            flows.append(
                 keep(
-                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part), own,
+                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part), shot_marks,
                     options=options.flow, progress=progress,
                 )
             )  # fmt: skip
-    return put_back(join_frames(found), np.concatenate(frames), len(video))
+    return put_back(join_frames(flows), np.concatenate(frames), len(video))
 
 
 def _with_annotated_keyframes(

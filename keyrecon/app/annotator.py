@@ -127,11 +127,11 @@ def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     _prepare_with_bodies(workspace, video)
     marks = project.load_annotations(workspace, video)
     options = workspace.options(Options(), Options())
-    found = prepare_project(workspace, video, marks, options, progress)
-    shots = found.preparation.shots
-    seen = float((found.preparation.track.confidence[shots.usable_frames] > 0).mean())
-    told = f"Player found in {seen:.1%} of {len(shots.usable_frames)} frames."
-    return "\n".join([told, *describe_shots(shots), *found.contradictions()])
+    prepared = prepare_project(workspace, video, marks, options, progress)
+    shots = prepared.preparation.shots
+    seen = float((prepared.preparation.track.confidence[shots.usable_frames] > 0).mean())
+    share = f"Player found in {seen:.1%} of {len(shots.usable_frames)} frames."
+    return "\n".join([share, *describe_shots(shots), *prepared.contradictions()])
 
 
 def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
@@ -175,18 +175,18 @@ def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
 def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     """A golf fit; what the page shows in no other place is returned."""
     model = read_motion_model(BUILT_IN_SWING_PRIOR)
-    told = golf.fit_project(Workspace(folder), model, progress=progress)
-    return "\n".join(line for line in told.splitlines() if line.startswith("Note: "))
+    summary = golf.fit_project(Workspace(folder), model, progress=progress)
+    return "\n".join(line for line in summary.splitlines() if line.startswith("Note: "))
 
 
-def _contradictions(told: str) -> str:
+def _contradictions(output: str) -> str:
     """Of what a command tells, the cuts, clicks and marks that do not fit the rest, and what speaks
     against the track: the page shows everything else in places of its own."""
     named = re.compile(
         r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+|The lower edge of the picture|"
         r"Another figure|The player found jumps"
     )
-    return "\n".join(line for line in told.splitlines() if named.match(line))
+    return "\n".join(line for line in output.splitlines() if named.match(line))
 
 
 def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:

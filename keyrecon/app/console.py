@@ -46,12 +46,12 @@ def _bar(items: Iterable[Item], description: str, total: int | None) -> Iterator
 
 
 def _lines(items: Iterable[Item], description: str, total: int | None) -> Iterator[Item]:
-    started = told = time.monotonic()
+    started = reported = time.monotonic()
     done = 0
     for done, item in enumerate(items, 1):
         yield item
-        if time.monotonic() - told > PLAIN_SECONDS:
-            told = time.monotonic()
+        if time.monotonic() - reported > PLAIN_SECONDS:
+            reported = time.monotonic()
             sys.stderr.write(f"{description}: {done}{f' of {total}' if total else ''}\n")
     if time.monotonic() - started > 1:
         sys.stderr.write(f"{description}: done ({done}, {time.monotonic() - started:.1f} s)\n")

@@ -71,16 +71,16 @@ def _mark(
 ) -> str:
     """Annotate the keyframes; tells where the marks come from."""
     preparation = prepared(workspace, Options(), progress)
-    video, found = preparation.video, preparation.keyframes
+    video, keyframes = preparation.video, preparation.keyframes
     size = (video.width, video.height)
     fresh = mark_from_truth(
-        found, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(CLICK_NOISE)
+        keyframes, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(CLICK_NOISE)
     )
-    asked = (found.upper.frames, found.lower.frames)
+    asked = (keyframes.upper.frames, keyframes.lower.frames)
     known = read_coco(kept, LSP14, len(video), size) if kept.is_file() else None
     known = marks_asked_for(known, *asked) if known else None
     missing = missing_marks(known, *asked)
     marks = merge_annotations(fresh, known) if known else fresh
     write_coco(workspace.annotations_file, marks, size)
-    text = f"Marks of {len(found.frames) - len(missing)} keyframes from {kept.name}"
+    text = f"Marks of {len(keyframes.frames) - len(missing)} keyframes from {kept.name}"
     return f"{text}, of {len(missing)} made from the truth." if missing else f"{text}."

@@ -80,12 +80,12 @@ def chosen_frames(text: str | None, count: int) -> tuple[int, int]:
     """First and last frame of "A-B"; all `count` of them where nothing is said."""
     if text is None:
         return 0, count - 1
-    found = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
-    if not found:
+    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
+    if not match:
         raise KeyreconError(
             f"--frames takes the first and the last, such as 120-180; got '{text}'."
         )
-    first, last = int(found[1]), int(found[2])
+    first, last = int(match[1]), int(match[2])
     if not first <= last < count:
         raise KeyreconError(
             f"--frames {text} cannot be: the motion has frames 0 to {count - 1}, and the first "

@@ -64,28 +64,28 @@ def find_keyframes(
     forms = as_printed(options) if printed else options
     video = workspace.video()
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
-    found = prepare_project(workspace, video, marks, forms, progress)
-    preparation = found.preparation
+    prepared = prepare_project(workspace, video, marks, forms, progress)
+    preparation = prepared.preparation
     if marks is not None and not printed:
         preparation = with_marked_keyframes(preparation, marks, options, progress)
     workspace.remember(options, Options())
     workspace.forget_shot_choices(choices)
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
-    return describe_keyframes(workspace, preparation, found.contradictions())
+    return describe_keyframes(workspace, preparation, prepared.contradictions())
 
 
 def describe_keyframes(
     workspace: Workspace, preparation: Preparation, contradictions: Sequence[str] = ()
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
-    found, frames = preparation.keyframes, len(preparation.video)
+    keyframes, frames = preparation.keyframes, len(preparation.video)
     folder, used = quoted(workspace.folder), preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
     halves = [
         f"{name} body: {counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
-        f"frames (beta {half.beta:.4f}; {_compare_with_printed(found, half)})."
-        for name, half in (("Upper", found.upper), ("Lower", found.lower))
+        f"frames (beta {half.beta:.4f}; {_compare_with_printed(keyframes, half)})."
+        for name, half in (("Upper", keyframes.upper), ("Lower", keyframes.lower))
     ]
     return "\n".join(
         [
@@ -93,27 +93,28 @@ def describe_keyframes(
             *describe_shots(preparation.shots),
             *contradictions,
             *_describe_absence(preparation),
-            *(stretch.text for stretch in unsure_track(preparation.track, found.reach)),
+            *(stretch.text for stretch in unsure_track(preparation.track, keyframes.reach)),
             *halves,
-            *_describe_gains(found),
-            f"Annotation cost {annotation_cost(found, frames):.2%}: {len(found.frames)} different "
-            f"frames, listed in {workspace.keyframes_file}, pictures in {workspace.pictures}.",
+            *_describe_gains(keyframes),
+            f"Annotation cost {annotation_cost(keyframes, frames):.2%}: {len(keyframes.frames)} "
+            f"different frames, listed in {workspace.keyframes_file}, pictures in "
+            f"{workspace.pictures}.",
             f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
             f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
         ]
     )
 
 
-def _compare_with_printed(found: Keyframes, half: HalfKeyframes) -> str:
-    if found.method == "paper":
+def _compare_with_printed(keyframes: Keyframes, half: HalfKeyframes) -> str:
+    if keyframes.method == "paper":
         return "chosen by Eq. 2-4 as printed"
     return f"as printed in the paper it would take {half.printed_count}"
 
 
-def _describe_gains(found: Keyframes) -> list[str]:
+def _describe_gains(keyframes: Keyframes) -> list[str]:
     """What a person who stops early has, and what one mark more would bring."""
     lines = []
-    for name, half in (("Upper", found.upper), ("Lower", found.lower)):
+    for name, half in (("Upper", keyframes.upper), ("Lower", keyframes.lower)):
         gains = half.gains
         if gains is None:
             continue

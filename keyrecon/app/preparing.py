@@ -217,23 +217,23 @@ def prepare_project(
         used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
     if used is None and marks is not None and not workspace.picks_file.is_file():
         used = marks
-    found = _without_misplaced(workspace, video, options, used, progress)
-    if marks is not None and len(frames_off_marks(found.preparation, marks)):
+    prepared = _without_misplaced(workspace, video, options, used, progress)
+    if marks is not None and len(frames_off_marks(prepared.preparation, marks)):
         used = marks
-        found = _without_misplaced(workspace, video, options, used, progress)
+        prepared = _without_misplaced(workspace, video, options, used, progress)
     if used is not None:
         size = (video.width, video.height)
         write_durably(file, coco_text(used, size).encode())
-    return _with_told(workspace, found, marks)
+    return _with_told(workspace, prepared, marks)
 
 
 def _with_told(
-    workspace: Workspace, found: ProjectPreparation, marks: Annotations | None
+    workspace: Workspace, prepared: ProjectPreparation, marks: Annotations | None
 ) -> ProjectPreparation:
     """With the marks and with the clicks that were not left aside."""
     picks = workspace.picks() if workspace.picks_file.is_file() else ()
-    kept = tuple(pick for pick in picks if pick not in found.set_aside)
-    return replace(found, marks=marks, picks=kept)
+    kept = tuple(pick for pick in picks if pick not in prepared.set_aside)
+    return replace(prepared, marks=marks, picks=kept)
 
 
 def _without_misplaced(

@@ -40,9 +40,9 @@ def start(
     opened = open_video(video, first, end, slow_motion)
     if skeleton is not None:
         read_skeleton(skeleton)
-    told: dict[str, float | None] = {"start": first or None, "end": end}
-    told["slow_motion"] = None if slow_motion == 1 else slow_motion
-    Workspace.create(folder, opened, video, told, "golf" if golf else None)
+    trim_of_video: dict[str, float | None] = {"start": first or None, "end": end}
+    trim_of_video["slow_motion"] = None if slow_motion == 1 else slow_motion
+    Workspace.create(folder, opened, video, trim_of_video, "golf" if golf else None)
     if skeleton is not None:
         write_durably(folder / "skeleton.json", skeleton.read_bytes())
     text = (
@@ -172,15 +172,15 @@ def asked_for(workspace: Workspace) -> Keyframes:
 
 def annotated(workspace: Workspace, partial: bool = False) -> Annotations:
     """The project's annotations; KeyreconError names the keyframes that lack theirs."""
-    file, found = workspace.annotations_file, asked_for(workspace)
+    file, asked = workspace.annotations_file, asked_for(workspace)
     annotations = load_annotations(workspace, workspace.video()) if file.is_file() else None
-    missing = missing_marks(annotations, found.upper.frames, found.lower.frames)
+    missing = missing_marks(annotations, asked.upper.frames, asked.lower.frames)
     if annotations is None or (missing and not partial):
         folder = quoted(workspace.folder)
         named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
         listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
         raise KeyreconError(
-            f"{len(missing)} of {len(found.frames)} keyframes are not marked yet: frame {listed}. "
+            f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame {listed}. "
             f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
             f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
         )

@@ -23,11 +23,11 @@ from keyrecon.report.page import write_report
 from keyrecon.uncertainty import uncertain_share, uncertain_stretches
 
 
-def settings(workspace: Workspace, told: Options, height: float | None = None) -> Options:
+def settings(workspace: Workspace, given: Options, height: float | None = None) -> Options:
     """The project's options and what is told now, with the height in metres."""
     if height is not None and not 0.5 < height < 2.6:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
-    options = workspace.options(told, Options())
+    options = workspace.options(given, Options())
     return options if height is None else with_height(options, height)
 
 
@@ -46,11 +46,11 @@ def run(
     done: what is refused on the way leaves no trace.
     """
     started = time.perf_counter()
-    told, options = options, as_printed(options) if printed else options
+    given, options = options, as_printed(options) if printed else options
     annotations = annotated(workspace, partial)
     asked = asked_for(workspace)
-    found = prepare_project(workspace, workspace.video(), annotations, options, progress)
-    preparation = replace(found.preparation, keyframes=asked)
+    prepared = prepare_project(workspace, workspace.video(), annotations, options, progress)
+    preparation = replace(prepared.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     placed = write_placed_motion(workspace, motion)
     material = ReportMaterial(
@@ -63,20 +63,20 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=found.contradictions(),
+        contradictions=prepared.contradictions(),
         court=placed.court,
         shots=describe_shots(preparation.shots),
     )
     write_report(workspace.report_file, material, progress)
     write_durably(workspace.doubts_file, json.dumps(list(material.contradictions)))
-    workspace.remember(told, Options())
+    workspace.remember(given, Options())
     return "\n".join(
         [
             f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
             f"{workspace.report_file}: open it in a browser.",
             *placed.lines,
             *describe_shots(preparation.shots),
-            *found.contradictions(),
+            *prepared.contradictions(),
             *_describe_doubt(motion),
             *_waiting_choices(workspace),
             *_other_choice(workspace, options, preparation.keyframes),
@@ -124,5 +124,5 @@ def prepared(
 ) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
     asked = asked_for(workspace)
-    found = prepare_project(workspace, workspace.video(), marks, options, progress)
-    return replace(found.preparation, keyframes=asked)
+    preparing = prepare_project(workspace, workspace.video(), marks, options, progress)
+    return replace(preparing.preparation, keyframes=asked)

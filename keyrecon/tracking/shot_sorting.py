@@ -121,21 +121,21 @@ def _layouts(video: Video, colors: Colors, track: Track) -> Float[np.ndarray, "n
     width = cropping.reading_width(video)
     to_small = shrinking(width / video.width)
     tables = np.stack([*posterior_tables(colors), foot_table(colors)]).astype(np.float32)
-    found = []
+    layouts = []
     pictures = read_small(video, width, set(frames.tolist()))
     for t, picture in zip(frames.tolist(), pictures, strict=True):
         way = (to_small @ cropping.crop_to_picture(t))[:2]
         maps = tables[:, color_bins(to_lab(cut_affine(picture, way, cropping.size)))]
         small = [cv2.resize(one, CELLS[::-1], interpolation=cv2.INTER_AREA) for one in maps]
         both = np.stack(small)
-        found.append((both + both[..., ::-1]) / 2)
-    return np.stack(found)
+        layouts.append((both + both[..., ::-1]) / 2)
+    return np.stack(layouts)
 
 
 def sort_shots(
     shots: Shots,
     sightings: Sequence[Sighting],
-    told: Bool[np.ndarray, "S"],
+    picked: Bool[np.ndarray, "S"],
     fps: float,
     options: ShotOptions = ShotOptions(),
     dissolves: tuple[int, ...] = (),
@@ -145,15 +145,15 @@ def sort_shots(
 
     Raises KeyreconError where a person's shot is asked for that is none, or where no shot is left.
     """
-    likeness = _likeness(sightings, told)
-    own = [seen.repeated for seen, tell in zip(sightings, told, strict=True) if tell]
-    usual = float(np.median(own)) if own else 0.0
-    used, skipped = (_numbers(text, len(told)) for text in (options.use, options.skip))
+    likeness = _likeness(sightings, picked)
+    repeats = [seen.repeated for seen, tell in zip(sightings, picked, strict=True) if tell]
+    usual = float(np.median(repeats)) if repeats else 0.0
+    used, skipped = (_numbers(text, len(picked)) for text in (options.use, options.skip))
     shows = []
     for number, (part, seen) in enumerate(zip(shots.parts, sightings, strict=True)):
         if number in skipped:
             shows.append("left out by --shots.skip")
-        elif number in used or told[number]:
+        elif number in used or picked[number]:
             shows.append(PLAYER if seen.track is not None else "nobody found")
         elif part.start in dissolves:
             shows.append("a dissolve")
@@ -168,22 +168,26 @@ def sort_shots(
         else:
             shows.append(PLAYER if likeness[number] >= options.alike else "somebody else")
     if PLAYER not in shows:
-        first = next(s for s, tell in zip(sightings, told, strict=True) if tell or not told.any())
+        first = next(
+            s for s, tell in zip(sightings, picked, strict=True) if tell or not picked.any()
+        )
         raise KeyreconError(f"No shot of the video shows the player. {first.why}".strip())
     return Shots(shots.first, shots.n_frames, tuple(shows))
 
 
-def _likeness(sightings: Sequence[Sighting], told: Bool[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
+def _likeness(
+    sightings: Sequence[Sighting], picked: Bool[np.ndarray, "S"]
+) -> Float[np.ndarray, "S"]:
     """Of each shot with those that a person told of, relative to what these have themselves."""
-    known = [s.layout for s, tell in zip(sightings, told, strict=True) if tell and len(s.layout)]
+    known = [s.layout for s, tell in zip(sightings, picked, strict=True) if tell and len(s.layout)]
     if not known:
         return np.ones(len(sightings))
     usual = np.concatenate(known)
     expected = _centred(np.median(usual, axis=0)[None])[0]
-    own = float(np.median(_centred(usual) @ expected))
+    reference = float(np.median(_centred(usual) @ expected))
     return np.array(
         [
-            float(np.median(_centred(s.layout) @ expected)) / max(own, 1e-6)
+            float(np.median(_centred(s.layout) @ expected)) / max(reference, 1e-6)
             if len(s.layout)
             else 0.0
             for s in sightings

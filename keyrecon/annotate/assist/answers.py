@@ -62,11 +62,11 @@ def make_assistant(workspace: Workspace) -> Assistant:
     )
 
 
-def _describe_swing(workspace: Workspace, *told: Any) -> Json:
+def _describe_swing(workspace: Workspace, *marked: Any) -> Json:
     """A golf swing; its modules are loaded when one is asked for."""
     from keyrecon.annotate.assist.swing_answers import describe_swing
 
-    return describe_swing(workspace, *told)
+    return describe_swing(workspace, *marked)
 
 
 def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:

@@ -233,9 +233,10 @@ def _off_track(annotations: Annotations, track: Track) -> Iterator[Check]:
     anchors = anchors_from_bodies(annotations)
     frames, height = anchors.frames, track.height[anchors.frames]
     head = np.linalg.norm(track.head[frames] - anchors.head, axis=1)
-    own = track.feet[frames]
+    tracked = track.feet[frames]
     straight, crossed = (
-        np.linalg.norm(feet - anchors.feet, axis=2).max(axis=1) for feet in (own, own[:, ::-1])
+        np.linalg.norm(feet - anchors.feet, axis=2).max(axis=1)
+        for feet in (tracked, tracked[:, ::-1])
     )
     both = np.minimum(head, np.minimum(straight, crossed)) / height
     sure = track.confidence[frames] > SURE_TRACK

@@ -33,9 +33,9 @@ def nearest_marks(annotations: Annotations, frame: int, fps: float) -> Annotatio
     for side in (away < 0, away > 0):
         near = marked & (side & (np.abs(away) <= REACH * fps))[:, None]
         distance = np.where(near, np.abs(away)[:, None], np.inf)
-        found = near.any(axis=0)
-        if found.any():
-            chosen[distance.argmin(axis=0)[found]] = True
+        close = near.any(axis=0)
+        if close.any():
+            chosen[distance.argmin(axis=0)[close]] = True
     return take_rows(annotations, chosen)
 
 

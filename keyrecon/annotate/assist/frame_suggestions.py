@@ -73,8 +73,8 @@ def _cover_half(
     distances: PoseDistances, keyframes: Keyframes, half: HalfName, added: dict[int, str]
 ) -> _HalfCoverage:
     chosen = getattr(keyframes, half)
-    own = [frame for frame, wanted in added.items() if wanted in (half, "both")]
-    frames = np.union1d(chosen.frames, np.array(own, dtype=np.int64))
+    added_here = [frame for frame, wanted in added.items() if wanted in (half, "both")]
+    frames = np.union1d(chosen.frames, np.array(added_here, dtype=np.int64))
     return _HalfCoverage(half, frames, distances_to(distances, half, frames), chosen.beta)
 
 

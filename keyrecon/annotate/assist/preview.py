@@ -91,14 +91,14 @@ def find_player(
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
     track: Track = find.find_player(strip, colors, camera, TrackAnchors.none())
     rows = np.searchsorted(strip.numbers, np.unique(frames))
-    found = track.confidence > 0
-    missing = ~found[rows]
+    tracked = track.confidence > 0
+    missing = ~tracked[rows]
     return PreviewedParts(
         frames=np.unique(frames),
         head=np.where(missing[:, None], np.nan, track.head[rows]),
         feet=np.where(missing[:, None, None], np.nan, track.feet[rows]),
         box=track.box[rows],
-        confidence=float(found.mean()),
+        confidence=float(tracked.mean()),
     )
 
 

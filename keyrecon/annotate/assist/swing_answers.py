@@ -32,25 +32,25 @@ _FRAME = re.compile(r" \(frame (\d+)\)$")
 def describe_swing(
     workspace: Workspace,
     size: tuple[int, int],
-    told: Mapping[str, Any],
+    settings: Mapping[str, Any],
     clicks: Mapping[str, Sequence[int | float]],
     keys: Mapping[str, int | float],
 ) -> Json:
     """What is wrong with what was clicked, and the fit: key postures, club, doubts, tempo."""
     return {
         "needed": list(NEEDED),
-        "wrong": _clicks_complaint(size, told, clicks) or _keys_complaint(keys),
+        "wrong": _clicks_complaint(size, settings, clicks) or _keys_complaint(keys),
         **_describe_fit(workspace),
     }
 
 
 def _clicks_complaint(
-    size: tuple[int, int], told: Mapping[str, Any], places: Mapping[str, Sequence[int | float]]
+    size: tuple[int, int], settings: Mapping[str, Any], places: Mapping[str, Sequence[int | float]]
 ) -> str | None:
     """Why no golfer has these joints; None where one has, or while joints are missing."""
     if not {*NEEDED} <= {*places}:
         return None
-    clicks = clicks_from_parts(told, places, size)
+    clicks = clicks_from_parts(settings, places, size)
     try:
         check_numbers(clicks, ORIGIN)
         check_joints(clicks, ORIGIN)
@@ -82,8 +82,8 @@ def _describe_fit(workspace: Workspace) -> Json:
     file = workspace.motion_file
     if not file.is_file():
         return {}
-    found = _read_fit(file, file.stat().st_mtime_ns)
-    return found and {**found, "fresh": workspace.is_fitted()}
+    fit = _read_fit(file, file.stat().st_mtime_ns)
+    return fit and {**fit, "fresh": workspace.is_fitted()}
 
 
 @lru_cache(maxsize=1)
@@ -104,8 +104,8 @@ def _read_fit(file: Path, changed: int) -> Json:
 
 def _describe_doubt(text: str) -> Json:
     """A doubt with the frame to look at."""
-    found = _FRAME.search(text)
-    return {"text": _FRAME.sub("", text), "frame": int(found[1]) if found else None}
+    match = _FRAME.search(text)
+    return {"text": _FRAME.sub("", text), "frame": int(match[1]) if match else None}
 
 
 def _describe_tempo(swing: RecordedSwing) -> str | None:

@@ -221,10 +221,10 @@ def swing(session: Session, request: ApiRequest) -> Json:
     describe, cells = session.assistant.swing, session.store.state.cells
     if describe is None:
         return {}
-    told = (by_frame(cells, kind) for kind in ("golf", "click", "key"))
-    found = describe(session.limits.size, *told)
-    texts = {"wrong": found["wrong"] and in_page_words(found["wrong"])}
-    return found | texts
+    values = (by_frame(cells, kind) for kind in ("golf", "click", "key"))
+    description = describe(session.limits.size, *values)
+    texts = {"wrong": description["wrong"] and in_page_words(description["wrong"])}
+    return description | texts
 
 
 def preview(session: Session, request: ApiRequest) -> Json:

@@ -63,16 +63,16 @@ def in_page_words(text: str) -> str:
     """A message without commands and options; one that names none is left as it is."""
     if not any(sign in text for sign in FOR_TERMINALS):
         return text
-    told = _NEXT.sub("", text).rstrip()
+    words = _NEXT.sub("", text).rstrip()
     for said, read in _PHRASES:
-        told = said.sub(partial(_in_sentence, read), told)
-    told = _COMMAND.sub(lambda found: OTHER[found[1]], told)
-    return _OPTION.sub(lambda found: f"the option '{found[0][2:].replace('.', ': ')}'", told)
+        words = said.sub(partial(_in_sentence, read), words)
+    words = _COMMAND.sub(lambda found: OTHER[found[1]], words)
+    return _OPTION.sub(lambda found: f"the option '{found[0][2:].replace('.', ': ')}'", words)
 
 
-def _in_sentence(read: str, found: re.Match[str]) -> str:
+def _in_sentence(read: str, match: re.Match[str]) -> str:
     """What is read for what was found, with a capital at the start of a sentence."""
-    words = found.expand(read)
-    before = found.string[: found.start()].rstrip(" ")
+    words = match.expand(read)
+    before = match.string[: match.start()].rstrip(" ")
     starts = words[:1].strip() and (not before or before[-1] in ".\n")
     return words[0].upper() + words[1:] if starts else words

@@ -45,10 +45,10 @@ def clicks_form(workspace: Workspace, limits: Limits) -> FileForm:
 
 def clicks_from_cells(cells: Cells, size: tuple[int, int]) -> GolfClicks:
     """The clicks as the fit reads them; joints may be missing."""
-    told, places = (
+    settings, places = (
         {str(key[1]): value for key, value in of_kind(cells, kind).items()} for kind in CLICK_CELLS
     )
-    return clicks_from_parts(told, places, size)
+    return clicks_from_parts(settings, places, size)
 
 
 def _cells_from_clicks(clicks: GolfClicks) -> Cells:
@@ -96,15 +96,15 @@ def _marks_from_cells(cells: Cells) -> SwingMarks:
 
 def _cells_from_marks(marks: SwingMarks, cells: Cells) -> Cells:
     """The cells that hold these marks; whether a joint is hidden is left as it was."""
-    found: Cells = {}
+    marked_cells: Cells = {}
     for frame, joints, ends in zip(marks.frames.tolist(), marks.joints, marks.shafts, strict=True):
         for j in np.flatnonzero(np.isfinite(joints).all(axis=1)).tolist():
             key, place = ("mark", frame, LSP14.names[j]), joints[j].tolist()
             before = cells.get(key, [None, None, 2])
-            found[key] = [*place, before[2] if place == before[:2] else 2]
+            marked_cells[key] = [*place, before[2] if place == before[:2] else 2]
         if np.isfinite(ends).all():
-            found["shaft", frame] = ends.ravel().tolist()
+            marked_cells["shaft", frame] = ends.ravel().tolist()
     for name, key_frame in zip(KEY_POSTURES, marks.keys.tolist(), strict=True):
         if np.isfinite(key_frame):
-            found["key", name] = key_frame
-    return found
+            marked_cells["key", name] = key_frame
+    return marked_cells

@@ -136,11 +136,11 @@ class Journal:
 
     def _check(self) -> None:
         """Raise ValueError where the journal is not as it was written."""
-        found = self._base.execute("PRAGMA integrity_check").fetchone()[0]
-        if found != "ok":
-            raise ValueError(found)
-        told = self.note(DIGEST_NOTE)
-        covered, expected = json.loads(told) if told else (0, NO_ROWS)
+        integrity = self._base.execute("PRAGMA integrity_check").fetchone()[0]
+        if integrity != "ok":
+            raise ValueError(integrity)
+        digest = self.note(DIGEST_NOTE)
+        covered, expected = json.loads(digest) if digest else (0, NO_ROWS)
         last = 0
         for row in self._rows():
             if row[0] != (last := last + 1):
