@@ -314,8 +314,8 @@ def follow_marks(
             frames.append(inside)
             flows.append(
                 keep(
-                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part), shot_marks,
-                    options=options.flow, progress=progress,
+                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part),
+                    shot_marks, options=options.flow, progress=progress,
                 )
             )  # fmt: skip
     return put_back(join_frames(flows), np.concatenate(frames), len(video))

@@ -47,6 +47,7 @@ def run(
     """
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
+    marks = workspace.marks_digest()
     annotations = annotated(workspace, partial)
     asked = asked_for(workspace)
     prepared = prepare_project(workspace, workspace.video(), annotations, options, progress)
@@ -68,7 +69,8 @@ def run(
         shots=describe_shots(preparation.shots),
     )
     write_report(workspace.report_file, material, progress)
-    write_durably(workspace.doubts_file, json.dumps(list(material.contradictions)))
+    described = {"doubts": list(material.contradictions), "marks": marks}
+    write_durably(workspace.run_file, json.dumps(described))
     workspace.remember(given, Options())
     return "\n".join(
         [

@@ -119,9 +119,16 @@ class Workspace:
         return self.folder / "cache" / "prepared_marks.json"
 
     @property
-    def doubts_file(self) -> Path:
-        """What spoke against the track when the motion was made, a list of lines."""
-        return self.folder / "cache" / "doubts.json"
+    def run_file(self) -> Path:
+        """What the page tells of the last run: `doubts`, lines that spoke against the track, and
+        `marks`, the digest of the marks it was made from."""
+        return self.folder / "cache" / "run.json"
+
+    def marks_digest(self) -> str | None:
+        """Tells states of annotations.json apart; None while there is none."""
+        if not self.annotations_file.is_file():
+            return None
+        return hashlib.sha256(self.annotations_file.read_bytes()).hexdigest()
 
     @property
     def motion_file(self) -> Path:

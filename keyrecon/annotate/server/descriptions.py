@@ -155,13 +155,17 @@ def describe_settings(workspace: Workspace) -> Json:
     }
 
 
-def describe_doubts(workspace: Workspace) -> list[str]:
-    """What spoke against the track when the motion was made, in the words of the page."""
+def describe_run(workspace: Workspace) -> Json:
+    """What spoke against the track when the motion was made, in the words of the page, and whether
+    it was made from the marks as they are now (true where that is not known)."""
     try:
-        lines = json.loads(workspace.doubts_file.read_text("utf-8"))
-    except (OSError, ValueError):  # a motion of a golf fit or of an older version; a torn file
-        return []
-    return [in_page_words(str(line)) for line in lines] if isinstance(lines, list) else []
+        run = json.loads(workspace.run_file.read_text("utf-8"))
+        lines, marks = list(run["doubts"]), run["marks"]
+    except (OSError, ValueError, TypeError, KeyError):
+        # a motion of a golf fit or of an older version; a torn file
+        return {"doubts": [], "is_current": True}
+    doubts = [in_page_words(str(line)) for line in lines]
+    return {"doubts": doubts, "is_current": marks == workspace.marks_digest()}
 
 
 def describe_state(state: JournalState) -> Json:

@@ -9,10 +9,10 @@ from typing import Any
 
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.server.descriptions import (
-    describe_doubts,
     describe_entries,
     describe_job,
     describe_keyframes,
+    describe_run,
     describe_settings,
     describe_skeleton,
     describe_video,
@@ -96,7 +96,7 @@ def describe_project(session: Session) -> Json:
         "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder)),
-        "doubts": describe_doubts(session.workspace),
+        "run": describe_run(session.workspace),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),

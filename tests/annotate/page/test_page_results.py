@@ -21,6 +21,7 @@ from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
 from keyrecon.io.formats.export import SUFFIXES
+from keyrecon.io.workspace import Workspace
 from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
@@ -79,8 +80,10 @@ def mark_and_run(person, height=""):
 
 def run_and_tell(folder, text, options, progress):
     run_at_once(folder, options, progress)
-    (folder / "cache").mkdir(exist_ok=True)
-    (folder / "cache" / "doubts.json").write_text(json.dumps(text.splitlines()[1:]))
+    workspace = Workspace(folder)
+    workspace.run_file.parent.mkdir(exist_ok=True)
+    described = {"doubts": text.splitlines()[1:], "marks": workspace.marks_digest()}
+    workspace.run_file.write_text(json.dumps(described))
     return text
 
 
@@ -111,6 +114,25 @@ def test_good_news_go_when_they_were_read_and_doubts_stay_until_they_are_closed(
             person.await_text("#motion-doubts", "cuts the feet off in frames 3 to 9")
         else:
             assert not person.page.is_visible("#motion-doubts")
+
+
+def test_marks_that_came_after_the_motion_are_told_when_the_page_is_opened_again(folder, visit):
+    with serving(folder, commands={"run": partial(run_and_tell, folder, "Made.")}) as server:
+        person = visit(server)
+        mark_and_run(person)
+        for changed, text in ((False, "The motion is made"), (True, "Not yet in the motion")):
+            if changed:
+                person.press("Alt+2")
+                person.open(40)
+                wrist = POINTS2D[40, LSP14.index("right_wrist")]
+                person.drag(wrist, wrist + 6)
+                person.await_saved()
+                person.press("Alt+3")
+                person.await_text("#motion-text", "Not yet in the motion")
+            person.page.reload()
+            person.page.wait_for_selector("body[data-view]")
+            person.press("Alt+3")
+            person.await_text("#motion-text", text)
 
 
 NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}

@@ -76,11 +76,16 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     shell.startJob("run", metres === null ? {} : { height: metres });
   }
 
-  // Whether there is anything to make anew: marks or the height changed since the motion was made.
+  // Whether the motion was made from the marks as they are.
+  function showsMarks() {
+    made ??= exists() && model.project.run.is_current ? model.state.revision : null;
+    return exists() && made === model.state.revision;
+  }
+
+  // Whether there is nothing to make anew: neither marks nor the height changed.
   function isMade() {
-    made ??= exists() ? model.state.revision : null;
     const { metres } = heightIn(byId("height").value);
-    return exists() && made === model.state.revision && metres === (model.project.settings.height ?? null);
+    return showsMarks() && metres === (model.project.settings.height ?? null);
   }
 
   function primary() {
@@ -126,7 +131,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   // What spoke against the track when the motion was made; it stays true when its notice is closed.
   function drawDoubts() {
     const list = byId("motion-doubts"),
-      doubts = exists() ? model.project.doubts : [];
+      doubts = exists() ? model.project.run.doubts : [];
     list.hidden = !doubts.length;
     if (list.dataset.content === doubts.join("\n")) return;
     list.dataset.content = doubts.join("\n");
@@ -163,6 +168,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const left = open
       ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
       : "All keyframes are marked.";
+    if (exists() && !showsMarks()) return ["Not yet in the motion", `Marks changed since it was made. ${left}`];
     if (exists()) return ["The motion is made", left];
     if (open < keyframes.length) return ["Make the motion", left];
     return [
