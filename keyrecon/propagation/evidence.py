@@ -75,6 +75,9 @@ NOBODY_AGREES = 0.2
 """Agreement that a hypothesis has with none: the logarithm has an end."""
 OVERLAP_DISTANCE = 0.03
 """Joints of both sides nearer than this are in one place, player heights."""
+GRIP = 0.15
+"""Wrists that hold one grip are not farther apart, player heights: a hand is .108 statures long
+(Winter), .12 of the height from the middle of the head to the feet; .03 for what marks are off."""
 SPAN_SPREAD = 0.03
 """Error of the distance between both hands: two eyes mark the same joint .016 apart."""
 
@@ -236,10 +239,13 @@ def rareness(
 ) -> Float[np.ndarray, "*n"]:
     """What speaks against hands, or feet, that are farther apart than they were ever marked, nats.
 
-    Hands that hold one club are never far apart. If frames were drawn like those marked, one in
-    as many and one more would have them farther apart than all marks: the most that can be said.
+    Hands that hold one club are never far apart, and where they were on all marks, they are taken
+    to hold one. Where they were not, marks tell little of how far apart they come: to ask it of
+    all hands cost 2.3 points in a rally whose strokes have them wider apart than any mark. If
+    frames were drawn like those marked, one in as many and one more would have them farther apart
+    than all marks: the most that can be said.
     """
-    if not len(marked):
+    if not len(marked) or marked.max() > GRIP:
         return np.zeros(span.shape)
     beyond = np.maximum(span - marked.max(), 0) / SPAN_SPREAD
     return np.log(len(marked) + 1) * (1 - np.exp(-0.5 * beyond**2))

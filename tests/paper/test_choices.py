@@ -30,7 +30,7 @@ def test_a_place_and_what_is_open_there_stand_in_one_row():
 
 @pytest.mark.parametrize("verb", [("keyframes",), ("golf", "fit")])
 def test_flags_that_the_table_names_exist(verb, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["keyrecon", *verb, "--help"])
+    monkeypatch.setattr(sys, "argv", ["keyrecon", *verb, "--help-all"])
     with pytest.raises(SystemExit):
         cli.main()
     known = set(re.findall(r"--[a-z][a-z.-]+", capsys.readouterr().out))

@@ -88,7 +88,7 @@ def test_parts_of_one_colour_count_as_one():
     [
         ([Pick(9, "head", 10.0, 10.0)], "frames 0 to 3"),
         ([Pick(0, "head", 400.0, 10.0)], "outside the picture of 320 x 180"),
-        ([Pick(0, "foot", 10.0, 10.0)], "pick the centre of the head"),
+        ([Pick(0, "foot", 10.0, 10.0)], "head is not picked in any frame; pick its centre"),
         ([Pick(0, "head", 10.0, 10.0)], "pick both shoes"),
         ([Pick(0, "head", 10.0, 10.0), Pick(1, "foot", 10.0, 90.0)], "No frame has both"),
     ],
