@@ -10,7 +10,7 @@ demo: $(STAMP)
 	$(VENV)/bin/keyrecon demo tennis --out demo
 
 test: $(STAMP)
-	$(VENV)/bin/python -m pytest -n auto --dist loadfile
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check keyrecon tests benchmarks

@@ -7,6 +7,11 @@ import pytest
 from numbered_pictures import numbered_picture
 
 
+def pytest_collection_modifyitems(items):
+    """Whole jobs first: they take longest, and what is last keeps one core waiting."""
+    items.sort(key=lambda item: len(item.path.parts))
+
+
 @pytest.fixture(scope="session")
 def write_numbered(tmp_path_factory):
     """Write a video of numbered pictures with the given times (ticks of 1/600 s)."""
