@@ -45,7 +45,10 @@ from keyrecon.synthetic.marks import mark_from_truth
 
 SECONDS, MEMORY = 20.0, 4 << 30
 """Limits of a case."""
-GAPS = ("joints", "points2d_propagated", "expected_error", "points", "confidence")
+GAPS = (
+    *("joints", "points2d_propagated", "expected_error", "points", "confidence"),
+    *("shafts", "keys"),
+)
 """Arrays in which NaN says that nothing is known there."""
 ABSURD = ("-1e9", "1e12", "nan", "inf", "-inf", "0.5.5", "x", "1e400", "", "[1]")
 """Values that no option can have."""

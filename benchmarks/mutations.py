@@ -10,6 +10,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,14 +20,18 @@ import numpy as np
 from keyrecon.annotate.store.edits import Limits, MarkEdit
 from keyrecon.annotate.store.store import Store
 from keyrecon.body import LSP14, read_skeleton
+from keyrecon.golf.records import SwingMarks
 from keyrecon.io.formats.acclaim import read_acclaim
 from keyrecon.io.formats.annotations import read_annotations
 from keyrecon.io.formats.bvh_motion import write_bvh
 from keyrecon.io.formats.c3d import read_points, write_c3d
+from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.coco import coco_text
+from keyrecon.io.formats.court_points import read_court_points, write_court_points
 from keyrecon.io.formats.cvat import cvat_text
 from keyrecon.io.formats.dlc import dlc_text
+from keyrecon.io.formats.golf_marks import read_golf_marks, write_golf_marks
 from keyrecon.io.formats.keyframes import keyframes_to_json, read_keyframes
 from keyrecon.io.formats.mocap import read_capture
 from keyrecon.io.formats.model_file import (
@@ -37,6 +42,7 @@ from keyrecon.io.formats.model_file import (
 )
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.formats.picks import read_picks, write_picks
+from keyrecon.io.formats.shot_choices import ShotChoices, read_shot_choices, write_shot_choices
 from keyrecon.io.project_file import new_project
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.io.video import open_video
@@ -46,6 +52,7 @@ from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
+from keyrecon.world.records import CourtCamera, CourtClick
 
 KEPT = Path(__file__).parent.parent / "annotations"
 FRAMES, SIZE = 40, (160, 96)
@@ -123,6 +130,14 @@ def _make_marks(folder: Path, marks: Annotations) -> None:
     write_picks(folder / "picks.json", [Pick(f, p, 20.5, 30) for f in (0, 9) for p in "ab"])
     (folder / "keyframes.json").write_text(keyframes_to_json(_keyframes()))
     (folder / "skeleton.json").write_text(_skeleton_text())
+    joints = np.where(np.isfinite(marks.joints), marks.joints, 20.0)
+    swing = replace(SwingMarks.of_joints(marks.frames, joints), keys=np.array([2.0, 9, 12, 30]))
+    write_golf_marks(folder / "golf_marks.json", swing, SIZE)
+    corners = ("near baseline, left", "far baseline, right")
+    clicks = [CourtClick(name, 9, 20.5, 30.25) for name in corners]
+    write_court_points(folder / "court_points.json", clicks)
+    write_shot_choices(folder / "shots.json", ShotChoices((1, 3), (2,)))
+    write_camera(folder / "camera.npz", _camera())
 
 
 def _make_project(folder: Path) -> None:
@@ -179,6 +194,13 @@ def _keyframes() -> Keyframes:
     return Keyframes(half, half, 10, 0.95)
 
 
+def _camera() -> CourtCamera:
+    ones = np.ones(FRAMES)
+    turn = np.tile(np.eye(3), (FRAMES, 1, 1))
+    places = np.tile([0.0, 1.5, 20.0], (FRAMES, 1))
+    return CourtCamera(900 * turn, turn, places, ones > 0, 0.01 * places, ones)
+
+
 def _skeleton_text() -> str:
     rows = [
         {"name": n, "parent": None if p < 0 else LSP14.names[p], "length": length}
@@ -203,6 +225,10 @@ def _read_video(path: Path) -> float:
 
 def _read_marks(path: Path) -> Annotations:
     return read_annotations(path, LSP14, FRAMES, SIZE)
+
+
+def _read_golf_marks(path: Path) -> SwingMarks:
+    return read_golf_marks(path, FRAMES, SIZE)
 
 
 def _read_project(path: Path) -> object:
@@ -233,6 +259,10 @@ READERS = {
     "prior": Reader("prior.npz", read_motion_model),
     "clicks": Reader("clicks.json", read_clicks),
     "picks": Reader("picks.json", read_picks),
+    "golf marks": Reader("golf_marks.json", _read_golf_marks),
+    "court points": Reader("court_points.json", read_court_points),
+    "shots": Reader("shots.json", read_shot_choices),
+    "camera": Reader("camera.npz", read_camera),
     "keyframes": Reader("keyframes.json", read_keyframes),
     "skeleton": Reader("skeleton.json", read_skeleton),
     "mp4": Reader("v.mp4", _read_video),

@@ -91,10 +91,15 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _run(words: Sequence[str]) -> None:
-    told = HELP_ALL in words or not {*HELP} & {*words}
+    all_options = HELP_ALL in words or not {*HELP} & {*words}
     words = ["--help" if word == HELP_ALL else word for word in words]
     app = _app(COMMANDS, words)
-    app.cli(prog="keyrecon", description=DESCRIPTION, args=words, registry=described_options(told))
+    app.cli(
+        prog="keyrecon",
+        description=DESCRIPTION,
+        args=words,
+        registry=described_options(all_options),
+    )
 
 
 def _app(commands: Mapping[str, Any], words: Sequence[str]) -> SubcommandApp:
@@ -105,8 +110,8 @@ def _app(commands: Mapping[str, Any], words: Sequence[str]) -> SubcommandApp:
     for name, command in commands.items():
         named = whole or name == typed
         if isinstance(command, Command):
-            found = _function(command) if named else _stand_in(_first_line(command))
-            app.command(name=name)(found)
+            registered = _function(command) if named else _stand_in(_first_line(command))
+            app.command(name=name)(registered)
         elif named:
             below = words if whole else words[1:]
             app.command(_app(command, below), name=name, help=SUMMARIES[name])

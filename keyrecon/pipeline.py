@@ -20,15 +20,10 @@ from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, call_stage
+from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
-from keyrecon.keyframes.selection import (
-    KeyframeOptions,
-    adopt_keyframes,
-    choose_keyframes,
-    count_labels,
-    keep_marked,
-)
+from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes, count_labels
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
@@ -223,14 +218,9 @@ def reconstruct(
     if not all(shots.usable):
         annotations = marks_in_shots(annotations, shots)
     preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
-    tracks = carry_joints(preparation, annotations, options, keep, progress)
-    if not all(shots.usable):
-        preparation, used = usable_part(preparation), shots.usable_frames
-        tracks, annotations = take_frames(tracks, used), part_of_marks(annotations, used)
-    lifted = _lift(preparation, tracks, annotations, models, options, keep, progress)
-    motion = assemble_motion(
-        preparation.video, annotations, tracks, lifted, options.lift.height, preparation.shots
-    )
+    part, marks, tracks = _carry_usable(preparation, annotations, options, keep, progress)
+    lifted = _lift(part, tracks, marks, models, options, keep, progress)
+    motion = assemble_motion(part.video, marks, tracks, lifted, options.lift.height, part.shots)
     return motion if len(shots.parts) == 1 else motion_in_file(motion, shots, whole.time)
 
 
@@ -280,17 +270,28 @@ def carry_joints(
     progress: Progress = silent,
 ) -> JointTracks:
     """The annotated joints in every frame of the video."""
+    shots = preparation.shots
+    _, _, tracks = _carry_usable(preparation, annotations, options, keep, progress)
+    return tracks if all(shots.usable) else put_back(tracks, shots.usable_frames, shots.n_frames)
+
+
+def _carry_usable(
+    preparation: Preparation,
+    annotations: Annotations,
+    options: Options,
+    keep: Keep,
+    progress: Progress,
+) -> tuple[Preparation, Annotations, JointTracks]:
+    """The usable shots end to end, the marks in them, and these in every frame of them."""
     flow, shots = None, preparation.shots
     if options.propagate.method == "fused":
         flow = follow_marks(preparation.video, annotations, shots, options, keep, progress)
-    used = shots.usable_frames
     if not all(shots.usable):
-        flow = flow and take_frames(flow, used)
-        annotations = part_of_marks(annotations, used)
-    tracks = propagate_in_groups(
-        usable_part(preparation), annotations, flow, options.propagate, keep, progress
-    )
-    return tracks if all(shots.usable) else put_back(tracks, used, shots.n_frames)
+        flow = flow and take_frames(flow, shots.usable_frames)
+        annotations = part_of_marks(annotations, shots.usable_frames)
+    part = usable_part(preparation)
+    tracks = propagate_in_groups(part, annotations, flow, options.propagate, keep, progress)
+    return part, annotations, tracks
 
 
 def follow_marks(

@@ -118,7 +118,7 @@ def propagate_in_groups(
             flow and take_frames(flow, group.frames),
             options=options,
         )
-        own = np.searchsorted(group.frames, (group.own.start, group.own.stop)).tolist()
-        tracks = take_frames(tracks, slice(*own))
+        span = np.searchsorted(group.frames, (group.own.start, group.own.stop)).tolist()
+        tracks = take_frames(tracks, slice(*span))
         carried.append(replace(tracks, keyframe=group.frames[tracks.keyframe]))
     return join_frames(carried)

@@ -56,8 +56,8 @@ def join_frames(records: Sequence[PerFrame]) -> PerFrame:
 
 def part_of_video(video: Video, frames: slice | Int[np.ndarray, "n"]) -> Video:
     """A video of some frames; its times stay those of the whole."""
-    own = {field.name: getattr(video, field.name) for field in fields(Video)}
-    return Video(**(own | {"stamps": video.stamps[frames], "time": video.time[frames]}))
+    inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
+    return Video(**(inherited | {"stamps": video.stamps[frames], "time": video.time[frames]}))
 
 
 def part_of_path(camera: CameraPath, frames: slice | Int[np.ndarray, "n"]) -> CameraPath:

@@ -43,6 +43,7 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames, mirror_video
 from keyrecon.io.option_tables import check_options
+from keyrecon.io.provenance import golf_evidence, note_fitted
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.keeping import Keep, call_stage
@@ -105,7 +106,7 @@ def fit_project(
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
-    video, folder, evidence = workspace.video(), workspace.folder, workspace.golf_evidence()
+    video, folder, evidence = workspace.video(), workspace.folder, golf_evidence(workspace)
     clicks = kept_clicks(workspace)
     slow_motion = workspace.project["video"].get("slow_motion", 1.0)
     check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
@@ -116,7 +117,7 @@ def fit_project(
     workspace.remember(options, GolfOptions(), GOLF)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
-    workspace.note_fitted(evidence)
+    note_fitted(workspace, evidence)
     spent = time.perf_counter() - began
     return "\n".join(
         [

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, replace
 
-from keyrecon.golf.candidates import find_candidates, place_in_film
+from keyrecon.golf.candidates import find_candidates, find_slowed_keys, place_in_film
 from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.golf.observation import ObservedSwing, observe_swing, retime
+from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts
 from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
@@ -55,10 +55,13 @@ def find_swing(
             in_film = place_in_film(clicked, observed.film)
             check_direction(observed.observations, in_film, model, "The clicks")
         tried.append(_try(observed, video, model, options, keep, progress, f"_{number}"))
-        retimed = retime(candidate, tried[-1].fitted.keys, observed, scene)
-        if retimed is not None and options.method == "swing":
+        slowed = None
+        if observed.slow_motion == 1 and options.method == "swing":
+            slowed = find_slowed_keys(tried[-1].fitted.keys, observed.film, scene.film)
+        if slowed is not None:
+            candidate = replace(candidate, keys=slowed)
             observed = keep(
-                f"observe_{number}s", observe_swing, video, scene, retimed, pose, marks, model,
+                f"observe_{number}s", observe_swing, video, scene, candidate, pose, marks, model,
                 options=options.observation, progress=progress,
             )  # fmt: skip
             tried.append(_try(observed, video, model, options, keep, progress, f"_{number}s"))

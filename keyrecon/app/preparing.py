@@ -108,12 +108,12 @@ def with_chosen_shots(options: Options, choices: ShotChoices) -> Options:
     """Options with the shots that a person chose on the page; these stand over former ones."""
     if choices == ShotChoices():
         return options
-    told = options.shots
-    use, skip = ({*text.replace(",", " ").split()} for text in (told.use, told.skip))
+    kept = options.shots
+    use, skip = ({*text.replace(",", " ").split()} for text in (kept.use, kept.skip))
     used, skipped = ({str(number) for number in part} for part in (choices.use, choices.skip))
     return replace(
         options,
-        shots=replace(told, use=_listed(use - skipped | used), skip=_listed(skip - used | skipped)),
+        shots=replace(kept, use=_listed(use - skipped | used), skip=_listed(skip - used | skipped)),
     )
 
 

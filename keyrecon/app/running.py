@@ -1,6 +1,5 @@
 """`keyrecon run`: from marks to motion and report, in a project folder."""
 
-import json
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,8 +10,8 @@ from keyrecon.app.court import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
-from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.shot_choices import ShotChoices
+from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
@@ -47,13 +46,14 @@ def run(
     """
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
-    marks = workspace.marks_digest()
+    evidence = marks_evidence(workspace)
     annotations = annotated(workspace, partial)
     asked = asked_for(workspace)
-    prepared = prepare_project(workspace, workspace.video(), annotations, options, progress)
-    preparation = replace(prepared.preparation, keyframes=asked)
+    automatic = prepare_project(workspace, workspace.video(), annotations, options, progress)
+    preparation = replace(automatic.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
     placed = write_placed_motion(workspace, motion)
+    doubts, shots = automatic.contradictions(), describe_shots(preparation.shots)
     material = ReportMaterial(
         video=preparation.video,
         track=preparation.track,
@@ -64,27 +64,26 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=prepared.contradictions(),
+        contradictions=doubts,
         court=placed.court,
-        shots=describe_shots(preparation.shots),
+        shots=shots,
     )
     write_report(workspace.report_file, material, progress)
-    described = {"doubts": list(material.contradictions), "marks": marks}
-    write_durably(workspace.run_file, json.dumps(described))
+    note_run(workspace, RunNotes(evidence, tuple(doubts)))
     workspace.remember(given, Options())
-    return "\n".join(
-        [
-            f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
-            f"{workspace.report_file}: open it in a browser.",
-            *placed.lines,
-            *describe_shots(preparation.shots),
-            *prepared.contradictions(),
-            *_describe_doubt(motion),
-            *_waiting_choices(workspace),
-            *_other_choice(workspace, options, preparation.keyframes),
-            f"Took {time.perf_counter() - started:.0f} s.",
-        ]
-    )
+    seconds = time.perf_counter() - started
+    lines = [*placed.lines, *shots, *doubts, *_describe_doubt(motion)]
+    choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
+    files = _describe_files(workspace, motion)
+    return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
+
+
+def _describe_files(workspace: Workspace, motion: Motion) -> list[str]:
+    """What was written."""
+    return [
+        f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
+        f"{workspace.report_file}: open it in a browser.",
+    ]
 
 
 def _describe_doubt(motion: Motion) -> list[str]:
@@ -126,5 +125,5 @@ def prepared(
 ) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
     asked = asked_for(workspace)
-    preparing = prepare_project(workspace, workspace.video(), marks, options, progress)
-    return replace(preparing.preparation, keyframes=asked)
+    automatic = prepare_project(workspace, workspace.video(), marks, options, progress)
+    return replace(automatic.preparation, keyframes=asked)

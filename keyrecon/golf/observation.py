@@ -147,25 +147,6 @@ def observe_swing(
     return ObservedSwing(window, slow_motion, observations)
 
 
-def retime(
-    hypothesis: SwingHypothesis,
-    keys: Float[np.ndarray, "4"],
-    observed: ObservedSwing,
-    scene: SwingScene,
-) -> SwingHypothesis | None:
-    """The hypothesis with the key postures of its fit, where these show slow motion and its own did
-    not; the time of the fit was wrong then.
-
-    A search may take part of a slow downswing for a pause: of two real films in slow motion, in
-    twelve variants, three fits took 0.7 to 1.2 s down.
-    """
-    own, whole = observed.film.numbers, scene.film.numbers
-    in_scene = np.interp(keys, np.arange(len(own)), np.searchsorted(whole, own))
-    if observed.slow_motion > 1 or find_slow_motion(in_scene, scene.film.fps) == 1:
-        return None
-    return replace(hypothesis, keys=in_scene)
-
-
 def _reach_to(clicked: int, chosen: Int[np.ndarray, "T"]) -> Int[np.ndarray, "R"]:
     """The frames of a swing and those between it and the clicked one, at the same steps."""
     first, last = int(chosen[0]), int(chosen[-1])

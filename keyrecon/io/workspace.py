@@ -17,11 +17,9 @@
 What a person made is written durably and never replaced by something that does not parse.
 """
 
-import hashlib
-import json
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +55,7 @@ from keyrecon.io.project_file import (
 )
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, has_fingerprint, open_video
-from keyrecon.reading import parse_json, read_text
+from keyrecon.reading import read_text
 from keyrecon.records import Pick
 from keyrecon.world.records import CourtClick
 
@@ -69,8 +67,6 @@ OWN_NAMES = (
 """Files that a project has or may come to have."""
 GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
-CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
-"""What golf_clicks.json tells."""
 COURT = "court"
 """The section of the options of `keyrecon court`."""
 SECTIONS = (GOLF, COURT)
@@ -119,18 +115,6 @@ class Workspace:
         return self.folder / "cache" / "prepared_marks.json"
 
     @property
-    def run_file(self) -> Path:
-        """What the page tells of the last run: `doubts`, lines that spoke against the track, and
-        `marks`, the digest of the marks it was made from."""
-        return self.folder / "cache" / "run.json"
-
-    def marks_digest(self) -> str | None:
-        """Tells states of annotations.json apart; None while there is none."""
-        if not self.annotations_file.is_file():
-            return None
-        return hashlib.sha256(self.annotations_file.read_bytes()).hexdigest()
-
-    @property
     def motion_file(self) -> Path:
         """motion.npz"""
         return self.folder / "motion.npz"
@@ -165,36 +149,12 @@ class Workspace:
         """Whether the project is one of a golf swing: begun as one, or with clicks for a fit."""
         return self.project.get("kind") == GOLF or self.golf_clicks_file.is_file()
 
-    @property
-    def _fitted_file(self) -> Path:
-        """Tells what the last golf fit was made from."""
-        return self.folder / "cache" / "golf_fitted"
-
     def become_golf(self) -> None:
         """Make the project one of a golf swing, besides what it is."""
         if self.project.get("kind") != GOLF:
             with self.exclusive():
                 write_durably(self.project_file, with_kind(self.project_file, GOLF))
             self.project = read_project(self.project_file)
-
-    def golf_evidence(self) -> str:
-        """A digest of all that a person told a golf fit."""
-        facts = [
-            _parts_of(self.golf_clicks_file, CLICK_PARTS),
-            _parts_of(self.golf_marks_file, ("keys", "frames")),
-            _parts_of(self.annotations_file, ("annotations",)),
-        ]
-        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
-
-    def note_fitted(self, evidence: str) -> None:
-        """Remember from what the last golf fit was made."""
-        self._fitted_file.parent.mkdir(exist_ok=True)
-        write_durably(self._fitted_file, evidence)
-
-    def is_fitted(self) -> bool:
-        """Whether the last golf fit was made from all that a person has told by now."""
-        noted = self._fitted_file
-        return noted.is_file() and noted.read_text() == self.golf_evidence()
 
     def golf_results(self) -> list[Path]:
         """Files besides motion and report that a golf fit wrote."""
@@ -416,16 +376,6 @@ def _section_of(name: str) -> str | None:
 
 def _without_sections(options: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in options.items() if name not in SECTIONS}
-
-
-def _parts_of(file: Path, names: Sequence[str]) -> list:
-    """What a JSON file says under some names; None for each where there is no such file."""
-    content = {}
-    if file.is_file():
-        with suppress(ValueError):  # who reads the file says what is wrong with it
-            content = parse_json(read_text(file))
-    table = content if isinstance(content, dict) else {}
-    return [table.get(name) or None for name in names]
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -184,8 +184,8 @@ def _accumulate(
         offered = offer_distances(elements, cells, part, frames, reach)
         total[:, frames.start : frames.stop] = members @ offered
         if matched is not None:
-            found = (offered < np.float32(reach)).astype(np.float32)
-            matched[:, frames.start : frames.stop] = members @ found
+            near = (offered < np.float32(reach)).astype(np.float32)
+            matched[:, frames.start : frames.stop] = members @ near
 
     blocks = range(0, elements.n_frames, FRAMES_PER_BLOCK)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:

@@ -21,16 +21,16 @@ def order_by_gain(
     n_frames = goal.hoods.n_frames
     cost = uncovered_cost(n_frames, goal.reach)
     rows = comparison.row[keyframes]
-    own = goal.hoods.only(rows)
+    hoods = goal.hoods.only(rows)
     represented = np.zeros(n_frames, dtype=bool)
     open_ones = np.arange(len(keyframes))
     order: list[int] = []
     coverage: list[float] = []
     while len(open_ones):
-        left = own.without(represented)
+        left = hoods.without(represented)
         gain, added = measure_gains(left, open_ones, represented, cost)
         best = int(open_ones[np.lexsort((-added, -gain))[0]])
-        represented[own.of(best)] = True
+        represented[hoods.of(best)] = True
         represented[keyframes[best]] = True
         order.append(best)
         coverage.append(1 - total_cost(represented, cost) / n_frames)

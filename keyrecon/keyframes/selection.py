@@ -25,6 +25,7 @@ before the serve, where little is lost, and coverage spreads its keyframes over 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -144,6 +145,11 @@ class HalfDistances:
             return smooth_distances(self.matched, beta, self.options.form)
         return self.smoothed
 
+    @cached_property
+    def sufficient_goal(self) -> CoverageGoal:
+        """What keyframes have to represent at the distance that is near enough."""
+        return self.goal(self.options.sufficient_beta)
+
     def goal(self, beta: float) -> CoverageGoal:
         """What keyframes with `beta` represent, and have to."""
         hoods = find_neighborhoods(
@@ -200,7 +206,7 @@ def choose_keyframes(
     betas = options.beta_upper, options.beta_lower
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
     for index, (name, beta) in enumerate(zip(names, betas, strict=True)):
-        half = _half(comparison, getattr(comparison, name), index, reach, options)
+        half = half_distances(comparison, getattr(comparison, name), index, reach, options)
         also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
         few, many = ((count + 1 - index) // 2 for count in (least, labels))
         halves.append(_choose_half(half, few, many, beta, also))
@@ -208,13 +214,14 @@ def choose_keyframes(
     return Keyframes(upper, lower, reach=reach, alpha=options.coverage, method=options.method)
 
 
-def _half(
+def half_distances(
     comparison: PoseDistances,
     matched: Float[np.ndarray, "M M"],
     index: int,
     reach: int,
     options: KeyframeOptions,
 ) -> HalfDistances:
+    """One half of the body, the upper one with `index` 0."""
     step = comparison.consecutive_distance[index]
     same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
     return HalfDistances(
@@ -249,14 +256,13 @@ def _choose_half(
     goal = half.goal(beta)
     if half.options.method == "coverage":
         chosen = _move_to_medoids(half, goal, chosen, count, also)
-    return _record(half, beta, half.pose_distances.frames[np.sort(chosen)])
+    return record_half(half, goal, beta, half.pose_distances.frames[np.sort(chosen)])
 
 
 def _sufficient_count(half: HalfDistances, least: int, most: int) -> int:
     """Keyframes that reach the coverage at the distance that is near enough, within bounds."""
-    goal = half.goal(half.options.sufficient_beta)
-    chosen = _fewest(half, goal, most)
-    return max(least, len(chosen)) if goal.reached(chosen) else most
+    chosen = _fewest(half, half.sufficient_goal, most)
+    return max(least, len(chosen)) if half.sufficient_goal.reached(chosen) else most
 
 
 def _fewest(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
@@ -287,10 +293,12 @@ def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list
 def _smallest_beta(half: HalfDistances, max_keyframes: int) -> tuple[float, list[int]]:
     """The smallest beta with which so many keyframes reach the coverage, and such keyframes."""
     low, high = 0.0, half.first_beta
-    chosen = _choose(half, half.goal(high), max_keyframes)
-    while not half.goal(high).reached(chosen):
+    goal = half.goal(high)
+    chosen = _choose(half, goal, max_keyframes)
+    while not goal.reached(chosen):
         low, high = high, 1.5 * high
-        chosen = _choose(half, half.goal(high), max_keyframes)
+        goal = half.goal(high)
+        chosen = _choose(half, goal, max_keyframes)
     while high - low > max(BETA_PRECISION * high, MIN_BETA):
         middle = (low + high) / 2
         goal = half.goal(middle)
@@ -349,8 +357,10 @@ def _move_to_medoids(
     return swap_medoids(goal, chosen, distance, weight)
 
 
-def _record(half: HalfDistances, beta: float, keyframes: Int[np.ndarray, "K"]) -> HalfKeyframes:
-    goal = half.goal(beta)
+def record_half(
+    half: HalfDistances, goal: CoverageGoal, beta: float, keyframes: Int[np.ndarray, "K"]
+) -> HalfKeyframes:
+    """What keyframes of one half stand for; `goal` is that of `beta`."""
     comparison, exemplar_distance = half.pose_distances, half.exemplar_distance
     nearest, distance = assign_frames(
         half.distances(beta), comparison, exemplar_distance, keyframes
@@ -359,7 +369,9 @@ def _record(half: HalfDistances, beta: float, keyframes: Int[np.ndarray, "K"]) -
         goal.hoods, comparison, exemplar_distance[keyframes] < beta, keyframes
     )
     printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
-    enough = half.options.sufficient_beta if half.options.method == "coverage" else beta
+    enough, of_enough = beta, goal
+    if half.options.method == "coverage":
+        enough, of_enough = half.options.sufficient_beta, half.sufficient_goal
     return HalfKeyframes(
         frames=keyframes,
         nearest=nearest,
@@ -368,63 +380,5 @@ def _record(half: HalfDistances, beta: float, keyframes: Int[np.ndarray, "K"]) -
         beta=beta,
         distance=distance,
         printed_count=len(printed),
-        gains=order_by_gain(half.goal(enough), enough, comparison, keyframes),
+        gains=order_by_gain(of_enough, enough, comparison, keyframes),
     )
-
-
-def adopt_keyframes(
-    comparison: PoseDistances,
-    asked: Keyframes,
-    annotated: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
-    options: KeyframeOptions = KeyframeOptions(),
-    progress: Progress = silent,
-) -> Keyframes:
-    """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
-
-    Frames that nobody asked for count like the others, also where the player seemed to be absent.
-    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
-    """
-    away = absent_frames(comparison.visibility_score, asked.reach)
-    away[np.concatenate(annotated)] = False
-    kept, everyone = np.flatnonzero(~away), len(comparison.row)
-    comparison = select_frames(comparison, kept)
-    halves: list[HalfKeyframes] = []
-    names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
-    for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
-        half = _half(comparison, getattr(comparison, name), index, asked.reach, options)
-        beta = getattr(asked, name).beta
-        chosen = np.searchsorted(kept, np.unique(frames))
-        adopted = _record(half, beta, chosen)
-        halves.append(restore_frames(adopted, kept, everyone))
-    upper, lower = halves
-    return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)
-
-
-def keep_marked(
-    comparison: PoseDistances,
-    asked: Keyframes,
-    marked: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
-    options: KeyframeOptions = KeyframeOptions(),
-    progress: Progress = silent,
-) -> Keyframes:
-    """The keyframes with frames that are marked already, upper and lower body, among them.
-
-    A marked frame takes the place of the keyframe most like it, if that represents it; else it
-    comes on top, which costs the person nothing.
-    """
-    halves = []
-    for half, name, frames in zip(
-        (asked.upper, asked.lower), ("upper", "lower"), marked, strict=True
-    ):
-        distances = getattr(comparison, name)
-        chosen = half.frames.tolist()
-        for frame in frames.tolist():
-            if chosen:
-                row = distances[comparison.row[frame], comparison.row[chosen]]
-                nearest = int(row.argmin())
-                if chosen[nearest] not in frames and row[nearest] < half.beta:
-                    chosen.pop(nearest)
-            if frame not in chosen:
-                chosen.append(frame)
-        halves.append(np.array(sorted(chosen), dtype=np.int64))
-    return adopt_keyframes(comparison, asked, (halves[0], halves[1]), options, progress)

@@ -50,8 +50,8 @@ def contradictions(material: ReportMaterial) -> str:
 def instants(material: ReportMaterial, pictures: Pictures) -> str:
     """Where a hand is fastest, with the angles there; empty where no hand ever is."""
     motion = material.motion
-    found = [instant for instant in key_instants(motion) if instant.frame in pictures.instants]
-    if not found:
+    pictured = [instant for instant in key_instants(motion) if instant.frame in pictures.instants]
+    if not pictured:
         return ""
     unit = "m/s" if motion.units == "m" else "heights/s"
     stills = "".join(
@@ -59,7 +59,7 @@ def instants(material: ReportMaterial, pictures: Pictures) -> str:
         f'<img src="{pictures.instants[instant.frame]}" alt="Frame {instant.frame}, the '
         f'{instant.hand} hand is fastest">'
         f"<span>{instant.frame} <small>{motion.time[instant.frame]:.2f} s</small></span></button>"
-        for instant in found
+        for instant in pictured
     )
     angles = instant_angles(motion)
     rows = [
@@ -69,7 +69,7 @@ def instants(material: ReportMaterial, pictures: Pictures) -> str:
             f"{instant.hand}, {instant.speed:.1f} {unit}",
             *(number(float(values[instant.frame]), ".0f") + "°" for values in angles.values()),
         )
-        for instant in found
+        for instant in pictured
     ]
     about = note(
         "The frames in which a hand is fastest, relative to the body: strokes, throws, swings. A "

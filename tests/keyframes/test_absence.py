@@ -7,7 +7,8 @@ import pytest
 from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.keyframes.absence import absent_frames, list_stretches
-from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes
+from keyrecon.keyframes.adoption import adopt_keyframes
+from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Track
 from keyrecon.segmentation.player_crops import Cropping, Crops
 from keyrecon.tracking.visibility import is_visible

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
 
-from keyrecon.keyframes.selection import KeyframeOptions, adopt_keyframes, choose_keyframes
+from keyrecon.keyframes.adoption import adopt_keyframes
+from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.propagation.marked_poses import distances_to
 
 

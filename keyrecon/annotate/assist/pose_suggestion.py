@@ -253,8 +253,8 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     """Joints of one half; those that are `known` stay."""
     templates, index = fitting.templates, fitting.index
     fitted = fit_similar(templates, index, fitting.distance, fitting.shift, OPTIONS.similar)
-    found = search_by_edges(templates, index, fitted.best_joints, LIMB_HYPOTHESES)
-    hypotheses = join_hypotheses(fitted, fit_limbs(templates, index, fitted, found))
+    limb_poses = search_by_edges(templates, index, fitted.best_joints, LIMB_HYPOTHESES)
+    hypotheses = join_hypotheses(fitted, fit_limbs(templates, index, fitted, limb_poses))
     limbs = _choose_each(templates, hypotheses, fitting.fps)
     chosen = np.where(np.isfinite(known), known, limbs.joints)
     weight = np.where(np.isfinite(known), FIXED_WEIGHT, HYPOTHESIS_WEIGHT)

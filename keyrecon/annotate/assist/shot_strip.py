@@ -39,8 +39,8 @@ def list_shots(shots: Shots, workspace: Workspace) -> list[Json]:
 def choose_shot(cache: ProjectCache, workspace: Workspace, number: int, used: bool) -> list[Json]:
     """Keep whether a shot is used in the next run; the shots anew."""
     listed = describe_shots(cache, workspace)
-    own = next((shot for shot in listed if shot["number"] == number), None)
-    if own is None:
+    clicked = next((shot for shot in listed if shot["number"] == number), None)
+    if clicked is None:
         raise KeyreconError(f"There is no shot {number}; there are {len(listed)}.")
-    workspace.choose_shot(number, None if own["used"] == used else used)
+    workspace.choose_shot(number, None if clicked["used"] == used else used)
     return describe_shots(cache, workspace)

@@ -20,6 +20,7 @@ from keyrecon.golf.records import MotionModel, RecordedSwing
 from keyrecon.io.formats.clicks import clicks_from_parts
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.swing_file import read_swing
+from keyrecon.io.provenance import is_fitted
 from keyrecon.io.workspace import Workspace
 from keyrecon.report.golf_measures import measure_swing
 
@@ -83,7 +84,7 @@ def _describe_fit(workspace: Workspace) -> Json:
     if not file.is_file():
         return {}
     fit = _read_fit(file, file.stat().st_mtime_ns)
-    return fit and {**fit, "fresh": workspace.is_fitted()}
+    return fit and {**fit, "fresh": is_fitted(workspace)}
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,5 @@
 """A project as JSON for the page: video, skeleton, keyframes, marks, edits and jobs."""
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any
@@ -14,6 +13,7 @@ from keyrecon.annotate.store.journal import Entry, JournalState
 from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
 from keyrecon.annotation_budget import usual_budget
 from keyrecon.body import Skeleton
+from keyrecon.io.provenance import marks_evidence, read_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Keyframes
@@ -158,14 +158,11 @@ def describe_settings(workspace: Workspace) -> Json:
 def describe_run(workspace: Workspace) -> Json:
     """What spoke against the track when the motion was made, in the words of the page, and whether
     it was made from the marks as they are now (true where that is not known)."""
-    try:
-        run = json.loads(workspace.run_file.read_text("utf-8"))
-        lines, marks = list(run["doubts"]), run["marks"]
-    except (OSError, ValueError, TypeError, KeyError):
-        # a motion of a golf fit or of an older version; a torn file
+    notes = read_run(workspace)
+    if notes is None:
         return {"doubts": [], "is_current": True}
-    doubts = [in_page_words(str(line)) for line in lines]
-    return {"doubts": doubts, "is_current": marks == workspace.marks_digest()}
+    doubts = [in_page_words(line) for line in notes.doubts]
+    return {"doubts": doubts, "is_current": notes.evidence == marks_evidence(workspace)}
 
 
 def describe_state(state: JournalState) -> Json:

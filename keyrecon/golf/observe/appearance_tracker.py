@@ -104,8 +104,8 @@ def track_patch(
         model = _learn(model, colors, responsibility, rate)
         speed = np.array([*(pose - before)[:2], 0.0, 0.0])
         poses.append(pose)
-        found = float((inside * (1 - responsibility[:, 2])).sum())
-        confidence.append(found / max(float(inside.sum()), whole, 1e-9))
+        inlying = float((inside * (1 - responsibility[:, 2])).sum())
+        confidence.append(inlying / max(float(inside.sum()), whole, 1e-9))
     path = np.array(poses)
     return PointTrack(path[:, :2], path[:, 2], np.array(confidence))
 

@@ -151,9 +151,9 @@ class FrameForeground:
         _, labels = cv2.connectedComponents(cv2.dilate(body, self._disk(ISLAND_GAP)))
         counts = np.bincount(labels[body > 0], minlength=2)
         standing = np.bincount(labels[(body > 0) & (self.places == STANCE)], minlength=len(counts))
-        own = standing.argmax() if standing.any() else counts.argmax()
-        player = (body > 0) & (labels == own)
-        large = np.flatnonzero(counts > ISLAND_SHARE * counts[own])
+        component = standing.argmax() if standing.any() else counts.argmax()
+        player = (body > 0) & (labels == component)
+        large = np.flatnonzero(counts > ISLAND_SHARE * counts[component])
         if len(large) < 2:
             return player
         away = cv2.distanceTransform((~player).astype(np.uint8), cv2.DIST_L2, 3)
@@ -161,7 +161,7 @@ class FrameForeground:
         feet = np.bincount(labels[(body > 0) & (self.places == BELOW_KNEES)], minlength=len(counts))
         parts = [
             k for k in large
-            if k == own or standing[k]
+            if k == component or standing[k]
             or (not feet[k] and away[(body > 0) & (labels == k)].min() < near)
         ]  # fmt: skip
         return (body > 0) & np.isin(labels, parts)

@@ -30,8 +30,8 @@ class ShotChoices:
 def read_shot_choices(path: Path) -> ShotChoices:
     """Read choices; raises KeyreconError for a file that does not hold them."""
     with reading(path, "a choice of shots", "delete it and choose again"):
-        told = parse_json(read_text(path))
-        use, skip = (tuple(whole(number) for number in told[name]) for name in ("use", "skip"))
+        content = parse_json(read_text(path))
+        use, skip = (tuple(whole(number) for number in content[name]) for name in ("use", "skip"))
         if {*use} & {*skip}:
             raise ValueError("a shot cannot be used and left out")
         return ShotChoices(use, skip)

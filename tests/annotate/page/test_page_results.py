@@ -21,6 +21,7 @@ from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
 from keyrecon.io.formats.export import SUFFIXES
+from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.report.overlay import Limbs, View
 
@@ -81,9 +82,8 @@ def mark_and_run(person, height=""):
 def run_and_tell(folder, text, options, progress):
     run_at_once(folder, options, progress)
     workspace = Workspace(folder)
-    workspace.run_file.parent.mkdir(exist_ok=True)
-    described = {"doubts": text.splitlines()[1:], "marks": workspace.marks_digest()}
-    workspace.run_file.write_text(json.dumps(described))
+    (folder / "cache").mkdir(exist_ok=True)
+    note_run(workspace, RunNotes(marks_evidence(workspace), tuple(text.splitlines()[1:])))
     return text
 
 

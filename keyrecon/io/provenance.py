@@ -1,0 +1,94 @@
+"""What results were made from, so that a page can tell whether a person changed anything since.
+
+A digest of what a person told is kept beside the results in the project's cache. It is of what the
+files say, not of their bytes: a file that is written anew with the same marks changes nothing.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from keyrecon.io.durable import write_durably
+from keyrecon.io.workspace import Workspace
+from keyrecon.reading import parse_json, read_text
+
+CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
+"""What golf_clicks.json tells."""
+
+
+@dataclass(frozen=True)
+class RunNotes:
+    """What is kept of the run that made the motion."""
+
+    evidence: str
+    """Digest of the marks that it was made from."""
+    doubts: tuple[str, ...]
+    """What spoke against the track, line by line."""
+
+
+def marks_evidence(workspace: Workspace) -> str:
+    """A digest of all joints that a person marked."""
+    return _digest([_parts_of(workspace.annotations_file, ("annotations",))])
+
+
+def golf_evidence(workspace: Workspace) -> str:
+    """A digest of all that a person told a golf fit."""
+    return _digest(
+        [
+            _parts_of(workspace.golf_clicks_file, CLICK_PARTS),
+            _parts_of(workspace.golf_marks_file, ("keys", "frames")),
+            _parts_of(workspace.annotations_file, ("annotations",)),
+        ]
+    )
+
+
+def note_run(workspace: Workspace, notes: RunNotes) -> None:
+    """Keep what the motion was made from, and what spoke against its track."""
+    write_durably(_run_file(workspace), json.dumps(asdict(notes)))
+
+
+def read_run(workspace: Workspace) -> RunNotes | None:
+    """What was kept of the run; None for the motion of a golf fit or of an older version."""
+    try:
+        noted = json.loads(_run_file(workspace).read_text("utf-8"))
+        return RunNotes(str(noted["evidence"]), tuple(map(str, noted["doubts"])))
+    except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
+        return None
+
+
+def note_fitted(workspace: Workspace, evidence: str) -> None:
+    """Keep what the last golf fit was made from."""
+    _fitted_file(workspace).parent.mkdir(exist_ok=True)
+    write_durably(_fitted_file(workspace), evidence)
+
+
+def is_fitted(workspace: Workspace) -> bool:
+    """Whether the last golf fit was made from all that a person has told by now."""
+    noted = _fitted_file(workspace)
+    return noted.is_file() and noted.read_text() == golf_evidence(workspace)
+
+
+def _run_file(workspace: Workspace) -> Path:
+    return workspace.folder / "cache" / "run.json"
+
+
+def _fitted_file(workspace: Workspace) -> Path:
+    return workspace.folder / "cache" / "golf_fitted"
+
+
+def _digest(facts: list[Any]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _parts_of(file: Path, names: Sequence[str]) -> list[Any]:
+    """What a JSON file says under some names; None for each where there is no such file."""
+    content = {}
+    if file.is_file():
+        with suppress(ValueError):  # who reads the file says what is wrong with it
+            content = parse_json(read_text(file))
+    table = content if isinstance(content, dict) else {}
+    return [table.get(name) or None for name in names]

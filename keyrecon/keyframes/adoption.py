@@ -1,0 +1,67 @@
+"""Keyframes that a person did annotate, whether they were asked for or not."""
+
+import numpy as np
+from jaxtyping import Int
+
+from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
+from keyrecon.keyframes.selection import KeyframeOptions, half_distances, record_half
+from keyrecon.progress import Progress, silent
+from keyrecon.records import HalfKeyframes, Keyframes, PoseDistances
+
+
+def adopt_keyframes(
+    comparison: PoseDistances,
+    asked: Keyframes,
+    annotated: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """The keyframes that a person did annotate, upper and lower body, in place of those asked for.
+
+    Frames that nobody asked for count like the others, also where the player seemed to be absent.
+    Beta stays, so that coverage tells what the missing ones cost or more ones bring.
+    """
+    away = absent_frames(comparison.visibility_score, asked.reach)
+    away[np.concatenate(annotated)] = False
+    kept, everyone = np.flatnonzero(~away), len(comparison.row)
+    comparison = select_frames(comparison, kept)
+    halves: list[HalfKeyframes] = []
+    names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
+    for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
+        half = half_distances(comparison, getattr(comparison, name), index, asked.reach, options)
+        beta = getattr(asked, name).beta
+        chosen = np.searchsorted(kept, np.unique(frames))
+        adopted = record_half(half, half.goal(beta), beta, chosen)
+        halves.append(restore_frames(adopted, kept, everyone))
+    upper, lower = halves
+    return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)
+
+
+def keep_marked(
+    comparison: PoseDistances,
+    asked: Keyframes,
+    marked: tuple[Int[np.ndarray, "u"], Int[np.ndarray, "l"]],
+    options: KeyframeOptions = KeyframeOptions(),
+    progress: Progress = silent,
+) -> Keyframes:
+    """The keyframes with frames that are marked already, upper and lower body, among them.
+
+    A marked frame takes the place of the keyframe most like it, if that represents it; else it
+    comes on top, which costs the person nothing.
+    """
+    halves = []
+    for half, name, frames in zip(
+        (asked.upper, asked.lower), ("upper", "lower"), marked, strict=True
+    ):
+        distances = getattr(comparison, name)
+        chosen = half.frames.tolist()
+        for frame in frames.tolist():
+            if chosen:
+                row = distances[comparison.row[frame], comparison.row[chosen]]
+                nearest = int(row.argmin())
+                if chosen[nearest] not in frames and row[nearest] < half.beta:
+                    chosen.pop(nearest)
+            if frame not in chosen:
+                chosen.append(frame)
+        halves.append(np.array(sorted(chosen), dtype=np.int64))
+    return adopt_keyframes(comparison, asked, (halves[0], halves[1]), options, progress)
