@@ -83,8 +83,9 @@ def describe_keyframes(
     folder, used = quoted(workspace.folder), preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
     halves = [
-        f"{name} body: {counted(len(half.frames), 'keyframe')} for {half.coverage:.1%} of the "
-        f"frames (beta {half.beta:.4f}; {_compare_with_printed(keyframes, half)})."
+        f"{name} body: {counted(len(half.frames), 'keyframe')}; {half.coverage:.1%} of the frames "
+        f"look like one of them (outlines at most {half.beta:.1%} of the player's height apart; "
+        f"{_compare_with_printed(keyframes, half)})."
         for name, half in (("Upper", keyframes.upper), ("Lower", keyframes.lower))
     ]
     return "\n".join(
@@ -108,7 +109,7 @@ def describe_keyframes(
 def _compare_with_printed(keyframes: Keyframes, half: HalfKeyframes) -> str:
     if keyframes.method == "paper":
         return "chosen by Eq. 2-4 as printed"
-    return f"as printed in the paper it would take {half.printed_count}"
+    return f"the choice printed in the paper would take {half.printed_count}"
 
 
 def _describe_gains(keyframes: Keyframes) -> list[str]:
@@ -120,10 +121,10 @@ def _describe_gains(keyframes: Keyframes) -> list[str]:
             continue
         first, middle = gains.order[:3].tolist(), (len(gains.order) + 1) // 2
         lines.append(
-            f"{name} body, within {gains.beta:.3g} body heights: the {middle} most useful marks "
-            f"(first {', '.join(map(str, first))}; all in order in keyframes.json) cover "
-            f"{gains.coverage[middle - 1]:.1%}, all {gains.coverage[-1]:.1%}, one more would "
-            f"bring {gains.next_gain:+.2%}."
+            f"{name} body, most useful first ({', '.join(map(str, first))}, ...; the order is in "
+            f"keyframes.json): {counted(middle, 'mark')} would stand for "
+            f"{gains.coverage[middle - 1]:.1%} of the frames to {gains.beta:.1%} of the height, "
+            f"all {gains.coverage[-1]:.1%}, one more than all {gains.next_gain:.2%} more."
         )
     return lines
 

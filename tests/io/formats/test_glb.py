@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from humanoid_names import JOINTS
 from scipy.spatial.transform import Rotation
 from small_motion import make_motion
 
@@ -15,13 +16,6 @@ from keyrecon.body import LSP14, Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor
 from keyrecon.io.formats.glb import write_glb
 
-NAMES = {
-    "Neck": "neck", "RightUpLeg": "right_hip", "RightLeg": "right_knee",
-    "RightFoot": "right_ankle", "LeftUpLeg": "left_hip", "LeftLeg": "left_knee",
-    "LeftFoot": "left_ankle", "RightArm": "right_shoulder", "RightForeArm": "right_elbow",
-    "RightHand": "right_wrist", "LeftArm": "left_shoulder", "LeftForeArm": "left_elbow",
-    "LeftHand": "left_wrist",
-}  # fmt: skip
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
@@ -117,7 +111,7 @@ def scene(motion, tmp_path_factory):
 def test_the_skin_holds_a_tree_of_joints_with_humanoid_names(scene):
     names = [scene.nodes[joint]["name"] for joint in scene.joints]
     assert names[0] == "Hips"
-    assert {"Spine", "Head", *NAMES} <= set(names)
+    assert {"Spine", "Head", *JOINTS} <= set(names)
     assert len(set(names)) == len(names)
     body = next(node for node in scene.nodes if "mesh" in node)
     assert body["skin"] == 0
@@ -128,7 +122,7 @@ def test_the_skin_holds_a_tree_of_joints_with_humanoid_names(scene):
 def test_joints_are_where_the_motion_has_them(scene, motion, frame):
     worlds, points = scene.worlds(frame), stand_on_floor(motion).points[frame]
     for number, node in enumerate(scene.nodes):
-        if joint := NAMES.get(node["name"]):
+        if joint := JOINTS.get(node["name"]):
             error = worlds[number][:3, 3] - points[LSP14.index(joint)]
             assert np.linalg.norm(error) < 0.001, node["name"]
 
