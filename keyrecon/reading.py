@@ -50,10 +50,13 @@ def read_text(path: Path) -> str:
 
 
 def parse_json(text: str) -> Any:
-    """What JSON says; ValueError for numbers that are none, or that nothing here can hold."""
-    return json.loads(
-        text, parse_constant=_refuse_word, parse_float=_finite, parse_int=_whole_number
-    )
+    """What JSON says; ValueError for what is none, and for what nothing here can hold."""
+    try:
+        return json.loads(
+            text, parse_constant=_refuse_word, parse_float=_finite, parse_int=_whole_number
+        )
+    except RecursionError as fault:
+        raise ValueError("lists within lists without end") from fault
 
 
 def _refuse_word(word: str) -> float:

@@ -54,7 +54,7 @@ def note_run(workspace: Workspace, notes: RunNotes) -> None:
 def read_run(workspace: Workspace) -> RunNotes | None:
     """What was kept of the run; None for the motion of a golf fit or of an older version."""
     try:
-        noted = json.loads(_run_file(workspace).read_text("utf-8"))
+        noted = parse_json(read_text(_run_file(workspace)))
         return RunNotes(str(noted["evidence"]), tuple(map(str, noted["doubts"])))
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None
@@ -69,7 +69,7 @@ def note_fitted(workspace: Workspace, evidence: str) -> None:
 def is_fitted(workspace: Workspace) -> bool:
     """Whether the last golf fit was made from all that a person has told by now."""
     noted = _fitted_file(workspace)
-    return noted.is_file() and noted.read_text() == golf_evidence(workspace)
+    return noted.is_file() and noted.read_bytes() == golf_evidence(workspace).encode()
 
 
 def _run_file(workspace: Workspace) -> Path:

@@ -15,6 +15,7 @@ from pathlib import Path
 from keyrecon.annotate.server.security import Credentials
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
+from keyrecon.reading import parse_json, read_text
 
 SECRET_LENGTH = 40
 """Secrets shorter than this were not made here."""
@@ -31,7 +32,7 @@ class LastAddress:
 def recall(file: Path) -> LastAddress:
     """What `remember` wrote; nothing where the file is not there or damaged."""
     try:
-        noted = json.loads(file.read_text())
+        noted = parse_json(read_text(file))
         port, secret = int(noted["port"]), str(noted["session"])
     except (OSError, ValueError, LookupError, TypeError):
         return LastAddress()

@@ -1,0 +1,57 @@
+"""What results were made from: by what the files say, and whatever state they are in."""
+
+import json
+
+import pytest
+
+from keyrecon.io.provenance import (
+    RunNotes,
+    is_fitted,
+    marks_evidence,
+    note_fitted,
+    note_run,
+    read_run,
+)
+from keyrecon.io.workspace import Workspace
+
+
+@pytest.fixture
+def workspace(bare):
+    (bare / "cache").mkdir()
+    return Workspace(bare)
+
+
+def write_marks(workspace, rows, **layout):
+    workspace.annotations_file.write_text(json.dumps({"annotations": rows}, **layout))
+
+
+def test_marks_written_anew_in_other_bytes_are_the_same_evidence(workspace):
+    rows = [{"id": 1, "keypoints": [1, 2, 2]}]
+    write_marks(workspace, rows)
+    before = marks_evidence(workspace)
+    write_marks(workspace, rows, indent=3)
+    assert marks_evidence(workspace) == before
+    write_marks(workspace, [{"id": 1, "keypoints": [1, 3, 2]}])
+    assert marks_evidence(workspace) != before
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"[" * 100_000, b"1e999", b"{"])
+def test_damaged_marks_are_left_to_their_reader(workspace, content):
+    """Who reads the file says in one line what is wrong with it."""
+    without = marks_evidence(workspace)
+    workspace.annotations_file.write_bytes(content)
+    assert marks_evidence(workspace) == without
+
+
+@pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff"])
+def test_torn_notes_are_none(workspace, content):
+    note_run(workspace, RunNotes("marks", ("a doubt",)))
+    assert read_run(workspace) == RunNotes("marks", ("a doubt",))
+    (workspace.folder / "cache" / "run.json").write_bytes(content)
+    assert read_run(workspace) is None
+
+
+def test_a_torn_note_of_a_fit_calls_for_another(workspace):
+    note_fitted(workspace, "all")
+    (workspace.folder / "cache" / "golf_fitted").write_bytes(b"\xff\xfe")
+    assert not is_fitted(workspace)
