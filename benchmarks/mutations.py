@@ -52,7 +52,7 @@ from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
-from keyrecon.world.records import CourtCamera, CourtClick
+from keyrecon.world.records import CourtClick, WorldCamera
 
 KEPT = Path(__file__).parent.parent / "annotations"
 FRAMES, SIZE = 40, (160, 96)
@@ -194,11 +194,11 @@ def _keyframes() -> Keyframes:
     return Keyframes(half, half, 10, 0.95)
 
 
-def _camera() -> CourtCamera:
+def _camera() -> WorldCamera:
     ones = np.ones(FRAMES)
     turn = np.tile(np.eye(3), (FRAMES, 1, 1))
     places = np.tile([0.0, 1.5, 20.0], (FRAMES, 1))
-    return CourtCamera(900 * turn, turn, places, ones > 0, 0.01 * places, ones)
+    return WorldCamera(900 * turn, turn, places, ones > 0, 0.01 * places, ones, ones)
 
 
 def _skeleton_text() -> str:

@@ -18,7 +18,7 @@ from keyrecon.io.storage import load_record
 from keyrecon.lifting.lifting import LiftResult
 from keyrecon.records import Motion
 from keyrecon.world.placement import place_motion
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import WorldCamera, WorldMotion
 from keyrecon.world.run_measures import TOP, run_velocity
 
 TO_COURT = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -27,7 +27,7 @@ PIECE = 12.0
 """Seconds that are measured at a time."""
 
 
-def camera_and_points(truth: dict[str, np.ndarray]) -> tuple[CourtCamera, np.ndarray]:
+def camera_and_points(truth: dict[str, np.ndarray]) -> tuple[WorldCamera, np.ndarray]:
     """The true camera and joints in the court's axes."""
     count, net = len(truth["focal"]), np.array([0, -11.885, 0])
     inner = np.zeros((count, 3, 3))
@@ -35,8 +35,8 @@ def camera_and_points(truth: dict[str, np.ndarray]) -> tuple[CourtCamera, np.nda
     inner[:, :2, 2], inner[:, 2, 2] = truth["principal"], 1
     turn = truth["rotation"] @ TO_COURT.T
     shift = -turn @ (TO_COURT @ truth["center"] + net)
-    sure = np.zeros((count, 3)), np.zeros(count)
-    camera = CourtCamera(inner, turn, shift, np.ones(count, dtype=bool), *sure)
+    sure = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    camera = WorldCamera(inner, turn, shift, np.ones(count, dtype=bool), *sure)
     world = np.einsum("tji,tnj->tni", truth["rotation"], truth["points3d"]) + truth["center"]
     return camera, world @ TO_COURT.T + net
 

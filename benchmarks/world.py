@@ -59,7 +59,7 @@ from keyrecon.world.court import CourtOptions, tennis_court
 from keyrecon.world.court_tracking import SPACING, check_still
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import place_motion
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import WorldCamera
 from keyrecon.world.refinement import OF_FRAMES
 from keyrecon.world.sight import sight_axes
 
@@ -148,7 +148,7 @@ class Truth:
         return cls(cameras, world, stored["points2d"])
 
 
-def lift_truth(truth: Truth, camera: CourtCamera, seed: int) -> Motion:
+def lift_truth(truth: Truth, camera: WorldCamera, seed: int) -> Motion:
     """The true motion as a lifting would have it: orthographic about the sight, with slow noise."""
     rng = np.random.default_rng(seed)
     count, joints = truth.points.shape[:2]
@@ -172,15 +172,15 @@ def lift_truth(truth: Truth, camera: CourtCamera, seed: int) -> Motion:
     )  # fmt: skip
 
 
-def true_camera(truth: Truth) -> CourtCamera:
+def true_camera(truth: Truth) -> WorldCamera:
     """What a perfect calibration would find."""
     inner = np.array([np.diag([c.focal, c.focal, 1.0]) for c in truth.cameras])
     inner[:, :2, 2] = [c.principal for c in truth.cameras]
     turns = np.array([c.rotation for c in truth.cameras])
     shifts = np.array([-c.rotation @ c.centre for c in truth.cameras])
     count = len(turns)
-    sure = np.zeros((count, 3)), np.zeros(count)
-    return CourtCamera(inner, turns, shifts, np.ones(count, dtype=bool), *sure)
+    sure = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    return WorldCamera(inner, turns, shifts, np.ones(count, dtype=bool), *sure)
 
 
 def measure(setting: Setting, work: Path) -> str:
@@ -222,12 +222,11 @@ def measure_lift(folder: Path, frames: int) -> str:
     own = slice(0, frames)
     motion, camera = lifted(folder, fps), true_camera(truth)
     motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
-    parts = ("K", "R", "t", "found", "sd_centre", "sd_focal")
-    camera = CourtCamera(*(getattr(camera, name)[own] for name in parts))
+    camera = camera.part(own)
     return f"{folder.name:<24}{_place(truth.points[own], camera, motion)}"
 
 
-def _place(true: np.ndarray, camera: CourtCamera, motion: Motion) -> str:
+def _place(true: np.ndarray, camera: WorldCamera, motion: Motion) -> str:
     """Root, slip, contact, joints in the world, and the pose before and after."""
     began = time.process_time()
     world = place_motion(motion, camera)
@@ -306,7 +305,7 @@ def look(name: str, work: Path) -> str:
     )
 
 
-def _pace(video: Video, camera: CourtCamera) -> str:
+def _pace(video: Video, camera: WorldCamera) -> str:
     """Milliseconds a frame of looking at the lines of a still camera."""
     greys = [grey for _, grey in zip(range(20), read_grey(video, 1280), strict=False)]
     t = int(np.flatnonzero(camera.found)[0])
@@ -317,7 +316,7 @@ def _pace(video: Video, camera: CourtCamera) -> str:
     return f"  {(time.process_time() - began) / len(greys) * 1000:.1f} ms a frame ({SPACING:g} px)"
 
 
-def draw(video: Video, camera: CourtCamera, file: Path) -> None:
+def draw(video: Video, camera: WorldCamera, file: Path) -> None:
     """Every tenth frame with the model's lines, on one sheet."""
     tiles = []
     for t in range(0, len(video), 10):

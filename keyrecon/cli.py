@@ -49,6 +49,7 @@ COMMANDS: dict[str, Command | dict[str, Command]] = {
     "evaluate": Command("keyrecon.commands", "projects", "evaluate"),
     "synth": Command("keyrecon.commands", "captures", "synth"),
     "court": Command("keyrecon.commands", "court", "court"),
+    "ground": Command("keyrecon.commands", "ground", "ground"),
     "relink": Command("keyrecon.commands", "projects", "relink"),
     "depths": Command("keyrecon.commands", "captures", "depths"),
     "golf": {

@@ -1,42 +1,24 @@
 """`keyrecon court`: the camera of every frame from the tennis court in the picture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from keyrecon.app.placing import old_report, place_again
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
 from keyrecon.io.formats.court_points import merge_clicks
-from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
-from keyrecon.records import Motion
-from keyrecon.report.court_drawing import draw_court, draw_way, write_court_picture
+from keyrecon.report.court_drawing import draw_court, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.clicked_points import ContradictoryClicks, check_click
 from keyrecon.world.court import tennis_court
-from keyrecon.world.placement import place_motion
-from keyrecon.world.records import CourtCamera, CourtClick, WorldMotion
-from keyrecon.world.run_measures import measure_run
-
-MAX_MISFIT = 0.2
-"""Share by which the player's size by the court may differ from the height that was given: rendered
-sequences are off by 2 to 9 %, a court taken for another by a third and more."""
-STATURES = (1.1, 2.3)
-"""Heights that players have, metres."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedMotion:
-    """A motion on the court, where it was put there, and what is said of it."""
-
-    lines: tuple[str, ...] = ()
-    court: tuple[WorldMotion, CourtCamera] | None = None
+from keyrecon.world.records import CourtClick, WorldCamera
 
 
 def court_click(text: str) -> CourtClick:
@@ -85,9 +67,7 @@ def calibrate(
     drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
     picture = workspace.folder / "court.jpg"
     write_court_picture(picture, drawn)
-    placed = PlacedMotion()
-    if workspace.motion_file.is_file():
-        placed = write_placed_motion(workspace, read_motion(workspace.motion_file))
+    placed = place_again(workspace)
     return "\n".join(
         [
             *describe_camera(camera),
@@ -96,16 +76,9 @@ def calibrate(
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
             *([f"By {len(together)} clicked points; they are kept."] if together else []),
             *placed.lines,
-            *_old_report(workspace, placed),
+            *old_report(workspace, placed),
         ]
     )
-
-
-def _old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
-    """The way to a report with the court."""
-    if placed.court is None or not workspace.report_file.is_file():
-        return []
-    return [f"For a report with the court: keyrecon run {quoted(workspace.folder)}"]
 
 
 def _find_camera(
@@ -114,7 +87,7 @@ def _find_camera(
     clicks: tuple[CourtClick, ...],
     options: CalibrationOptions,
     progress: Progress,
-) -> CourtCamera:
+) -> WorldCamera:
     keep = workspace.stages.keep
     motion = workspace.options(Options(), Options()).camera
     path = keep("camera", estimate_camera_motion, video, options=motion, progress=progress)
@@ -146,64 +119,19 @@ def _how_many(clicks: Sequence[CourtClick]) -> str:
     return f" Clicked so far, and kept: {names}." if clicks else ""
 
 
-def write_placed_motion(workspace: Workspace, motion: Motion) -> PlacedMotion:
-    """Write motion.npz, with the motion on the court where that is known.
-
-    What the motion is without a court is written the same in any case.
-    """
-    if not workspace.camera_file.is_file():
-        write_motion(workspace.motion_file, motion)
-        return PlacedMotion()
-    camera, world = read_camera(workspace.camera_file), None
-    if len(camera.found) == len(motion.time):
-        world = place_motion(motion, camera)
-    doubt = _doubt(world, motion, camera)
-    if world is None or doubt:
-        write_motion(workspace.motion_file, motion)
-        return PlacedMotion((f"No way on the court: {doubt}",))
-    write_motion(workspace.motion_file, motion, (world, camera))
-    way = measure_run(world, motion)
-    if way is None:
-        return PlacedMotion(court=(world, camera))
-    picture = workspace.folder / "way.jpg"
-    title = f"{way.length.value:.1f} m run, top speed {way.top_speed.value:.1f} m/s"
-    write_court_picture(picture, draw_way(world.root, way.speed, title))
-    height = f" The player is {world.height_ratio:.2f} m tall by the court."
-    line = f"On the court: {title}; {picture} shows the way."
-    return PlacedMotion((line + (height if motion.units != "m" else ""),), (world, camera))
-
-
-def _doubt(world: WorldMotion | None, motion: Motion, camera: CourtCamera) -> str:
-    """Why a motion is not put on the court; empty where it is."""
-    if len(camera.found) != len(motion.time):
-        return (
-            f"camera.npz was made for {len(camera.found)} frames and the motion has "
-            f"{len(motion.time)}; run keyrecon court again."
-        )
-    if world is None:
-        return "in no frame with the court was a foot seen to stand on the ground."
-    low, high = (1 - MAX_MISFIT, 1 + MAX_MISFIT) if motion.units == "m" else STATURES
-    if not low < world.height_ratio < high:
-        return (
-            f"by the court the player would be {world.height_ratio:.2f} "
-            f"{'times the height given' if motion.units == 'm' else 'm tall'}; look at court.jpg, "
-            "and at the height."
-        )
-    return ""
-
-
 def export_calibration(workspace: Workspace, file: Path) -> str:
     """Write the camera as Pose2Sim reads it; returns the line to show."""
     if not workspace.camera_file.is_file():
         raise KeyreconError(
-            f"{workspace.folder} has no camera yet; run: keyrecon court {quoted(workspace.folder)}"
+            f"{workspace.folder} has no camera yet; run: keyrecon court {quoted(workspace.folder)} "
+            f"(where there is no court: keyrecon ground {quoted(workspace.folder)})"
         )
     video = workspace.video()
     camera = read_camera(workspace.camera_file)
     return f"Wrote {file}{write_calibration(file, camera, (video.width, video.height), file.stem)}."
 
 
-def describe_camera(camera: CourtCamera) -> list[str]:
+def describe_camera(camera: WorldCamera) -> list[str]:
     """Where the camera stands, how surely, and in which frames it was found."""
     seen = np.flatnonzero(camera.found)
     x, y, z = camera.centre[seen].mean(axis=0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from keyrecon.app.court import write_placed_motion
+from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted

@@ -20,7 +20,7 @@ def export(
     """Write the motion in other formats, told by suffix.
 
     .bvh .trc .c3d .csv .nc .npz .glb, .json (COCO keypoints of every frame), .mp4 (overlay),
-    .toml (the camera of keyrecon court, as Pose2Sim reads it).
+    .toml (the camera of keyrecon court or ground, as Pose2Sim reads it).
 
     Args:
         project: Project folder.

@@ -9,7 +9,8 @@
     golf_marks.json    of a golf swing: what a person put right in a fit
     court_points.json  points of the court that a person clicked
     shots.json         shots that a person said to use or to leave out, until the next run
-    camera.npz         the camera of every frame, where the court was found
+    ground_marks.json  upright things, lengths and the horizon that a person marked
+    camera.npz         the camera of every frame, where a court or the ground has told it
     motion.npz, report.html
     exports/           files for other programs that the page wrote
     cache/             results of the stages; safe to delete
@@ -31,6 +32,7 @@ from keyrecon.io.formats.court_points import (
     read_court_points,
     write_court_points,
 )
+from keyrecon.io.formats.ground_marks import read_ground_marks, write_ground_marks
 from keyrecon.io.formats.picks import read_picks, write_picks
 from keyrecon.io.formats.shot_choices import (
     ShotChoices,
@@ -57,12 +59,13 @@ from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
+from keyrecon.world.ground_evidence import GroundMarks
 from keyrecon.world.records import CourtClick
 
 OWN_NAMES = (
     *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
     *("annotate.sqlite", "motion.npz", "report.html", "golf_clicks.json", "golf_marks.json"),
-    *("camera.npz", "court_points.json", "shots.json"),
+    *("camera.npz", "court_points.json", "ground_marks.json", "shots.json"),
 )
 """Files that a project has or may come to have."""
 GOLF = "golf"
@@ -302,6 +305,22 @@ class Workspace:
             new = merge_clicks([click for click in old if click not in dropped], added)
             if new != old:
                 write_court_points(self.court_points_file, new)
+
+    @property
+    def ground_marks_file(self) -> Path:
+        """ground_marks.json"""
+        return self.folder / "ground_marks.json"
+
+    def ground_marks(self) -> GroundMarks:
+        """What a person told of the ground and the camera."""
+        file = self.ground_marks_file
+        return read_ground_marks(file) if file.is_file() else GroundMarks()
+
+    def keep_ground_marks(self, told: GroundMarks) -> None:
+        """Keep what a person told of the ground."""
+        with self.exclusive():
+            if told != self.ground_marks():
+                write_ground_marks(self.ground_marks_file, told)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:

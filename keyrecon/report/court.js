@@ -1,4 +1,4 @@
-// The court from above with the player's way, at the frame of the page's cursor. Metres on the court:
+// The court, or the ground in squares of a metre, from above with the player's way, at the frame of the page's cursor. Metres on the court:
 // x along the net to the right, y up the court, the camera's end below.
 import { cssColor } from "./colors.js";
 import { byId, data, unpack, count, frame, show, followers, restyled } from "./cursor.js";
@@ -7,6 +7,7 @@ import { prepareCanvas } from "./figure3d.js";
 const SURFACE = "#34548a",
   SURROUND = "#40695a",
   LINE = "#f5f5f5",
+  GRID = "#80a092",
   NET = "#ffdc00";
 const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
 const MARGIN = { top: 8, left: 8, right: 92, bottom: 8 };
@@ -97,15 +98,17 @@ function createMap(canvas, court) {
     pen.clip();
     pen.fillStyle = SURROUND;
     pen.fillRect(x0, y0, x1 - x0, y1 - y0);
-    const [wide, long] = court.surface,
-      [sx, sy] = at(-wide, long),
-      [ex, ey] = at(wide, -long);
-    pen.fillStyle = SURFACE;
-    pen.fillRect(sx, sy, ex - sx, ey - sy);
+    if (court.surface) {
+      const [wide, long] = court.surface,
+        [sx, sy] = at(-wide, long),
+        [ex, ey] = at(wide, -long);
+      pen.fillStyle = SURFACE;
+      pen.fillRect(sx, sy, ex - sx, ey - sy);
+    }
     if (kind === "heat") drawHeat(pen, at, scale);
     for (const [a, b] of court.lines) {
-      pen.strokeStyle = a[2] || b[2] ? NET : LINE;
-      pen.lineWidth = Math.max(1.5, 0.05 * scale);
+      pen.strokeStyle = a[2] || b[2] ? NET : court.surface ? LINE : GRID;
+      pen.lineWidth = court.surface ? Math.max(1.5, 0.05 * scale) : 1;
       pen.beginPath();
       pen.moveTo(...at(a[0], a[1]));
       pen.lineTo(...at(b[0], b[1]));
@@ -121,10 +124,8 @@ function createMap(canvas, court) {
     const t = frame(),
       [x, y] = [root[2 * t], root[2 * t + 1]];
     byId("court-now").textContent = known(t)
-      ? `${speed[t].toFixed(1)} m/s, ${Math.abs(Math.abs(y) - court.surface[1]).toFixed(1)} m ${
-          Math.abs(y) > court.surface[1] ? "behind" : "inside"
-        } the baseline`
-      : "the court is not seen in this frame";
+      ? `${speed[t].toFixed(1)} m/s${court.surface ? fromBaseline(y) : ""}`
+      : `the ${court.origin} is not known in this frame`;
     if (!known(t)) return;
     const [px, py] = at(x, y);
     pen.fillStyle = "#fff";
@@ -134,6 +135,11 @@ function createMap(canvas, court) {
     pen.arc(px, py, 7, 0, 2 * Math.PI);
     pen.fill();
     pen.stroke();
+  }
+
+  function fromBaseline(y) {
+    const [, long] = court.surface;
+    return `, ${Math.abs(Math.abs(y) - long).toFixed(1)} m ${Math.abs(y) > long ? "behind" : "inside"} the baseline`;
   }
 
   // The frame whose place is nearest to a point of the canvas; of several passes the one nearest in time.

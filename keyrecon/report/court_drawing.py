@@ -1,4 +1,4 @@
-"""The court's model drawn on a frame, so that a wrong camera is seen at a glance."""
+"""Court or ground drawn on a frame, so that a wrong camera is seen at a glance."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from keyrecon.io.durable import write_durably
 from keyrecon.records import Motion
 from keyrecon.report.drawing import LEFT, RIGHT
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, CourtModel, tennis_court
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import COURT, Origin, WorldCamera, WorldMotion
 
 GROUND, NET = (255, 40, 120), (0, 220, 255)
 """Colours of the lines on the ground and of the net's tape: neither is found on courts."""
@@ -21,13 +21,15 @@ RECENT, FAINT = 2.0, 0.4
 SURFACE, SURROUND = (52, 84, 138), (64, 106, 88)
 PER_METRE, BESIDE = 28, 4.5
 """px per metre of the court from above, and metres shown beside it."""
+GRID, ABOUT, LEAST_PICTURE = (128, 160, 146), 3, 640
+"""Colour of squares of a metre, how many there are about the way, and px of the longer side."""
 SUBPIXEL = 4
 QUALITY = 92
 
 
 def draw_court(
     picture: UInt8[np.ndarray, "h w 3"],
-    camera: CourtCamera,
+    camera: WorldCamera,
     frame: int,
     court: CourtModel | None = None,
 ) -> UInt8[np.ndarray, "h w 3"]:
@@ -50,28 +52,60 @@ def draw_court(
     return drawn
 
 
+def draw_grid(
+    picture: UInt8[np.ndarray, "h w 3"], camera: WorldCamera, frame: int, height: float
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A copy of the picture with squares of a metre about the origin, and a post at it."""
+    drawn = picture.copy()
+    thick = max(1, round(picture.shape[1] / 1280))
+    for start, end in metre_grid(np.zeros((1, 2))):
+        _draw_line(drawn, camera.project(frame, np.linspace(start, end, 41)), GROUND, thick)
+    post = np.linspace([0, 0, 0], [0, 0, height], 11)
+    _draw_line(drawn, camera.project(frame, post), NET, 2 * thick)
+    return drawn
+
+
+def metre_grid(places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "L 2 3"]:
+    """Lines on whole metres about some places, both ends of each."""
+    known = places[np.isfinite(places).all(axis=1)]
+    low, high = np.floor(known.min(axis=0)) - ABOUT, np.ceil(known.max(axis=0)) + ABOUT
+    across = [[[low[0], y, 0], [high[0], y, 0]] for y in np.arange(low[1], high[1] + 1)]
+    along = [[[x, low[1], 0], [x, high[1], 0]] for x in np.arange(low[0], high[0] + 1)]
+    return np.array(across + along)
+
+
 def draw_way(
-    root: Float[np.ndarray, "T 3"], speed: Float[np.ndarray, "T"], title: str
+    root: Float[np.ndarray, "T 3"],
+    speed: Float[np.ndarray, "T"],
+    title: str,
+    origin: Origin = COURT,
 ) -> UInt8[np.ndarray, "h w 3"]:
     """The court from above, to scale, with the way of the root coloured by its speed.
 
-    The near half is below, as the camera sees it; frames without a place are left out.
+    The near half is below, as the camera sees it; frames without a place are left out. Without a
+    court there are squares of a metre.
     """
-    court = tennis_court()
-    size = 2 * (np.array([HALF_DOUBLES, HALF_LENGTH]) + BESIDE)
-    picture = np.full((*np.ceil(size[::-1] * PER_METRE).astype(int), 3), SURROUND, np.uint8)
+    on_court = origin == COURT
+    lines = tennis_court().ends if on_court else metre_grid(root[:, :2])
+    half = np.array([HALF_DOUBLES, HALF_LENGTH])
+    low, high = (-half - BESIDE, half + BESIDE)
+    if not on_court:
+        low, high = lines[..., :2].min(axis=(0, 1)), lines[..., :2].max(axis=(0, 1))
+    scale = max(PER_METRE, LEAST_PICTURE / float((high - low).max()))
+    shape = np.ceil((high - low)[::-1] * scale).astype(int)
+    picture = np.full((*shape, 3), SURROUND, np.uint8)
 
     def pixel(place: Float[np.ndarray, "n 2"]) -> np.ndarray:
-        way = (place * [1, -1] + size / 2) * PER_METRE
+        way = (place - [low[0], high[1]]) * [1, -1] * scale
         return np.rint(way * 2**SUBPIXEL).astype(np.int32)
 
-    half = np.array([HALF_DOUBLES, HALF_LENGTH])
-    corners = pixel(np.array([-half, half])) >> SUBPIXEL
-    cv2.rectangle(picture, corners[0].tolist(), corners[1].tolist(), SURFACE, -1)
-    for ends in court.ends:
-        color = NET if ends[:, 2].any() else (245, 245, 245)
+    if on_court:
+        corners = pixel(np.array([-half, half])) >> SUBPIXEL
+        cv2.rectangle(picture, corners[0].tolist(), corners[1].tolist(), SURFACE, -1)
+    for ends in lines:
+        color = NET if ends[:, 2].any() else (245, 245, 245) if on_court else GRID
         a, b = pixel(ends[:, :2]).tolist()
-        cv2.line(picture, a, b, color, 2, cv2.LINE_AA, SUBPIXEL)
+        cv2.line(picture, a, b, color, 2 if on_court else 1, cv2.LINE_AA, SUBPIXEL)
     top = max(float(np.nanmax(speed)), 1e-6)
     share = np.nan_to_num(255 * speed / top).astype(np.uint8)
     colors = cv2.applyColorMap(share[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1]
@@ -89,7 +123,7 @@ def draw_way(
 
 def draw_ground(
     picture: UInt8[np.ndarray, "h w 3"],
-    court: tuple[WorldMotion, CourtCamera],
+    court: tuple[WorldMotion, WorldCamera],
     motion: Motion,
     frame: int,
 ) -> UInt8[np.ndarray, "h w 3"]:
@@ -98,7 +132,7 @@ def draw_ground(
     The way lies on the ground under the middle of the hips. As it is where the court is not seen.
     """
     world, camera = court
-    drawn = draw_court(picture, camera, frame)
+    drawn = draw_court(picture, camera, frame) if camera.origin == COURT else picture.copy()
     if frame >= len(camera.found) or not camera.found[frame]:
         return drawn
     thick = max(1, round(picture.shape[1] / 640))

@@ -11,9 +11,10 @@ from scipy.ndimage import gaussian_filter
 
 from keyrecon.records import Motion
 from keyrecon.report.charts import stack_charts, style_chart
+from keyrecon.report.court_drawing import metre_grid
 from keyrecon.report.markup import ReportMaterial, note, pack, section, text
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, tennis_court
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import COURT, WorldCamera, WorldMotion
 from keyrecon.world.run_measures import ON_BASELINE, ZONES, RunMeasures, measure_run
 
 BESIDE, BEYOND_NET = 3.7, 1.0
@@ -27,6 +28,8 @@ VIEWS = (
     ("Behind the opponent", "opponent"),
 )
 """From where the figure on the court can be seen."""
+COURT_EYES = ("umpire", "opponent")
+"""Those that there are on a court alone."""
 UMPIRE, OPPONENT = (-HALF_DOUBLES - 1.8, 0.0, 2.4), (0.0, HALF_LENGTH + 4.0, 2.5)
 """Eyes of an umpire in the chair and of somebody behind the opponent, metres; x and y are mirrored
 for a player on the far half."""
@@ -36,9 +39,10 @@ def court_section(material: ReportMaterial, chart: str) -> str:
     """The way on the court; empty where it is not known. `chart` is that of `run_chart`."""
     if material.court is None or (way := measure_run(material.court[0], material.motion)) is None:
         return ""
+    on_court = material.court[1].origin == COURT
     tiles = "".join(
         f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
-        for name, value, more in (*_pace(way), *_whereabouts(way))
+        for name, value, more in (*_pace(way), *(_whereabouts(way) if on_court else []))
     )
     buttons = "".join(
         f'<button type="button" data-map="{kind}">{name}</button>'
@@ -46,14 +50,20 @@ def court_section(material: ReportMaterial, chart: str) -> str:
     )
     return section(
         "court",
-        "On the court",
+        "On the court" if on_court else "On the ground",
         note(
-            "The court from above, to scale, the camera's end below; where the middle of the hips "
+            f"The {'court' if on_court else 'ground'} from above, to scale, the camera's end below"
+            f"{'' if on_court else ', in squares of a metre'}; where the middle of the hips "
             "is over the ground. Press the way to go to a frame. &plusmn; is the standard error on "
             "rendered rallies whose truth is known, of walks and short steps, which come out short "
             "rather than long; the camera's own is "
-            f"{_camera_error(material.court[1]):.2f} m. On the baseline is within {ON_BASELINE} m "
-            "of it, with the hips."
+            f"{_camera_error(material.court[1]):.2f} m"
+            + (
+                f". On the baseline is within {ON_BASELINE} m of it, with the hips."
+                if on_court
+                else f", and lengths away from the camera are off by {_focal_error(material):.0%} "
+                "besides."
+            )
         ),
         f'<dl class="cards">{tiles}</dl>',
         f'<div class="views-bar">{buttons}<output id="court-now"></output></div>'
@@ -89,9 +99,15 @@ def _whereabouts(way: RunMeasures) -> list[tuple[str, str, str]]:
     ]
 
 
-def _camera_error(camera: CourtCamera) -> float:
+def _camera_error(camera: WorldCamera) -> float:
     """Standard deviation of the camera's place, the largest of all frames, metres."""
     return float(np.linalg.norm(camera.sd_centre[camera.found], axis=1).max())
+
+
+def _focal_error(material: ReportMaterial) -> float:
+    """Spread of the focal length, which stretches the way away from the camera."""
+    camera = material.court[1] if material.court else None
+    return float(np.nanmax(camera.sd_focal / camera.focal)) if camera else 0.0
 
 
 def run_chart(material: ReportMaterial) -> go.Figure | None:
@@ -117,11 +133,14 @@ def view_buttons(material: ReportMaterial) -> str:
     if material.court is None:
         return ""
     buttons = "".join(
-        f'<button type="button" data-eye="{eye}">{name}</button>' for name, eye in VIEWS
+        f'<button type="button" data-eye="{eye}">{name}</button>'
+        for name, eye in VIEWS
+        if material.court[1].origin == COURT or eye not in COURT_EYES
     )
     return (
         f'<span class="on-court">{buttons}</span>'
-        '<label><input type="checkbox" id="on-court" checked> on the court</label>'
+        '<label><input type="checkbox" id="on-court" checked> on the '
+        f"{material.court[1].origin}</label>"
     )
 
 
@@ -130,9 +149,10 @@ def court_numbers(material: ReportMaterial) -> dict[str, object] | None:
     if material.court is None or (way := measure_run(material.court[0], material.motion)) is None:
         return None
     world, camera = material.court
-    ends = tennis_court().ends
+    on_court = camera.origin == COURT
+    ends = tennis_court().ends if on_court else metre_grid(world.root[:, :2])
     half = -1.0 if np.nanmedian(world.root[:, 1]) <= 0 else 1.0
-    frame = _map_frame(world.root)
+    frame = _map_frame(world.root) if on_court else _around(ends)
     return {
         "lines": ends.round(3).tolist(),
         "points": pack(world.points),
@@ -141,9 +161,10 @@ def court_numbers(material: ReportMaterial) -> dict[str, object] | None:
         "contact": pack(world.contact.astype(float)),
         "feet": _feet(material.motion),
         "camera": pack(camera.centre),
-        "umpire": list(UMPIRE),
-        "opponent": [OPPONENT[0], -half * OPPONENT[1], OPPONENT[2]],
-        "surface": [HALF_DOUBLES, HALF_LENGTH],
+        "origin": camera.origin,
+        "umpire": list(UMPIRE) if on_court else None,
+        "opponent": [OPPONENT[0], -half * OPPONENT[1], OPPONENT[2]] if on_court else None,
+        "surface": [HALF_DOUBLES, HALF_LENGTH] if on_court else None,
         "frame": frame,
         "heat": {"cell": CELL, "seconds": pack(_heat(world, material.motion, frame))},
     }
@@ -161,6 +182,12 @@ def _map_frame(root: Float[np.ndarray, "T 3"]) -> list[float]:
     far = max(long, high + 1.0) if high > 0 else BEYOND_NET
     across = max(wide, float(np.nanmax(np.abs(root[:, 0]))) + 1.0)
     return [float(v) for v in (-across, near, across, far)]
+
+
+def _around(lines: Float[np.ndarray, "L 2 3"]) -> list[float]:
+    """Left, near, right and far edge of a grid."""
+    low, high = lines[..., :2].min(axis=(0, 1)), lines[..., :2].max(axis=(0, 1))
+    return [float(v) for v in (*low, *high)]
 
 
 def _heat(

@@ -106,8 +106,10 @@ function sceneOnCourt() {
       .map((joint) => [points[joint][0], 0, points[joint][2]]),
     eyes: {
       camera: { eye: eye(places.camera.slice(3 * t, 3 * t + 3)), words: "from the camera" },
-      umpire: { eye: eye(court.umpire), words: "from the umpire's chair" },
-      opponent: { eye: eye(court.opponent), words: "from behind the opponent" },
+      ...(court.umpire && {
+        umpire: { eye: eye(court.umpire), words: "from the umpire's chair" },
+        opponent: { eye: eye(court.opponent), words: "from behind the opponent" },
+      }),
       above: { eye: [x, -ABOVE, y - 1e-3], words: "from above", zoom: 0.5 },
     },
     reach: REACH,

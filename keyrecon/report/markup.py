@@ -16,7 +16,7 @@ from jaxtyping import Float
 from keyrecon.io.video import Video
 from keyrecon.records import Annotations, Keyframes, Motion, PoseDistances, Track
 from keyrecon.report.summary import Truth, arrange_truth
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import WorldCamera, WorldMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ReportMaterial:
     """Joints as they really were, frame for frame, as `metrics.read_truth` gives them."""
     options: object = None
     """The options record of the run, to be listed."""
-    court: tuple[WorldMotion, CourtCamera] | None = None
+    court: tuple[WorldMotion, WorldCamera] | None = None
     """The motion on the court, where that is known, and the camera."""
     contradictions: Sequence[str] = ()
     """What of the video and of what a person told does not fit the rest, a line each."""

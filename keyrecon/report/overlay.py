@@ -21,7 +21,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_ground
 from keyrecon.report.drawing import TRUNK, draw_club, draw_pose, joint_sides
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import WorldCamera, WorldMotion
 
 View = Literal["camera", "right", "left", "back", "above"]
 Limbs = Literal["all", "upper", "lower", "left", "right", "none"]
@@ -67,7 +67,7 @@ def write_overlay(
     progress: Progress = silent,
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
-    court: tuple[WorldMotion, CourtCamera] | None = None,
+    court: tuple[WorldMotion, WorldCamera] | None = None,
     club: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> None:
     """Write the video with the refined pose and the frame number on every frame.
@@ -104,7 +104,7 @@ def overlay_frames(
     progress: Progress = silent,
     options: OverlayOptions = OverlayOptions(),
     frames: tuple[int, int] | None = None,
-    court: tuple[WorldMotion, CourtCamera] | None = None,
+    court: tuple[WorldMotion, WorldCamera] | None = None,
     club: Float[np.ndarray, "T 2 2"] | None = None,
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The pictures of `write_overlay`, one at a time."""

@@ -213,8 +213,9 @@ def _figure_player(pictures: Pictures, material: ReportMaterial) -> str:
             + (
                 "The body is held at its root; the grid lies at the lower foot."
                 if material.court is None
-                else "It stands on the court, and the way of two seconds lies on the ground; off "
-                "the court the body is held at its root, and the grid lies at the lower foot."
+                else f"It stands on the {material.court[1].origin}, and the way of two seconds "
+                f"lies on it; off the {material.court[1].origin} the body is held at its root, and "
+                "the grid lies at the lower foot."
             )
         ),
     )
@@ -250,7 +251,7 @@ def _navigation(material: ReportMaterial, pictures: Pictures) -> str:
     links = (
         ("figure", "Motion"),
         *([("instants", "Key instants")] if pictures.instants else []),
-        *([("court", "Court")] if material.court is not None else []),
+        *([("court", material.court[1].origin.title())] if material.court is not None else []),
         ("video", "Video"),
         ("accuracy", "Trust"),
         *([("doubts", "Doubts")] if material.motion.expected_error is not None else []),

@@ -48,7 +48,7 @@ from keyrecon.world.court_tracking import (
 from keyrecon.world.joint_fit import JointFit, fit_views
 from keyrecon.world.line_fit import FIXED_CENTRE, LOOSE, evaluate, fit_lines
 from keyrecon.world.pinhole import Pinhole
-from keyrecon.world.records import CourtCamera, CourtClick
+from keyrecon.world.records import CourtClick, WorldCamera
 
 MEASURED_WIDTH = 1280
 """Width of the pictures in which lines are measured, px."""
@@ -102,7 +102,7 @@ def calibrate_court(
     clicks: Sequence[CourtClick] = (),
     options: CalibrationOptions = CalibrationOptions(),
     progress: Progress = silent,
-) -> CourtCamera:
+) -> WorldCamera:
     """The camera of every frame of a clip that shows a tennis court.
 
     `camera_path` is the camera's motion (`estimate_camera_motion`). Clicks on named points
@@ -274,7 +274,7 @@ def _elsewhere(one: Pinhole, other: Pinhole) -> bool:
     return away > MAX_SPREAD * float(np.linalg.norm(other.centre))
 
 
-def _camera(views: TrackedViews, joint: JointFit, scale: float) -> CourtCamera:
+def _camera(views: TrackedViews, joint: JointFit, scale: float) -> WorldCamera:
     """The result in the pixels of the video, `scale` times as many; NaN where not found."""
     if not views.found.any():
         raise KeyreconError(NO_COURT)
@@ -290,4 +290,7 @@ def _camera(views: TrackedViews, joint: JointFit, scale: float) -> CourtCamera:
     inner[lost], rotation[lost], shift[lost], focal[lost] = np.nan, np.nan, np.nan, np.nan
     spread = np.tile(joint.sd_centre, (len(full), 1))
     spread[lost] = np.nan
-    return CourtCamera(inner, rotation, shift, views.found, spread, focal * joint.sd_log_focal)
+    untold = np.full(len(full), np.nan)
+    return WorldCamera(
+        inner, rotation, shift, views.found, spread, focal * joint.sd_log_focal, untold
+    )

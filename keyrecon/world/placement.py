@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.linalg import spsolve
 
 from keyrecon.records import Motion
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import WorldCamera, WorldMotion
 from keyrecon.world.refinement import HEEL_UP, Placed, Standing, refine_placed, without_moments
 from keyrecon.world.sight import sight_axes, sight_lines
 
@@ -62,7 +62,7 @@ class _Stances:
     count: int
 
 
-def place_motion(motion: Motion, camera: CourtCamera) -> WorldMotion | None:
+def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     """The motion in the world of the court; None where no foot was seen to stand on it."""
     skeleton = motion.skeleton
     ankles = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
@@ -76,16 +76,16 @@ def place_motion(motion: Motion, camera: CourtCamera) -> WorldMotion | None:
     feet = motion.points2d[:, ankles]
     ratio, contact = 1.0 if motion.units == "m" else 1.75, np.zeros((len(seen), 2), dtype=bool)
     for _ in range(2):  # the ankle's height hangs on the player's size
-        stature = ratio * _stature(motion)
+        stature = ratio * stature_in_units(motion)
         ground = _on_ground(camera, feet, ANKLE_SHARE * stature)
         contact = _standing(motion, camera, ground, pose[:, ankles, 2] * ratio) & seen[:, None]
         if not contact.any():
             return None
         ratio = _size(motion, camera, ground, contact)
-    ankle = ANKLE_SHARE * ratio * _stature(motion)
+    ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)
     root = _solve(motion, camera, evidence, _spells(contact))
-    placed = Placed(motion, camera, seen, root, ratio, ratio * _stature(motion), ankle)
+    placed = Placed(motion, camera, seen, root, ratio, ratio * stature_in_units(motion), ankle)
     return _refined(_filled(placed), contact)
 
 
@@ -115,7 +115,7 @@ def _filled(placed: Placed) -> Placed:
     return replace(placed.part(nearest), seen=placed.seen, root=placed.root)
 
 
-def _stature(motion: Motion) -> float:
+def stature_in_units(motion: Motion) -> float:
     """Length of the body in the motion's own units."""
     if motion.units != "m":
         return 1.0
@@ -128,7 +128,7 @@ def _stature(motion: Motion) -> float:
 
 
 def _turned_pose(
-    motion: Motion, camera: CourtCamera, at_root: Float[np.ndarray, "T 2"], hips: list[int]
+    motion: Motion, camera: WorldCamera, at_root: Float[np.ndarray, "T 2"], hips: list[int]
 ) -> Float[np.ndarray, "T J 3"]:
     """Joints relative to the middle of the hips, in the world's axes and the motion's units."""
     relative = motion.points3d - motion.points3d[:, hips].mean(axis=1, keepdims=True)
@@ -136,7 +136,7 @@ def _turned_pose(
 
 
 def _on_ground(
-    camera: CourtCamera, feet: Float[np.ndarray, "T 2 2"], height: float
+    camera: WorldCamera, feet: Float[np.ndarray, "T 2 2"], height: float
 ) -> Float[np.ndarray, "T 2 3"]:
     """Where lines of sight through the feet meet the plane at a height; NaN at the horizon."""
     places = []
@@ -151,7 +151,7 @@ def _on_ground(
 
 def _standing(
     motion: Motion,
-    camera: CourtCamera,
+    camera: WorldCamera,
     ground: Float[np.ndarray, "T 2 3"],
     height: Float[np.ndarray, "T 2"],
 ) -> Bool[np.ndarray, "T 2"]:
@@ -173,7 +173,7 @@ def _standing(
 
 def _size(
     motion: Motion,
-    camera: CourtCamera,
+    camera: WorldCamera,
     ground: Float[np.ndarray, "T 2 3"],
     contact: Bool[np.ndarray, "T 2"],
 ) -> float:
@@ -212,7 +212,7 @@ class _Evidence:
 
 
 def _solve(
-    motion: Motion, camera: CourtCamera, evidence: _Evidence, stances: _Stances
+    motion: Motion, camera: WorldCamera, evidence: _Evidence, stances: _Stances
 ) -> Float[np.ndarray, "T 3"]:
     """The root in all frames, and with it the places on which feet stand."""
     count = len(motion.time)
@@ -254,7 +254,7 @@ def _rows(
     return coo_matrix((entries, where), shape=(len(right), size)).tocsr(), right
 
 
-def _sight_rows(motion: Motion, camera: CourtCamera, evidence: _Evidence, size: int) -> list[Rows]:
+def _sight_rows(motion: Motion, camera: WorldCamera, evidence: _Evidence, size: int) -> list[Rows]:
     """The root lies on its line of sight, about as far away as the player is small."""
     seen = np.flatnonzero(evidence.seen)
     _, ray = sight_lines(camera, evidence.at_root)
@@ -285,7 +285,7 @@ def _calm_rows(motion: Motion, size: int) -> Rows:
 
 
 def _stance_rows(
-    camera: CourtCamera,
+    camera: WorldCamera,
     evidence: _Evidence,
     stances: _Stances,
     weight: Float[np.ndarray, "n"],

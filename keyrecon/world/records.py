@@ -1,14 +1,26 @@
-"""What is known of the camera and the court; see `keyrecon.world.court` for the world's axes."""
+"""What is known of the camera and the ground, and the motion there.
 
-from dataclasses import dataclass
+World axes: metres, z up, y away from the camera, x to the right. On a court the origin is at the
+middle of the net (`keyrecon.world.court`), elsewhere under the player (`GROUND`).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+
+Origin = Literal["court", "ground"]
+COURT: Origin = "court"
+"""The origin is at the middle of the net, x along it, y up the court away from the camera."""
+GROUND: Origin = "ground"
+"""The origin is on the ground where the player first stands, y away from the camera along its axis
+in that frame."""
 
 
 @dataclass(frozen=True, eq=False)
-class CourtCamera:
-    """Where every frame was taken from: x ~ K (R X + t), X in metres on the court.
+class WorldCamera:
+    """Where every frame was taken from: x ~ K (R X + t), X in metres in the world.
 
     R and t in OpenCV's convention. NaN where the camera was not found.
     """
@@ -17,11 +29,14 @@ class CourtCamera:
     R: Float[np.ndarray, "T 3 3"]
     t: Float[np.ndarray, "T 3"]
     found: Bool[np.ndarray, "T"]
-    """Whether the court's lines lie where this camera puts them."""
+    """Whether the camera is known; on a court, whether its lines lie where it puts them."""
     sd_centre: Float[np.ndarray, "T 3"]
     """Standard deviation of the camera's place, metres."""
     sd_focal: Float[np.ndarray, "T"]
     """Standard deviation of the focal length, px."""
+    sd_tilt: Float[np.ndarray, "T"]
+    """Standard deviation of the direction of the vertical, radians; NaN where nobody told."""
+    origin: Origin = COURT
 
     @property
     def centre(self) -> Float[np.ndarray, "T 3"]:
@@ -33,11 +48,19 @@ class CourtCamera:
         """px"""
         return self.K[:, 0, 0]
 
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> "WorldCamera":
+        """Some of its frames."""
+        return replace(self, **{name: getattr(self, name)[frames] for name in OF_CAMERA})
+
     def project(self, frame: int, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
-        """Pixels of points on the court in one frame; NaN behind the camera."""
+        """Pixels of points in the world in one frame; NaN behind the camera."""
         local = points @ self.R[frame].T + self.t[frame]
         depth = np.where(local[:, 2:] > 0, local[:, 2:], np.nan)
         return (local / depth @ self.K[frame].T)[:, :2]
+
+
+OF_CAMERA = ("K", "R", "t", "found", "sd_centre", "sd_focal", "sd_tilt")
+"""What a camera has of every frame."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +76,7 @@ class CourtClick:
 
 @dataclass(frozen=True, eq=False)
 class WorldMotion:
-    """A motion on the court, metres; NaN in frames whose camera was not found."""
+    """A motion in the world, metres; NaN in frames whose camera was not found."""
 
     points: Float[np.ndarray, "T J 3"]
     """Joints."""
@@ -62,5 +85,5 @@ class WorldMotion:
     contact: Bool[np.ndarray, "T 2"]
     """Whether the right foot, and the left, stands on the ground."""
     height_ratio: float
-    """Size of the player by the court over that of the motion; for a motion in body heights the
+    """Size of the player by the camera over that of the motion; for a motion in body heights the
     player's height in metres."""

@@ -28,7 +28,7 @@ from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 from keyrecon.world import world_terms as terms
 from keyrecon.world.motion_solver import DirectionPrior, Figure, Term, WorldState, solve
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import WorldCamera
 from keyrecon.world.sight import sight_axes
 
 DEPTH_ERROR = {"hip": 0.05, "shoulder": 0.165, "head": 0.155, "knee": 0.16, "ankle": 0.23}
@@ -111,7 +111,7 @@ class Placed:
     """A motion that has its place on the court, but the pose of the lifting."""
 
     motion: Motion
-    camera: CourtCamera
+    camera: WorldCamera
     seen: Bool[np.ndarray, "T"]
     """Frames of which both are known; in others both hold what they hold nearby."""
     root: Float[np.ndarray, "T 3"]
@@ -130,14 +130,12 @@ class Placed:
             **{name: getattr(self.motion, name)[frames] for name in OF_FRAMES},
             expected_error=None,
         )
-        camera = CourtCamera(
-            *(
-                getattr(self.camera, name)[frames]
-                for name in ("K", "R", "t", "found", "sd_centre", "sd_focal")
-            )
-        )
         return replace(
-            self, motion=motion, camera=camera, seen=self.seen[frames], root=self.root[frames]
+            self,
+            motion=motion,
+            camera=self.camera.part(frames),
+            seen=self.seen[frames],
+            root=self.root[frames],
         )
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import WorldCamera
 
 
 def sight_lines(
-    camera: CourtCamera, pixels: Float[np.ndarray, "T 2"]
+    camera: WorldCamera, pixels: Float[np.ndarray, "T 2"]
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
     """Unit lines of sight through pixels, in camera axes and in the world's."""
     flat = (pixels - camera.K[:, :2, 2]) / camera.K[:, 0, :1]
@@ -16,7 +16,7 @@ def sight_lines(
     return ray, np.einsum("tji,tj->ti", camera.R, ray)
 
 
-def sight_axes(camera: CourtCamera, pixels: Float[np.ndarray, "T 2"]) -> Float[np.ndarray, "T 3 3"]:
+def sight_axes(camera: WorldCamera, pixels: Float[np.ndarray, "T 2"]) -> Float[np.ndarray, "T 3 3"]:
     """Columns: right, down and away along the line of sight through a pixel, in the world.
 
     Scaled orthography has its picture plane at right angles to the line of sight to the player,

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.world.motion_solver import JointRows, Term
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import WorldCamera
 
 
 def reprojection(
-    camera: CourtCamera, pixels: Float[np.ndarray, "T J 2"], spread: Float[np.ndarray, "T J"]
+    camera: WorldCamera, pixels: Float[np.ndarray, "T J 2"], spread: Float[np.ndarray, "T J"]
 ) -> Term:
     """Joints are seen where they were seen, within so many pixels; an infinite spread is blind."""
     rotation, shift = camera.R, camera.t

@@ -7,7 +7,8 @@ import pytest
 from court_walker import court_camera, lifted, walk
 from painted_court import camera_at, paint
 
-from keyrecon.app.court import calibrate, court_click, describe_camera, write_placed_motion
+from keyrecon.app.court import calibrate, court_click, describe_camera
+from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera

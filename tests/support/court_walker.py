@@ -5,7 +5,7 @@ import numpy as np
 from keyrecon.body import LSP14
 from keyrecon.records import Motion
 from keyrecon.world.placement import ANKLE_SHARE
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import WorldCamera
 
 STATURE, FPS, STEP = 1.8, 50.0, 25
 THIGH, SHANK = 0.25, 0.24
@@ -75,11 +75,12 @@ def court_camera(pinhole, frames):
          [0, 0, 1.0]]
     )  # fmt: skip
     shift = -pinhole.rotation @ pinhole.centre
-    return CourtCamera(
+    return WorldCamera(
         *(np.repeat(a[None], frames, axis=0) for a in (inner, pinhole.rotation, shift)),
         np.ones(frames, dtype=bool),
         np.full((frames, 3), 0.02),
         np.full(frames, 3.0),
+        np.full(frames, np.nan),
     )
 
 

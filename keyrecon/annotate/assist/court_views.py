@@ -18,7 +18,7 @@ from keyrecon.io.formats.camera_file import read_camera
 from keyrecon.io.workspace import Workspace
 from keyrecon.world.clicked_points import FEWEST, camera_from_points, check_click
 from keyrecon.world.court import POINTS, tennis_court
-from keyrecon.world.records import CourtCamera, CourtClick
+from keyrecon.world.records import COURT, CourtClick, WorldCamera
 
 Json = dict[str, Any]
 Projection = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n 2"]]
@@ -93,18 +93,19 @@ def _changed(workspace: Workspace) -> bool:
     points, camera = workspace.court_points_file, workspace.camera_file
     if not points.is_file() or not workspace.court_clicks():
         return False
-    return not camera.is_file() or points.stat().st_mtime_ns > camera.stat().st_mtime_ns
+    return _camera(workspace) is None or points.stat().st_mtime_ns > camera.stat().st_mtime_ns
 
 
-def _camera(workspace: Workspace) -> CourtCamera | None:
+def _camera(workspace: Workspace) -> WorldCamera | None:
     file = workspace.camera_file
     return _read(file, file.stat().st_mtime_ns) if file.is_file() else None
 
 
 @lru_cache(maxsize=1)
-def _read(file: Path, changed: int) -> CourtCamera:
-    """The camera; read again when the file has changed."""
-    return read_camera(file)
+def _read(file: Path, changed: int) -> WorldCamera | None:
+    """The camera on a court; read again when the file has changed."""
+    camera = read_camera(file)
+    return camera if camera.origin == COURT else None
 
 
 def _drawn(project: Projection, size: tuple[int, int]) -> Json:

@@ -6,6 +6,7 @@ camera: size, matrix, distortions, rotation (a rotation vector from world to cam
 """
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -14,7 +15,7 @@ import numpy as np
 from keyrecon import __version__
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import read_arrays, reading
-from keyrecon.world.records import CourtCamera
+from keyrecon.world.records import COURT, GROUND, Origin, WorldCamera
 
 ARRAYS = {
     "K": (3, 3),
@@ -24,23 +25,31 @@ ARRAYS = {
     "sd_centre": (3,),
     "sd_focal": (),
 }
-"""Arrays of a `CourtCamera` and their shape in one frame."""
+"""Arrays of a `WorldCamera` and their shape in one frame."""
+TILT = "sd_tilt"
+"""Another, NaN where nobody told; files of former versions lack it."""
+WORLDS = {
+    COURT: "origin on the ground at the middle of the net, x along it, y up the court, z up",
+    GROUND: "origin on the ground under the player's first stance, x right, y away, z up",
+}
+"""Axes of the world by the name of its origin."""
 
 
-def write_camera(path: Path, camera: CourtCamera) -> None:
-    """Write camera.npz; names and axes as in `CourtCamera`."""
+def write_camera(path: Path, camera: WorldCamera) -> None:
+    """Write camera.npz; names and axes as in `WorldCamera`."""
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
-        **{name: getattr(camera, name) for name in ARRAYS},
+        **{name: getattr(camera, name) for name in (*ARRAYS, TILT)},
+        origin=np.array(camera.origin),
         keyrecon_version=np.array(__version__),
     )
     write_durably(path, buffer.getvalue())
 
 
-def read_camera(path: Path) -> CourtCamera:
+def read_camera(path: Path) -> WorldCamera:
     """Read what `write_camera` wrote; raises KeyreconError for any other file."""
-    with reading(path, "a camera", "make it with keyrecon court"):
+    with reading(path, "a camera", "make it with keyrecon court or keyrecon ground"):
         data = read_arrays(path)
         frames = len(data["found"])
         for name, shape in ARRAYS.items():
@@ -50,10 +59,22 @@ def read_camera(path: Path) -> CourtCamera:
         numbers = {name: data[name].astype(np.float64) for name in ARRAYS if name != "found"}
         if not all(np.isfinite(values[found]).all() for values in numbers.values()):
             raise ValueError("a camera that was found has numbers missing")
-        return CourtCamera(found=found, **numbers)
+        tilt = data.get(TILT, np.full(frames, np.nan)).astype(np.float64)
+        if tilt.shape != (frames,):
+            raise ValueError(f"{TILT} has shape {tilt.shape}")
+        return WorldCamera(found=found, sd_tilt=tilt, origin=read_origin(data), **numbers)
 
 
-def write_calibration(path: Path, camera: CourtCamera, size: tuple[int, int], name: str) -> str:
+def read_origin(data: Mapping[str, np.ndarray]) -> Origin:
+    """Which world the numbers of a file are in; files of former versions know courts alone."""
+    named = str(data.get("origin", COURT))
+    for origin in WORLDS:
+        if named == origin:
+            return origin
+    raise ValueError(f"'{named}' is no origin of a world")
+
+
+def write_calibration(path: Path, camera: WorldCamera, size: tuple[int, int], name: str) -> str:
     """Write a calibration TOML of one camera; returns what was done to it.
 
     Of a camera that moves, that of the middle one of the frames in which it was found.
@@ -70,7 +91,7 @@ def write_calibration(path: Path, camera: CourtCamera, size: tuple[int, int], na
     matrix = ", ".join(row(values) for values in camera.K[frame])
     lines = [
         f"# keyrecon {__version__}, {of_frame}.",
-        "# World: origin on the ground at the middle of the net, x along it, y up the court, z up.",
+        f"# World: {WORLDS[camera.origin]}.",
         "[cam_01]",
         f'name = "{name}"',
         f"size = {row(np.array(size, dtype=float))}",

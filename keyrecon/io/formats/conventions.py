@@ -13,8 +13,9 @@ is nor where the ground lies, so three things are estimated, and every file or t
   follows the player, because a step away from a camera that looks down shows as a rise.
 - Over what. The middle of the hips is over the origin in the first frame.
 
-Where a court's lines have told where the player stands (`points3d_world` of motion.npz), nothing is
-estimated: the origin is on the ground at the middle of the net, x along the net to the right.
+Where a camera that is known has told where the player stands (`points3d_world` of motion.npz),
+nothing is estimated here: the origin is at the middle of the net of a court, elsewhere under the
+player's first stance, x to the right.
 
 Every shot of a video stands by itself. Where shots do not show the player there is no figure:
 markers are missing there, and formats that hold a figure in every frame have it stand still.
@@ -32,6 +33,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 from keyrecon.timeline import cut_motion, frames_before
+from keyrecon.world.records import COURT, GROUND, Origin
 
 UNEVEN = 0.1
 """Frame times that stray further than this share of a frame from an even spacing are uneven.
@@ -48,13 +50,24 @@ down by 3 to 10 degrees gave 1 to 7, one by 32 degrees 21 (the lifting has flatt
 real swings and rallies by a level camera gave -1 to 6."""
 
 
-World = Float[np.ndarray, "T J 3"] | None
-"""Joints on the court, metres; None where there is none, NaN in frames where it was not found."""
-ON_COURT = (
-    "on the court: origin on the ground at the middle of the net, x along the net to the right, "
-    "feet where the court's lines put them"
-)
-WITH_WORLD = ", and the court's besides"
+@dataclass(frozen=True, eq=False)
+class WorldJoints:
+    """Joints in the world: metres, y away from the camera, z up."""
+
+    points: Float[np.ndarray, "T J 3"]
+    """NaN in frames where the camera was not found."""
+    origin: Origin
+
+
+World = WorldJoints | None
+"""None where no camera has put the motion into the world."""
+IN_WORLD = {
+    COURT: "on the court: origin on the ground at the middle of the net, x along the net to the "
+    "right, feet where the court's lines put them",
+    GROUND: "on the ground: origin under the player's first stance, x to the right, feet where the "
+    "camera's place, height and tilt put them (as keyrecon ground estimates them)",
+}
+WITH_WORLD = ", and the world's besides"
 """Said of files that hold the motion in both axes."""
 
 
@@ -114,9 +127,8 @@ def stand_on_floor(motion: Motion, even_times: bool = True, world: World = None)
     """The motion with Y up, feet on the floor, and the first frame over the origin.
 
     With `even_times`, frames that are unevenly spaced are replaced by as many at even times.
-    `world` are the joints on the court (metres, x along the net, y away from the camera, z up),
-    which are taken as they are if all of them are known. Raises KeyreconError where joints are
-    missing.
+    Joints in the `world` are taken as they are if all of them are known. Raises KeyreconError
+    where joints are missing.
     """
     parts = motion.stretches
     if len(parts) > 1 or not motion.known.all():
@@ -130,7 +142,11 @@ def _stand_in_shots(
     """Each stretch of frames as `_stand` places it; NaN in the frames between."""
     _check_whole(motion)
     placed = [
-        _stand(cut_motion(motion, part), False, None if world is None else world[part])
+        _stand(
+            cut_motion(motion, part),
+            False,
+            None if world is None else replace(world, points=world.points[part]),
+        )
         for part in parts
     ]
     points = np.full(motion.points3d.shape, np.nan)
@@ -180,10 +196,11 @@ def _stand(motion: Motion, even_times: bool, world: World) -> StandingMotion:
     """A motion of one shot in which every frame is known."""
     _check_whole(motion)
     units, size, lean = motion.units, stature(motion), camera_pitch(motion)
-    on_court = world is not None and bool(np.isfinite(world).all())
-    if world is not None and on_court:
-        points = world[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
+    placing = _describe_placing(lean)
+    if world is not None and np.isfinite(world.points).all():
+        points = world.points[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
         units, size = "m", stature(replace(motion, points3d=points))
+        placing = IN_WORLD[world.origin]
     else:
         points = y_up(motion.points3d) @ Rotation.from_euler("x", -lean).as_matrix().T
         points[..., 1] -= _floor(points, motion, size)[:, None]
@@ -202,7 +219,7 @@ def _stand(motion: Motion, even_times: bool, world: World) -> StandingMotion:
         fps=fps,
         units=units,
         stature=size,
-        placing=ON_COURT if on_court else _describe_placing(lean),
+        placing=placing,
         timing=describe_times(motion, even_times),
     )
 

@@ -5,21 +5,17 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.camera_file import WORLDS
 from keyrecon.io.formats.conventions import WITH_WORLD, World, describe_times
 from keyrecon.records import SOURCES, Motion
-
-COURT_AXES = (
-    "origin on the ground at the middle of the net, x along the net to the right, y up the court "
-    "away from the camera, z up"
-)
 
 
 def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = None) -> str:
     """Write a table that pandas reads with `read_csv(path, comment="#")`.
 
     Unknown numbers are empty. The comment lines on top say units, axes and times; returns the
-    latter two. `first_frame` is the video's frame that comes first; with `world`, the joints on
-    the court, every joint has three columns more.
+    latter two. `first_frame` is the video's frame that comes first; with joints in the `world`
+    every joint has three columns more.
     """
     names = motion.skeleton.names
     head = [
@@ -34,8 +30,8 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = N
     known = [motion.points3d, motion.points2d, motion.confidence[..., None]]
     if world is not None:
         columns += ["world_x", "world_y", "world_z"]
-        known.append(world)
-        head.insert(2, "# world_x, world_y, world_z: m, on the court: " + COURT_AXES)
+        known.append(world.points)
+        head.insert(2, f"# world_x, world_y, world_z: m, {WORLDS[world.origin]}")
     columns.append("source")
     head.append(",".join(["frame", "time", *(f"{n}_{c}" for n in names for c in columns)]))
     numbers = np.concatenate(known, axis=2)

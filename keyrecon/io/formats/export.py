@@ -8,8 +8,9 @@ import numpy as np
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.bvh_motion import write_bvh
 from keyrecon.io.formats.c3d import write_c3d
+from keyrecon.io.formats.camera_file import read_origin
 from keyrecon.io.formats.coco import write_coco_motion
-from keyrecon.io.formats.conventions import WITH_WORLD, World, describe_times
+from keyrecon.io.formats.conventions import WITH_WORLD, World, WorldJoints, describe_times
 from keyrecon.io.formats.csv_table import write_csv
 from keyrecon.io.formats.glb import write_glb
 from keyrecon.io.formats.motion_file import write_motion
@@ -56,13 +57,15 @@ def export_motion(
 
     `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with;
     `further` is what motion.npz holds besides (`read_further_arrays`): .npz keeps all of it, the
-    others its joints on the court. Raises KeyreconError for a suffix that is not known, an
+    others its joints in the world. Raises KeyreconError for a suffix that is not known, an
     optional library that is not installed, or a motion that the format cannot hold.
     """
     check_suffix(path)
     suffix = path.suffix.lower()
-    on_court = (further or {}).get("points3d_world")
-    world = None if on_court is None else on_court.astype(np.float64)
+    joints = (further or {}).get("points3d_world")
+    world: World = None
+    if joints is not None:
+        world = WorldJoints(joints.astype(np.float64), read_origin(further or {}))
     if suffix in WRITERS:
         return WRITERS[suffix](path, motion, world)
     if suffix == ".trc":

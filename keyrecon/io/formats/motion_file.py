@@ -11,9 +11,10 @@ from jaxtyping import Bool
 from keyrecon import __version__
 from keyrecon.body import Skeleton, check_skeleton
 from keyrecon.io.durable import write_durably
+from keyrecon.io.formats.camera_file import read_origin
 from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.records import SOURCES, Motion
-from keyrecon.world.records import CourtCamera, WorldMotion
+from keyrecon.world.records import WorldCamera, WorldMotion
 
 ARRAYS = {
     "points3d": "TJ3",
@@ -39,14 +40,20 @@ ABOUT = (
 """What else every file holds."""
 FRAME_NUMBERS = ("key_postures",)
 """Further arrays that hold numbers of frames."""
-NOT_BY_FRAME = ("key_posture_names", "vertical", "left_handed", "doubts")
+NOT_BY_FRAME = ("key_posture_names", "vertical", "left_handed", "doubts", "origin")
 """Further arrays that say one thing of the whole motion; all others have a row for every frame."""
+
+
+OF_WORLD = (
+    *("points3d_world", "root_world", "contact", "camera_K", "camera_R", "camera_t", "origin"),
+)
+"""Further arrays that put a motion into the world."""
 
 
 def write_motion(
     path: Path,
     motion: Motion,
-    world: tuple[WorldMotion, CourtCamera] | None = None,
+    world: tuple[WorldMotion, WorldCamera] | None = None,
     more: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write motion.npz; axes and units as in `records.Motion`, names as listed in the README.
@@ -74,7 +81,7 @@ def write_motion(
     write_durably(path, buffer.getvalue())
 
 
-def _on_court(motion: WorldMotion, camera: CourtCamera) -> dict[str, Any]:
+def _on_court(motion: WorldMotion, camera: WorldCamera) -> dict[str, Any]:
     return {
         "points3d_world": motion.points,
         "root_world": motion.root,
@@ -82,6 +89,7 @@ def _on_court(motion: WorldMotion, camera: CourtCamera) -> dict[str, Any]:
         "camera_K": camera.K,
         "camera_R": camera.R,
         "camera_t": camera.t,
+        "origin": np.array(camera.origin),
     }
 
 
@@ -124,7 +132,7 @@ def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
         return further
 
 
-def read_on_court(path: Path) -> tuple[WorldMotion, CourtCamera] | None:
+def read_on_court(path: Path) -> tuple[WorldMotion, WorldCamera] | None:
     """The motion on the court and the camera, as `write_motion` wrote them; None without them.
 
     How sure the camera is, and the size by the court, are not in the file: they are NaN.
@@ -143,7 +151,9 @@ def read_on_court(path: Path) -> tuple[WorldMotion, CourtCamera] | None:
                 data["contact"].astype(bool),
                 float("nan"),
             ),
-            CourtCamera(inner, turn, shift, known, unknown, unknown[:, 0]),
+            WorldCamera(
+                inner, turn, shift, known, unknown, unknown[:, 0], unknown[:, 0], read_origin(data)
+            ),
         )
 
 

@@ -1,0 +1,263 @@
+"""`keyrecon ground`: the camera over level ground, where there is no court."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from keyrecon.app.placing import MAX_TILT_ERROR, old_report, place_again
+from keyrecon.errors import KeyreconError, counted, quoted
+from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.lens_metadata import lens_focal
+from keyrecon.io.video import Video
+from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
+from keyrecon.progress import Progress
+from keyrecon.report.court_drawing import draw_grid, write_court_picture
+from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.world.ground_calibration import (
+    ContradictoryMarks,
+    FieldOfView,
+    GroundCalibration,
+    calibrate_ground,
+)
+from keyrecon.world.ground_evidence import KINDS, GroundMark, GroundMarks, Kind
+
+FORMS = {
+    "vertical": ("FRAME:X,Y:X,Y or FRAME:X,Y:X,Y:METRES", "0:212,120:214,655:2.44"),
+    "length": ("FRAME:X,Y:X,Y:METRES", "0:212,640:655,641:3.66"),
+    "horizon": ("FRAME:X,Y:X,Y", "0:20,301:1260,305"),
+}
+"""How marks are typed, with an example of each."""
+TYPED_ERROR, LENS_ERROR = 0.05, 0.12
+"""Spread of the logarithm of a focal length by a field of view that was typed, and by the lens that
+the file names: phones crop up to 10 % of the width where they stabilise (our estimate)."""
+OPEN_FOCAL = 0.2
+"""Spread from which on the focal length counts as open."""
+SHORTEST = 4.0
+"""px between the ends of a mark."""
+FOV = "fov"
+"""What --forget calls the field of view."""
+
+
+def ground_mark(kind: Kind, text: str) -> GroundMark:
+    """Parse a mark as it is typed."""
+    form, example = FORMS[kind]
+    try:
+        frame, start, end, *length = (part.strip() for part in text.split(":"))
+        (x0, y0), (x1, y1) = ((float(v) for v in place.split(",")) for place in (start, end))
+        metres = float(*length) if length else None
+        mark = GroundMark(kind, int(frame), (x0, y0), (x1, y1), metres)
+    except ValueError as fault:
+        raise KeyreconError(f"--{kind} needs {form}, such as {example}; got '{text}'.") from fault
+    if (kind == "length") > (metres is not None) or (kind == "horizon" and metres is not None):
+        raise KeyreconError(f"--{kind} needs {form}, such as {example}; got '{text}'.")
+    return mark
+
+
+def find_ground(
+    workspace: Workspace,
+    told: GroundMarks,
+    progress: Progress,
+    forget: Sequence[str] = (),
+) -> str:
+    """Calibrate on all evidence, write camera.npz and ground.jpg; returns the text to show.
+
+    The project keeps the marks, with those of former calls; `forget` names some to be taken out:
+    vertical-2, fov, all. Marks that contradict the rest are not kept.
+    """
+    video = workspace.video()
+    for mark in told.marks:
+        check_mark(mark, video)
+    if told.field_of_view is not None and not 3 < told.field_of_view < 150:
+        raise KeyreconError(
+            f"--fov is the angle across the width of the picture in degrees, 40 to 75 for phones; "
+            f"{told.field_of_view:g} cannot be."
+        )
+    kept = _without(workspace.ground_marks(), forget)
+    together = GroundMarks(
+        tuple(dict.fromkeys((*kept.marks, *told.marks))),
+        kept.field_of_view if told.field_of_view is None else told.field_of_view,
+    )
+    if not workspace.motion_file.is_file():
+        raise KeyreconError(
+            "There is no motion yet, and the player is what tells where the ground is: make it "
+            f"first with keyrecon run {quoted(workspace.folder)} --height METRES"
+        )
+    motion = read_motion(workspace.motion_file)
+    known = _known_focal(video, together.field_of_view)
+    options = workspace.options(Options(), Options()).camera
+    path = workspace.stages.keep(
+        "camera", estimate_camera_motion, video, options=options, progress=progress
+    )
+    size = (video.width, video.height)
+    if len(motion.time) != len(video):
+        raise KeyreconError(
+            f"The motion has {len(motion.time)} frames and the video {len(video)}; run keyrecon "
+            "run again."
+        )
+    try:
+        found = calibrate_ground(motion, path, size, together.marks, known)
+    except ContradictoryMarks as fault:
+        raise KeyreconError(f"{fault}{_whose(kept, told)}") from fault
+    workspace.keep_ground_marks(together)
+    write_camera(workspace.camera_file, found.camera)
+    picture = workspace.folder / "ground.jpg"
+    drawn = draw_grid(video.frame(found.reference), found.camera, found.reference, _height(found))
+    write_court_picture(picture, drawn)
+    placed = place_again(workspace)
+    return "\n".join(
+        [
+            *describe_ground(found, together, known),
+            *_advice(workspace, found, together, known),
+            f"{workspace.camera_file}: the camera of every frame. {picture}: squares of a metre on "
+            "the ground, and a post as tall as the player where he first stands; look whether they "
+            "lie flat and upright.",
+            *_list_marks(together),
+            *placed.lines,
+            *old_report(workspace, placed),
+        ]
+    )
+
+
+def check_mark(mark: GroundMark, video: Video) -> None:
+    """Raise KeyreconError for a mark outside the video, or of no length."""
+    if not 0 <= mark.frame < len(video):
+        raise KeyreconError(
+            f"Frame {mark.frame} is outside the video, which has frames 0 to {len(video) - 1}."
+        )
+    for x, y in (mark.start, mark.end):
+        if not (0 <= x < video.width and 0 <= y < video.height):
+            raise KeyreconError(
+                f"The end of the {mark.kind} at {x:g},{y:g} in frame {mark.frame} is outside the "
+                f"picture of {video.width}x{video.height}."
+            )
+    if np.hypot(mark.end[0] - mark.start[0], mark.end[1] - mark.start[1]) < SHORTEST:
+        raise KeyreconError(
+            f"Both ends of the {mark.kind} in frame {mark.frame} are in one place; mark the two "
+            "ends of something long."
+        )
+    if mark.metres is not None and not 0.01 <= mark.metres <= 1000:
+        raise KeyreconError(
+            f"A {mark.kind} of {mark.metres:g} m cannot be; give its length in metres."
+        )
+
+
+def _known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
+    """What is known of the focal length without looking at the picture."""
+    if degrees is not None:
+        focal = video.width / 2 / np.tan(np.radians(degrees) / 2)
+        return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
+    lens = lens_focal(video.path, (video.width, video.height))
+    return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")
+
+
+def mark_names(marks: Sequence[GroundMark]) -> list[str]:
+    """vertical-1, vertical-2, length-1, ..."""
+    counts = dict.fromkeys(KINDS, 0)
+    names = []
+    for mark in marks:
+        counts[mark.kind] += 1
+        names.append(f"{mark.kind}-{counts[mark.kind]}")
+    return names
+
+
+def _without(told: GroundMarks, forget: Sequence[str]) -> GroundMarks:
+    """Marks but for those that are named."""
+    names = mark_names(told.marks)
+    known = [*names, *([FOV] if told.field_of_view is not None else [])]
+    if unknown := sorted(set(forget) - {*known, "all"}):
+        there = f"it has {', '.join(known)}" if known else "it has none"
+        raise KeyreconError(f"The project has no mark {unknown[0]} to forget; {there}.")
+    if "all" in forget:
+        return GroundMarks()
+    left = tuple(m for name, m in zip(names, told.marks, strict=True) if name not in forget)
+    return GroundMarks(left, None if FOV in forget else told.field_of_view)
+
+
+def _whose(kept: GroundMarks, told: GroundMarks) -> str:
+    """What becomes of marks that contradict one another."""
+    if not kept.marks:
+        return ""
+    return (
+        f"{' The new marks were not kept.' if told.marks else ''} Marks of former calls: "
+        f"{', '.join(mark_names(kept.marks))}; --forget NAME takes one out, --forget all starts "
+        "anew."
+    )
+
+
+def _list_marks(told: GroundMarks) -> list[str]:
+    """What is kept."""
+    if not told.marks:
+        return []
+    rows = [
+        f"{name} (frame {m.frame}, {m.start[0]:g},{m.start[1]:g} to {m.end[0]:g},{m.end[1]:g}"
+        f"{'' if m.metres is None else f', {m.metres:g} m'})"
+        for name, m in zip(mark_names(told.marks), told.marks, strict=True)
+    ]
+    return [f"Kept marks: {'; '.join(rows)}."]
+
+
+def _height(found: GroundCalibration) -> float:
+    """Of the player, metres."""
+    return float(np.exp(found.state.log_size)) * found.stances.stature
+
+
+def describe_ground(
+    found: GroundCalibration, told: GroundMarks, known: FieldOfView | None
+) -> list[str]:
+    """Where the camera stands, how it is turned, how surely, and what told so."""
+    state, sd = found.state, found.sd
+    height, tilt = np.exp(state.log_height), np.degrees(state.tilt)
+    near, far = found.distances
+    moments = len(found.stances.frame)
+    evidence = [f"the player's height where he stands, {counted(moments, 'moment')}"]
+    evidence += [
+        counted(count, words)
+        for kind, words in zip(
+            KINDS, ("upright thing", "length on the ground", "horizon"), strict=True
+        )
+        if (count := sum(mark.kind == kind for mark in told.marks))
+    ]
+    evidence += [known.told_by] if known else []
+    return [
+        f"The camera is {height:.2f} m high (standard deviation {height * sd.log_height:.2f} m), "
+        f"looks {'down' if tilt >= 0 else 'up'} by {abs(tilt):.1f} degrees "
+        f"({np.degrees(sd.tilt):.1f}), and is turned by {np.degrees(state.roll):.1f} degrees "
+        f"({np.degrees(sd.roll):.1f}); focal length {np.exp(state.log_focal):.0f} px within "
+        f"{sd.log_focal:.0%}. The player stands {near:.1f} to {far:.1f} m from it.",
+        f"By {', '.join(evidence)}.",
+    ]
+
+
+def _advice(
+    workspace: Workspace, found: GroundCalibration, told: GroundMarks, known: FieldOfView | None
+) -> list[str]:
+    """What is open, and what would tell it."""
+    open_focal = found.sd.log_focal > OPEN_FOCAL
+    tilt = float(np.nanmax(found.camera.sd_tilt))
+    if not open_focal and tilt <= MAX_TILT_ERROR:
+        return []
+    near, far = found.distances
+    lines = []
+    if open_focal:
+        focal, factor = np.exp(found.state.log_focal), np.exp(found.sd.log_focal)
+        still = " stays on one spot, which" if far < 1.4 * near else "'s ways"
+        tells = " tells nothing of it" if far < 1.4 * near else " do not tell more"
+        lines.append(
+            f"The focal length cannot be told from this ({focal / factor:.0f} to "
+            f"{focal * factor:.0f} px): the player{still}{tells}, and distances away from the "
+            "camera are as open."
+        )
+    verticals = sum(mark.kind == "vertical" for mark in told.marks)
+    command = f"keyrecon ground {quoted(workspace.folder)}"
+    if verticals < 2:
+        help_by = (
+            "Mark two upright things, far left and far right in the picture, as long as can be: "
+            f"{command} --vertical FRAME:X,Y:X,Y --vertical FRAME:X,Y:X,Y"
+        )
+    elif known is None:
+        help_by = f"Tell the camera's angle across the picture: {command} --fov DEGREES"
+    else:
+        help_by = f"Mark two points of the horizon: {command} --horizon FRAME:X,Y:X,Y"
+    return [*lines, help_by]

@@ -1,0 +1,406 @@
+"""The camera over level ground where there is no court: maximum likelihood over all evidence.
+
+For every focal length of a wide range the other numbers are fitted to all evidence together
+(`ground_evidence`), which tells how likely that focal length is (Laplace's approximation in the
+others: Tierney and Kadane, JASA 81, 1986). The range is gone over twice, the second time where it
+matters. So the spread is right also where the focal length stays open over a factor of three, as it
+does where the player stays on one spot, and what follows from that for tilt, height and place is in
+their spreads. What nothing tells comes from what cameras are like (`USUAL_*`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import least_squares
+
+from keyrecon.errors import KeyreconError
+from keyrecon.numerics.geometry import warp_points
+from keyrecon.records import CameraPath, Motion
+from keyrecon.world.clicked_points import CLICK_NOISE
+from keyrecon.world.court_tracking import between, carried
+from keyrecon.world.ground_evidence import (
+    LEAN,
+    LEANING,
+    GroundMark,
+    GroundState,
+    MarkedEnds,
+    Stances,
+    lean_residuals,
+    mark_residuals,
+    on_plane,
+    robust,
+    size_residuals,
+)
+from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.records import GROUND, WorldCamera
+from keyrecon.world.stances import STATURE, find_stances
+
+USUAL_FOCAL, FOCAL_SPREAD = 1.0, 0.7
+"""Focal length of cameras at sports, in the picture's longer side, and the spread of its logarithm:
+phones have .7 to .85, their second lens 1.5 to 2.2, cameras on tripods up to 4."""
+FOCAL_LENGTHS = (0.35, 8.0)
+"""Shortest and longest, in the longer side."""
+USUAL_TILT, TILT_SPREAD = np.radians(5.0), np.radians(12.0)
+"""How far cameras look down, and the spread."""
+ROLL_SPREAD = np.radians(2.5)
+"""How far cameras are turned about their axis."""
+USUAL_HEIGHT, HEIGHT_SPREAD = 1.8, 0.8
+"""Metres that cameras stand high, and the spread of the logarithm: .35 to 9 m."""
+SIZE_SPREAD = 0.04
+"""Share by which the size of a lifted motion is off for a whole clip: 0 to .06 too large in eight
+rendered sequences."""
+STATURE_SPREAD = 0.06
+"""The same for a player whose height is not known."""
+SIZE_NOISE = (0.01, 0.06)
+"""Least and most that it is off from moment to moment; in between it is taken from the fit."""
+SIZE_MEMORY = 3.0
+"""Moments over which that lasts and counts once."""
+COARSE, FINE, SAMPLES = 17, 15, 600
+"""Focal lengths tried at first and then, and draws from what is left open."""
+CONTRADICTION = 4.0
+"""Standard deviations by which a mark may be off."""
+
+
+@dataclass(frozen=True)
+class FieldOfView:
+    """A focal length that is known from elsewhere."""
+
+    focal: float
+    """px"""
+    spread: float
+    """Of its logarithm."""
+    told_by: str
+
+
+@dataclass(frozen=True, eq=False)
+class GroundCalibration:
+    """The camera and how it came about."""
+
+    camera: WorldCamera
+    state: GroundState
+    """In the reference frame."""
+    sd: GroundState
+    """Standard deviations of the same numbers."""
+    reference: int
+    """The frame in which the player first stands; clicks and stances are in its pixels."""
+    stances: Stances
+    distances: tuple[float, float]
+    """Least and most distance at which the player stands, metres."""
+
+
+class ContradictoryMarks(KeyreconError):
+    """No camera sees the marks where they were clicked."""
+
+
+@dataclass(frozen=True, eq=False)
+class _GroundEvidence:
+    """All that is held against a camera."""
+
+    marks: MarkedEnds
+    stances: Stances
+    prior: tuple[GroundState, GroundState]
+    """Mean and spread of what is known beforehand."""
+    principal: Float[np.ndarray, "2"]
+    click: float
+    noise: float = 0.03
+    """Of the player's size in one moment."""
+
+    def residuals(self, x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "m"]:
+        """In standard deviations."""
+        state = GroundState(*x)
+        camera = state.pinhole(self.principal)
+        mean, spread = (_numbers(part) for part in self.prior)
+        parts = [(x - mean) / spread, mark_residuals(camera, self.marks, self.click).ravel()]
+        if len(self.stances.frame):
+            once = 1 / np.sqrt(SIZE_MEMORY)
+            sizes = size_residuals(camera, self.stances, state.log_size) / self.noise
+            leans = lean_residuals(camera, self.stances, state.lean) / LEAN
+            parts += [once * robust(sizes), once * robust(leans)]
+        return np.concatenate(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """What is left open: normal distributions, one for each focal length tried."""
+
+    weight: Float[np.ndarray, "n"]
+    mean: Float[np.ndarray, "n 6"]
+    root: Float[np.ndarray, "n 5 5"]
+    """Of the covariance of all but the focal length."""
+
+    @property
+    def best(self) -> Float[np.ndarray, "6"]:
+        """The likeliest of the focal lengths tried, and what goes with it."""
+        return self.mean[int(self.weight.argmax())]
+
+    def draws(self) -> Float[np.ndarray, "s 6"]:
+        """Draws, the same each time."""
+        rng = np.random.default_rng(0)
+        chosen = rng.choice(len(self.weight), SAMPLES, p=self.weight)
+        drawn = self.mean[chosen].copy()
+        drawn[:, 1:] += np.einsum(
+            "sij,sj->si", self.root[chosen], rng.standard_normal((SAMPLES, 5))
+        )
+        return drawn
+
+
+def calibrate_ground(
+    motion: Motion,
+    path: CameraPath,
+    size: tuple[int, int],
+    marks: Sequence[GroundMark] = (),
+    known: FieldOfView | None = None,
+) -> GroundCalibration:
+    """The camera of every frame of a shot in which a player stands on level ground.
+
+    `size` is the picture's, px. Metres come from the motion's, or from lengths among the `marks`.
+    Raises KeyreconError where the player never stands, nothing is in metres, or marks contradict
+    one another.
+    """
+    usable = _shot(motion, path)
+    if motion.units != "m" and not any(mark.metres for mark in marks):
+        raise KeyreconError(
+            "Nothing is in metres yet: give the player's height (keyrecon run --height), or mark "
+            "a thing of known length."
+        )
+    principal = (np.array(size) - 1) / 2
+    first = np.flatnonzero(usable)[:1]
+    zoom = _zoom(path, usable, int(first[0]), principal, max(size)) if len(first) else np.ones(0)
+    reference = _first_stance(motion, usable, path, zoom)
+    to_reference = np.array([between(path, t, reference) for t in range(len(usable))])
+    stances = find_stances(motion, usable, to_reference, zoom / zoom[reference])
+    ends = _marked(marks, usable, to_reference)
+    click = CLICK_NOISE * max(size) / 1280
+    evidence = _GroundEvidence(ends, stances, _prior(motion, max(size), known), principal, click)
+    posterior, evidence = _explore(evidence, max(size))
+    if blame := _contradiction(evidence, posterior, marks):
+        raise ContradictoryMarks(blame)
+    return _result(posterior, evidence, path, usable, reference)
+
+
+def _shot(motion: Motion, path: CameraPath) -> Bool[np.ndarray, "T"]:
+    """Frames of the shot with the most of the motion: a path means nothing across cuts."""
+    number = np.searchsorted(path.cuts, np.arange(len(motion.time)), side="right")
+    longest = np.bincount(number, weights=motion.known).argmax()
+    return motion.known & (number == longest)
+
+
+def _zoom(
+    path: CameraPath,
+    usable: Bool[np.ndarray, "T"],
+    start: int,
+    principal: Float[np.ndarray, "2"],
+    longer: int,
+) -> Float[np.ndarray, "T"]:
+    """Focal length of every frame in those of one of them; it hardly hangs on what that one is."""
+    camera = Pinhole(USUAL_FOCAL * longer, principal, np.eye(3), np.zeros(3))
+    zoom = np.ones(len(usable))
+    for t in np.flatnonzero(usable):
+        zoom[t] = carried(camera, between(path, start, int(t))).focal / camera.focal
+    return zoom
+
+
+def _first_stance(
+    motion: Motion,
+    usable: Bool[np.ndarray, "T"],
+    path: CameraPath,
+    zoom: Float[np.ndarray, "T"],
+) -> int:
+    """The first frame in which the player stands."""
+    frames = np.zeros(0)
+    if usable.any():
+        start = int(np.flatnonzero(usable)[0])
+        homographies = np.array([between(path, t, start) for t in range(len(usable))])
+        frames = find_stances(motion, usable, homographies, zoom).frame
+    if not len(frames):
+        raise KeyreconError(
+            "The player is never seen to stand, so that nothing tells where the ground is; look "
+            "at the overlay, and mark the ankles of a frame in which he stands."
+        )
+    return int(frames[0])
+
+
+def _marked(
+    marks: Sequence[GroundMark],
+    usable: Bool[np.ndarray, "T"],
+    to_reference: Float[np.ndarray, "T 3 3"],
+) -> MarkedEnds:
+    """Marks in the reference picture."""
+    for mark in marks:
+        if not usable[mark.frame]:
+            raise KeyreconError(
+                f"The {mark.kind} marked in frame {mark.frame} is in no frame with the motion of "
+                "the shot that is used; mark one in another frame."
+            )
+    ends = [warp_points(to_reference[m.frame], np.array([m.start, m.end])) for m in marks]
+    metres = [np.nan if mark.metres is None else mark.metres for mark in marks]
+    return MarkedEnds(
+        tuple(mark.kind for mark in marks),
+        np.array(ends).reshape(-1, 2, 2),
+        np.array(metres, float),
+    )
+
+
+def _prior(
+    motion: Motion, longer: int, known: FieldOfView | None
+) -> tuple[GroundState, GroundState]:
+    """What is known of cameras and players beforehand: mean and spread."""
+    focal, spread = np.log(USUAL_FOCAL * longer), FOCAL_SPREAD
+    if known is not None:
+        focal, spread = np.log(known.focal), known.spread
+    size = 0.0 if motion.units == "m" else float(np.log(STATURE))
+    sizes = SIZE_SPREAD if motion.units == "m" else STATURE_SPREAD
+    return (
+        GroundState(focal, USUAL_TILT, 0.0, np.log(USUAL_HEIGHT), size, 0.0),
+        GroundState(spread, TILT_SPREAD, ROLL_SPREAD, HEIGHT_SPREAD, sizes, LEANING),
+    )
+
+
+def _numbers(state: GroundState) -> Float[np.ndarray, "6"]:
+    return np.array(list(vars(state).values()))
+
+
+def _explore(evidence: _GroundEvidence, longer: int) -> tuple[_Posterior, _GroundEvidence]:
+    """All focal lengths, coarsely, then the likely ones; with the noise that the fit tells."""
+    grid = np.log(np.geomspace(*FOCAL_LENGTHS, COARSE) * longer)
+    posterior = _over(evidence, grid)
+    for _ in range(2):
+        evidence = replace(evidence, noise=_size_noise(evidence, posterior.best))
+        middle = float(posterior.weight @ posterior.mean[:, 0])
+        spread = float(np.sqrt(posterior.weight @ (posterior.mean[:, 0] - middle) ** 2))
+        step = max(spread, 0.3 * (grid[1] - grid[0]))
+        low, high = max(grid[0], middle - 4 * step), min(grid[-1], middle + 4 * step)
+        posterior = _over(evidence, np.linspace(low, high, FINE))
+    return posterior, evidence
+
+
+def _size_noise(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
+    """Noise of the player's size from moment to moment."""
+    if len(evidence.stances.frame) < 4:
+        return evidence.noise
+    state = GroundState(*x)
+    off = size_residuals(state.pinhole(evidence.principal), evidence.stances, state.log_size)
+    return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), *SIZE_NOISE))
+
+
+def _over(evidence: _GroundEvidence, log_focals: Float[np.ndarray, "n"]) -> _Posterior:
+    """How likely each focal length is, and the rest given it."""
+    start = _numbers(evidence.prior[0])[1:]
+    cost, means, roots = [], [], []
+    for log_focal in log_focals:
+
+        def residuals(rest: np.ndarray, log_focal: float = float(log_focal)) -> np.ndarray:
+            return evidence.residuals(np.concatenate([[log_focal], rest]))
+
+        spread = _numbers(evidence.prior[1])[1:]
+        solved = least_squares(residuals, start, x_scale=spread, max_nfev=40)
+        start = solved.x
+        normal = solved.jac.T @ solved.jac
+        cost.append(solved.cost + 0.5 * np.linalg.slogdet(normal)[1])
+        means.append(np.concatenate([[log_focal], solved.x]))
+        roots.append(np.linalg.inv(np.linalg.cholesky(normal)).T)
+    weight = np.exp(np.min(cost) - np.array(cost))
+    return _Posterior(weight / weight.sum(), np.array(means), np.array(roots))
+
+
+def _contradiction(
+    evidence: _GroundEvidence, posterior: _Posterior, marks: Sequence[GroundMark]
+) -> str:
+    """Which mark contradicts the others; empty where none does."""
+    off = _misfits(evidence, posterior.best)
+    if not len(off) or off.max() <= CONTRADICTION:
+        return ""
+    blame = []
+    for k in range(len(marks)):
+        kept = [i for i in range(len(marks)) if i != k]
+        ends = evidence.marks
+        ends = MarkedEnds(tuple(ends.kinds[i] for i in kept), ends.ends[kept], ends.metres[kept])
+        without = replace(evidence, marks=ends)
+        best = _over(without, posterior.mean[:, 0]).best
+        rest = _misfits(without, best)
+        if not len(rest) or rest.max() <= CONTRADICTION:
+            cost = float((without.residuals(best) ** 2).sum())
+            blame.append((cost, k, float(_misfits(evidence, best)[k])))
+    if not blame or (len(marks) == 2 and len(blame) == 2 and not len(evidence.stances.frame)):
+        names = ", ".join(describe_mark(mark) for mark in marks)
+        return f"The marks ({names}) contradict one another; click them again."
+    _, k, away = min(blame)
+    return (
+        f"{describe_mark(marks[k])} contradicts the rest: it is off by {away:.0f} times what a "
+        "careful click is. Click it again, or leave it out."
+    )
+
+
+def _misfits(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "n"]:
+    """How far each mark is off, standard deviations."""
+    camera = GroundState(*x).pinhole(evidence.principal)
+    return np.abs(mark_residuals(camera, evidence.marks, evidence.click)).max(axis=1)
+
+
+def describe_mark(mark: GroundMark) -> str:
+    """A mark by its place."""
+    (x0, y0), (x1, y1) = mark.start, mark.end
+    return f"the {mark.kind} at {x0:g},{y0:g} to {x1:g},{y1:g} in frame {mark.frame}"
+
+
+def _result(
+    posterior: _Posterior,
+    evidence: _GroundEvidence,
+    path: CameraPath,
+    usable: Bool[np.ndarray, "T"],
+    reference: int,
+) -> GroundCalibration:
+    """The camera of all frames in the world of the player's first stance."""
+    best, draws = posterior.best, posterior.draws()
+    places = np.array([_place(x, evidence) for x in [best, *draws]])
+    sd = draws.std(axis=0)
+    tilts = np.array([_up(x) for x in [best, *draws]])
+    sd_tilt = float(np.sqrt(((tilts[1:] - tilts[0]) ** 2).sum(axis=1).mean()))
+    state = GroundState(*best)
+    pinhole = replace(state.pinhole(evidence.principal), centre=places[0])
+    count = len(usable)
+    inner, rotation, shift = np.full((count, 3, 3), np.nan), np.full((count, 3, 3), np.nan), None
+    shift = np.full((count, 3), np.nan)
+    for t in np.flatnonzero(usable):
+        view = carried(pinhole, between(path, reference, int(t)))
+        inner[t] = [
+            [view.focal, 0, view.principal[0]],
+            [0, view.focal, view.principal[1]],
+            [0, 0, 1],
+        ]
+        rotation[t], shift[t] = view.rotation, -view.rotation @ view.centre
+    spread = np.where(usable[:, None], places[1:].std(axis=0), np.nan)
+    camera = WorldCamera(
+        inner,
+        rotation,
+        shift,
+        usable,
+        spread,
+        inner[:, 0, 0] * sd[0],
+        np.where(usable, sd_tilt, np.nan),
+        GROUND,
+    )
+    far = _distances(state, evidence)
+    return GroundCalibration(camera, state, GroundState(*sd), reference, evidence.stances, far)
+
+
+def _place(x: Float[np.ndarray, "6"], evidence: _GroundEvidence) -> Float[np.ndarray, "3"]:
+    """The camera's place when the origin is between the player's feet as he first stands."""
+    state = GroundState(*x)
+    camera = state.pinhole(evidence.principal)
+    foot = on_plane(camera, evidence.stances.foot[:1])[0]
+    return camera.centre - foot * [1, 1, 0]
+
+
+def _up(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
+    """The vertical in camera axes."""
+    return GroundState(*x).pinhole(np.zeros(2)).rotation[:, 2]
+
+
+def _distances(state: GroundState, evidence: _GroundEvidence) -> tuple[float, float]:
+    """Least and most distance at which the player stands, metres."""
+    camera = state.pinhole(evidence.principal)
+    far = np.linalg.norm(on_plane(camera, evidence.stances.foot) - camera.centre, axis=1)
+    return float(np.percentile(far, 2)), float(np.percentile(far, 98))

@@ -1,0 +1,157 @@
+"""What keyrecon ground does to a project, and what it says."""
+
+import numpy as np
+import pytest
+from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
+
+from keyrecon.app.ground import find_ground, ground_mark
+from keyrecon.app.placing import write_placed_motion
+from keyrecon.app.project import start
+from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.formats.motion_file import read_further_arrays, read_on_court, write_motion
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.progress import silent
+from keyrecon.world.ground_evidence import GroundMark, GroundMarks
+from keyrecon.world.records import GROUND
+
+
+def project(tmp_path_factory, points):
+    """A project with a motion, and a film of nothing by a camera that stands still."""
+    folder = tmp_path_factory.mktemp("ground")
+    picture = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    picture[::40, ::40] = 200
+    write_video(folder / "v.mp4", [picture] * len(points), 50.0)
+    start(folder / "v.mp4", folder / "p")
+    write_motion(folder / "p" / "motion.npz", seen(points))
+    return folder / "p"
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory):
+    return project(tmp_path_factory, WAY)
+
+
+@pytest.fixture(scope="module")
+def stood(tmp_path_factory):
+    return project(tmp_path_factory, standing(steps=6))
+
+
+WAY = walks(((-1.0, 6.5, 75),), 12, 0.6)
+"""Away from the camera, from 6.5 to 13.5 m."""
+
+
+def told(folder, marks=(), fov=None, forget=()):
+    return find_ground(Workspace(folder), GroundMarks(tuple(marks), fov), silent, forget)
+
+
+def test_the_motion_comes_to_stand_on_the_ground(walked):
+    text = told(walked, posts(), 2 * np.degrees(np.arctan(640 / 1100)))
+    assert "The camera is 2.5" in text and "2 upright things" in text
+    workspace = Workspace(walked)
+    camera = read_camera(workspace.camera_file)
+    assert camera.origin == GROUND
+    assert abs(camera.centre[0, 2] - CAMERA.centre[2]) < 0.15
+    world, stored = read_on_court(workspace.motion_file)
+    assert stored.origin == GROUND
+    feet = world.points[:, [0, 5]][world.contact]
+    assert np.abs(feet[:, 2]).max() < 0.2
+    assert np.linalg.norm(world.points[0, [0, 5], :2].mean(axis=0)) < 0.5
+    assert (walked / "ground.jpg").is_file() and (walked / "way.jpg").is_file()
+    assert "On the ground: " in text
+    assert "On the ground: " in write_placed_motion(workspace, seen(WAY)).lines[0]  # run again
+
+
+def test_one_spot_is_told_and_the_motion_stays_as_it_is(stood):
+    with np.load(stood / "motion.npz") as file:
+        before = {name: file[name] for name in file.files}
+    text = told(stood)
+    assert "The focal length cannot be told from this" in text
+    assert "stays on one spot" in text
+    assert "Mark two upright things" in text and "--vertical FRAME:X,Y:X,Y --vertical" in text
+    assert "No way on the ground: how far the camera looks down is open by" in text
+    with np.load(stood / "motion.npz") as file:
+        assert set(file.files) == set(before)
+        assert all(np.array_equal(file[name], before[name]) for name in before)
+
+
+def test_what_else_a_motion_holds_stays(walked):
+    workspace = Workspace(walked)
+    motion = seen(WAY)
+    club = np.zeros((len(motion.time), 2, 2))
+    write_motion(workspace.motion_file, motion, more={"club2d": club})
+    told(walked, posts(), 60.4)
+    assert set(read_further_arrays(workspace.motion_file)) >= {"club2d", "points3d_world"}
+
+
+def test_marks_are_kept_named_and_forgotten(stood):
+    told(stood, posts())
+    assert Workspace(stood).ground_marks().marks == posts()
+    text = told(stood, fov=60.0)
+    assert "vertical-1 (frame 0" in text and "the field of view of 60 degrees" in text
+    with pytest.raises(KeyreconError, match="no mark horizon-1 to forget; it has vertical-1, vert"):
+        told(stood, forget=["horizon-1"])
+    told(stood, forget=["vertical-2", "fov"])
+    assert Workspace(stood).ground_marks() == GroundMarks(posts()[:1])
+    assert "Kept marks" not in told(stood, forget=["all"])
+
+
+def test_marks_that_contradict_one_another_are_named_and_not_kept(stood):
+    told(stood, forget=["all"] if Workspace(stood).ground_marks().marks else ())
+    third = GroundMark("vertical", 0, (640.0, 100.0), (640.0, 600.0))
+    leaning = posts(leaning=1.0)[1]
+    told(stood, [third, posts()[0]])
+    with pytest.raises(
+        KeyreconError, match=f"at {leaning.start[0]:g}.*The new marks were not kept"
+    ):
+        told(stood, [leaning])
+    assert len(Workspace(stood).ground_marks().marks) == 2
+    told(stood, forget=["all"])
+
+
+@pytest.mark.parametrize(
+    ("mark", "words"),
+    [
+        (
+            GroundMark("vertical", 0, (10.0, 10.0), (10.0, 11.0)),
+            "Both ends of the vertical .* in one place",
+        ),
+        (GroundMark("length", 0, (10.0, 10.0), (90.0, 11.0), 0.0), "A length of 0 m cannot be"),
+        (
+            GroundMark("vertical", 0, (10.0, 10.0), (10.0, 900.0)),
+            "10,900 in frame 0 is outside the picture",
+        ),
+        (
+            GroundMark("horizon", 7000, (10.0, 10.0), (90.0, 11.0)),
+            "Frame 7000 is outside the video",
+        ),
+    ],
+)
+def test_a_mark_that_cannot_be_is_told(stood, mark, words):
+    with pytest.raises(KeyreconError, match=words):
+        told(stood, [mark])
+
+
+def test_a_field_of_view_that_no_camera_has_is_told(stood):
+    with pytest.raises(KeyreconError, match="--fov is the angle across"):
+        told(stood, fov=0.0)
+
+
+def test_without_a_motion_the_way_to_one_is_told(stood):
+    file = stood / "motion.npz"
+    kept = file.read_bytes()
+    file.unlink()
+    with pytest.raises(KeyreconError, match="There is no motion yet"):
+        told(stood)
+    file.write_bytes(kept)
+
+
+def test_marks_are_typed():
+    assert ground_mark("vertical", "3:1,2:1.5,90") == GroundMark(
+        "vertical", 3, (1.0, 2.0), (1.5, 90.0)
+    )
+    assert ground_mark("length", "0:1,2:3,4:2.5").metres == 2.5
+    for kind, text in (("vertical", "3:1,2"), ("length", "0:1,2:3,4"), ("horizon", "0:1,2:3,4:5")):
+        with pytest.raises(KeyreconError, match=f"--{kind} needs FRAME:X,Y:X,Y"):
+            ground_mark(kind, text)
