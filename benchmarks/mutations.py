@@ -32,6 +32,7 @@ from keyrecon.io.formats.court_points import read_court_points, write_court_poin
 from keyrecon.io.formats.cvat import cvat_text
 from keyrecon.io.formats.dlc import dlc_text
 from keyrecon.io.formats.golf_marks import read_golf_marks, write_golf_marks
+from keyrecon.io.formats.ground_marks import read_ground_marks, write_ground_marks
 from keyrecon.io.formats.keyframes import keyframes_to_json, read_keyframes
 from keyrecon.io.formats.mocap import read_capture
 from keyrecon.io.formats.model_file import (
@@ -52,7 +53,7 @@ from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, Pick
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
-from keyrecon.world.records import CourtClick, WorldCamera
+from keyrecon.world.records import CourtClick, GroundMark, GroundMarks, WorldCamera
 
 KEPT = Path(__file__).parent.parent / "annotations"
 FRAMES, SIZE = 40, (160, 96)
@@ -136,6 +137,8 @@ def _make_marks(folder: Path, marks: Annotations) -> None:
     corners = ("near baseline, left", "far baseline, right")
     clicks = [CourtClick(name, 9, 20.5, 30.25) for name in corners]
     write_court_points(folder / "court_points.json", clicks)
+    post = GroundMark("vertical", 3, (212.0, 120.5), (214.0, 655.0), 2.44)
+    write_ground_marks(folder / "ground_marks.json", GroundMarks((post,), 62.0))
     write_shot_choices(folder / "shots.json", ShotChoices((1, 3), (2,)))
     write_camera(folder / "camera.npz", _camera())
 
@@ -262,6 +265,7 @@ READERS = {
     "golf marks": Reader("golf_marks.json", _read_golf_marks),
     "court points": Reader("court_points.json", read_court_points),
     "shots": Reader("shots.json", read_shot_choices),
+    "ground marks": Reader("ground_marks.json", read_ground_marks),
     "camera": Reader("camera.npz", read_camera),
     "keyframes": Reader("keyframes.json", read_keyframes),
     "skeleton": Reader("skeleton.json", read_skeleton),

@@ -6,7 +6,7 @@ import numpy as np
 
 from keyrecon.app.placing import MAX_TILT_ERROR, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
-from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.lens_metadata import lens_focal
 from keyrecon.io.video import Video
@@ -21,7 +21,7 @@ from keyrecon.world.ground_calibration import (
     GroundCalibration,
     calibrate_ground,
 )
-from keyrecon.world.ground_evidence import KINDS, GroundMark, GroundMarks, Kind
+from keyrecon.world.records import COURT, KINDS, GroundMark, GroundMarks, Kind
 
 FORMS = {
     "vertical": ("FRAME:X,Y:X,Y or FRAME:X,Y:X,Y:METRES", "0:212,120:214,655:2.44"),
@@ -79,6 +79,7 @@ def find_ground(
         tuple(dict.fromkeys((*kept.marks, *told.marks))),
         kept.field_of_view if told.field_of_view is None else told.field_of_view,
     )
+    _keep_court(workspace)
     if not workspace.motion_file.is_file():
         raise KeyreconError(
             "There is no motion yet, and the player is what tells where the ground is: make it "
@@ -118,6 +119,16 @@ def find_ground(
             *old_report(workspace, placed),
         ]
     )
+
+
+def _keep_court(workspace: Workspace) -> None:
+    """Raise KeyreconError where a court has told the camera, which it does far better."""
+    file = workspace.camera_file
+    if file.is_file() and read_camera(file).origin == COURT:
+        raise KeyreconError(
+            f"{file} has the camera from a court, which tells it more surely than the ground can; "
+            "to use the ground all the same, move that file away."
+        )
 
 
 def check_mark(mark: GroundMark, video: Video) -> None:

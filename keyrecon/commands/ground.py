@@ -8,7 +8,7 @@ from keyrecon.app.console import show
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.commands.arguments import MaybeNumber, Project
 from keyrecon.io.workspace import Workspace
-from keyrecon.world.ground_evidence import KINDS, GroundMarks
+from keyrecon.world.records import KINDS, GroundMarks
 
 ENDS = "FRAME:X,Y:X,Y[:METRES]"
 

@@ -59,8 +59,7 @@ from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
-from keyrecon.world.ground_evidence import GroundMarks
-from keyrecon.world.records import CourtClick
+from keyrecon.world.records import CourtClick, GroundMarks
 
 OWN_NAMES = (
     *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),

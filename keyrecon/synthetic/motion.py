@@ -41,13 +41,13 @@ def play_tennis(options: MotionOptions = MotionOptions()) -> Float[np.ndarray, "
     rng = np.random.default_rng([options.seed, 41])
     plan = plan_points(options.seconds, rng)
     times = np.arange(round(options.seconds * options.fps)) / options.fps
-    points = _place_joints(plan, times, options)
+    points = place_joints(plan, times, options)
     if options.left_handed:
         points = points[:, LSP14.mirror] * [-1, 1, 1]
     return points
 
 
-def _place_joints(
+def place_joints(
     plan: PointPlan, times: Float[np.ndarray, "T"], options: MotionOptions
 ) -> Float[np.ndarray, "T 14 3"]:
     """Turn the plan into joints, limb by limb."""

@@ -23,7 +23,6 @@ from keyrecon.world.court_tracking import between, carried
 from keyrecon.world.ground_evidence import (
     LEAN,
     LEANING,
-    GroundMark,
     GroundState,
     MarkedEnds,
     Stances,
@@ -34,7 +33,8 @@ from keyrecon.world.ground_evidence import (
     size_residuals,
 )
 from keyrecon.world.pinhole import Pinhole
-from keyrecon.world.records import GROUND, WorldCamera
+from keyrecon.world.placement import ANKLE_SHARE
+from keyrecon.world.records import GROUND, GroundMark, WorldCamera
 from keyrecon.world.stances import STATURE, find_stances
 
 USUAL_FOCAL, FOCAL_SPREAD = 1.0, 0.7
@@ -387,11 +387,17 @@ def _result(
 
 
 def _place(x: Float[np.ndarray, "6"], evidence: _GroundEvidence) -> Float[np.ndarray, "3"]:
-    """The camera's place when the origin is between the player's feet as he first stands."""
+    """The camera's place when the origin is under the foot on which the player first stands."""
     state = GroundState(*x)
+    foot = _standing_ankles(state, evidence)[0]
+    return state.pinhole(evidence.principal).centre - foot * [1, 1, 0]
+
+
+def _standing_ankles(state: GroundState, evidence: _GroundEvidence) -> Float[np.ndarray, "N 3"]:
+    """Where they are, the camera being over the origin."""
+    height = ANKLE_SHARE * np.exp(state.log_size) * evidence.stances.stature
     camera = state.pinhole(evidence.principal)
-    foot = on_plane(camera, evidence.stances.foot[:1])[0]
-    return camera.centre - foot * [1, 1, 0]
+    return on_plane(camera, evidence.stances.foot, float(height))
 
 
 def _up(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
@@ -402,5 +408,5 @@ def _up(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
 def _distances(state: GroundState, evidence: _GroundEvidence) -> tuple[float, float]:
     """Least and most distance at which the player stands, metres."""
     camera = state.pinhole(evidence.principal)
-    far = np.linalg.norm(on_plane(camera, evidence.stances.foot) - camera.centre, axis=1)
+    far = np.linalg.norm(_standing_ankles(state, evidence) - camera.centre, axis=1)
     return float(np.percentile(far, 2)), float(np.percentile(far, 98))

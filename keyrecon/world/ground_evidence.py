@@ -19,16 +19,14 @@ the homographies of its path.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import ANKLE_SHARE
+from keyrecon.world.records import Kind
 
-Kind = Literal["vertical", "length", "horizon"]
-KINDS: tuple[Kind, ...] = ("vertical", "length", "horizon")
 PLUMB = np.radians(0.5)
 """By which posts, corners of buildings and door frames are off the vertical (our estimate)."""
 LEVEL = np.radians(0.3)
@@ -42,27 +40,6 @@ OUTLIERS = 2.0
 """Standard deviations from which on a moment of the player counts less (Cauchy)."""
 NEAREST, FARTHEST = 0.2, 500.0
 """Metres within which a line of sight is taken to meet the ground."""
-
-
-@dataclass(frozen=True)
-class GroundMark:
-    """What a person clicked: both ends of something in one frame, px."""
-
-    kind: Kind
-    frame: int
-    start: tuple[float, float]
-    end: tuple[float, float]
-    metres: float | None = None
-    """Length; of a vertical thing, that stands on the ground then; None where it is not known."""
-
-
-@dataclass(frozen=True)
-class GroundMarks:
-    """All that a person told."""
-
-    marks: tuple[GroundMark, ...] = ()
-    field_of_view: float | None = None
-    """Degrees across the width of the picture."""
 
 
 @dataclass(frozen=True, eq=False)

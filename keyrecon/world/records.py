@@ -74,6 +74,32 @@ class CourtClick:
     y: float
 
 
+Kind = Literal["vertical", "length", "horizon"]
+KINDS: tuple[Kind, ...] = ("vertical", "length", "horizon")
+"""What can be marked where there is no court."""
+
+
+@dataclass(frozen=True)
+class GroundMark:
+    """What a person clicked: both ends of something in one frame, px."""
+
+    kind: Kind
+    frame: int
+    start: tuple[float, float]
+    end: tuple[float, float]
+    metres: float | None = None
+    """Length; of a vertical thing, that stands on the ground then; None where it is not known."""
+
+
+@dataclass(frozen=True)
+class GroundMarks:
+    """All that a person told."""
+
+    marks: tuple[GroundMark, ...] = ()
+    field_of_view: float | None = None
+    """Degrees across the width of the picture."""
+
+
 @dataclass(frozen=True, eq=False)
 class WorldMotion:
     """A motion in the world, metres; NaN in frames whose camera was not found."""

@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
+from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
 
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.motion_file import read_further_arrays, read_on_court, write_motion
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
-from keyrecon.world.ground_evidence import GroundMark, GroundMarks
-from keyrecon.world.records import GROUND
+from keyrecon.world.records import GROUND, GroundMark, GroundMarks
 
 
 def project(tmp_path_factory, points):
@@ -136,6 +136,15 @@ def test_a_mark_that_cannot_be_is_told(stood, mark, words):
 def test_a_field_of_view_that_no_camera_has_is_told(stood):
     with pytest.raises(KeyreconError, match="--fov is the angle across"):
         told(stood, fov=0.0)
+
+
+def test_a_camera_from_a_court_is_kept(stood):
+    file = Workspace(stood).camera_file
+    kept = file.read_bytes()
+    write_camera(file, court_camera(CAMERA, 3))
+    with pytest.raises(KeyreconError, match=r"camera.npz has the camera from a court"):
+        told(stood)
+    file.write_bytes(kept)
 
 
 def test_without_a_motion_the_way_to_one_is_told(stood):

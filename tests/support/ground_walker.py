@@ -6,7 +6,8 @@ import numpy as np
 from court_walker import lifted, walk
 
 from keyrecon.records import CameraPath
-from keyrecon.world.ground_evidence import GroundMark, GroundState
+from keyrecon.world.ground_evidence import GroundState
+from keyrecon.world.records import GroundMark
 
 SIZE = (1280, 720)
 PRINCIPAL = (np.array(SIZE) - 1) / 2

@@ -11,7 +11,7 @@ from typing import Any
 
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import parse_json, read_text, reading, real, whole
-from keyrecon.world.ground_evidence import KINDS, GroundMark, GroundMarks, Kind
+from keyrecon.world.records import KINDS, GroundMark, GroundMarks, Kind
 
 
 def read_ground_marks(path: Path) -> GroundMarks:

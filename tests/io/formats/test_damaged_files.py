@@ -17,6 +17,7 @@ from keyrecon.body import LSP14, read_skeleton
 from keyrecon.io.formats.annotations import read_annotations
 from keyrecon.io.formats.c3d import write_c3d
 from keyrecon.io.formats.clicks import read_clicks
+from keyrecon.io.formats.ground_marks import read_ground_marks
 from keyrecon.io.formats.mocap import read_capture
 from keyrecon.io.formats.model_file import (
     BUILT_IN_DEPTH_MODEL,
@@ -57,6 +58,8 @@ CLICKED = {"head_top": [50, 10], "root": [50, 60], "right_knee": [45, 80], "left
 CLICKED |= {"right_ankle": [45, 100], "left_ankle": [55, 100]}
 CLICKS = {"keyrecon_golf_clicks": 1, "frame": 0, "size": [200, 200], "joints": CLICKED}
 PICKS = {"picks": [{"frame": 0, "part": "head", "x": 1.5, "y": 2}]}
+POST = {"kind": "vertical", "frame": 3, "ends": [[2.5, 1.0], [2.5, 9.0]], "metres": 2.44}
+GROUND = {"field_of_view": None, "marks": [POST]}
 SKELETON = {
     "joints": [
         {"name": "neck", "parent": None, "length": 0},
@@ -71,6 +74,7 @@ TEXTS = {
     "clicks": (read_clicks, json.dumps(CLICKS)),
     "picks": (read_picks, json.dumps(PICKS)),
     "skeleton": (read_skeleton, json.dumps(SKELETON)),
+    "ground": (read_ground_marks, json.dumps(GROUND)),
 }
 
 
@@ -82,10 +86,11 @@ def test_the_whole_files_are_read(tmp_path, name):
 
 
 @pytest.mark.parametrize("number", ["1e999", "9" * 400, "NaN", "-Infinity", '"x"', "null", "[" * 9])
-@pytest.mark.parametrize("name", ["coco", "clicks", "picks", "skeleton"])
+@pytest.mark.parametrize("name", ["coco", "clicks", "picks", "skeleton", "ground"])
 def test_a_number_in_json_that_is_none_is_refused(tmp_path, name, number):
     read, text = TEXTS[name]
-    place = {"coco": "[5, 5", "clicks": "[45, 80]", "picks": "1.5", "skeleton": "0.3"}[name]
+    places = {"coco": "[5, 5", "clicks": "[45, 80]", "picks": "1.5", "skeleton": "0.3"}
+    place = (places | {"ground": "9.0"})[name]
     (tmp_path / name).write_text(text.replace(place, number, 1))
     refused(read, tmp_path / name)
 
