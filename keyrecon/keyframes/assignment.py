@@ -8,9 +8,11 @@ interpolation (J).
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from keyrecon.keyframes.coverage import Neighborhoods
-from keyrecon.numerics.ragged import ranges
+from keyrecon.keyframes.coverage import Neighborhoods, join_neighborhoods
 from keyrecon.records import PoseDistances
+
+GROUP_SIZE = 1 << 25
+"""Candidates times frames that are looked at together; changes nothing but memory."""
 
 
 def find_neighborhoods(
@@ -25,15 +27,14 @@ def find_neighborhoods(
     """
     near = smoothed < beta
     np.fill_diagonal(near, True)
-    n_frames = len(comparison.row)
-    served = np.flatnonzero(exemplar_distance < beta).astype(np.int32)
-    members = np.bincount(comparison.row[served], minlength=len(near))
-    first_member = np.cumsum(members) - members
-    candidate, row = np.nonzero(near)
-    count = members[row]
-    frame = served[ranges(first_member[row], count)]
-    size = np.bincount(candidate, count, minlength=len(near)).astype(np.int64)
-    return Neighborhoods(np.concatenate([[0], np.cumsum(size)]), frame, n_frames)
+    served = exemplar_distance < beta
+    step = max(1, GROUP_SIZE // max(1, len(served)))
+    return join_neighborhoods(
+        [
+            Neighborhoods.of_members(near[first : first + step, comparison.row] & served)
+            for first in range(0, max(1, len(near)), step)
+        ]
+    )
 
 
 def assign_frames(

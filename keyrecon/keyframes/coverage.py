@@ -17,7 +17,8 @@ from keyrecon.numerics.ragged import ranges
 
 Gaps = Int[np.ndarray, "P"]
 GapCost = Callable[[Gaps, Gaps], Gaps]
-"""Cost of the gaps between represented frames `left` and `right`, -1 and T at the ends."""
+"""Cost of the gaps between represented frames `left` and `right`, -1 and T at the ends; of a gap
+without frames it is the same everywhere between the ends."""
 
 
 def uncovered_cost(
@@ -53,23 +54,40 @@ TIME_UNIT = 100
 
 @dataclass(frozen=True, eq=False)
 class Neighborhoods:
-    """w(k): the frames that each candidate represents."""
+    """w(k): the frames that each candidate represents, as runs of consecutive ones.
+
+    Poses change slowly, so that a candidate represents some ten frames in a row: of hours of video
+    there are far fewer runs than frames.
+    """
 
     first: Int[np.ndarray, "ends"]
-    """Where each candidate's frames start in `frame`, and the end of the last."""
-    frame: Int[np.ndarray, "P"]
-    """Frame numbers, ascending within each candidate."""
+    """Where each candidate's runs begin in `start`, and the end of the last."""
+    start: Int[np.ndarray, "P"]
+    """First frames of the runs, ascending within each candidate."""
+    stop: Int[np.ndarray, "P"]
+    """The frames after their last ones."""
     n_frames: int
+
+    @staticmethod
+    def of_members(member: Bool[np.ndarray, "m T"]) -> "Neighborhoods":
+        """Those of candidates of whom each row says which frames they represent."""
+        count, n_frames = member.shape
+        padded = np.zeros((count, n_frames + 2), dtype=bool)
+        padded[:, 1:-1] = member
+        owner, edge = np.nonzero(padded[:, 1:] != padded[:, :-1])
+        runs = np.bincount(owner, minlength=count) // 2
+        return Neighborhoods(_ends(runs), edge[0::2], edge[1::2], n_frames)
 
     def of(self, candidate: int) -> Int[np.ndarray, "p"]:
         """Frames that one candidate represents."""
-        return self.frame[self.first[candidate] : self.first[candidate + 1]]
+        runs = slice(self.first[candidate], self.first[candidate + 1])
+        return ranges(self.start[runs], self.stop[runs] - self.start[runs])
 
     def only(self, candidates: Int[np.ndarray, "m"]) -> "Neighborhoods":
         """Those of some candidates, numbered anew."""
         count = self.first[candidates + 1] - self.first[candidates]
-        frame = self.frame[ranges(self.first[candidates], count)]
-        return Neighborhoods(np.concatenate([[0], np.cumsum(count)]), frame, self.n_frames)
+        runs = ranges(self.first[candidates], count)
+        return Neighborhoods(_ends(count), self.start[runs], self.stop[runs], self.n_frames)
 
     def union(self, candidates: list[int]) -> Bool[np.ndarray, "T"]:
         """W: frames that any of the candidates represents."""
@@ -80,9 +98,33 @@ class Neighborhoods:
 
     def without(self, represented: Bool[np.ndarray, "T"]) -> "Neighborhoods":
         """The same, less frames that are represented already."""
-        kept = ~represented[self.frame]
-        first = np.concatenate([[0], np.cumsum(kept)])[self.first]
-        return Neighborhoods(first, self.frame[kept], self.n_frames)
+        still_open = Neighborhoods.of_members(~represented[None])
+        before = np.searchsorted(still_open.stop, self.start, side="right")
+        after = np.searchsorted(still_open.start, self.stop, side="left")
+        parts = after - before
+        gap, run = ranges(before, parts), np.repeat(np.arange(len(parts)), parts)
+        return Neighborhoods(
+            first=_ends(parts)[self.first],
+            start=np.maximum(self.start[run], still_open.start[gap]),
+            stop=np.minimum(self.stop[run], still_open.stop[gap]),
+            n_frames=self.n_frames,
+        )
+
+
+def join_neighborhoods(parts: list[Neighborhoods]) -> Neighborhoods:
+    """Those of one group of candidates after the other."""
+    counts = [np.diff(part.first) for part in parts]
+    return Neighborhoods(
+        _ends(np.concatenate(counts)),
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.stop for part in parts]),
+        parts[0].n_frames,
+    )
+
+
+def _ends(count: Int[np.ndarray, "m"]) -> Int[np.ndarray, "ends"]:
+    """Where lists of so many begin end to end, and the end of the last."""
+    return np.concatenate([[0], np.cumsum(count)])
 
 
 def total_cost(represented: Bool[np.ndarray, "T"], cost: GapCost) -> int:
@@ -102,19 +144,21 @@ def measure_gains(
     `open_frames` must hold no represented frame.
     """
     count = open_frames.first[candidates + 1] - open_frames.first[candidates]
-    frame = open_frames.frame[ranges(open_frames.first[candidates], count)]
+    runs = ranges(open_frames.first[candidates], count)
+    start, last = open_frames.start[runs], open_frames.stop[runs] - 1
     owner = np.repeat(np.arange(len(candidates)), count)
     before, after = _bounds(represented)
-    left, right = before[frame], after[frame]
-    follows = np.zeros(len(frame), dtype=bool)
+    left, right = before[start], after[start]
+    follows = np.zeros(len(start), dtype=bool)
     follows[1:] = (owner[1:] == owner[:-1]) & (left[1:] == left[:-1])
-    closes = np.ones(len(frame), dtype=bool)
+    closes = np.ones(len(start), dtype=bool)
     closes[:-1] = ~follows[1:]
-    previous = np.where(follows, np.roll(frame, 1), left)
-    change = -cost(previous, frame)
-    change[closes] += cost(left[closes], right[closes]) - cost(frame[closes], right[closes])
+    previous = np.where(follows, np.roll(last, 1), left)
+    change = -cost(previous, start) - (last - start) * cost(start, start + 1)
+    change[closes] += cost(left[closes], right[closes]) - cost(last[closes], right[closes])
     gain = np.bincount(owner, change, minlength=len(candidates))
-    return gain.round().astype(np.int64), count
+    added = np.bincount(owner, last - start + 1, minlength=len(candidates))
+    return gain.round().astype(np.int64), added.astype(np.int64)
 
 
 def _bounds(

@@ -11,13 +11,6 @@ from keyrecon.keyframes.coverage import (
 from keyrecon.paper.keyframe_choice import choose_as_printed, printed_cost
 
 
-def hoods_from(near):
-    """Neighbourhoods from a matrix that says who represents whom."""
-    row, column = np.nonzero(near)
-    first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(near)))])
-    return Neighborhoods(first, column, near.shape[1])
-
-
 def random_near(rng, n):
     """Frames near one another in time and in a pose that comes back."""
     pose = np.cumsum(rng.normal(size=(n, 2)), axis=0) * 0.3
@@ -71,7 +64,7 @@ def test_gaps_count_uncovered_frames_as_equation_1_does():
 @pytest.mark.parametrize("make_cost", [printed_cost, lambda n: uncovered_cost(n, 6)])
 def test_gains_of_all_candidates_are_differences_of_the_total(make_cost):
     rng = np.random.default_rng(2)
-    hoods = hoods_from(random_near(rng, 90))
+    hoods = Neighborhoods.of_members(random_near(rng, 90))
     cost = make_cost(90)
     represented = hoods.union([3, 40])
     gain, added = measure_gains(hoods.without(represented), np.arange(90), represented, cost)
@@ -91,12 +84,12 @@ def test_lazy_choice_is_the_exhaustive_one():
             totals = [literal_eq2(represented | near[k]) for k in range(n)]
             chosen.append(int(np.argmin(totals)))
             represented |= near[chosen[-1]]
-        assert choose_as_printed(hoods_from(near), reach, int(0.05 * n), n) == chosen
+        assert choose_as_printed(Neighborhoods.of_members(near), reach, int(0.05 * n), n) == chosen
 
 
 def test_equation_2_only_ever_gains_less_as_keyframes_are_added():
     rng = np.random.default_rng(7)
-    hoods, cost = hoods_from(random_near(rng, 80)), printed_cost(80)
+    hoods, cost = Neighborhoods.of_members(random_near(rng, 80)), printed_cost(80)
     few, more = hoods.union([5]), hoods.union([5, 30, 60])
     early, _ = measure_gains(hoods.without(few), np.arange(80), few, cost)
     late, _ = measure_gains(hoods.without(more), np.arange(80), more, cost)
@@ -108,7 +101,7 @@ def test_choosing_for_coverage_takes_no_more_keyframes_than_the_printed_choice()
     taken = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
-        hoods = hoods_from(random_near(rng, 200))
+        hoods = Neighborhoods.of_members(random_near(rng, 200))
         for_coverage = choose_greedily(hoods, 6, 10, 200, np.ones(200))
         taken.append((len(for_coverage), len(choose_as_printed(hoods, 6, 10, 200))))
     for_coverage, as_printed = np.sum(taken, axis=0)
@@ -118,4 +111,4 @@ def test_choosing_for_coverage_takes_no_more_keyframes_than_the_printed_choice()
 def test_among_equal_candidates_the_clearer_frame_is_chosen():
     near = np.ones((5, 5), dtype=bool)
     visibility_score = np.array([0.1, 0.4, 0.2, 0.9, 0.3])
-    assert choose_greedily(hoods_from(near), 3, 0, 5, visibility_score) == [3]
+    assert choose_greedily(Neighborhoods.of_members(near), 3, 0, 5, visibility_score) == [3]
