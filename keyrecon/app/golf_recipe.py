@@ -7,7 +7,8 @@ from keyrecon.golf.click_checks import check_direction
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
-from keyrecon.golf.plausibility import SwingDoubt, find_doubts
+from keyrecon.golf.observe.motion_timing import TimeShift, measure_time_shift
+from keyrecon.golf.plausibility import SwingDoubt, find_doubts, is_shifted
 from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
 from keyrecon.golf.scene import observe_scene
 from keyrecon.golf.swing_fit import (
@@ -16,6 +17,7 @@ from keyrecon.golf.swing_fit import (
     finish_fit,
     fit_guided,
     fit_observations,
+    retime,
     swing_found,
 )
 from keyrecon.io.video import Video
@@ -74,13 +76,22 @@ def find_swing(
     )  # fmt: skip
 
 
+RETIMINGS = 2
+"""Times that a fit is made anew at the time at which the pictures show its downswing. Of a real
+swing without masks and club around the downswing and begun .4 downswings late, the first brought
+joints within a fifth of the trunk from .86 to .89 and clubs within 15 degrees from .73 to .86."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Tried:
     """A candidate that was fitted, and what speaks against it."""
 
+    first: Observations
+    """Those before any fit."""
     fitted: FittedSwing
     observations: Observations
     observed: ObservedSwing
+    shift: TimeShift
     doubts: tuple[SwingDoubt, ...]
 
 
@@ -93,12 +104,33 @@ def _try(
     progress: Progress,
     suffix: str,
 ) -> _Tried:
-    """One candidate fitted."""
-    first = observed.observations
-    fitted, observations = fit_candidate(
-        first, observed.film.open(video), model, options, keep, progress, suffix
-    )
-    return _Tried(fitted, observations, observed, tuple(find_doubts(fitted, first)))
+    """One candidate fitted, and anew at their time where the pictures show it clearly off."""
+    shown = observed.film.open(video)
+
+    def fit(first: Observations, suffix: str) -> _Tried:
+        fitted, guided = fit_candidate(first, shown, model, options, keep, progress, suffix)
+        shift = keep(f"timing{suffix}", measure_time_shift, shown, fitted, first.height)
+        doubts = tuple(find_doubts(fitted, first, shift))
+        return _Tried(first, fitted, guided, observed, shift, doubts)
+
+    tried = fit(observed.observations, suffix)
+    for number in range(RETIMINGS if options.method == "swing" else 0):
+        if not is_shifted(tried.shift):
+            break
+        again = f"{suffix}_timed_{number + 1}"
+        first = keep(f"observe{again}", retime, tried.first, tried.fitted, tried.shift, model)
+        retried = fit(first, again)
+        if _is_worse(retried, tried):
+            break
+        tried = retried
+    return tried
+
+
+def _is_worse(one: _Tried, other: _Tried) -> bool:
+    """Whether more speaks against a fit, or the same and its downswing is no less off in time."""
+    if len(one.doubts) != len(other.doubts):
+        return len(one.doubts) > len(other.doubts)
+    return abs(one.shift.downswings) >= abs(other.shift.downswings)
 
 
 def fit_candidate(

@@ -3,7 +3,8 @@
 Observations come first (`observation`): of the frames that are fitted (`observe.film`), with the
 swings that these may show. The motion model is fitted to the likeliest of them. Then, in rounds,
 the club is detected once more where the fitted swing expects it, the hands tell when the swing
-begins and ends better than club or fit do, and the model is fitted to both. A fit that does not
+begins and ends better than club or fit do, and the model is fitted to both. A downswing that runs
+ahead of what moves in the pictures, or behind it, is fitted anew at their time. A fit that does not
 explain its film (`plausibility`) gives way to the next candidate. At last the swing is given in
 every frame of the file, before the camera as it moved.
 """
@@ -28,10 +29,12 @@ from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.marks import hold_joints, hold_keys, hold_observations
 from keyrecon.golf.observation import ObservationOptions, ObservedSwing
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
+from keyrecon.golf.observe.motion_timing import TimeShift
 from keyrecon.golf.observe.swing_events import (
     SwingEventOptions,
     detect_swing_events,
     interpolate_times,
+    order_keys,
 )
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.prior.skeleton import size_body
@@ -134,6 +137,20 @@ def fit_guided(
     guided = hold_observations(replace(guided, keys=keys, phase=phase))
     fitted = fit_observations(guided, video, model, options, fitted.state)
     return GuidedFit(guided.club, guided.club_along, keys, phase, fitted)
+
+
+def retime(
+    observations: Observations, fitted: FittedSwing, shift: TimeShift, model: MotionModel
+) -> Observations:
+    """The observations with top and hit when the pictures show them, and not when a fit has them.
+
+    What a person marked stays.
+    """
+    keys = observations.keys.copy()
+    keys[1:3] = fitted.keys[1:3] + shift.frames
+    keys = hold_keys(order_keys(keys), observations.marks)
+    phase = interpolate_times(keys, model.keys, len(observations.phase))
+    return hold_observations(replace(observations, keys=keys, phase=phase))
 
 
 def finish_fit(

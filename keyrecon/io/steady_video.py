@@ -51,13 +51,18 @@ class SteadyVideo(Video):
         """The frames with these numbers up to `last`."""
         yield from self._read(numbers, min(last, len(self) - 1), None)
 
-    def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
-        """The brightness of all frames in order."""
-        row = 0
-        for number, grey in enumerate(self.source.grey_frames()):
-            while row < len(self) and self.numbers[row] == number:
-                yield grey if self.warps is None else self._warp(row, grey, self._plates[1])
-                row += 1
+    def grey_frames(
+        self, wanted: Container[int] | None = None
+    ) -> Iterator[UInt8[np.ndarray, "h w"]]:
+        """The brightness of all frames, or of the wanted ones, in order."""
+        rows = [t for t in range(len(self)) if wanted is None or t in wanted]
+        chosen = set(self.numbers[rows].tolist())
+        place = 0
+        for number, grey in zip(sorted(chosen), self.source.grey_frames(chosen), strict=True):
+            while place < len(rows) and self.numbers[rows[place]] == number:
+                plain = self.warps is None
+                yield grey if plain else self._warp(rows[place], grey, self._grey_plate)
+                place += 1
 
     def _read(
         self, wanted: Container[int], last: int, width: int | None
@@ -73,7 +78,7 @@ class SteadyVideo(Video):
             return
         read = self.source.chosen_frames(chosen, max(chosen))
         for row, picture in zip(rows, read, strict=True):
-            warped = picture if plain else self._warp(row, picture, self._plates[0])
+            warped = picture if plain else self._warp(row, picture, self._colour_plate)
             if width and width != self.width:
                 size = (width, max(1, round(self.height * width / self.width)))
                 warped = cv2.resize(warped, size, interpolation=cv2.INTER_AREA)
@@ -86,14 +91,21 @@ class SteadyVideo(Video):
         return _fill(*_warped(picture, self.warps[row], (self.width, self.height)), plate)
 
     @cached_property
-    def _plates(self) -> tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
-        """The scene that all frames together show, in colour and in brightness."""
+    def _colour_plate(self) -> UInt8[np.ndarray, "h w 3"]:
+        """The scene that all frames together show."""
+        chosen = self._plate_frames()
+        return self._plate(self.source.chosen_frames(chosen, max(chosen)), chosen)
+
+    @cached_property
+    def _grey_plate(self) -> UInt8[np.ndarray, "h w"]:
+        """The same in brightness."""
+        chosen = self._plate_frames()
+        return self._plate(self.source.grey_frames(chosen), chosen)
+
+    def _plate_frames(self) -> dict[int, int]:
+        """Rows of the frames that the scene is taken from, by their numbers in the source."""
         rows = np.unique(np.linspace(0, len(self) - 1, PLATE_FRAMES).astype(int))
-        chosen = dict(zip(self.numbers[rows].tolist(), rows.tolist(), strict=True))
-        colour = self.source.chosen_frames(chosen, max(chosen))
-        grey = (g for t, g in enumerate(self.source.grey_frames()) if t in chosen)
-        both = [self._plate(pictures, chosen) for pictures in (colour, grey)]
-        return both[0], both[1]
+        return dict(zip(self.numbers[rows].tolist(), rows.tolist(), strict=True))
 
     def _plate(self, pictures: Iterator[np.ndarray], chosen: dict[int, int]) -> np.ndarray:
         if self.warps is None:
@@ -139,7 +151,7 @@ def _warped(
 
 def _fill(picture: np.ndarray, seen: Bool[np.ndarray, "h w"], plate: np.ndarray) -> np.ndarray:
     if not seen.all():
-        picture[~seen] = plate[~seen]
+        np.copyto(picture, plate, where=~(seen if picture.ndim == 2 else seen[..., None]))
     return picture
 
 
@@ -148,9 +160,10 @@ def _masked_median(stack: np.ndarray, seen: Bool[np.ndarray, "n h w"]) -> np.nda
     count = seen.sum(axis=0)
     shaped = seen if stack.ndim == 3 else seen[..., None]
     # Unseen values sort to the end; the middle of the first `count` is the median.
-    ordered = np.sort(np.where(shaped, stack.astype(np.int16), 256), axis=0)
+    ordered = np.sort(np.where(shaped, stack, np.uint8(255)), axis=0)
     middle = np.maximum(count - 1, 0) // 2
     middle = middle if stack.ndim == 3 else np.repeat(middle[..., None], stack.shape[-1], axis=2)
-    median = np.take_along_axis(ordered, middle[None], axis=0)[0]
-    never = np.median(stack, axis=0)
-    return np.where(median > 255, never, median).astype(np.uint8)
+    median: np.ndarray = np.take_along_axis(ordered, middle[None], axis=0)[0]
+    never = count == 0
+    median[never] = np.median(stack[:, never], axis=0)
+    return median

@@ -99,10 +99,17 @@ class Video:
             if number in numbers:
                 yield self._picture(frame, None)
 
-    def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
-        """The brightness of all frames in order, in the range that the file stores."""
+    def grey_frames(
+        self, wanted: Container[int] | None = None
+    ) -> Iterator[UInt8[np.ndarray, "h w"]]:
+        """The brightness of all frames, or of the wanted ones, in the range that the file stores.
+
+        They come in order.
+        """
         grey: UInt8[np.ndarray, "h w"]
-        for frame in self._decoded(0, None):
+        for number, frame in enumerate(self._decoded(0, None)):
+            if wanted is not None and number not in wanted:
+                continue
             if frame.format.name in LUMA_FIRST:
                 plane = frame.planes[0]
                 pixels = np.frombuffer(memoryview(plane), np.uint8)

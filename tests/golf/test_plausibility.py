@@ -9,6 +9,7 @@ from golf_truth import camera_before, even_times, observe
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
 from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.motion_timing import TimeShift
 from keyrecon.golf.plausibility import find_doubts
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
@@ -61,6 +62,21 @@ def test_a_pace_that_nobody_swings_at_is_told(played):
     _, top, hit, finish = fitted.keys
     hasty = replace(fitted, keys=np.array([top - 0.5 * (hit - top), top, hit, finish]))
     assert "the tempo is 0.5 to 1" in texts(hasty, observations)
+
+
+def test_a_downswing_off_from_what_moves_in_the_pictures_is_told(played):
+    fitted, observations = played
+    middle = round(float(fitted.keys[1:3].mean()))
+
+    def told(*shift):
+        (doubt,) = find_doubts(fitted, observations, TimeShift(*shift))
+        assert abs(doubt.frame - middle) <= 1
+        return doubt.text
+
+    assert "come down 0.10 s later" in told(3.0, 0.35, 0.2, 0.5)
+    assert "come down 0.10 s earlier" in told(-3.0, -0.35, 0.2, 0.5)
+    assert "nothing moves where" in told(-3.0, -0.35, -0.1, 0.05)
+    assert find_doubts(fitted, observations, TimeShift(0.5, 0.06, 0.4, 0.45)) == []
 
 
 def test_a_club_elsewhere_or_nowhere_is_told(played):

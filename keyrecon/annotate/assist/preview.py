@@ -51,10 +51,13 @@ class Strip(Video):
             if place in numbers:
                 yield picture
 
-    def grey_frames(self) -> Iterator[UInt8[np.ndarray, "h w"]]:
-        """The brightness of all pictures."""
-        for picture in self.pictures:
-            yield cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+    def grey_frames(
+        self, wanted: Container[int] | None = None
+    ) -> Iterator[UInt8[np.ndarray, "h w"]]:
+        """The brightness of all pictures, or of those with the wanted places."""
+        for place, picture in enumerate(self.pictures):
+            if wanted is None or place in wanted:
+                yield cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
 
 def cut_strip(video: Video, frames: tuple[int, ...]) -> Strip:

@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solveh_banded
+from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.parameterisation import ROOT, spline_matrix
-from keyrecon.golf.fit.solver import ResidualBlock, add_rows, chain_rule, robust_weights
+from keyrecon.golf.fit.solver import ResidualBlock, SegmentEquations, robust_weights
 from keyrecon.golf.prior.kinematics import PoseRates, find_joints, place_body, pose_rates
 from keyrecon.golf.prior.motion_model import left_jacobian, posture_at, turn_posture
 from keyrecon.golf.prior.skeleton import CLUB, SEGMENTS
@@ -139,15 +140,15 @@ class _Problem:
         posture = self.posture(state)
         pose = place_body(body, posture, state)
         rates = _by_values(pose_rates(body, posture, state, pose), self.spline @ knots)
-        frames = len(state.phase)
-        normal, slope = np.zeros((frames, CHANNELS, CHANNELS)), np.zeros((frames, CHANNELS))
+        equations = SegmentEquations.none(pose)
         share, cost = min(1.0, INDEPENDENT_PER_SECOND / self.fps), 0.0
         for block in self.blocks:
             rows = block.residuals(pose)
             robust = robust_weights(rows, block.robust)
             weight = share * block.weight
             cost += weight * robust.cost
-            add_rows(normal, slope, rows, chain_rule(rows, pose, rates), weight * robust.weights)
+            equations.add(rows, pose, weight * robust.weights)
+        normal, slope = equations.by_unknowns(rates)
         cost += self._add_grip(normal, slope, pose, rates, share)
         lags, gradient = _on_knots(self.spline, normal, slope)
         cost += self._add_prior(lags, gradient, knots)
@@ -256,6 +257,6 @@ def _on_knots(
     flat = normal.reshape(len(normal), -1)
     lags = np.zeros((4, count, channels, channels))
     for lag in range(min(4, count)):
-        both = spline[:, : count - lag] * spline[:, lag:]
-        lags[lag, : count - lag] = (both.T @ flat).reshape(-1, channels, channels)
+        both = csr_array((spline[:, : count - lag] * spline[:, lag:]).T)
+        lags[lag, : count - lag] = (both @ flat).reshape(-1, channels, channels)
     return lags, spline.T @ slope

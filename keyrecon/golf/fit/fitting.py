@@ -44,7 +44,7 @@ from keyrecon.golf.fit.solver import (
     Problem,
     Regulariser,
     ResidualBlock,
-    chain_rule,
+    SegmentEquations,
     robust_weights,
     solve,
 )
@@ -329,6 +329,7 @@ def measure_influence(block: ResidualBlock, fit: SwingFit) -> float:
     pose = place_body(fit.body, posture, fit.state)
     rows = block.residuals(pose)
     rates = pose_rates(fit.body, posture, fit.state, pose)
-    slopes = chain_rule(rows, pose, rates) * TYPICAL_STEPS
-    weights = robust_weights(rows, 10 * block.robust).weights
-    return float(((slopes**2).sum(axis=1) * weights).sum())
+    equations = SegmentEquations.none(pose)
+    equations.add(rows, pose, robust_weights(rows, 10 * block.robust).weights)
+    normal, _ = equations.by_unknowns(rates)
+    return float(np.trace(normal.sum(axis=0) * TYPICAL_STEPS**2))

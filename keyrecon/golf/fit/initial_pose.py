@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.prior.kinematics import find_joints, place_body
-from keyrecon.golf.prior.motion_model import posture_at
+from keyrecon.golf.prior.motion_model import cross_matrix, left_jacobian, posture_at
 from keyrecon.golf.records import (
     Body,
     Camera,
@@ -64,18 +64,33 @@ def estimate_initial_pose(
     depth = camera.focal / max(tall, 1e-6)
     middle = (pixels.mean(axis=0) - camera.principal) * depth / camera.focal
 
+    def turned(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
+        there: np.ndarray = Rotation.from_rotvec(unknown[:3]).as_matrix() @ base
+        return there
+
     def errors(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
-        turned = Rotation.from_rotvec(unknown[:3]).as_matrix() @ base
-        projected, _ = project(points @ turned.T + unknown[3:], camera)
-        up = turned[:, 1]
+        turn = turned(unknown, base)
+        projected, _ = project(points @ turn.T + unknown[3:], camera)
         off = ((projected - pixels) / JOINT_SPREAD).ravel()
-        return np.concatenate([off, up[[0, 2]] / LEAN_SPREAD])
+        return np.concatenate([off, turn[[0, 2], 1] / LEAN_SPREAD])
+
+    def slopes(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
+        turn = turned(unknown, base)
+        rate = left_jacobian(unknown[:3])
+        arms = points @ turn.T
+        moved = np.tile(np.eye(3, 6, 3), (len(arms), 1, 1))
+        moved[:, :, :3] = -cross_matrix(arms) @ rate
+        _, slope = project(arms + unknown[3:], camera)
+        lean = np.zeros((2, 6))
+        lean[:, :3] = -(cross_matrix(turn[:, 1]) @ rate)[[0, 2]]
+        off = (slope @ moved).reshape(-1, 6)
+        return np.concatenate([off / JOINT_SPREAD, lean / LEAN_SPREAD])
 
     placements: list[tuple[float, Placement]] = []
     for heading in np.linspace(0, 2 * np.pi, HEADINGS, endpoint=False):
         base = LEVEL @ Rotation.from_euler("y", heading).as_matrix()
         start = np.append(middle, depth) - base @ points.mean(axis=0)
-        fit = least_squares(errors, np.concatenate([np.zeros(3), start]), args=(base,),
+        fit = least_squares(errors, np.concatenate([np.zeros(3), start]), slopes, args=(base,),
                             loss="soft_l1", max_nfev=60)  # fmt: skip
         turn = Rotation.from_rotvec(fit.x[:3]).as_matrix()
         placements.append((fit.cost, Placement(turn @ base, fit.x[3:])))

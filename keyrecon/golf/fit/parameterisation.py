@@ -7,6 +7,7 @@ bases; with identities it is the paper's form.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -43,14 +44,35 @@ class SplineBasis:
         """Where the unknowns of G stand."""
         return slice(self.n_coefficients + self.phase.shape[1], self.size)
 
-    def frame_unknowns(self, frame: int) -> Float[np.ndarray, "L S"]:
-        """What coefficients, phase and G of one frame are made of; L = m + 1 + 6."""
-        number = self.n_coefficients
-        rows = np.zeros((number + 1 + ROOT, self.size))
-        rows[:number, :number] = np.eye(number)
-        rows[number, self.phase_columns] = self.phase[frame]
-        rows[number + 1 :, self.root_columns] = np.kron(self.root[frame], np.eye(ROOT))
+    @cached_property
+    def _local(self) -> Float[np.ndarray, "T 7 Z"]:
+        """What phase and G of every frame are made of, the coefficients left out."""
+        frames, phases = self.phase.shape
+        rows = np.zeros((frames, 1 + ROOT, self.size - self.n_coefficients))
+        rows[:, 0, :phases] = self.phase
+        rows[:, 1:, phases:] = np.einsum("tb,ij->tibj", self.root, np.eye(ROOT)).reshape(
+            frames, ROOT, -1
+        )
         return rows
+
+    def gather(
+        self, normal: Float[np.ndarray, "T L L"], slope: Float[np.ndarray, "T L"]
+    ) -> tuple[Float[np.ndarray, "S S"], Float[np.ndarray, "S"]]:
+        """Normal equations of frames, by coefficients, phase and G, as those of the unknowns.
+
+        L = m + 1 + 6.
+        """
+        number, spread = self.n_coefficients, self._local
+        flat = spread.reshape(-1, spread.shape[2])
+        common = normal[:, number:, :number].reshape(len(flat), number)
+        matrix = np.empty((self.size, self.size))
+        matrix[:number, :number] = normal[:, :number, :number].sum(axis=0)
+        matrix[number:, :number] = flat.T @ common
+        matrix[:number, number:] = matrix[number:, :number].T
+        local = normal[:, number:, number:] @ spread
+        matrix[number:, number:] = flat.T @ local.reshape(flat.shape)
+        gradient = [slope[:, :number].sum(axis=0), flat.T @ slope[:, number:].ravel()]
+        return matrix, np.concatenate(gradient)
 
 
 @dataclass(frozen=True)

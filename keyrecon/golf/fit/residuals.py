@@ -35,6 +35,7 @@ from keyrecon.golf.records import (
     Residuals,
     RootPose,
 )
+from keyrecon.io.frame_reader import side_by_side
 from keyrecon.numerics.geometry import unit_vectors
 
 # segment, start and end (x, along, z in statures; along: share of the segment), radii in statures,
@@ -99,6 +100,9 @@ capsules overlap, and the middle."""
 SILHOUETTE_STEP = 4
 """Pixels of the video per pixel of the distance transforms: a distance changes by no more than its
 step, so a coarse grid read between its pixels loses nothing of note."""
+
+LINES_AT_ONCE = 8192
+"""Lines of sight that a core passes by all capsules at a time: a millisecond or two of work."""
 
 Vectors = Float[np.ndarray, "n 3"]
 
@@ -313,18 +317,29 @@ def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
     vanishes at u = k h / sqrt(g (g - k^2)), k the change of the radius along the axis. All squares
     follow from how far both vectors go along the line.
     """
-    frame, starts, radii = lines.frame, axes.starts, axes.radii
+    starts, radii = axes.starts, axes.radii
     ways = axes.ends - starts
     first, along = _along(lines, starts), _along(lines, ways)
-    g = np.maximum(_dot(ways, ways)[frame] - along**2, 1e-12)
-    slope = _dot(starts, ways)[frame] - first * along
-    square = _dot(starts, starts)[frame] - first**2
-    h = np.sqrt(np.maximum(square - slope**2 / g, 0.0))
+    long, both, away = _dot(ways, ways), _dot(starts, ways), _dot(starts, starts)
     k = radii[:, 1] - radii[:, 0]
-    slant = k * h / np.sqrt(g * np.maximum(g - k**2, 1e-12))
-    q = np.clip(slant - slope / g, 0.0, 1.0)
-    reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
-    return Passing(q, reach - (radii[:, 0] + q * k))
+
+    def pass_some(some: slice) -> Passing:
+        frame = lines.frame[some]
+        g = np.maximum(long[frame] - along[some] ** 2, 1e-12)
+        slope = both[frame] - first[some] * along[some]
+        square = away[frame] - first[some] ** 2
+        h = np.sqrt(np.maximum(square - slope**2 / g, 0.0))
+        slant = k * h / np.sqrt(g * np.maximum(g - k**2, 1e-12))
+        q = np.clip(slant - slope / g, 0.0, 1.0)
+        reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
+        return Passing(q, reach - (radii[:, 0] + q * k))
+
+    parts = [slice(a, a + LINES_AT_ONCE) for a in range(0, max(1, len(first)), LINES_AT_ONCE)]
+    done = list(side_by_side(pass_some, parts) if len(parts) > 1 else map(pass_some, parts))
+    return Passing(
+        np.concatenate([part.place for part in done]),
+        np.concatenate([part.distance for part in done]),
+    )
 
 
 def _along(lines: SightLines, vectors: Float[np.ndarray, "T Q 3"]) -> Float[np.ndarray, "n Q"]:

@@ -1,8 +1,9 @@
 """The least-squares problem of a swing, linearised frame by frame (CVPR 2005, Section 4).
 
 The chain rule (IC/2004/90, Eq. 3-4) turns the slope of a residual by a point of the body into
-slopes by coefficients, phase and root pose G of one frame; normal equations are summed frame by
-frame and only then spread over the unknowns, so that cost grows linearly with the number of frames.
+slopes by coefficients, phase and root pose G of one frame. Normal equations are summed segment by
+segment, then frame by frame, and only then spread over the unknowns, so that cost grows linearly
+with the number of frames and hardly with that of residuals.
 """
 
 from collections.abc import Callable, Sequence
@@ -91,35 +92,70 @@ def _linearise(problem: Problem, state: SwingState) -> LinearisedProblem:
         posture = turn_posture(posture, state.deviation)
     pose = place_body(problem.body, posture, state)
     rates = pose_rates(problem.body, posture, state, pose)
-    frames, unknowns = len(state.phase), rates.origins.shape[-1]
-    normal, slope = (
-        np.zeros((frames, unknowns, unknowns)),
-        np.zeros((frames, unknowns)),
-    )
-    cost = 0.0
+    equations, cost = SegmentEquations.none(pose), 0.0
     for block in problem.blocks:
         rows = block.residuals(pose)
         robust = robust_weights(rows, block.robust)
         cost += block.weight * robust.cost
-        add_rows(normal, slope, rows, chain_rule(rows, pose, rates), block.weight * robust.weights)
+        equations.add(rows, pose, block.weight * robust.weights)
     expected = problem.regulariser(state)
-    matrix = expected.slopes.T @ expected.slopes
-    gradient = expected.slopes.T @ expected.values
-    for t in range(frames):
-        spread = problem.basis.frame_unknowns(t)
-        matrix += spread.T @ normal[t] @ spread
-        gradient += spread.T @ slope[t]
+    matrix, gradient = problem.basis.gather(*equations.by_unknowns(rates))
+    matrix += expected.slopes.T @ expected.slopes
+    gradient += expected.slopes.T @ expected.values
     return LinearisedProblem(cost + float(expected.values @ expected.values), matrix, gradient)
 
 
-def chain_rule(rows: Residuals, pose: RootPose, rates: PoseRates) -> Float[np.ndarray, "n L"]:
-    """Slopes of residuals by coefficients, phase and G of their frame."""
-    place = rows.frame, rows.segment
-    arm = rows.point - pose.origins[place]
-    moved, turned = rates.origins[place], rates.rotations[place]
-    return np.einsum("ni,nil->nl", rows.gradient, moved) + np.einsum(
-        "ni,nil->nl", np.cross(arm, rows.gradient), turned
-    )
+TWIST = 6
+"""Unknowns of a segment: the velocity of its origin, then its rotation velocity."""
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentEquations:
+    """Normal equations by how every segment moves, summed over all residuals that hang on it.
+
+    A residual's slope by the unknowns is its slope by the twist of its segment times the twist's by
+    the unknowns, so what a segment's residuals tell is 6 x 6 numbers, however many they are.
+    """
+
+    normal: Float[np.ndarray, "T P 6 6"]
+    slope: Float[np.ndarray, "T P 6"]
+
+    @classmethod
+    def none(cls, pose: RootPose) -> "SegmentEquations":
+        """Those of no residuals."""
+        places = pose.origins.shape[:2]
+        return cls(np.zeros((*places, TWIST, TWIST)), np.zeros((*places, TWIST)))
+
+    def add(self, rows: Residuals, pose: RootPose, weight: Float[np.ndarray, "n"]) -> None:
+        """Add residuals with their weights."""
+        if not len(rows.values):
+            return
+        frames, segments = self.slope.shape[:2]
+        place = rows.frame * segments + rows.segment
+        arm = rows.point - pose.origins[rows.frame, rows.segment]
+        slopes = np.concatenate([rows.gradient, np.cross(arm, rows.gradient)], axis=1).T
+
+        def total(values: Float[np.ndarray, "n"]) -> Float[np.ndarray, "T P"]:
+            return np.bincount(place, values, frames * segments).reshape(frames, segments)
+
+        for i, weighted in enumerate(slopes * weight):
+            self.slope[..., i] += total(weighted * rows.values)
+            for j in range(i + 1):
+                product = total(weighted * slopes[j])
+                self.normal[..., i, j] += product
+                if i != j:
+                    self.normal[..., j, i] += product
+
+    def by_unknowns(
+        self, rates: PoseRates
+    ) -> tuple[Float[np.ndarray, "T L L"], Float[np.ndarray, "T L"]]:
+        """The same by coefficients, phase and G of every frame."""
+        frames, segments = self.slope.shape[:2]
+        twists = np.concatenate([rates.origins, rates.rotations], axis=2)
+        flat = twists.reshape(frames, segments * TWIST, -1).swapaxes(1, 2)
+        weighted = (self.normal @ twists).reshape(frames, segments * TWIST, -1)
+        slope = flat @ self.slope.reshape(frames, -1, 1)
+        return flat @ weighted, slope[..., 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,21 +176,3 @@ def robust_weights(rows: Residuals, robust: float) -> RobustWeights:
     square = np.bincount(rows.group, rows.values**2)
     far = 1 + square / robust**2
     return RobustWeights((1 / far**2)[rows.group], float((square / far).sum()))
-
-
-def add_rows(
-    normal: Float[np.ndarray, "T L L"],
-    slope: Float[np.ndarray, "T L"],
-    rows: Residuals,
-    slopes: Float[np.ndarray, "n L"],
-    weight: Float[np.ndarray, "n"],
-) -> None:
-    """Add rows to the normal equations of their frames."""
-    order = np.argsort(rows.frame, kind="stable")
-    bounds = np.searchsorted(rows.frame[order], np.arange(len(normal) + 1))
-    for t in range(len(normal)):
-        of_frame = order[bounds[t] : bounds[t + 1]]
-        if len(of_frame):
-            weighted = slopes[of_frame] * weight[of_frame, None]
-            normal[t] += weighted.T @ slopes[of_frame]
-            slope[t] += weighted.T @ rows.values[of_frame]

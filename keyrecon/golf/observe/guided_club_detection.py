@@ -336,8 +336,10 @@ def detect_clubs(
 def median_picture(video: Video) -> Float[np.ndarray, "h w"]:
     """The scene, and what of the player hardly moves."""
     chosen = set(np.linspace(0, len(video) - 1, MEDIAN_FRAMES).astype(int).tolist())
-    pictures = [g for t, g in enumerate(video.grey_frames()) if t in chosen]
-    return np.median(np.stack(pictures), axis=0).astype(np.float32)
+    ordered = np.sort(np.stack(list(video.grey_frames(chosen))), axis=0)
+    middle = ordered[[(len(ordered) - 1) // 2, len(ordered) // 2]]
+    median: Float[np.ndarray, "h w"] = middle.mean(axis=0, dtype=np.float32)
+    return median
 
 
 def _choose(

@@ -20,6 +20,7 @@ Constants were chosen on rendered swings; see benchmarks/golf.py.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -348,13 +349,12 @@ def _hand_speeds(
 ) -> list[Float[np.ndarray, "_"]]:
     """Speed of the hands in the picture in parts of the video, heights per second."""
     steps = np.full((len(tracks.hands), 2), np.nan)
-    before: UInt8[np.ndarray, "h w"] | None = None
-    for t, picture in enumerate(video.grey_frames()):
-        after = np.ascontiguousarray(picture)
-        if before is not None and any(part.start < t < part.stop for part in parts):
-            points = _points_on_hands(tracks, t - 1, options)
-            steps[t - 1] = _find_step(before, after, points, tracks.height, options)
-        before = after
+    wanted = sorted({t for part in parts for t in range(part.start, part.stop)})
+    greys = (np.ascontiguousarray(picture) for picture in video.grey_frames(set(wanted)))
+    for (t, before), (following, after) in pairwise(zip(wanted, greys, strict=True)):
+        if following == t + 1:
+            points = _points_on_hands(tracks, t, options)
+            steps[t] = _find_step(before, after, points, tracks.height, options)
     return [_speed(steps[part.start : part.stop - 1], video.fps) for part in parts]
 
 
