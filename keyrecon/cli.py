@@ -40,6 +40,7 @@ class Command(NamedTuple):
 COMMANDS: dict[str, Command | dict[str, Command]] = {
     "demo": Command("keyrecon.commands", "projects", "demo"),
     "new": Command("keyrecon.commands", "projects", "new"),
+    "add": Command("keyrecon.commands", "projects", "add"),
     "pick": Command("keyrecon.commands", "projects", "pick"),
     "keyframes": Command("keyrecon.commands", "reconstruction", "keyframes"),
     "annotate": Command("keyrecon.commands", "projects", "annotate"),

@@ -30,7 +30,6 @@ from keyrecon.timeline import (
     part_of_anchors,
     part_of_path,
     part_of_picks,
-    part_of_video,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.shot_sorting import ShotOptions, Sighting, sight_player, sort_shots
@@ -140,7 +139,7 @@ def _shot(
     sized &= {pick.frame for pick in picks if pick.part == "foot"}
     return _Shot(
         f"@{part.start}",
-        part_of_video(video, part),
+        video.part(part),
         part_of_path(camera, part),
         replace(colors, height=picked_height(picks)) if sized else colors,
         part_of_anchors(anchors, part),

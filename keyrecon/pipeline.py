@@ -50,7 +50,6 @@ from keyrecon.timeline import (
     join_frames,
     motion_in_file,
     part_of_marks,
-    part_of_video,
     put_back,
     take_frames,
 )
@@ -315,7 +314,7 @@ def follow_marks(
             frames.append(inside)
             flows.append(
                 keep(
-                    f"flow@{part.start}", track_marked_joints, part_of_video(video, part),
+                    f"flow@{part.start}", track_marked_joints, video.part(part),
                     shot_marks, options=options.flow, progress=progress,
                 )
             )  # fmt: skip

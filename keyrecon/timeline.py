@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.io.video import Video
 from keyrecon.records import (
     SOURCES,
     Annotations,
@@ -52,12 +51,6 @@ def join_frames(records: Sequence[PerFrame]) -> PerFrame:
             for field in fields(records[0])
         }
     )
-
-
-def part_of_video(video: Video, frames: slice | Int[np.ndarray, "n"]) -> Video:
-    """A video of some frames; its times stay those of the whole."""
-    inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
-    return Video(**(inherited | {"stamps": video.stamps[frames], "time": video.time[frames]}))
 
 
 def part_of_path(camera: CameraPath, frames: slice | Int[np.ndarray, "n"]) -> CameraPath:

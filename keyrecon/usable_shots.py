@@ -21,7 +21,6 @@ from keyrecon.timeline import (
     part_of_keyframes,
     part_of_marks,
     part_of_path,
-    part_of_video,
     spread_distances,
     spread_edges,
     spread_track,
@@ -69,7 +68,7 @@ def part_of_preparation(preparation: Preparation, frames: Int[np.ndarray, "n"]) 
     number = preparation.shots.number[frames]
     cuts = np.flatnonzero((np.diff(frames) > 1) | (np.diff(number) > 0)) + 1
     return Preparation(
-        part_of_video(preparation.video, frames),
+        preparation.video.part(frames),
         part_of_path(preparation.camera, frames),
         preparation.colors,
         take_frames(preparation.track, frames),

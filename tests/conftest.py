@@ -16,7 +16,7 @@ def pytest_collection_modifyitems(items):
 def write_numbered(tmp_path_factory):
     """Write a video of numbered pictures with the given times (ticks of 1/600 s)."""
 
-    def write(name, ticks, options=None, codec="libx264", turn=0):
+    def write(name, ticks, options=None, codec="libx264"):
         path = tmp_path_factory.mktemp("video") / name
         with av.open(str(path), "w") as container:
             stream = container.add_stream(codec, rate=50, options=options or {})

@@ -60,7 +60,7 @@ def one_line(code, err, *words):
     "verb",
     [
         *("demo", "new", "pick", "keyframes", "annotate", "import"),
-        *("run", "export", "evaluate", "synth", "relink"),
+        *("run", "export", "evaluate", "synth", "relink", "add"),
     ],
 )
 def test_every_command_explains_itself(keyrecon, verb):
@@ -234,6 +234,16 @@ def test_a_moved_video_is_relinked(keyrecon, project, tmp_path):
     assert keyrecon("pick", project, "--frame", 0, "--head", "5,20")[0] == 0
 
 
+def test_another_file_is_added_and_its_frames_numbered_on(keyrecon, project, write_numbered):
+    second = write_numbered("second.mp4", list(range(0, 120, 12)))
+    code, out, _ = keyrecon("add", second, "--project", project, "--start", 2)
+    assert code == 0
+    assert "8 frames" in out
+    assert "numbered from 20 on; 28 in all" in out
+    assert keyrecon("pick", project, "--frame", 27, "--head", "5,20")[0] == 0
+    assert one_line(*keyrecon("pick", project, "--frame", 28, "--head", "5,20")[::2], "0 to 27")
+
+
 def test_a_motion_that_is_not_there(keyrecon, project, tmp_path):
     code, _, err = keyrecon("export", project, tmp_path / "m.bvh")
     assert one_line(code, err, "keyrecon run")
@@ -364,6 +374,8 @@ def test_public_names_are_there_for_programs_and_for_type_checkers():
         ("keyframes", "{p}", "--camera.width", "1000000000"),
         ("import", "{p}", "{p}/bad.npz"),
         ("relink", "{p}", "{p}/bad.npz"),
+        ("add", "{p}/bad.npz", "--project", "{p}"),
+        ("add", "{p}/../video.mp4", "--project", "{p}"),
     ],
 )
 def test_a_refused_command_leaves_the_project_as_it_was(project, keyrecon, words):

@@ -23,7 +23,6 @@ from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
 from keyrecon.report.drawing import point_out
-from keyrecon.timeline import part_of_video
 from keyrecon.uncertainty import unsure_track
 
 
@@ -155,7 +154,7 @@ def write_keyframe_pictures(
     """
     make_folder(workspace.pictures)
     frames = preparation.keyframes.frames
-    pictures = part_of_video(preparation.video, frames).frames()
+    pictures = preparation.video.part(frames).frames()
     shown = progress(pictures, "Writing keyframe pictures", len(frames))
 
     def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:

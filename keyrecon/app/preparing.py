@@ -179,14 +179,16 @@ def describe_shots(shots: Shots) -> list[str]:
     """How many shots there are, which of them show the player, and what the others show."""
     if len(shots.parts) == 1:
         return []
-    used = sum(shots.usable)
     listed = [
         f"{number} ({part.start}-{part.stop - 1}) {shown}"
         for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
     ]
     more = f"; and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
+    told = f"{'; '.join(listed[:MOST_LISTED])}{more}"
+    if all(shots.usable):
+        return [f"{len(listed)} shots, all usable (frames): {told}."]
     return [
-        f"{len(listed)} shots, {used} usable (frames): {'; '.join(listed[:MOST_LISTED])}{more}. "
+        f"{len(listed)} shots, {sum(shots.usable)} usable (frames): {told}. "
         "Nothing is made of the others; where this is wrong, say so with --shots.use or "
         "--shots.skip and their numbers, or mark the player there."
     ]

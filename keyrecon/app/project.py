@@ -63,6 +63,26 @@ def start(
     )
 
 
+def add_video(
+    workspace: Workspace, video: Path, trim: tuple[int, int | None], slow_motion: float = 1.0
+) -> str:
+    """Go on with another file of the same player; what was marked stays."""
+    if workspace.is_golf:
+        raise KeyreconError("A golf swing is one video; start a project for each swing.")
+    before = len(workspace.video())
+    first, end = trim
+    told: dict[str, float | None] = {"start": first or None, "end": end}
+    told["slow_motion"] = None if slow_motion == 1 else slow_motion
+    together = workspace.add_video(video, {n: v for n, v in told.items() if v is not None})
+    folder = quoted(workspace.folder)
+    return (
+        f"{workspace.folder}: {counted(len(together) - before, 'frame')} of {video} were added, "
+        f"numbered from {before} on; {len(together)} in all. What was marked stays.\n"
+        f"Next: keyrecon keyframes {folder}, which asks for what is new, then keyrecon annotate "
+        f"{folder}"
+    )
+
+
 def point(text: str, flag: str) -> tuple[float, float]:
     """Parse X,Y."""
     try:

@@ -157,6 +157,32 @@ def evaluate(
     print(describe_accuracy(motion, truth))
 
 
+def add(
+    video: VideoFile,
+    project: Annotated[Path, arg(metavar="FOLDER")],
+    start: int = 0,
+    end: MaybeWhole = None,
+    slowmo: float = 1.0,
+) -> None:
+    """Add another video of the same player to a project.
+
+    Its frames are numbered on behind those that are there. Colours, body lengths and marks count
+    for all files together, so that only poses are asked for that were not marked yet. The files
+    must have pictures of one size and the same frame rate.
+
+    Args:
+        video: An mp4, mov, mkv or avi file.
+        project: Project folder.
+        start: First frame of the file to use.
+        end: Frame after the last one to use; all to the end by default.
+        slowmo: How many times slower than life the video plays.
+    """
+    from keyrecon.app.project import add_video
+    from keyrecon.io.workspace import Workspace
+
+    print(add_video(Workspace(project), video, (start, end), slowmo))
+
+
 def relink(project: Project, video: VideoFile) -> None:
     """Tell a project where its video has moved to.
 

@@ -7,6 +7,10 @@
     path = "../rally.mp4"
     fingerprint = "..."
 
+    [[added]]                     # further files, one after the other
+    path = "../second.mp4"
+    fingerprint = "..."
+
     [options]
     keyframes.budget = 0.05
 
@@ -60,7 +64,11 @@ def _checked(project: Project, path: Path) -> Project:
         )
     if version is True or version != VERSION:
         raise ValueError(f"version cannot be {version!r}")
-    _check_video(project["video"])
+    added = project.get("added", [])
+    if not isinstance(added, list):
+        raise TypeError("added must be a list of tables")
+    for table in (project["video"], *added):
+        _check_video(table)
     if project.get("kind", KINDS[0]) not in KINDS:
         raise ValueError(f"kind cannot be {project['kind']!r}")
     if not isinstance(options := project.get("options", {}), dict):
@@ -95,13 +103,30 @@ def new_project(
     return _proven(document.as_string(), project, path)
 
 
-def with_video_path(path: Path, video_path: str) -> str:
-    """The file's text with another place of its video."""
+def with_video_path(path: Path, video_path: str, number: int = 0) -> str:
+    """The file's text with another place of its video, or of the `number`-th that was added."""
     document, project = _parse(path)
-    table: Any = document["video"]
-    table["path"] = video_path
-    project["video"]["path"] = video_path
+    for content in (document, project):
+        table: Any = content["added"][number - 1] if number else content["video"]
+        table["path"] = video_path
     return _proven(document.as_string(), project, path)
+
+
+def with_added_video(path: Path, video: Mapping[str, str | float | None]) -> str:
+    """The file's text with one more video."""
+    import tomlkit
+
+    document, project = _parse(path)
+    told = {n: v for n, v in video.items() if v is not None}
+    table = tomlkit.table()
+    table.update(told)
+    if "added" not in document:
+        document.add("added", tomlkit.aot())
+    added: Any = document["added"]
+    added.append(table)
+    return _proven(
+        document.as_string(), {**project, "added": [*project.get("added", []), told]}, path
+    )
 
 
 def with_kind(path: Path, kind: str) -> str:

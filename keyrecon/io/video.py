@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -74,6 +74,21 @@ class Video:
     def __len__(self) -> int:
         """Number of frames."""
         return len(self.stamps)
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return self.path.name
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Frames with which another file begins; of one file none."""
+        return ()
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
+        """A video of some frames; its times stay those of the whole."""
+        inherited = {field.name: getattr(self, field.name) for field in fields(Video)}
+        return Video(**(inherited | {"stamps": self.stamps[frames], "time": self.time[frames]}))
 
     @property
     def variable_rate(self) -> bool:

@@ -18,7 +18,6 @@
 What a person made is written durably and never replaced by something that does not parse.
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,6 +38,7 @@ from keyrecon.io.formats.shot_choices import (
     read_shot_choices,
     write_shot_choices,
 )
+from keyrecon.io.joined_video import join_videos
 from keyrecon.io.option_tables import (
     Record,
     changed_options,
@@ -51,12 +51,21 @@ from keyrecon.io.option_tables import (
 from keyrecon.io.project_file import (
     new_project,
     read_project,
+    with_added_video,
     with_kind,
     with_options,
     with_video_path,
 )
+from keyrecon.io.project_videos import (
+    describe_video,
+    open_project_video,
+    possible_places,
+    relative_path,
+    shares_frames,
+    which_video,
+)
 from keyrecon.io.stages import StageStore
-from keyrecon.io.video import Video, has_fingerprint, open_video
+from keyrecon.io.video import Video, open_video
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
 from keyrecon.world.records import CourtClick, GroundMarks
@@ -192,57 +201,47 @@ class Workspace:
         file = folder / "project.toml"
         if file.exists():
             raise KeyreconError(f"{file} exists already; choose another folder for a new project.")
-        table = {"path": _relative(video_file, folder), "fingerprint": video.fingerprint, **trim}
-        text = new_project(file, table, kind)
+        text = new_project(file, describe_video(video, video_file, folder, trim), kind)
         make_folder(folder)
         write_durably(file, text)
         return cls(folder)
 
-    def video(self) -> Video:
-        """The project's video; looks beside the project when it has moved."""
-        wanted = self.project["video"]
-        path = (self.folder / wanted["path"]).resolve()
-        if not path.is_file():
-            path = self._find_video(Path(wanted["path"]).name, wanted["fingerprint"])
-        elif not has_fingerprint(path, wanted["fingerprint"]):
-            raise KeyreconError(
-                f"{path} has changed since the project was made (its fingerprint differs); "
-                "bring the old file back, or start a new project for the new one."
-            )
-        return open_video(
-            path,
-            wanted.get("start", 0),
-            wanted.get("end"),
-            wanted.get("slow_motion", 1.0),
-        )
+    @property
+    def _videos(self) -> list[dict]:
+        """What project.toml tells of each video."""
+        return [self.project["video"], *self.project.get("added", [])]
 
-    def _places_of_video(self) -> tuple[Path, Path]:
-        """Where a video is looked for that has moved."""
-        return self.folder, self.folder.resolve().parent
+    def video(self) -> Video:
+        """The project's video, of all its files; looks beside the project for one that has moved.
+
+        Raises KeyreconError where one is gone, or has changed since.
+        """
+        return open_project_video(self.folder, self._videos)
+
+    def add_video(self, file: Path, trim: dict) -> Video:
+        """Go on with another file behind those that are there; returns all together.
+
+        Raises KeyreconError, and changes nothing, where it does not fit to them.
+        """
+        alone = open_video(
+            file, trim.get("start", 0), trim.get("end"), trim.get("slow_motion", 1.0)
+        )
+        table = describe_video(alone, file, self.folder, trim)
+        if any(shares_frames(table, present) for present in self._videos):
+            raise KeyreconError(f"Frames of {file} are in the project already.")
+        together = join_videos([self.video(), alone])
+        with self.exclusive():
+            write_durably(self.project_file, with_added_video(self.project_file, table))
+        self.project = read_project(self.project_file)
+        return together
 
     def relink(self, video_file: Path) -> None:
-        """Point the project at the place its video has moved to."""
-        if not video_file.is_file():
-            raise KeyreconError(f"There is no video at {video_file}.")
-        if not has_fingerprint(video_file, self.project["video"]["fingerprint"]):
-            raise KeyreconError(
-                f"{video_file} is not the video of this project (its fingerprint differs); "
-                "start a new project for it with: keyrecon new"
-            )
+        """Point the project at the place that a video of it has moved to."""
+        number = which_video(self._videos, video_file)
         with self.exclusive():
-            place = _relative(video_file, self.folder)
-            write_durably(self.project_file, with_video_path(self.project_file, place))
+            place = relative_path(video_file, self.folder)
+            write_durably(self.project_file, with_video_path(self.project_file, place, number))
         self.project = read_project(self.project_file)
-
-    def _find_video(self, name: str, fingerprint: str) -> Path:
-        for place in self._places_of_video():
-            candidate = place / name
-            if candidate.is_file() and has_fingerprint(candidate, fingerprint):
-                return candidate
-        raise KeyreconError(
-            f"The video {self.project['video']['path']} is not where the project expects it; "
-            f"tell where it is now with: keyrecon relink {quoted(self.folder)} VIDEO"
-        )
 
     def picks(self) -> tuple[Pick, ...]:
         """What a person clicked, in one order: stage results do not hang on who clicked first.
@@ -338,17 +337,16 @@ class Workspace:
         """Files there are that hold a person's work, or from which the rest is made."""
         names = ("*.toml", "*.json", "*.sqlite*", self.motion_file.name, self.report_file.name)
         files = [file for name in names for file in self.folder.glob(name)]
-        video = Path(self.project["video"]["path"])
-        places = [self.folder / video, *(place / video.name for place in self._places_of_video())]
+        places = possible_places(self.folder, self._videos)
         return files + [file for file in places if file.is_file()]
 
     def needs(self, file: Path) -> bool:
         """Whether a file's place is one of the project's own, whether there is a file or not."""
         inside = file.parent.exists() and file.parent.samefile(self.folder)
-        video = self.folder / self.project["video"]["path"]
+        videos = [(self.folder / table["path"]).resolve() for table in self._videos]
         return (
             (inside and file.name.lower() in OWN_NAMES)
-            or file.resolve() == video.resolve()
+            or file.resolve() in videos
             or (file.exists() and any(kept.samefile(file) for kept in self.kept_files()))
         )
 
@@ -394,8 +392,3 @@ def _section_of(name: str) -> str | None:
 
 def _without_sections(options: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in options.items() if name not in SECTIONS}
-
-
-def _relative(path: Path, folder: Path) -> str:
-    """`path` as seen from `folder`, with forward slashes."""
-    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()

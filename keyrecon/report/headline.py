@@ -20,7 +20,7 @@ def opening(material: ReportMaterial) -> str:
         " more in depth"
     )
     return (
-        f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.path.name)}</h1>'
+        f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.name)}</h1>'
         f'<p class="lead">{video.width} &times; {video.height} px, {motion.time[-1]:.1f} s, '
         f"{len(motion.time):,} frames, {len(marked_frames(material.annotations))} of them marked "
         f"by a person{sure}</p>{''.join(note(text(line)) for line in material.shots)}</header>"

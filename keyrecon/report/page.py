@@ -56,7 +56,7 @@ def write_report(path: Path, material: ReportMaterial, progress: Progress = sile
 
 def build_page(material: ReportMaterial, pictures: Pictures) -> str:
     """The whole page as text."""
-    title = text(material.video.path.name)
+    title = text(material.video.name)
     navigation = _navigation(material, pictures)
     style = (files("keyrecon.report") / "report.css").read_text("utf-8")
     scripts = (get_plotlyjs(), bundle_scripts(*SCRIPTS))

@@ -31,7 +31,6 @@ from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import CameraPath, Shots
 from keyrecon.segmentation.static_overlay import StaticOverlay
-from keyrecon.timeline import part_of_video
 from keyrecon.tracking.shots import CutDetector
 
 Grey = UInt8[np.ndarray, "h w"]
@@ -166,15 +165,16 @@ def estimate_camera_motion(
     """
     detector = CutDetector()
     path = estimate_shot_motion(video, options, progress, detector)
-    if not detector.cuts:
+    cuts = tuple(sorted({*detector.cuts, *video.joints}))
+    if not cuts:
         return path
-    shots = Shots.between(tuple(detector.cuts), len(video))
+    shots = Shots.between(cuts, len(video))
     parts = progress(shots.parts, "Estimating the camera's motion in each shot", len(shots.parts))
-    paths = [estimate_shot_motion(part_of_video(video, part), options) for part in parts]
+    paths = [estimate_shot_motion(video.part(part), options) for part in parts]
     return CameraPath(
         np.concatenate([path.to_reference for path in paths]),
         np.concatenate([path.confidence for path in paths]),
-        tuple(detector.cuts),
+        cuts,
         tuple(detector.dissolves),
     )
 

@@ -10,7 +10,6 @@ from keyrecon import KeyreconError
 from keyrecon.io.frame_reader import read_grey, read_small
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.video import open_video
-from keyrecon.timeline import part_of_video
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -224,7 +223,7 @@ def test_a_video_of_parts_has_their_pictures_whatever_lies_between(
     monkeypatch.setattr("keyrecon.io.video.SOUGHT_SECONDS", 0.0)
     monkeypatch.setattr("keyrecon.io.video.SOUGHT_FRAMES", longest)
     frames = np.r_[3:6, 21:24, 50, 58:60]
-    part = part_of_video(whole, frames)
+    part = whole.part(frames)
     assert [read_number(p) for p in part.frames()] == frames.tolist()
     assert [read_number(p) for p in part.chosen_frames({1, 4, 6}, 6)] == [4, 22, 50]
     assert read_number(part.frame(7)) == 58

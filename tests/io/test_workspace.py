@@ -67,6 +67,46 @@ def test_a_changed_video_is_refused(project, tmp_path, write_numbered):
         project.relink(other)
 
 
+@pytest.fixture
+def second(tmp_path, write_numbered):
+    path = tmp_path / "second.mp4"
+    path.write_bytes(write_numbered("w.mp4", list(range(0, 120, 12))).read_bytes())
+    return path
+
+
+def test_a_video_is_added_behind_the_first_and_what_a_person_wrote_stays(project, second):
+    project.project_file.write_text(project.project_file.read_text() + "# my note\n")
+    assert len(project.add_video(second, {"start": 2})) == 15 + 8
+    again = Workspace(project.folder)
+    assert again.video().joints == (15,)
+    assert "# my note" in project.project_file.read_text()
+    assert again.needs(second)
+
+
+def test_another_part_of_the_same_file_may_be_added_once(project, tmp_path):
+    assert len(project.add_video(tmp_path / "video.mp4", {"start": 15})) == 20
+    with pytest.raises(KeyreconError, match="in the project already"):
+        project.add_video(tmp_path / "video.mp4", {"start": 18})
+
+
+def test_an_added_video_that_moved_is_relinked(project, second, tmp_path):
+    project.add_video(second, {})
+    (tmp_path / "far").mkdir()
+    second.rename(tmp_path / "far" / "renamed.mp4")
+    with pytest.raises(KeyreconError, match=r"second\.mp4 is not where"):
+        project.video()
+    project.relink(tmp_path / "far" / "renamed.mp4")
+    assert len(Workspace(project.folder).video()) == 15 + 10
+
+
+def test_a_video_that_cannot_be_added_changes_nothing(project, tmp_path, write_numbered):
+    before = project.project_file.read_bytes()
+    for file in (tmp_path / "video.mp4", write_numbered("slow.mp4", [0, 24, 48])):
+        with pytest.raises(KeyreconError):
+            project.add_video(file, {})
+    assert project.project_file.read_bytes() == before
+
+
 def test_picks_add_up(project):
     with pytest.raises(KeyreconError, match="no picks yet"):
         project.picks()
