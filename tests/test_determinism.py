@@ -60,7 +60,7 @@ from keyrecon.app.golf import fit_file
 from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.swing_fit import GolfOptions
 
-options = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1)
+options = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 video, folder = Path(sys.argv[1]), Path(sys.argv[2])
 fit_file(video, video.with_name("clicks.json"), folder, options=options)
 """

@@ -100,7 +100,7 @@ def detect_shafts(
     def propose(numbered: tuple[int, LineSegments]) -> ShaftHypotheses:
         frame, of_frame = numbered
         return propose_shafts(
-            of_frame, foreground.frame(frame), shoulders, options.shaft_hypotheses
+            of_frame, foreground.frame(frame), players[frame], shoulders, options.shaft_hypotheses
         )
 
     return list(side_by_side(propose, enumerate(segments)))

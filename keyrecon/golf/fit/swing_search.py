@@ -11,6 +11,7 @@ that a person marked, joints and shaft say more than any mask.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -52,6 +53,18 @@ class SwingEvidence:
     shafts: tuple[ShaftHypotheses, ...]
     """What may be the club."""
     fps: float
+
+    @cached_property
+    def soft_masks(self) -> Float[np.ndarray, "T y x"]:
+        """The masks as they are compared: reduced further and smoothed."""
+        factor = PLAYER_PIXELS / (self.height * self.shrink)
+        h, w = self.players.shape[1:]
+        size = max(8, round(w * factor)), max(8, round(h * factor))
+        small = (
+            cv2.resize(m.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+            for m in self.players
+        )
+        return np.stack([_soften(mask, SOFT * PLAYER_PIXELS) for mask in small])
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,15 +226,11 @@ def _mark_costs(
 
 def _silhouette_costs(evidence: SwingEvidence, drawn: DrawnSwing) -> Float[np.ndarray, "T P"]:
     """Weighted squared difference of masks and drawn silhouettes, per usual one of two phases."""
-    factor = PLAYER_PIXELS / (evidence.height * evidence.shrink)
-    h, w = evidence.players.shape[1:]
-    size = max(8, round(w * factor)), max(8, round(h * factor))
+    masks = evidence.soft_masks
+    (h, w), size = evidence.players.shape[1:], masks.shape[:0:-1]
     scale = np.array(size) / (w / evidence.shrink, h / evidence.shrink)
-    soft = SOFT * PLAYER_PIXELS
-    masks = np.stack([_soften(cv2.resize(m.astype(np.float32), size, interpolation=cv2.INTER_AREA),
-                              soft) for m in evidence.players])  # fmt: skip
     shapes = np.stack([
-        _soften(silhouette(ends, radii, scale, size), soft)
+        _soften(silhouette(ends, radii, scale, size), SOFT * PLAYER_PIXELS)
         for ends, radii in zip(drawn.capsules, drawn.radii, strict=True)
     ])  # fmt: skip
     weight = shapes.std(axis=0)

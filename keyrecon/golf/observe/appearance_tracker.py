@@ -23,6 +23,9 @@ from keyrecon.ranges import within
 PATCH_SIDE = 21
 """Pixels of a patch along each side. Chosen on rendered swings, like all values here; see
 benchmarks/golf_tracks.py."""
+_SIDE = np.arange(PATCH_SIDE) - (PATCH_SIDE - 1) / 2
+GRID = np.stack([along.ravel() for along in np.meshgrid(_SIDE, _SIDE)])
+"""Where its pixels lie around its middle, to the right and down."""
 LEVELS = (4.0, 2.0, 1.0)
 """Blur of the picture and the patch from coarse to fine, pixels of the patch."""
 LOST_DENSITY = 1e-6
@@ -112,8 +115,7 @@ def track_patch(
 
 def _places(pose: Float[np.ndarray, "4"]) -> Float[np.ndarray, "n 2"]:
     """Picture positions of the patch's pixels."""
-    side = np.arange(PATCH_SIDE) - (PATCH_SIDE - 1) / 2
-    x, y = (c.ravel() * np.exp(pose[3]) for c in np.meshgrid(side, side))
+    x, y = GRID * np.exp(pose[3])
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.stack([pose[0] + c * x - s * y, pose[1] + s * x + c * y], axis=1)
 
@@ -221,8 +223,9 @@ def _step(
     total = weight.sum(axis=1)
     residual = colors * total[:, None] - weight[:, :1] * model.stable - weight[:, 1:] * model.last
     # Neighbouring pixels of a blurred picture tell the same: they count as a ninth of evidence.
-    normal = np.einsum("nci,nc,ncj->ij", slopes, np.repeat(total[:, None], 3, 1), slopes) / 9
-    slope = np.einsum("nci,nc->i", slopes, residual) / 9
+    flat = slopes.reshape(-1, len(pose))
+    normal = (flat * np.repeat(total, slopes.shape[1])[:, None]).T @ flat / 9
+    slope = residual.ravel() @ flat / 9
     prior = np.diag(1 / expected.spread**2)
     return -np.linalg.solve(normal + prior, slope + prior @ (pose - expected.pose))
 

@@ -94,12 +94,16 @@ class _Player:
 def propose_shafts(
     segments: LineSegments,
     foreground: FrameForeground,
+    figure: Bool[np.ndarray, "h w"],
     shoulders: Float[np.ndarray, "2"],
     options: ShaftOptions = ShaftOptions(),
 ) -> ShaftHypotheses:
-    """The most likely clubs of a frame, best first; `shoulders` is the middle between them, px."""
+    """The most likely clubs of a frame, best first.
+
+    `figure` is the player's mask without the club, `shoulders` the middle between them, px.
+    """
     player = _Player(
-        foreground, _player_distance(foreground),
+        foreground, cv2.distanceTransform((~figure).astype(np.uint8), cv2.DIST_L2, 3),
         options.rim * foreground.height * foreground.shrink,
     )  # fmt: skip
     rows = []
@@ -154,12 +158,6 @@ def _is_tip(hand: Float[np.ndarray, "2"], head: Float[np.ndarray, "2"], player: 
     unit = (hand - head) / np.linalg.norm(hand - head)
     line = hand + player.foreground.height * np.linspace(*BEYOND_HANDS, 10)[:, None] * unit
     return bool((player.outside(line) > player.rim).mean() > TIP_SHARE)
-
-
-def _player_distance(foreground: FrameForeground) -> Float[np.ndarray, "h w"]:
-    """Distance of every pixel to the player without the club, pixels of the mask."""
-    free = (~foreground.player()).astype(np.uint8)
-    return cv2.distanceTransform(free, cv2.DIST_L2, 3)
 
 
 def _read(

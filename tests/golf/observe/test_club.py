@@ -46,7 +46,7 @@ def direction(ends):
 def test_a_dark_or_bright_shaft_is_found_from_the_hands_to_the_head(shade, degrees):
     picture, foreground, head = draw(np.radians(degrees), shade)
     segments = detect_line_segments(picture, foreground)
-    best = propose_shafts(segments, foreground, SHOULDERS).ends[0]
+    best = propose_shafts(segments, foreground, foreground.player(), SHOULDERS).ends[0]
     assert abs(direction(best) - degrees) < 1.5
     turn = np.exp(-1j * np.radians(degrees)) * complex(*best[0] - HANDS)
     assert 0 <= turn.real < 0.08 * HEIGHT  # the fist hides where it begins
@@ -58,7 +58,7 @@ def test_a_shaft_that_differs_from_the_scene_in_colour_only_is_found_in_the_fore
     _, foreground, _ = draw(np.radians(20))
     plain = np.full((300, 320), 120, np.uint8)
     segments = detect_line_segments(plain, foreground)
-    best = propose_shafts(segments, foreground, SHOULDERS).ends[0]
+    best = propose_shafts(segments, foreground, foreground.player(), SHOULDERS).ends[0]
     assert abs(direction(best) - 20) < 2
 
 
