@@ -2,28 +2,30 @@
 
     python benchmarks/golf_measures.py OUT
 
-fits the scenes of benchmarks/golf.py (OUT is its folder; what is there is used) and compares turns,
+fits the scenes of benchmarks/golf.py (OUT is its folder; what is there is used, also the errors of
+an earlier run: remove measures.json from a scene's folder to measure it anew) and compares turns,
 spine, sway and lift with those of the captured body, at the true address, top, hit and finish. The
 root mean square of each is what `keyrecon.report.golf_measures.MEASURE_ERRORS` tells; how far the
-key postures are off in time is what `KEY_ERRORS` tells.
+key postures are off in time is what `KEY_ERRORS` tells. A scene takes half a minute.
 """
 
 import argparse
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from golf import MOCAP, SCENES, click, film, learn_without, observe
+from golf import MOCAP, SCENES, Scene, click, film, learn_without, observe
 
 from keyrecon.app.golf_recipe import refine_fit
 from keyrecon.app.golf_training import read_swings
 from keyrecon.golf.clicks import clicked_pose
-from keyrecon.golf.records import RecordedSwing
+from keyrecon.golf.records import RecordedSwing, Swing
 from keyrecon.golf.swing_fit import fit_observations
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.video import open_video
 from keyrecon.metrics import read_truth
-from keyrecon.report.golf_measures import AT, measure_curves, record_swing
+from keyrecon.report.golf_measures import AT, KEY_ERRORS, measure_curves, record_swing
 
 UP = np.array([0.0, 1.0, 0.0])
 """Of the rendered world."""
@@ -51,6 +53,35 @@ def measure_errors(swing: RecordedSwing, truth: dict[str, np.ndarray]) -> dict[s
     return errors
 
 
+def measure_scene(scene: Scene, swings: tuple[Swing, ...], out: Path) -> dict[str, list[float]]:
+    """Errors of a scene's numbers, and of its key postures in seconds, kept beside its video."""
+    folder = film(scene, swings, out)
+    file = folder / "measures.json"
+    if not file.is_file():
+        truth = read_truth(folder / "truth.npz")
+        video = hold_frames(open_video(folder / "video.mp4"))
+        model = learn_without(scene.player, swings, out)
+        clicks = click(truth, scene, (video.width, video.height), SCENES.index(scene))
+        seen = observe(video, clicked_pose(clicks), model, folder)
+        fitted = fit_observations(seen, video, model)
+        swing = record_swing(*refine_fit(fitted, seen, video, model))
+        errors = measure_errors(swing, truth)
+        errors["key postures"] = ((swing.keys - truth["keys"]) / scene.fps).tolist()
+        file.write_text(json.dumps(errors))
+    kept: dict[str, list[float]] = json.loads(file.read_text())
+    return kept
+
+
+def at_all_keys(name: str, errors: np.ndarray) -> list[float]:
+    """Errors at all key postures: 0 before the first at which a number says something.
+
+    After the last one it keeps its error.
+    """
+    first, *_, last = AT[name]
+    before, after = [0.0] * first, [float(errors[-1])] * (len(KEY_ERRORS) - 1 - last)
+    return [*before, *errors.tolist(), *after]
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -59,27 +90,20 @@ def main() -> None:
     parser.add_argument("--only", nargs="*")
     arguments = parser.parse_args()
     swings = read_swings([arguments.mocap])
-    together: dict[str, list[float]] = {}
-    times = []
-    for number, scene in enumerate(SCENES):
+    together: dict[str, list[list[float]]] = {}
+    for scene in SCENES:
         if arguments.only and scene.name not in arguments.only:
             continue
-        folder = film(scene, swings, arguments.out)
-        truth = read_truth(folder / "truth.npz")
-        video = hold_frames(open_video(folder / "video.mp4"))
-        model = learn_without(scene.player, swings, arguments.out)
-        clicks = clicked_pose(click(truth, scene, (video.width, video.height), number))
-        seen = observe(video, clicks, model, folder)
-        fitted = fit_observations(seen, video, model)
-        swing = record_swing(*refine_fit(fitted, seen, video, model))
-        times.append((swing.keys - truth["keys"]) / scene.fps)
-        for name, errors in measure_errors(swing, truth).items():
-            together.setdefault(name, []).extend(errors)
-            print(f"{scene.name:<18} {name:<14} {np.round(errors, 1)}", flush=True)
-    print("\nRoot mean square")
+        for name, errors in measure_scene(scene, swings, arguments.out).items():
+            together.setdefault(name, []).append(errors)
+            print(f"{scene.name:<18} {name:<14} {np.round(errors, 3)}", flush=True)
+    print("\nRoot mean square at address, top, hit and finish")
     for name, errors in together.items():
-        print(f"  {name:<14} {np.sqrt(np.mean(np.square(errors))):5.1f}")
-    print(f"  key postures   {np.sqrt(np.mean(np.square(times), axis=0)).round(4)} s")
+        square = np.sqrt(np.mean(np.square(errors), axis=0))
+        if name in AT:
+            print(f"  {name:<14} {np.round(at_all_keys(name, square), 1)}")
+        else:
+            print(f"  {name:<14} {square.round(3)} s")
 
 
 if __name__ == "__main__":

@@ -210,10 +210,10 @@ def _contrast(
     widths = [np.full(SAMPLES_ALONG, w) for w in options.widths]
     widths += [options.widths[0] + share * blur for share in BLUR_SHARES]
     sides = [searched.height * width[:, None] * across[:, None] for width in widths]
-    return np.minimum(
-        _stand_out(searched.picture, searched.height * points, sides),
-        _stand_out(searched.change, searched.height * points, sides),
-    )
+    in_picture = _stand_out(searched.picture, searched.height * points, sides)
+    if searched.change is searched.picture:
+        return in_picture
+    return np.minimum(in_picture, _stand_out(searched.change, searched.height * points, sides))
 
 
 def _stand_out(
