@@ -33,7 +33,7 @@ from keyrecon.golf.candidates import find_candidates, place_in_film
 from keyrecon.golf.clicks import ClickedPose, GolfClicks, clicked_pose
 from keyrecon.golf.fit.fitting import FitOptions, WeightOptions
 from keyrecon.golf.observation import observe_swing
-from keyrecon.golf.observe.film import choose_frames
+from keyrecon.golf.observe.film import Film
 from keyrecon.golf.prior.captured_swing import change_swing
 from keyrecon.golf.prior.skeleton import size_body, turns_from_swing
 from keyrecon.golf.prior.training import TrainOptions, collect_swings, learn_motion
@@ -58,7 +58,6 @@ from keyrecon.report.golf_pictures import draw_golfer
 from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.golf import SwingFilm, film_swing
 from keyrecon.synthetic.sequence import SceneOptions
-from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 MOCAP = Path(__file__).parent.parent.parent / "shared" / "data" / "mocap" / "golf"
 CLICKED = ("head_top", "right_knee", "left_knee", "right_ankle", "left_ankle")
@@ -145,18 +144,26 @@ def learn_without(player: int, swings: tuple[Swing, ...], out: Path) -> MotionMo
     return read_motion_model(file)
 
 
+def whole_film(video: Video) -> Film:
+    """All frames: where a capture has ended its last posture is held, which looks like repeats."""
+    every, last = np.arange(len(video)), len(video) - 1
+    return Film(
+        every, video.time, every.astype(float), np.tile(np.eye(3), (len(video), 1, 1)),
+        (video.width, video.height), np.zeros(2), True, (0, last), 0.0, (0, last),
+    )  # fmt: skip
+
+
 def observe(video: Video, pose: ClickedPose, model: MotionModel, folder: Path) -> Observations:
     """What is observed in a video, kept beside it."""
     file = folder / "observations.npz"
     if not file.is_file():
         began = time.perf_counter()
-        camera = estimate_camera_motion(video)
-        film = choose_frames(video, camera, pose.frame)
+        film = whole_film(video)
         scene = observe_scene(video, film, place_in_film(pose, film))
         (likeliest, *_) = find_candidates(scene, pose, NO_MARKS, model)
         observed = observe_swing(video, scene, likeliest, pose, NO_MARKS, model)
         if not observed.film.is_whole(video):
-            raise SystemExit(f"{folder.name}: frames were left out of a film that has no repeats.")
+            raise SystemExit(f"{folder.name}: frames were left out, though all are of the swing.")
         save_record(file, observed.observations)
         (folder / "seconds.txt").write_text(f"{time.perf_counter() - began:.1f}")
     return load_record(file)
