@@ -11,7 +11,7 @@ One scene of `golf.py` (OUT is its folder; what is there is used), fitted from i
     repeats    with every fourth picture shown twice
     double     with a second golfer beside the player: himself, mirrored, three quarters as tall
     mirror     mirrored, with the player's other hand told: the same swing to the digit
-    exchanged  with left and right of knees and ankles exchanged in the clicks: refused
+    exchanged  with left and right of knees and ankles exchanged in the clicks: refused, or warned of
 
 Columns are those of `golf.py`, errors of the key postures in frames at 60 per second; joints are
 measured in the frames of the swing that was asked for.
@@ -176,7 +176,7 @@ def describe(fit: GolfFit, truth: Truth, first: int, fps: float) -> str:
     fitted, part = fit.fitted, slice(first, None)
     ours, theirs = fitted.motion.points3d[part], truth["points3d"][part]
     keys = (fitted.keys - truth["keys"]) * 60 / fps
-    off = club_angle(fitted.club2d, truth["club2d"])[club_visible(truth)]
+    off = club_angle(fitted.club2d, truth["club2d"])[part][club_visible(truth)[part]]
     warned = "; ".join(f"{doubt.text} ({doubt.frame})" for doubt in fit.doubts)
     return (
         f"PA-MPJPE {pa_mpjpe(1000 * ours, 1000 * theirs):5.1f} mm   keys {keys.round(1)}   "
@@ -207,10 +207,10 @@ def fit_row(
     if name == "exchanged":
         try:
             check_evidence(exchange(clicks), held, model, 1.0, "The clicks")
-            fit_video(held, exchange(clicks), model)
+            found = fit_video(held, exchange(clicks), model)
         except KeyreconError as fault:
             return f"refused: {fault}"
-        return "NOT refused"
+        return describe(found, changed, row.first, video.fps)
     found = fit_video(held, clicks, model)
     if name == "mirror":
         return check_mirror(fit_video(mirror_video(held), mirror(clicks), model), found)
