@@ -11,7 +11,7 @@ One scene of `golf.py` (OUT is its folder; what is there is used), fitted from i
     repeats    with every fourth picture shown twice
     double     with a second golfer beside the player: himself, mirrored, three quarters as tall
     mirror     mirrored, with the player's other hand told: the same swing to the digit
-    exchanged  with left and right of knees and ankles exchanged in the clicks: refused, or warned of
+    exchanged  with left and right of knees and ankles exchanged in the clicks: refused or warned of
 
 Columns are those of `golf.py`, errors of the key postures in frames at 60 per second; joints are
 measured in the frames of the swing that was asked for.
