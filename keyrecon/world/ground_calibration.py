@@ -8,7 +8,7 @@ does where the player stays on one spot, and what follows from that for tilt, he
 their spreads. What nothing tells comes from what cameras are like (`USUAL_*`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,10 +57,17 @@ SIZE_NOISE = (0.01, 0.06)
 """Least and most that it is off from moment to moment; in between it is taken from the fit."""
 SIZE_MEMORY = 3.0
 """Moments over which that lasts and counts once."""
-COARSE, FINE, SAMPLES = 17, 15, 600
+STARTS = tuple((np.radians(tilt), np.log(high)) for tilt in (0, 12, 25, 40) for high in (1, 3, 9))
+"""Tilts and heights from which the fit may begin."""
+ENOUGH = {"ftol": 1e-4, "xtol": 1e-4, "gtol": 1e-4, "max_nfev": 40}
+"""Where a fit ends: what is left changes the likelihood by less than a hundredth."""
+COARSE, FINE, SAMPLES = 11, 11, 600
 """Focal lengths tried at first and then, and draws from what is left open."""
 CONTRADICTION = 4.0
-"""Standard deviations by which a mark may be off."""
+"""Standard deviations by which a mark may contradict the rest."""
+ALIKE = 9.0
+"""Sum of squares by which the rest fits better without one mark than without another, from which on
+it is told which of them is wrong: three standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -169,13 +176,13 @@ def calibrate_ground(
     first = np.flatnonzero(usable)[:1]
     zoom = _zoom(path, usable, int(first[0]), principal, max(size)) if len(first) else np.ones(0)
     reference = _first_stance(motion, usable, path, zoom)
-    to_reference = np.array([between(path, t, reference) for t in range(len(usable))])
+    to_reference = _homographies(path, reference)
     stances = find_stances(motion, usable, to_reference, zoom / zoom[reference])
     ends = _marked(marks, usable, to_reference)
     click = CLICK_NOISE * max(size) / 1280
     evidence = _GroundEvidence(ends, stances, _prior(motion, max(size), known), principal, click)
     posterior, evidence = _explore(evidence, max(size))
-    if blame := _contradiction(evidence, posterior, marks):
+    if blame := _contradiction(evidence, posterior, marks, max(size)):
         raise ContradictoryMarks(blame)
     return _result(posterior, evidence, path, usable, reference)
 
@@ -197,9 +204,29 @@ def _zoom(
     """Focal length of every frame in those of one of them; it hardly hangs on what that one is."""
     camera = Pinhole(USUAL_FOCAL * longer, principal, np.eye(3), np.zeros(3))
     zoom = np.ones(len(usable))
-    for t in np.flatnonzero(usable):
-        zoom[t] = carried(camera, between(path, start, int(t))).focal / camera.focal
+    for frames, view in _views(camera, path, start, usable):
+        zoom[frames] = view.focal / camera.focal
     return zoom
+
+
+def _homographies(path: CameraPath, frame: int) -> Float[np.ndarray, "T 3 3"]:
+    """From the pixels of every frame to those of one of them."""
+    to_frame = np.linalg.solve(path.to_reference[frame], path.to_reference)
+    return to_frame / to_frame[:, 2:, 2:]
+
+
+def _views(
+    camera: Pinhole, path: CameraPath, frame: int, usable: Bool[np.ndarray, "T"]
+) -> Iterator[tuple[slice, Pinhole]]:
+    """The camera of one frame in the others, runs of frames in which it stands still at a time."""
+    moves = np.ones(len(usable), dtype=bool)
+    moves[1:] = (path.to_reference[1:] != path.to_reference[:-1]).any(axis=(1, 2))
+    moves[1:] |= usable[1:] != usable[:-1]
+    first = np.flatnonzero(moves)
+    for start, end in zip(first, np.append(first[1:], len(usable)), strict=True):
+        if usable[start]:
+            view = carried(camera, between(path, frame, int(start)))
+            yield slice(int(start), int(end)), view
 
 
 def _first_stance(
@@ -212,8 +239,7 @@ def _first_stance(
     frames = np.zeros(0)
     if usable.any():
         start = int(np.flatnonzero(usable)[0])
-        homographies = np.array([between(path, t, start) for t in range(len(usable))])
-        frames = find_stances(motion, usable, homographies, zoom).frame
+        frames = find_stances(motion, usable, _homographies(path, start), zoom).frame
     if not len(frames):
         raise KeyreconError(
             "The player is never seen to stand, so that nothing tells where the ground is; look "
@@ -272,7 +298,7 @@ def _explore(evidence: _GroundEvidence, longer: int) -> tuple[_Posterior, _Groun
         spread = float(np.sqrt(posterior.weight @ (posterior.mean[:, 0] - middle) ** 2))
         step = max(spread, 0.3 * (grid[1] - grid[0]))
         low, high = max(grid[0], middle - 4 * step), min(grid[-1], middle + 4 * step)
-        posterior = _over(evidence, np.linspace(low, high, FINE))
+        posterior = _over(evidence, np.linspace(low, high, FINE), posterior.best)
     return posterior, evidence
 
 
@@ -285,17 +311,25 @@ def _size_noise(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
     return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), *SIZE_NOISE))
 
 
-def _over(evidence: _GroundEvidence, log_focals: Float[np.ndarray, "n"]) -> _Posterior:
-    """How likely each focal length is, and the rest given it."""
-    start = _numbers(evidence.prior[0])[1:]
+def _over(
+    evidence: _GroundEvidence,
+    log_focals: Float[np.ndarray, "n"],
+    near: Float[np.ndarray, "6"] | None = None,
+) -> _Posterior:
+    """How likely each focal length is, and the rest given it, which is not far from `near`."""
+    usual = _numbers(evidence.prior[0])[1:]
+    start = usual if near is None else near[1:]
     cost, means, roots = [], [], []
     for log_focal in log_focals:
 
         def residuals(rest: np.ndarray, log_focal: float = float(log_focal)) -> np.ndarray:
             return evidence.residuals(np.concatenate([[log_focal], rest]))
 
+        if near is None:  # lines of sight over the horizon pull nowhere: begin where they do
+            others = (np.array([t, 0.0, h, *usual[3:]]) for t, h in STARTS)
+            start = min((start, *others), key=lambda rest: float((residuals(rest) ** 2).sum()))
         spread = _numbers(evidence.prior[1])[1:]
-        solved = least_squares(residuals, start, x_scale=spread, max_nfev=40)
+        solved = least_squares(residuals, start, x_scale=spread, **ENOUGH)
         start = solved.x
         normal = solved.jac.T @ solved.jac
         cost.append(solved.cost + 0.5 * np.linalg.slogdet(normal)[1])
@@ -306,37 +340,49 @@ def _over(evidence: _GroundEvidence, log_focals: Float[np.ndarray, "n"]) -> _Pos
 
 
 def _contradiction(
-    evidence: _GroundEvidence, posterior: _Posterior, marks: Sequence[GroundMark]
+    evidence: _GroundEvidence, posterior: _Posterior, marks: Sequence[GroundMark], longer: int
 ) -> str:
-    """Which mark contradicts the others; empty where none does."""
-    off = _misfits(evidence, posterior.best)
-    if not len(off) or off.max() <= CONTRADICTION:
+    """Which mark contradicts the others; empty where none does.
+
+    That is one without which all the rest, player and usual cameras included, fits far better. A
+    camera that is turned about its axis by all accounts is so.
+    """
+    best = posterior.best
+    strain = float((evidence.residuals(best)[: 6 + 2 * len(marks)] ** 2).sum())
+    if strain <= CONTRADICTION**2:
         return ""
-    blame = []
+    gain, misfit = [], []
     for k in range(len(marks)):
         kept = [i for i in range(len(marks)) if i != k]
         ends = evidence.marks
         ends = MarkedEnds(tuple(ends.kinds[i] for i in kept), ends.ends[kept], ends.metres[kept])
-        without = replace(evidence, marks=ends)
-        best = _over(without, posterior.mean[:, 0]).best
-        rest = _misfits(without, best)
-        if not len(rest) or rest.max() <= CONTRADICTION:
-            cost = float((without.residuals(best) ** 2).sum())
-            blame.append((cost, k, float(_misfits(evidence, best)[k])))
-    if not blame or (len(marks) == 2 and len(blame) == 2 and not len(evidence.stances.frame)):
-        names = ", ".join(describe_mark(mark) for mark in marks)
-        return f"The marks ({names}) contradict one another; click them again."
-    _, k, away = min(blame)
+        found, without = _explore(replace(evidence, marks=ends), longer)
+        without = replace(without, noise=evidence.noise)
+        gain.append(_cost(evidence, best) - _cost(without, found.best))
+        misfit.append(_misfit(evidence, found.best, k))
+    if not gain or max(gain) <= CONTRADICTION**2:
+        return ""
+    suspects = [k for k in range(len(marks)) if gain[k] > max(gain) - ALIKE]
+    if len(suspects) > 1:
+        names = " and ".join(describe_mark(marks[k]) for k in suspects)
+        return (
+            f"{names.capitalize()} contradict one another; mark them again, or a third thing to "
+            "tell which."
+        )
     return (
-        f"{describe_mark(marks[k])} contradicts the rest: it is off by {away:.0f} times what a "
-        "careful click is. Click it again, or leave it out."
+        f"{describe_mark(marks[suspects[0]]).capitalize()} contradicts the rest: it is off by "
+        f"{misfit[suspects[0]]:.0f} times what a careful click is. Mark it again, or leave it out."
     )
 
 
-def _misfits(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "n"]:
-    """How far each mark is off, standard deviations."""
+def _cost(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
+    return float((evidence.residuals(x) ** 2).sum())
+
+
+def _misfit(evidence: _GroundEvidence, x: Float[np.ndarray, "6"], number: int) -> float:
+    """How far a mark is off, standard deviations."""
     camera = GroundState(*x).pinhole(evidence.principal)
-    return np.abs(mark_residuals(camera, evidence.marks, evidence.click)).max(axis=1)
+    return float(np.abs(mark_residuals(camera, evidence.marks, evidence.click)[number]).max())
 
 
 def describe_mark(mark: GroundMark) -> str:
@@ -361,10 +407,9 @@ def _result(
     state = GroundState(*best)
     pinhole = replace(state.pinhole(evidence.principal), centre=places[0])
     count = len(usable)
-    inner, rotation, shift = np.full((count, 3, 3), np.nan), np.full((count, 3, 3), np.nan), None
+    inner, rotation = np.full((2, count, 3, 3), np.nan)
     shift = np.full((count, 3), np.nan)
-    for t in np.flatnonzero(usable):
-        view = carried(pinhole, between(path, reference, int(t)))
+    for t, view in _views(pinhole, path, reference, usable):
         inner[t] = [
             [view.focal, 0, view.principal[0]],
             [0, view.focal, view.principal[1]],
