@@ -157,6 +157,20 @@ def test_a_motion_on_the_court_is_exported_where_it_stands(project):
     assert "on the court" in export(project, [folder / "a.trc"], silent, "10-19")[0]
 
 
+def test_a_motion_where_there_is_no_court_says_where_its_origin_is(project):
+    folder, motion = project.folder.parent, read_motion(project.motion_file)
+    with np.load(project.motion_file) as stored:
+        data = dict(stored)
+    world = motion.points3d[..., [0, 2, 1]] * [1, 1, -1]
+    np.savez(project.motion_file, **data, points3d_world=world, origin="ground")
+    told = export(project, [folder / "a.trc", folder / "a.csv"], silent)
+    assert "on the ground: origin under the player's first stance, x to the right" in told[0]
+    assert "m, origin on the ground under the player's" in (folder / "a.csv").read_text()
+    np.savez(project.motion_file, **data, points3d_world=world, origin="moon")
+    with pytest.raises(KeyreconError, match="'moon' is no origin"):
+        export(project, [folder / "a.trc"], silent)
+
+
 def test_a_motion_file_keeps_all_that_is_known_of_its_frames(project):
     folder, count = project.folder.parent, 20
     rng = np.random.default_rng(0)

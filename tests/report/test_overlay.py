@@ -1,7 +1,7 @@
 """Poses drawn on pictures."""
 
 import numpy as np
-from report_material import make_material, on_court
+from report_material import make_material, on_court, on_ground
 
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
@@ -166,6 +166,24 @@ def test_court_way_and_standing_feet_are_drawn_where_the_court_is_known(tmp_path
         near = slice(y - 3, y + 4), slice(x - 3, x + 4)
         assert np.abs(drawn[near] - plain[near]).max() > 40
     assert np.abs(frame(6) - frame(6, court=False)).max() > 40  # no way, but the court
+
+
+def test_no_court_is_drawn_where_there_is_none(tmp_path):
+    material = on_ground(make_material(tmp_path))
+    world, camera = material.court
+
+    def frame(**chosen):
+        options = OverlayOptions(skeleton="none", **chosen)
+        shown = overlay_frames(
+            material.video, material.motion, silent, options, (20, 20), material.court
+        )
+        return next(shown).astype(int)
+
+    plain, drawn = frame(court=False), frame()
+    line, way = camera.project(20, np.array([[4.0, -11.8, 0], world.root[20] * [1, 1, 0]]))
+    for (x, y), changed in ((line.round().astype(int), False), (way.round().astype(int), True)):
+        near = slice(y - 3, y + 4), slice(x - 3, x + 4)
+        assert (np.abs(drawn[near] - plain[near]).max() > 40) == changed
 
 
 def test_brackets_and_an_arrow_point_out_a_player_and_leave_what_is_in_the_box_alone():

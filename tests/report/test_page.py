@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_material import make_material, on_court, renamed_video, walk
+from report_material import make_material, on_court, on_ground, renamed_video, walk
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
@@ -80,6 +80,13 @@ def test_a_way_on_the_court_is_told_in_numbers(material, pictures, page):
         "km/h, mean of half a second",
     ):
         assert words in re.sub(r"\s+", " ", told)
+
+
+def test_a_way_where_there_is_no_court_knows_no_baseline(material, pictures):
+    told = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", build_page(on_ground(material), pictures)))
+    assert "On the ground" in told and "in squares of a metre" in told and "Top speed" in told
+    for words in ("baseline", "Umpire", "opponent", "on the court"):
+        assert words not in told.split("How it was made")[0]
 
 
 def test_the_page_shows_every_section_once(page):

@@ -2,7 +2,7 @@
 
 import pytest
 from page_driver import BROWSER
-from report_material import make_material, on_court
+from report_material import make_material, on_court, on_ground
 
 from keyrecon.report.page import write_report
 
@@ -60,4 +60,21 @@ def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
     page.uncheck("#on-court")
     page.close()
     assert len(seen) == 4
+    assert faults == []
+
+
+def test_the_way_lies_on_the_ground_where_there_is_no_court(chromium, tmp_path):
+    write_report(tmp_path / "report.html", on_ground(make_material(tmp_path)))
+    page = chromium.new_page(viewport={"width": 1366, "height": 900})
+    faults = []
+    page.on("pageerror", lambda fault: faults.append(str(fault)))
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector(".js-plotly-plot .main-svg")
+    for eye in ("camera", "above"):
+        page.click(f"[data-eye={eye}]")
+    for kind in ("time", "heat", "speed"):
+        page.click(f"[data-map={kind}]")
+    assert page.inner_text("#court-now").endswith("m/s")
+    assert page.locator("[data-eye=umpire]").count() == 0
+    page.close()
     assert faults == []

@@ -12,7 +12,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, PoseDistances, Track
 from keyrecon.report.drawing import draw_pose
 from keyrecon.report.markup import ReportMaterial
-from keyrecon.world.records import WorldMotion
+from keyrecon.world.records import GROUND, WorldMotion
 
 SCALE, FPS = 90.0, 25.0
 
@@ -148,6 +148,12 @@ def on_court(material):
     world = WorldMotion(points, root, np.ones((count, 2), dtype=bool), 1.0)
     camera = court_camera(camera_at((1, -25, 5), (0, -9, 0), size=(240, 320)), count)
     return replace(material, court=(world, camera))
+
+
+def on_ground(material):
+    """The same where there is no court."""
+    world, camera = on_court(material).court
+    return replace(material, court=(world, replace(camera, origin=GROUND)))
 
 
 def renamed_video(material, path):

@@ -126,6 +126,7 @@ def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
             per_frame = name not in (*FRAME_NUMBERS, *NOT_BY_FRAME)
             if per_frame and values.shape[:1] != data["time"].shape:
                 raise ValueError(f"{name} has shape {values.shape}")
+        read_origin(further)
         world = further.get("points3d_world", data["points3d"])
         if world.shape != data["points3d"].shape:
             raise ValueError(f"points3d_world has shape {world.shape}")
