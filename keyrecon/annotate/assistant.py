@@ -52,6 +52,16 @@ class Assistant:
     """The court over a frame of pictures of a size."""
     court_point: Callable[[str, int, tuple[float, float] | None], Json] | None = None
     """Keeps a clicked point of the court by name and frame, or drops it without a place."""
+    ground: Callable[[], Json] | None = None
+    """Marks on upright things, lengths and the horizon, and what is known of the camera."""
+    ground_view: Callable[[tuple[int, int], int], Json] | None = None
+    """Squares of a metre over a frame of pictures of a size."""
+    ground_mark: Callable[..., Json] | None = None
+    """Keeps a mark of a kind in a frame by both ends, and its length or None."""
+    ground_removal: Callable[[str], Json] | None = None
+    """Takes one away by its name."""
+    field_of_view: Callable[[float | None], Json] | None = None
+    """Keeps the angle across the picture, or none."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None
     """How much each pixel of a frame looks like a part: RGBA, (h, w, 4)."""
     swing: Callable[[tuple[int, int], Json, Json, Json], Json] | None = None

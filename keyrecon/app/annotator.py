@@ -28,6 +28,7 @@ from keyrecon.annotate.server.session import ProjectWatch, Session, open_session
 from keyrecon.app import golf, keyframing, project, running
 from keyrecon.app.court import calibrate
 from keyrecon.app.exporting import export
+from keyrecon.app.ground import find_ground
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
@@ -40,7 +41,10 @@ from keyrecon.progress import Progress
 from keyrecon.report.overlay import Limbs, OverlayOptions, View
 from keyrecon.world.calibration import CalibrationOptions
 from keyrecon.world.court_finding import ASK
+from keyrecon.world.records import GroundMarks
 
+OPEN_GROUND = ("The focal length cannot", "Mark two", "Tell the camera's", "No way on")
+"""How lines begin that say what is open, and what would tell it."""
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
 IDLE_SECONDS = 75
@@ -117,6 +121,7 @@ def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress],
         "golf": partial(_fit_swing, folder),
         "export": partial(_export, folder),
         "court": partial(_find_court, folder),
+        "ground": partial(_find_ground, folder),
     }
 
 
@@ -170,6 +175,12 @@ def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
             text.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
     return ""
+
+
+def _find_ground(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+    """The camera from all that was marked; what is still open is returned."""
+    lines = find_ground(Workspace(folder), GroundMarks(), progress).splitlines()
+    return "\n".join(line for line in lines if line.startswith(OPEN_GROUND))
 
 
 def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:

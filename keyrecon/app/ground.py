@@ -21,6 +21,12 @@ from keyrecon.world.ground_calibration import (
     GroundCalibration,
     calibrate_ground,
 )
+from keyrecon.world.ground_marks import (
+    check_field_of_view,
+    check_mark,
+    mark_names,
+    without_marks,
+)
 from keyrecon.world.records import COURT, KINDS, GroundMark, GroundMarks, Kind
 
 FORMS = {
@@ -34,10 +40,6 @@ TYPED_ERROR, LENS_ERROR = 0.05, 0.12
 the file names: phones crop up to 10 % of the width where they stabilise (our estimate)."""
 OPEN_FOCAL = 0.2
 """Spread from which on the focal length counts as open."""
-SHORTEST = 4.0
-"""px between the ends of a mark."""
-FOV = "fov"
-"""What --forget calls the field of view."""
 
 
 def ground_mark(kind: Kind, text: str) -> GroundMark:
@@ -68,13 +70,10 @@ def find_ground(
     """
     video = workspace.video()
     for mark in told.marks:
-        check_mark(mark, video)
-    if told.field_of_view is not None and not 3 < told.field_of_view < 150:
-        raise KeyreconError(
-            f"--fov is the angle across the width of the picture in degrees, 40 to 75 for phones; "
-            f"{told.field_of_view:g} cannot be."
-        )
-    kept = _without(workspace.ground_marks(), forget)
+        check_mark(mark, len(video), (video.width, video.height))
+    if told.field_of_view is not None:
+        check_field_of_view(told.field_of_view)
+    kept = without_marks(workspace.ground_marks(), forget)
     together = GroundMarks(
         tuple(dict.fromkeys((*kept.marks, *told.marks))),
         kept.field_of_view if told.field_of_view is None else told.field_of_view,
@@ -131,29 +130,6 @@ def _keep_court(workspace: Workspace) -> None:
         )
 
 
-def check_mark(mark: GroundMark, video: Video) -> None:
-    """Raise KeyreconError for a mark outside the video, or of no length."""
-    if not 0 <= mark.frame < len(video):
-        raise KeyreconError(
-            f"Frame {mark.frame} is outside the video, which has frames 0 to {len(video) - 1}."
-        )
-    for x, y in (mark.start, mark.end):
-        if not (0 <= x < video.width and 0 <= y < video.height):
-            raise KeyreconError(
-                f"The end of the {mark.kind} at {x:g},{y:g} in frame {mark.frame} is outside the "
-                f"picture of {video.width}x{video.height}."
-            )
-    if np.hypot(mark.end[0] - mark.start[0], mark.end[1] - mark.start[1]) < SHORTEST:
-        raise KeyreconError(
-            f"Both ends of the {mark.kind} in frame {mark.frame} are in one place; mark the two "
-            "ends of something long."
-        )
-    if mark.metres is not None and not 0.01 <= mark.metres <= 1000:
-        raise KeyreconError(
-            f"A {mark.kind} of {mark.metres:g} m cannot be; give its length in metres."
-        )
-
-
 def _known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
     """What is known of the focal length without looking at the picture."""
     if degrees is not None:
@@ -161,29 +137,6 @@ def _known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
         return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
     lens = lens_focal(video.path, (video.width, video.height))
     return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")
-
-
-def mark_names(marks: Sequence[GroundMark]) -> list[str]:
-    """vertical-1, vertical-2, length-1, ..."""
-    counts = dict.fromkeys(KINDS, 0)
-    names = []
-    for mark in marks:
-        counts[mark.kind] += 1
-        names.append(f"{mark.kind}-{counts[mark.kind]}")
-    return names
-
-
-def _without(told: GroundMarks, forget: Sequence[str]) -> GroundMarks:
-    """Marks but for those that are named."""
-    names = mark_names(told.marks)
-    known = [*names, *([FOV] if told.field_of_view is not None else [])]
-    if unknown := sorted(set(forget) - {*known, "all"}):
-        there = f"it has {', '.join(known)}" if known else "it has none"
-        raise KeyreconError(f"The project has no mark {unknown[0]} to forget; {there}.")
-    if "all" in forget:
-        return GroundMarks()
-    left = tuple(m for name, m in zip(names, told.marks, strict=True) if name not in forget)
-    return GroundMarks(left, None if FOV in forget else told.field_of_view)
 
 
 def _whose(kept: GroundMarks, told: GroundMarks) -> str:

@@ -20,6 +20,13 @@ from keyrecon.annotate.assist.court_views import (
     keep_court_point,
 )
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
+from keyrecon.annotate.assist.ground_views import (
+    describe_ground,
+    describe_ground_view,
+    drop_ground_mark,
+    keep_field_of_view,
+    keep_ground_mark,
+)
 from keyrecon.annotate.assist.pose_estimate import (
     Alternative,
     FrameObservation,
@@ -58,6 +65,11 @@ def make_assistant(workspace: Workspace) -> Assistant:
         court=partial(describe_court, workspace),
         court_view=partial(describe_court_view, workspace),
         court_point=partial(keep_court_point, workspace),
+        ground=partial(describe_ground, workspace),
+        ground_view=partial(describe_ground_view, workspace),
+        ground_mark=partial(keep_ground_mark, workspace),
+        ground_removal=partial(drop_ground_mark, workspace),
+        field_of_view=partial(keep_field_of_view, workspace),
         swing=partial(_describe_swing, workspace) if workspace.is_golf else None,
     )
 

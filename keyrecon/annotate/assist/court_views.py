@@ -110,15 +110,6 @@ def _read(file: Path, changed: int) -> WorldCamera | None:
 
 def _drawn(project: Projection, size: tuple[int, int]) -> Json:
     """Lines as pieces in the picture, and points that lie in it, px."""
-    lines = []
-    for start, end in tennis_court().ends:
-        count = int(np.ceil(np.linalg.norm(end - start) / PIECE)) + 1
-        pixels = project(start + np.linspace(0, 1, count)[:, None] * (end - start))
-        near = np.isfinite(pixels).all(axis=1)
-        near &= (np.abs(np.nan_to_num(pixels)) < FARTHEST * size[0]).all(axis=1)
-        for part in np.split(np.arange(count), np.flatnonzero(np.diff(near)) + 1):
-            if near[part[0]] and len(part) > 1:
-                lines.append(pixels[part][[0, -1]].round(1).tolist())
     places = project(np.array(list(POINTS.values())))
     inside = np.asarray(((places >= 0) & (places < size)).all(axis=1))
     points = {
@@ -126,4 +117,20 @@ def _drawn(project: Projection, size: tuple[int, int]) -> Json:
         for name, place, shown in zip(POINTS, places, inside, strict=True)
         if shown
     }
-    return {"lines": lines, "points": points}
+    return {"lines": drawn_lines(tennis_court().ends, project, size), "points": points}
+
+
+def drawn_lines(
+    ends: Float[np.ndarray, "L 2 3"], project: Projection, size: tuple[int, int]
+) -> list[list[list[float]]]:
+    """Straight lines of the world as pieces in the picture, px; nothing from behind the camera."""
+    lines = []
+    for start, end in ends:
+        count = int(np.ceil(np.linalg.norm(end - start) / PIECE)) + 1
+        pixels = project(start + np.linspace(0, 1, count)[:, None] * (end - start))
+        near = np.isfinite(pixels).all(axis=1)
+        near &= (np.abs(np.nan_to_num(pixels)) < FARTHEST * size[0]).all(axis=1)
+        for part in np.split(np.arange(count), np.flatnonzero(np.diff(near)) + 1):
+            if near[part[0]] and len(part) > 1:
+                lines.append(pixels[part][[0, -1]].round(1).tolist())
+    return lines

@@ -7,6 +7,7 @@ import { createFrameCache } from "./state/caches.js";
 import { createModel } from "./state/model.js";
 import { createBodies } from "./views/bodies.js";
 import { createCourt } from "./views/court.js";
+import { createGround } from "./views/ground.js";
 import { createDepth } from "./views/depth.js";
 import { byId } from "./views/dom.js";
 import { createExports } from "./views/exports.js";
@@ -50,6 +51,7 @@ const panels = [
 const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
 const court = createCourt(model, { frames, shell });
+const ground = createGround(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
 const address = createAddress(model, { frames, shell, colors });
 const swing = createSwing(model, { frames, shell, actions, colors, go });
@@ -111,6 +113,7 @@ model.onDraw(() => {
   if (ui.view === "motion") motion.draw();
   if (ui.view === "files") exports.draw();
   if (ui.view === "court") court.draw();
+  if (ui.view === "ground") ground.draw();
 });
 
 function go(view) {
@@ -120,6 +123,7 @@ function go(view) {
   if (view === "pick") pick.opened();
   if (view === "files") exports.opened();
   if (view === "court") court.opened();
+  if (view === "ground") ground.opened();
 }
 
 const commands = {
@@ -138,6 +142,7 @@ const commands = {
   motion: motion.commands,
   files: exports.commands,
   court: court.commands,
+  ground: ground.commands,
 };
 
 function execute(command, key) {

@@ -34,6 +34,10 @@ PHRASES = (
     (r"--budget [\d.]+ or more allows that", "a larger share of frames to mark allows that"),
     (r"--height is the athlete's height in metres; (\S+) cannot be",
      r"the player's height cannot be \1 m"),
+    (rf": keyrecon ground {_NAME} --(?:vertical|horizon|fov) [^.;\n]*", "."),
+    (r"--fov is", "The field of view is"),
+    (rf"first with keyrecon run {_NAME} --height METRES", "first (3 Motion)."),
+    (r"\(keyrecon run --height\)", "(3 Motion)"),
     (r"--coverage", "the coverage"),
     (r"--reach", "the reach"),
     (r"--budget", "what is marked"),
@@ -47,6 +51,7 @@ OTHER = {
     "annotate": "mark joints (2 Keyframes)",
     "import": "take marks from a file (4 Files)",
     "run": "make the motion (3 Motion)",
+    "ground": "find the ground (6 Ground)",
     "golf": "fit the swing (2 Swing)",
     "export": "write the files (4 Files)",
 }

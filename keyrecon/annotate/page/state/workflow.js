@@ -100,7 +100,7 @@ const joinHalves = (a, b) => (!a || a === b ? b : "both");
 export const stepsOf = ({ golf, has }) =>
   golf
     ? ["address", "swing", ...(has.keyframes ? ["keyframes", "motion"] : []), "files"]
-    : ["bodies", "keyframes", "motion", "files", "court"];
+    : ["bodies", "keyframes", "motion", "files", "court", "ground"];
 
 // "right_ankle" -> "right ankle"
 export const label = (joint) => joint.replaceAll("_", " ");

@@ -7,7 +7,7 @@ export const KEYS = {
   any: [
     [["Ctrl+z"], "undo", "undo"],
     [["Ctrl+Shift+z", "Ctrl+y"], "redo", "redo"],
-    [["1", "2", "3", "4", "5"].map((n) => `Alt+${n}`), "the pages, as they are numbered above", "page"],
+    [["1", "2", "3", "4", "5", "6"].map((n) => `Alt+${n}`), "the pages, as they are numbered above", "page"],
     [["?"], "show or hide the keys", "help"],
   ],
   keyframes: [
@@ -112,6 +112,15 @@ export const KEYS = {
     [["z"], "the whole picture", "zoom"],
     [["+", "-"], "zoom in, out", "zoomBy"],
     [["Enter"], "find the court", "primary"],
+  ],
+  ground: [
+    [["q", "e"], "a frame back, ahead (with Shift a second)", "step"],
+    [["1", "2", "3"], "mark an upright thing, a length on the ground, the horizon", "kind"],
+    [["Backspace", "Delete"], "take the last mark of this frame away", "clear"],
+    [["Escape"], "forget the first end", "back"],
+    [["z"], "the whole picture", "zoom"],
+    [["+", "-"], "zoom in, out", "zoomBy"],
+    [["Enter"], "find the ground", "primary"],
   ],
 };
 

@@ -15,7 +15,7 @@ const LASTING = {}; // an offer of nothing: the notice stays until it is read
 const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
 const GOOD_NEWS = /^(Player found in|Note: )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
-const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court" };
+const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court", ground: "Ground" };
 
 function keyElements(keys) {
   const shortened = keys.length > 4 ? [keys[0], keys.at(-1)] : keys;

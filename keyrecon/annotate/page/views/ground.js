@@ -1,0 +1,220 @@
+// The page of the ground where there is no court: both ends of upright things, of a known length or two
+// points of the horizon are clicked; squares of a metre show what they and the player tell.
+import { CASING, drawCross, drawLabel } from "../draw/canvas.js";
+import { createViewer } from "../draw/viewer.js";
+import * as api from "../state/api.js";
+import { byId, make, numberIn, setText } from "./dom.js";
+
+const SMALL_WIDTH = 960; // of a frame until the sharp one is here, px
+const GRID = "#ff2878",
+  POST = "#00dcff",
+  MARKED = "#56b4e9",
+  CHOSEN = "#e69f00";
+const KINDS = {
+  vertical: { name: "Upright thing", ends: ["one end of something upright", "its other end"] },
+  length: { name: "Length", ends: ["one end of a length on the ground", "its other end"] },
+  horizon: { name: "Horizon", ends: ["a point of the horizon", "another point of it, far from the first"] },
+};
+
+export function createGround(model, { frames, shell }) {
+  const { project } = model,
+    last = project.n_frames - 1;
+  const viewer = createViewer({ root: byId("ground-picture"), project, frames, redraw: model.redraw });
+  const selection = { frame: 0, kind: "vertical", start: null, pointer: null };
+  let ground = null, // what was marked and what is known; see assist/ground_views.py
+    view = null, // the ground over the frame that is shown: {frame, lines, post}
+    working = false;
+  const metres = byId("ground-metres"),
+    field = byId("ground-fov");
+
+  const here = () => ground.marks.filter(({ frame }) => frame === selection.frame);
+  const failed = (fault) => model.notify(fault.message || "The server does not answer.");
+
+  const loadView = api.latestOnly(async (frame) => {
+    view = { frame, ...(await api.read(`ground/${frame}`)) };
+    model.redraw();
+  }, failed);
+
+  function take(answer) {
+    ground = answer.marks ? answer : null;
+    if (ground && document.activeElement !== field) field.value = ground.field_of_view ?? "";
+    loadView(selection.frame);
+    model.redraw();
+  }
+
+  const load = async () => take(await api.read("ground"));
+  const change = (request) => api.send("ground", request).then(take, failed);
+
+  function show(frame) {
+    selection.frame = Math.max(0, Math.min(last, frame));
+    selection.start = null;
+    loadView(selection.frame);
+    model.redraw();
+  }
+
+  function choose(kind) {
+    Object.assign(selection, { kind, start: null });
+    model.redraw();
+  }
+
+  // The length that is typed; undefined where one is missing or is none.
+  function typedLength() {
+    const number = selection.kind === "horizon" ? null : numberIn(metres);
+    if (Number.isNaN(number) || (number !== null && number <= 0)) return undefined;
+    return selection.kind === "length" && number === null ? undefined : number;
+  }
+
+  function click(at) {
+    if (!ground || viewer.shown() !== selection.frame) return;
+    const place = viewer.toPicture(at).map((value) => Math.round(value * 10) / 10);
+    if (place.some((value, axis) => value < 0 || value > [project.width, project.height][axis] - 1)) return;
+    const length = typedLength();
+    if (length === undefined) {
+      model.notify("Type the length in metres first.");
+      metres.focus();
+      return;
+    }
+    if (!selection.start) selection.start = place;
+    else {
+      const { frame, kind, start } = selection;
+      selection.start = null;
+      metres.value = "";
+      change({ mark: { kind, frame, ends: [start, place], metres: length } });
+    }
+    model.redraw();
+  }
+
+  viewer.listen({
+    grab: () => null,
+    drag() {},
+    drop() {},
+    click,
+    hover(at) {
+      selection.pointer = at;
+      model.redraw();
+    },
+  });
+
+  const buttons = Object.entries(KINDS).map(([kind, { name }]) => {
+    const button = make("button", { type: "button", data: { kind } }, name);
+    button.addEventListener("click", () => choose(kind));
+    return button;
+  });
+  byId("ground-kinds").append(...buttons);
+  const slider = byId("ground-frame");
+  slider.max = last;
+  slider.addEventListener("input", () => show(Number(slider.value)));
+  byId("ground-back").addEventListener("click", () => show(selection.frame - 1));
+  byId("ground-ahead").addEventListener("click", () => show(selection.frame + 1));
+  byId("ground-primary").addEventListener("click", primary);
+  field.addEventListener("change", () => {
+    const degrees = numberIn(field);
+    if (Number.isNaN(degrees)) model.notify("The field of view is a number of degrees.");
+    else change(degrees === null ? { remove: "fov" } : { field_of_view: degrees });
+  });
+
+  function primary() {
+    if (!shell.runningJob() && ground?.motion && !ground.court) shell.startJob("ground");
+  }
+
+  function words() {
+    const { name, ends } = KINDS[selection.kind];
+    if (shell.runningJob()?.kind === "ground") return ["The ground is being looked for", ""];
+    if (ground.court) return ["The court has told the camera", "The ground is for videos without one."];
+    if (!ground.motion)
+      return ["Make the motion first", "The player's own height tells where the ground is, best where he walks about."];
+    if (selection.start) return [`Click ${ends[1]}`, `${name}: the first end is marked.`];
+    if (ground.camera && !ground.changed)
+      return ["Do the squares lie flat, and does the post stand upright?", ground.camera];
+    return [
+      `Click ${ends[0]}`,
+      "Two upright things, far left and far right, tell most; a known length, the horizon or the field of view help.",
+    ];
+  }
+
+  function drawLines(pen, lines, color, width) {
+    for (const [style, wide] of [[CASING, width + 2], [color, width]]) {
+      pen.strokeStyle = style;
+      pen.lineWidth = wide;
+      pen.beginPath();
+      for (const [from, to] of lines) {
+        pen.moveTo(...viewer.toScreen(from));
+        pen.lineTo(...viewer.toScreen(to));
+      }
+      pen.stroke();
+    }
+  }
+
+  function drawPicture() {
+    viewer.drawPicture(selection.frame, [undefined, SMALL_WIDTH]);
+    const [pen] = viewer.overlay();
+    pen.lineCap = "round";
+    if (view?.frame === viewer.shown() && view.lines) {
+      drawLines(pen, view.lines, GRID, 1);
+      drawLines(pen, view.post, POST, 2.5);
+    }
+    for (const { name, ends } of here()) {
+      drawLines(pen, [ends], MARKED, 1.5);
+      for (const end of ends) drawCross(pen, viewer.toScreen(end), MARKED);
+      const [x, y] = viewer.toScreen(ends[0]);
+      drawLabel(pen, [x + 10, y - 14], name);
+    }
+    if (selection.start) {
+      drawCross(pen, viewer.toScreen(selection.start), CHOSEN);
+      if (selection.pointer)
+        drawLines(pen, [[selection.start, viewer.toPicture(selection.pointer)]], CHOSEN, 1.5);
+    }
+    viewer.cursor("crosshair");
+  }
+
+  function markRow({ name, frame, metres: length }) {
+    const known = length === null ? "" : `, ${length} m`,
+      go = make("button", { className: "plain" }, `${name}, frame ${frame}${known}`),
+      removal = make("button", { className: "plain", "aria-label": `Remove ${name}` }, "✕");
+    go.addEventListener("click", () => show(frame));
+    removal.addEventListener("click", () => change({ remove: name }));
+    return make("div", {}, go, removal);
+  }
+
+  function drawMarks() {
+    const list = byId("ground-marks"),
+      content = JSON.stringify(ground.marks);
+    if (list.dataset.content === content) return;
+    list.dataset.content = content;
+    list.replaceChildren(...ground.marks.map(markRow));
+  }
+
+  // When the work has ended, what it found is shown.
+  function watchWork() {
+    const running = shell.runningJob()?.kind === "ground";
+    if (working && !running) load().catch(failed);
+    working = running;
+  }
+
+  function draw() {
+    watchWork();
+    if (!ground) return;
+    const [text, more] = words(),
+      done = ground.camera && !ground.changed;
+    slider.value = selection.frame;
+    setText(byId("ground-where"), `frame ${selection.frame} of ${project.n_frames}`);
+    setText(byId("ground-text"), text);
+    setText(byId("ground-more"), more);
+    byId("ground-primary").hidden = Boolean(shell.runningJob()) || !ground.motion || ground.court || done;
+    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.kind === selection.kind);
+    drawMarks();
+    drawPicture();
+  }
+
+  const commands = {
+    primary: () => !byId("ground-primary").hidden && primary(),
+    clear: () => here().length && change({ remove: here().at(-1).name }),
+    kind: ({ index }) => choose(Object.keys(KINDS)[index]),
+    back: () => choose(selection.kind),
+    step: ({ index, shift }) =>
+      show(selection.frame + (index ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
+    zoom: viewer.toggleZoom,
+    zoomBy: ({ index }) => viewer.zoom(viewer.toScreen(viewer.middle()), index ? 0.8 : 1.25),
+  };
+  return { draw, commands, opened: () => load().catch(failed) };
+}

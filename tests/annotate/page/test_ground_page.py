@@ -1,0 +1,70 @@
+"""The step of the page where the ground is found where there is no court."""
+
+import numpy as np
+import pytest
+from ground_walker import HORIZON, SIZE, posts, seen, standing
+from page_driver import BROWSER, Person, serving
+
+from keyrecon.annotate.assist.answers import make_assistant
+from keyrecon.app.annotator import job_commands
+from keyrecon.app.project import start
+from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+
+pytestmark = pytest.mark.skipif(
+    not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    points = standing(steps=2)
+    picture = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    picture[::40, ::40] = 200
+    write_video(tmp_path / "v.mp4", [picture] * len(points), 50.0)
+    start(tmp_path / "v.mp4", tmp_path / "p")
+    write_motion(tmp_path / "p" / "motion.npz", seen(points))
+    return tmp_path / "p"
+
+
+def click_on(person, place):
+    scale, x, y = map(float, person.page.get_attribute("#ground-picture", "data-view").split())
+    box = person.page.locator("#ground-picture").bounding_box()
+    person.page.mouse.click(box["x"] + scale * place[0] + x, box["y"] + scale * place[1] + y)
+
+
+def test_upright_things_are_marked_and_squares_lie_on_the_ground(folder, chromium):
+    with serving(
+        folder, make_assistant(Workspace(folder)), commands=job_commands(folder)
+    ) as server:
+        context = chromium.new_context(viewport={"width": 1440, "height": 900})
+        person = Person(context, server.credentials.address)
+        person.press("Alt+6")
+        person.await_text("#ground-text", "Click one end of something upright")
+        person.page.wait_for_selector("#ground-picture[data-frame='0']")
+        for number, post in enumerate(posts(), start=1):
+            click_on(person, post.start)
+            person.await_text("#ground-text", "Click its other end")
+            click_on(person, post.end)
+            person.await_text("#ground-marks", f"vertical-{number}")
+        person.page.click("#ground-kinds [data-kind=length]")
+        click_on(person, posts()[0].start)
+        person.await_text("#notice-text", "Type the length in metres first")
+        person.press("3")
+        click_on(person, HORIZON.start)
+        click_on(person, HORIZON.end)
+        person.await_text("#ground-marks", "horizon-1")
+        person.page.fill("#ground-fov", "60.4")
+        person.page.press("#ground-fov", "Tab")
+        person.page.wait_for_timeout(300)
+        person.page.click("#ground-primary")
+        person.await_text("#ground-text", "Do the squares lie flat")
+        person.await_text("#ground-more", "The camera is 2.")
+        context.close()
+        assert person.complaints == []
+        told = Workspace(folder).ground_marks()
+        assert told.field_of_view == 60.4
+        assert [mark.kind for mark in told.marks] == ["vertical", "vertical", "horizon"]
+        for mark, post in zip(told.marks, posts(), strict=False):
+            assert np.abs(np.subtract(mark.start, post.start)).max() < 2.5
