@@ -20,6 +20,7 @@ from keyrecon.world.ground_calibration import (
     FieldOfView,
     GroundCalibration,
     calibrate_ground,
+    describe_mark,
 )
 from keyrecon.world.ground_marks import (
     check_field_of_view,
@@ -99,7 +100,7 @@ def find_ground(
     try:
         found = calibrate_ground(motion, path, size, together.marks, known)
     except ContradictoryMarks as fault:
-        raise KeyreconError(f"{fault}{_whose(kept, told)}") from fault
+        raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, told)}") from fault
     workspace.keep_ground_marks(together)
     write_camera(workspace.camera_file, found.camera)
     picture = workspace.folder / "ground.jpg"
@@ -148,6 +149,14 @@ def _whose(kept: GroundMarks, told: GroundMarks) -> str:
         f"{', '.join(mark_names(kept.marks))}; --forget NAME takes one out, --forget all starts "
         "anew."
     )
+
+
+def _with_names(text: str, kept: GroundMarks) -> str:
+    """A message about marks with the names of those that the project has."""
+    for name, mark in zip(mark_names(kept.marks), kept.marks, strict=True):
+        words = describe_mark(mark).removeprefix("the ")
+        text = text.replace(words, f"{words} ({name})")
+    return text
 
 
 def _list_marks(told: GroundMarks) -> list[str]:

@@ -5,6 +5,7 @@ import pytest
 from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
 
+from keyrecon.app import ground
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
@@ -106,7 +107,11 @@ def test_marks_that_contradict_one_another_are_named_and_not_kept(stood):
         KeyreconError, match=f"at {leaning.start[0]:g}.*The new marks were not kept"
     ):
         told(stood, [leaning])
-    assert len(Workspace(stood).ground_marks().marks) == 2
+    workspace = Workspace(stood)
+    assert len(workspace.ground_marks().marks) == 2
+    workspace.keep_ground_marks(GroundMarks((third, posts()[0], leaning)))  # as the page does
+    with pytest.raises(KeyreconError, match=r"in frame 0 \(vertical-3\)"):
+        told(stood)
     told(stood, forget=["all"])
 
 
@@ -136,6 +141,13 @@ def test_a_mark_that_cannot_be_is_told(stood, mark, words):
 def test_a_field_of_view_that_no_camera_has_is_told(stood):
     with pytest.raises(KeyreconError, match="--fov is the angle across"):
         told(stood, fov=0.0)
+
+
+def test_the_lens_that_a_phone_wrote_into_the_file_counts(stood, monkeypatch):
+    monkeypatch.setattr(ground, "lens_focal", lambda path, size: 1100.0)
+    assert "the lens that the file names" in told(stood)
+    assert "the lens" not in told(stood, fov=60.0)
+    told(stood, forget=["fov"])
 
 
 def test_a_camera_from_a_court_is_kept(stood):

@@ -112,7 +112,7 @@ test("labels on the strip stand side by side, as near to their places as can be"
 });
 
 test("a golf project has pages of its own, and those of keyframes where it has some", () => {
-  assert.deepEqual(stepsOf({ golf: false, has: {} }), ["bodies", "keyframes", "motion", "files", "court"]);
+  assert.deepEqual(stepsOf({ golf: false, has: {} }), ["bodies", "keyframes", "motion", "files", "court", "ground"]);
   assert.deepEqual(stepsOf({ golf: true, has: {} }), ["address", "swing", "files"]);
   assert.equal(stepsOf({ golf: true, has: { keyframes: true } }).length, 5);
 });
