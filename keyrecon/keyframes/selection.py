@@ -260,9 +260,17 @@ def _choose_half(
 
 
 def _sufficient_count(half: HalfDistances, least: int, most: int) -> int:
-    """Keyframes that reach the coverage at the distance that is near enough, within bounds."""
-    chosen = _fewest(half, half.sufficient_goal, most)
-    return max(least, len(chosen)) if half.sufficient_goal.reached(chosen) else most
+    """Keyframes that reach the coverage at the distance that is near enough, within bounds.
+
+    Of hours of video one frame stands for its neighbours in the comparison, and where these are
+    farther from it than that, no keyframe covers them: then the coverage is a share of the others.
+    """
+    goal = half.sufficient_goal
+    unreachable = goal.time_left(goal.hoods.union(list(range(len(half.matched)))))
+    if unreachable > goal.allowed:
+        goal = goal.beyond(unreachable, half.options.coverage)
+    chosen = _fewest(half, goal, most)
+    return max(least, len(chosen)) if goal.reached(chosen) else most
 
 
 def _fewest(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:

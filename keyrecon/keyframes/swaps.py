@@ -8,7 +8,7 @@ stand for to their middle, and away from blurred frames. The last is the swap ph
 (Kaufman and Rousseeuw, "Finding Groups in Data", 1990), `add_medoids` its build phase.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -60,6 +60,17 @@ class CoverageGoal:
         represented = self.hoods.union(chosen)
         enough = self.time_left(represented) <= self.allowed
         return enough and self.left_over(represented) <= self.uncovered
+
+    def beyond(self, unreachable: int, coverage: float) -> "CoverageGoal":
+        """The same share of what can be covered at all; `unreachable` cannot be, in measured time.
+
+        Frames are counted by their share of that time.
+        """
+        unit = 1 if self.elapsed is None else TIME_UNIT
+        frames = unreachable / unit
+        return replace(
+            self, uncovered=int(frames + (1 - coverage) * (self.hoods.n_frames - frames))
+        )
 
     def _cost(self) -> GapCost:
         return uncovered_cost(self.hoods.n_frames, self.reach, self.elapsed)

@@ -240,6 +240,20 @@ def test_what_repeats_itself_is_not_marked_again_however_long_it_lasts(repeated)
         assert half.beta <= KeyframeOptions().sufficient_beta
 
 
+def test_frames_that_no_keyframe_can_cover_are_not_marked_for(repeated):
+    """Of hours one frame stands for its neighbours; here every fifth differs much from it."""
+    row = np.arange(1500)
+    apart = repeated.exemplar_distance.copy()
+    apart[:, (row // 25) % 5 == 2] = 0.1
+    coarse = replace(repeated, exemplar_distance=apart)
+    found = choose_keyframes(coarse, 25.0)
+    labels = len(found.upper.frames) + len(found.lower.frames)
+    assert labels <= count_labels(KeyframeOptions(), 1500, 25.0) - 4
+    for half in (found.upper, found.lower):
+        assert half.gains is not None
+        assert 0.95 * 0.8 - 0.02 <= half.gains.coverage[-1] <= 0.85
+
+
 def test_no_more_is_asked_for_than_the_limit_however_near_it_must_be(repeated):
     found = choose_keyframes(repeated, 25.0, KeyframeOptions(sufficient_beta=0.001))
     labels = len(found.upper.frames) + len(found.lower.frames)
