@@ -1,10 +1,10 @@
 """Weights of the evidence that chooses among hypotheses (`keyrecon/propagation/evidence.py`).
 
     python benchmarks/choice.py [--work DIR] [--only NAME ...] [--rendered DIR]
-        [--sequences NAME ...]
+        [--sequences NAME ...] [--draws 3]
 
-Takes the real clips of `develop` as benchmarks/real.py does (with the same `--work` what it stored
-is found again), and the first 12 s of rendered sequences (`--rendered`, as benchmarks/accuracy.py
+Takes the real clips of `develop` as benchmarks/draws.py does, as they are and mirrored, with
+several choices of marks each (with the same `--work` what real.py stored is found again), and the first 12 s of rendered sequences (`--rendered`, as benchmarks/accuracy.py
 left them), looks at frames whose joints are known and that nobody marked for the program, and fits
 the weights by which the right pairs of limbs are most probable (a conditional logit). Prints
 
@@ -26,6 +26,7 @@ from unittest.mock import patch
 import numpy as np
 import real
 from accuracy import Case, mark
+from draws import mark_draw, prepare_clip
 from scipy.optimize import minimize
 from sequences import TENNIS
 from variant import cut
@@ -37,13 +38,14 @@ from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.metrics import read_truth
-from keyrecon.pipeline import Options, prepare
+from keyrecon.pipeline import Options, follow_marks, prepare
 from keyrecon.propagation import evidence, selection
 from keyrecon.propagation.appearance import regular_frames
 from keyrecon.propagation.body_frame import stabilise_shots
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
 from keyrecon.propagation.propagation import propagate_joints
+from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Annotations, FlowTracks, Preparation
 from keyrecon.tracking.mark_flow import track_marked_joints
 
@@ -65,7 +67,7 @@ RENDERED_WEIGHT = 0.35
 frames as nine real clips twice over."""
 RIDGE = 3.0
 """Pull of the weights to 0, in frames, per weight squared in units of SPREAD."""
-SPREAD = {"residual": 3.0, "end residual": 3.0, "unexplained": 20.0}
+SPREAD = {"residual": 3.0, "end residual": 3.0, "unexplained": 20.0, "uncovered": 20.0}
 """Usual weights; others have that of a likeness, 2 units."""
 USED = {
     "upper": (
@@ -77,6 +79,7 @@ USED = {
         "off flow",
         "off lines",
         "unexplained",
+        "uncovered",
         "together",
         "of two poses",
     ),
@@ -91,13 +94,14 @@ USED = {
         "off flow",
         "off lines",
         "unexplained",
+        "uncovered",
         "together",
         "of two poses",
     ),
 }
 """Evidence that is weighed. With disagreement among the arms' fewer were right in other clips (88.0
 % against 88.7)."""
-PAIRED = "unexplained", "together", "of two poses"
+PAIRED = "unexplained", "uncovered", "together", "of two poses"
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,15 +145,16 @@ def held_out(truth: Annotations, marks: Annotations) -> np.ndarray:
     return known
 
 
-def real_clip(name: str, work: Path) -> Known:
-    """A clip as benchmarks/real.py has it marked."""
-    clip, options = real.load_clip(name), Options()
-    options = replace(options, keyframes=replace(options.keyframes, budget=COST))
-    store = StageStore(work / name / "cache")
-    preparation, _, marks = real.mark_clip(clip, options, store)
-    flow = store.keep("flow", track_marked_joints, clip.video, marks, options=options.flow)
-    judged = held_out(clip.truth, marks) & clip.seen
-    return Known(name, preparation, marks, flow, clip.truth, judged, clip.action, clip.torso)
+def real_draws(name: str, draws: int, work: Path) -> Iterator[Known]:
+    """A clip as benchmarks/draws.py has it marked, as it is and in a mirror."""
+    for mirrored in (False, True):
+        prepared = prepare_clip(name, mirrored, COST, work)
+        clip, options, keep = prepared.clip, prepared.options, prepared.store.keep
+        for seed in range(draws):
+            made, marks = mark_draw(prepared, seed)
+            flow = follow_marks(clip.video, marks, made.shots, options, keep, show)
+            judged = held_out(clip.truth, marks) & clip.seen
+            yield Known(name, made, marks, flow, clip.truth, judged, clip.action, clip.torso)
 
 
 def rendered_clip(name: str, folder: Path, work: Path) -> Known:
@@ -189,8 +194,9 @@ def collect(known: Known, weight: float) -> dict[str, Sample]:
         hypotheses: PoseHypotheses,
         trunk: np.ndarray,
         ways: MarkedWays | None,
+        silhouettes: Silhouettes,
     ) -> evidence.LimbEvidence:
-        found = original(templates, hypotheses, trunk, ways)
+        found = original(templates, hypotheses, trunk, ways, silhouettes)
         half, pairs = templates.half, list(found.of_pairs)
         free = half.joints[np.concatenate(half.sides)]
         rows = np.flatnonzero(
@@ -231,6 +237,11 @@ def collect(known: Known, weight: float) -> dict[str, Sample]:
     with patch.object(selection, "find_evidence", record):
         propagate_joints(known.preparation, known.marks, known.flow)
     return samples
+
+
+def weigh(name: str, draws: int) -> float:
+    """What a frame counts for: every clip as much, however often it is drawn."""
+    return RENDERED_WEIGHT if name in SEQUENCES else 1 / draws
 
 
 def costs(sample: Sample, weights: np.ndarray) -> np.ndarray:
@@ -326,34 +337,34 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names of real clips")
     parser.add_argument("--rendered", type=Path, default=Path("benchmarks/work"))
     parser.add_argument("--sequences", nargs="*", default=list(SEQUENCES))
+    parser.add_argument("--draws", type=int, default=3, help="choices of marks of a real clip")
     words = parser.parse_args()
     names = words.only if words.only is not None else list(real.DEVELOP)
     if len(names) + len(words.sequences) < 2:
         raise SystemExit("A clip is chosen by weights from the others: name at least two.")
-    clips = [real_clip(name, words.work) for name in names]
-    clips += [rendered_clip(name, words.rendered, words.work) for name in words.sequences]
-    samples = {}
-    for known in clips:
-        samples[known.name] = collect(known, RENDERED_WEIGHT if known.name in SEQUENCES else 1.0)
+    clips = {name: list(real_draws(name, words.draws, words.work)) for name in names}
+    for name in words.sequences:
+        clips[name] = [rendered_clip(name, words.rendered, words.work)]
+    samples = {name: [collect(k, weigh(name, len(every))) for k in every] for name, every in clips.items()}
     print(
         f"{'clip':<26}{'arms: best':>11}{'others':>8}{'now':>8}{'legs: best':>12}"
         f"{'others':>8}{'now':>8}{'PCK':>8}{'action':>8}"
     )
-    for known in clips:
-        line, table = f"{known.name:<26}", {}
+    for name, every in clips.items():
+        line, table = f"{name:<26}", {}
         for half in ("upper", "lower"):
-            own = samples[known.name][half]
-            others = [s[half] for name, s in samples.items() if name != known.name]
-            weights = fit(others)
-            table[half] = table_of(own, weights)
-            best = 1 - own.wrong.reshape(len(own.wrong), -1).min(axis=1).sum() / max(own.count, 1)
-            line += f"{best:11.1%}{share_right(own, weights):8.1%}"
-            line += f"{share_right(own, present(own, half)):8.1%} "
+            own = [s[half] for s in samples[name]]
+            weights = fit([s[half] for n, drawn in samples.items() if n != name for s in drawn])
+            table[half] = table_of(own[0], weights)
+            now = present(own[0], half)
+            best = [1 - s.wrong.min(axis=(1, 2)).sum() / max(s.count, 1) for s in own]
+            line += f"{np.mean(best):11.1%}{np.mean([share_right(s, weights) for s in own]):8.1%}"
+            line += f"{np.mean([share_right(s, now) for s in own]):8.1%} "
         with weighed(table):
-            whole, action = pck(known)
+            whole, action = np.mean([pck(known) for known in every], axis=0)
         print(f"{line}{whole:7.1%}{action:8.1%}", flush=True)
     for half in ("upper", "lower"):
-        every = [s[half] for s in samples.values()]
+        every = [s[half] for drawn in samples.values() for s in drawn]
         print(half, table_of(every[0], fit(every)))
 
 

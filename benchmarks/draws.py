@@ -103,8 +103,8 @@ class Draw:
     figures: dict[str, float]
 
 
-def draw_once(prepared: Prepared, seed: int, lifted: bool) -> Draw:
-    """Choose with noise, mark, propagate."""
+def mark_draw(prepared: Prepared, seed: int) -> tuple[Preparation, Annotations]:
+    """Choose with noise, mark."""
     clip, options, store = prepared.clip, prepared.options, prepared.store
     made, bodies = prepared.preparation, real.take(clip, prepared.first, prepared.first)
     noisy = perturb(made.pose_distances, seed)
@@ -113,6 +113,13 @@ def draw_once(prepared: Prepared, seed: int, lifted: bool) -> Draw:
     marks = real.mark_keyframes(clip, made.keyframes, prepared.first)
     if len(frames_off_marks(made, marks)):
         made = prepare(clip.video, (), options, store.keep, show, marks)
+    return made, marks
+
+
+def draw_once(prepared: Prepared, seed: int, lifted: bool) -> Draw:
+    """Choose with noise, mark, propagate."""
+    clip, options, store = prepared.clip, prepared.options, prepared.store
+    made, marks = mark_draw(prepared, seed)
     unknown = real.held_out(clip, marks) & clip.seen
     if not lifted:
         joints = carry_joints(made, marks, options, store.keep, show).joints

@@ -5,7 +5,7 @@ C colours. Unknown numbers are NaN. Pixels and axes as in the package docstring.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
 
@@ -174,6 +174,8 @@ class Edges:
     upper: Bool[np.ndarray, "E"]
     """Counts for the upper body; near the waist an element counts for both."""
     lower: Bool[np.ndarray, "E"]
+    inside: Float[np.ndarray, "P 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """Places on the player, px: the cells of a regular grid that regions cover by half and more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,11 @@ from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
 from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.silhouette import (
+    Silhouettes,
+    gather_silhouettes,
+    search_by_silhouette,
+)
 from keyrecon.propagation.trajectory_smoothing import smooth_trajectories
 from keyrecon.ranges import within
 from keyrecon.records import (
@@ -117,6 +122,7 @@ class HalfStart:
     """Nothing is carried from one to the next but what is marked."""
     ways: MarkedWays
     """Where flow and straight lines lead from marks."""
+    silhouettes: Silhouettes
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +181,7 @@ def _propagate_fused(
     count, frames = len(edges), np.arange(len(edges))
     looked_at = np.union1d(regular_frames(preparation.video), annotations.frames)
     features = describe_player(preparation.video, body_frame, looked_at)
+    silhouettes = gather_silhouettes(edges, body_frame)
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
@@ -194,7 +201,7 @@ def _propagate_fused(
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
         shift = at[:, None] - at[poses.frames]
-        start = HalfStart(shift, distance, fixed, features, preparation.shots, ways)
+        start = HalfStart(shift, distance, fixed, features, preparation.shots, ways, silhouettes)
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -224,6 +231,8 @@ def propagate_half(
         limbs = search_by_edges(templates, index, trunk, count)
         parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
+        missed = search_by_silhouette(start.silhouettes, poses, trunk)
+        parts.append(fit_poses(templates, index, missed, nearest))
         if half.middle:
             parts.append(fit_poses(templates, index, arms, nearest))
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
@@ -232,7 +241,7 @@ def propagate_half(
         unlikeness=appearance.unlikeness(hypotheses.joints),
         bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
     )
-    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps, start.ways)
+    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps, start.ways, start.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     gain += appearance_gain(half, limbs_chosen.unlikeness, fps)

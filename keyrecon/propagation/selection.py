@@ -19,6 +19,7 @@ from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.evidence import SideStates, find_evidence, weigh_evidence
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
+from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Shots
 
 STEP_SPEED = 1.5
@@ -72,6 +73,7 @@ def choose_limbs(
     shots: Shots,
     fps: float,
     ways: MarkedWays | None = None,
+    silhouettes: Silhouettes | None = None,
 ) -> ChosenLimbs:
     """The cheapest limbs of every frame."""
     half, frames = templates.half, np.arange(len(hypotheses.template))
@@ -80,7 +82,7 @@ def choose_limbs(
     unlikeness = hypotheses.unlikeness[:, 0].copy()
     trunk = _choose_trunk(templates, hypotheses, shots, fps)
     middle = half.middle
-    evidence = find_evidence(templates, hypotheses, trunk, ways)
+    evidence = find_evidence(templates, hypotheses, trunk, ways, silhouettes)
     costs = weigh_evidence(half.name, evidence)
     joints[:, middle] = hypotheses.joints[frames, trunk][:, middle]
     joints[templates.poses.frames[:, None], middle] = templates.poses.joints[:, middle]

@@ -11,6 +11,7 @@ from keyrecon.propagation.evidence import WEIGHTS, find_evidence
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import MarkedWays
 from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Shots
 
 LEGS, ARMS = split_body(LSP14)
@@ -68,7 +69,9 @@ def test_every_weight_is_of_some_evidence_and_none_is_negative():
     for half in (LEGS, ARMS):
         _, _, (templates, hypotheses) = poses(half)
         here = hypotheses.joints[0, 0]
-        found = find_evidence(templates, hypotheses, np.zeros(FRAMES, int), ways(here))
+        nothing = Silhouettes(np.zeros((FRAMES, 1), complex), np.zeros((FRAMES, 1), bool))
+        trunk = np.zeros(FRAMES, int)
+        found = find_evidence(templates, hypotheses, trunk, ways(here), nothing)
         names = {*found.of_sides[0], *(name for name, _ in found.of_pairs)}
         assert {*WEIGHTS[half.name]} <= names
         assert min(WEIGHTS[half.name].values()) >= 0

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.segmentation.contours import EdgeOptions, trace_edges
+from keyrecon.segmentation.contours import EdgeOptions, sample_inside, trace_edges
 
 OPTIONS = EdgeOptions(player=100, step=0.02)
 CENTER = np.array([80.0, 70.0])
@@ -74,3 +74,16 @@ def test_a_crowded_crop_is_thinned_to_the_most_elements_allowed():
         for y in range(10, 190, 20):
             cv2.circle(labels, (x, y), 7, 1, -1)
     assert len(trace_edges(labels, EdgeOptions(player=100, most=150)).points) == 150
+
+
+def test_places_inside_fill_all_regions_evenly():
+    labels = ring(40, 15)
+    labels[:, 80:] *= 2
+    places = sample_inside(labels, 4.5)
+    distance = np.linalg.norm(places - CENTER, axis=1)
+    assert ((distance > 13) & (distance < 42)).all()
+    assert len(places) * 4.5**2 == pytest.approx(np.pi * (40**2 - 15**2), rel=0.05)
+
+
+def test_there_is_no_place_inside_nothing():
+    assert sample_inside(np.zeros((40, 50), np.uint8), 4.5).shape == (0, 2)

@@ -20,7 +20,7 @@ from keyrecon.records import (
     Track,
 )
 
-STEP = 0.018
+STEP, INSIDE_SPACING = 0.018, 0.04
 SHIRT, SHORTS, SKIN, HAIR = range(4)
 STANDING = {  # player heights from the head, y down
     "head_top": (0.0, -0.08), "neck": (0.0, 0.10),
@@ -86,7 +86,20 @@ def outline(pose, scale, origin):
         kept &= ~(inside & (colors == color) & (owners != row))
     points, tangents, colors = points[kept], tangents[kept], colors[kept]
     upper, lower = points[:, 1] < 0.46, points[:, 1] > 0.38
-    return Edges(points * scale + origin, tangents, colors, upper, lower)
+    inside = silhouette(pose) * scale + origin
+    return Edges(points * scale + origin, tangents, colors, upper, lower, inside)
+
+
+def silhouette(pose):
+    """Places of a grid within any limb of a pose, player heights."""
+    across = INSIDE_SPACING * np.arange(-40, 41)
+    grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
+    inside = np.zeros(len(grid), dtype=bool)
+    for a, b, radius, _ in LIMBS:
+        start, bone = pose[LSP14.index(a)], pose[LSP14.index(b)] - pose[LSP14.index(a)]
+        along = np.clip((grid - start) @ bone / (bone @ bone), 0, 1)[:, None]
+        inside |= np.linalg.norm(grid - start - along * bone, axis=1) < radius
+    return grid[inside]
 
 
 def scene(poses, keyframes, scale=180.0, origin=(600.0, 200.0)):

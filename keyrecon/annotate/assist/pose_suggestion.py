@@ -45,6 +45,7 @@ from keyrecon.propagation.registration import (
     register_templates,
 )
 from keyrecon.propagation.selection import ChosenLimbs, choose_limbs
+from keyrecon.propagation.silhouette import Silhouettes, gather_silhouettes
 from keyrecon.propagation.trajectory_smoothing import SEARCH_RADII, SHAPE_PRIOR
 from keyrecon.records import Annotations, Preparation, Shots
 
@@ -96,6 +97,8 @@ class Fitting:
     """From each template to the same pose in each frame, by head or feet."""
     sources: Int[np.ndarray, "K"]
     """Frame numbers."""
+    silhouettes: Silhouettes
+    """Of the N frames."""
     fps: float
 
 
@@ -110,13 +113,14 @@ def prepare_fitting(
     marks = body_frame.of_marks(scene.sources)
     poses = gather_poses(marks, bound_bones(marks), half, joints[:, half.joints[half.fixed]])
     edges = tuple(preparation.edges[t] for t in frames)
-    index = index_elements(edges, _select_frames(body_frame, frames))
+    own_frame = _select_frames(body_frame, frames)
+    index, silhouettes = index_elements(edges, own_frame), gather_silhouettes(edges, own_frame)
     distance = distances_to(preparation.pose_distances, half.name, poses.frames)[frames]
     at = scene.at(preparation.track.head if half.name == "upper" else preparation.track.mid_feet)
     shift = at[frames][:, None] - at[poses.frames]
     templates = _make_templates(scene, poses, frames)
     fps = preparation.video.fps
-    return Fitting(templates, index, distance, shift, poses.frames, fps)
+    return Fitting(templates, index, distance, shift, poses.frames, silhouettes, fps)
 
 
 def _select_frames(body_frame: BodyFrame, frames: Int[np.ndarray, "N"]) -> BodyFrame:
@@ -255,7 +259,7 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     fitted = fit_similar(templates, index, fitting.distance, fitting.shift, OPTIONS.similar)
     limb_poses = search_by_edges(templates, index, fitted.best_joints, LIMB_HYPOTHESES)
     hypotheses = join_hypotheses(fitted, fit_limbs(templates, index, fitted, limb_poses))
-    limbs = _choose_each(templates, hypotheses, fitting.fps)
+    limbs = _choose_each(templates, hypotheses, fitting.silhouettes, fitting.fps)
     chosen = np.where(np.isfinite(known), known, limbs.joints)
     weight = np.where(np.isfinite(known), FIXED_WEIGHT, HYPOTHESIS_WEIGHT)
     similar = fitted.template[:, 0]
@@ -269,7 +273,9 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     return _HalfSuggestion(final[:, free], confidence[:, free], source)
 
 
-def _choose_each(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: float) -> ChosenLimbs:
+def _choose_each(
+    templates: EdgeTemplates, hypotheses: PoseHypotheses, silhouettes: Silhouettes, fps: float
+) -> ChosenLimbs:
     """The best hypotheses, each frame by itself."""
     no_poses = replace(
         templates.poses, **{f.name: getattr(templates.poses, f.name)[:0] for f in _PER_POSE_FIELDS}
@@ -286,7 +292,8 @@ def _choose_each(templates: EdgeTemplates, hypotheses: PoseHypotheses, fps: floa
             frame_elements=templates.frame_elements[n : n + 1],
             feet=feet,
         )
-        chosen.append(choose_limbs(single, one, Shots.between((), 1), fps))
+        silhouette = silhouettes.take(slice(n, n + 1))
+        chosen.append(choose_limbs(single, one, Shots.between((), 1), fps, None, silhouette))
     return ChosenLimbs(
         *(
             np.concatenate([getattr(one, field.name) for one in chosen])

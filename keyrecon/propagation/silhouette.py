@@ -1,0 +1,223 @@
+"""What limbs explain of the player's silhouette, and limbs looked for where it has one.
+
+Two legs on one leg match edges and look like marked legs, and yet the leg that kicks out beside
+them is nobody's. A silhouette does not tell which limb is which, but all of it belongs to some:
+what neither limb of a pair and no trunk covers speaks against the pair (`uncovered`). And where no
+annotated frame has the pose, the silhouette itself proposes it: beside the leg that edges are sure
+of, the other leg is where it explains most of the rest and leaves the silhouette least
+(`search_by_silhouette`). Bones count as capsules, the simplest body there is.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Float32
+
+from keyrecon.numerics.geometry import to_complex
+from keyrecon.propagation.body_frame import BodyFrame
+from keyrecon.propagation.edge_template import AnnotatedPoses
+from keyrecon.propagation.half_body import BodyHalf
+from keyrecon.records import Edges
+from keyrecon.segmentation.contours import INSIDE_SPACING
+
+LIMB_RADIUS, END_RADIUS, TRUNK_RADIUS = 0.04, 0.055, 0.06
+"""Half widths of limbs, of hand or foot about the last joint, and of bones of the trunk, player
+heights. Thighs and shanks with their own, all radii a quarter smaller, edges half or twice as soft:
+within .2 points of the legs that were chosen right in single frames of five clips."""
+SOFTNESS = 0.05
+"""Distance from a limb's surface at which it explains nothing any more, player heights."""
+LIMB_REACH = 0.6
+"""A limb's places are not farther from the middle of both shoulders or hips, player heights: a
+stretched leg with its foot."""
+SHORTENING = 1.0, 0.6
+"""Lengths of a bone that are tried, as shares of the longest that it can have."""
+DIRECTIONS = 20
+"""Directions of a bone that are tried."""
+USUAL_LENGTH = 0.245
+"""Length of a bone where none is marked, player heights: a thigh (Winter)."""
+CORE_RADIUS = 0.02
+"""Half width of what must lie on the silhouette, player heights: half a forearm's."""
+OUTSIDE_COST = 3.0
+"""Cost of such a place beside the silhouette, against one that it explains."""
+SHORTEST = np.float32(1e-9)
+"""Square of a bone's length at least: a bone may be seen end on."""
+FRAMES_AT_A_TIME = 256
+"""Frames in work at a time."""
+CELLS = round(LIMB_REACH / INSIDE_SPACING)
+GRID = INSIDE_SPACING * np.arange(-CELLS, CELLS + 1)
+"""Places of a limb from its first joint, along one axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouettes:
+    """Places on the player in every frame, player coordinates, `INSIDE_SPACING` apart."""
+
+    points: Complex[np.ndarray, "T P"]
+    there: Bool[np.ndarray, "T P"]
+    """False for what only fills up."""
+
+    def take(self, frames: slice) -> "Silhouettes":
+        """Those of some frames."""
+        return Silhouettes(self.points[frames], self.there[frames])
+
+
+def gather_silhouettes(edges: tuple[Edges, ...], body_frame: BodyFrame) -> Silhouettes:
+    """Of all frames, side by side."""
+    count = np.array([len(e.inside) for e in edges])
+    there = np.arange(max(1, count.max(initial=0))) < count[:, None]
+    points = np.zeros(there.shape, complex)
+    frame, _ = np.nonzero(there)
+    pixels = np.concatenate([e.inside for e in edges])
+    points[there] = (to_complex(pixels) - body_frame.origin[frame]) / body_frame.height[frame]
+    return Silhouettes(points, there)
+
+
+def limb_places(
+    silhouettes: Silhouettes, half: BodyHalf, trunk: Complex[np.ndarray, "T J"]
+) -> Silhouettes:
+    """The places that limbs of one half can explain: in reach, above the hips or below them."""
+    roots = trunk[:, [side[0] for side in half.sides]].mean(axis=1)
+    hips = trunk[:, half.fixed].mean(axis=1) if half.fixed.any() else roots
+    below = silhouettes.points.imag > hips.imag[:, None]
+    near = np.abs(silhouettes.points - roots[:, None]) < LIMB_REACH
+    own = silhouettes.there & near & (below == (half.name == "lower"))
+    width = max(1, int(own.sum(axis=1).max(initial=0)))
+    order = np.argsort(~own, axis=1, kind="stable")[:, :width]
+    points, there = (np.take_along_axis(v, order, axis=1) for v in (silhouettes.points, own))
+    return Silhouettes(points, there)
+
+
+def bone_gaps(
+    points: Complex[np.ndarray, "..."],
+    start: Complex[np.ndarray, "..."],
+    stop: Complex[np.ndarray, "..."],
+    radius: float,
+) -> Float32[np.ndarray, "..."]:
+    """Distance of places from a bone's surface, in `SOFTNESS`, 0-1; shapes broadcast."""
+    points, start, stop = (places.astype(np.complex64) for places in (points, start, stop))
+    bone, gap = stop - start, points - start
+    along = gap.real * bone.real
+    along = along + gap.imag * bone.imag
+    along /= np.maximum(bone.real**2 + bone.imag**2, SHORTEST)
+    return _soften(np.abs(gap - np.clip(along, 0, 1, out=along) * bone), radius)
+
+
+def _soften(apart: Float32[np.ndarray, "..."], radius: float) -> Float32[np.ndarray, "..."]:
+    apart -= np.float32(radius)
+    apart /= np.float32(SOFTNESS)
+    return np.clip(apart, 0, 1, out=apart)
+
+
+def limb_gaps(
+    points: Complex[np.ndarray, "..."], limb: tuple[Complex[np.ndarray, "..."], ...]
+) -> Float32[np.ndarray, "..."]:
+    """The same of a limb whose joints are given from the trunk outwards."""
+    gaps = [bone_gaps(points, a, b, LIMB_RADIUS) for a, b in zip(limb, limb[1:], strict=False)]
+    end = points.astype(np.complex64) - limb[-1].astype(np.complex64)
+    return reduce(np.minimum, gaps, _soften(np.abs(end), END_RADIUS))
+
+
+def trunk_gaps(
+    points: Complex[np.ndarray, "T P"], half: BodyHalf, trunk: Complex[np.ndarray, "T J"]
+) -> Float32[np.ndarray, "T P"]:
+    """The same of the bones of the trunk."""
+    bones = half.bones[half.limb == 0]
+    gaps = [bone_gaps(points, trunk[:, [a]], trunk[:, [b]], TRUNK_RADIUS) for a, b in bones]
+    return reduce(np.minimum, gaps)
+
+
+def uncovered(
+    places: Silhouettes,
+    half: BodyHalf,
+    trunk: Complex[np.ndarray, "T J"],
+    one: Complex[np.ndarray, "T S j"],
+    other: Complex[np.ndarray, "T S j"],
+) -> Float[np.ndarray, "T S S"]:
+    """Share of the `limb_places` that the trunk and both limbs of a pair leave unexplained."""
+    count = np.maximum(places.there.sum(axis=1), 1)
+    free = trunk_gaps(places.points, half, trunk) * places.there
+    first, second = (
+        limb_gaps(places.points[:, None], tuple(limb.transpose(2, 0, 1)[..., None]))
+        for limb in (one, other)
+    )
+    return (first * free[:, None]) @ second.transpose(0, 2, 1) / count[:, None, None]
+
+
+@dataclass(frozen=True, eq=False)
+class _LimbLibrary:
+    """Limbs of two bones from their first joint, and the places of the grid about it."""
+
+    middle: Complex[np.ndarray, "C"]
+    outer: Complex[np.ndarray, "C"]
+    explained: Float32[np.ndarray, "G C"]
+    core: Float32[np.ndarray, "G C"]
+    """1 along the bones."""
+
+
+def search_by_silhouette(
+    silhouettes: Silhouettes, poses: AnnotatedPoses, best: Complex[np.ndarray, "T J"]
+) -> Complex[np.ndarray, "T 2 J"]:
+    """The poses that are given, with the one limb and with the other looked for anew."""
+    half = poses.half
+    library = _make_library(poses)
+    joints = np.repeat(best[:, None], 2, axis=1)
+    places = limb_places(silhouettes, half, best)
+    for frames in _blocks(len(best)):
+        whole, points = silhouettes.take(frames), places.points[frames]
+        free = trunk_gaps(points, half, best[frames]) * places.there[frames]
+        for number, (side, kept) in enumerate(zip(half.sides, half.sides[::-1], strict=True)):
+            root = best[frames, side[0]][:, None]
+            kept_limb = tuple(best[frames][:, kept].T[..., None])
+            rest = free * limb_gaps(points, kept_limb)
+            left = _splat(points - root, rest) @ library.explained
+            inside = _splat(whole.points - root, whole.there.astype(float))
+            beside = (1 - np.minimum(inside, 1)) @ library.core
+            chosen = (left - OUTSIDE_COST * beside).argmax(axis=1)
+            root = root[:, 0]
+            joints[frames, number, side[1]] = root + library.middle[chosen]
+            joints[frames, number, side[2]] = root + library.outer[chosen]
+    return joints
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    for first in range(0, count, FRAMES_AT_A_TIME):
+        yield slice(first, first + FRAMES_AT_A_TIME)
+
+
+def _make_library(poses: AnnotatedPoses) -> _LimbLibrary:
+    half, (inner, middle, outer) = poses.half, poses.half.sides[0]
+    bones = half.bones.tolist()
+    rows = [bones.index([a, b]) for a, b in ((inner, middle), (middle, outer))]
+    longest = [max(poses.longest[row], poses.longest[half.bone_mirror[row]]) for row in rows]
+    turns = np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
+    steps = np.outer(SHORTENING, turns).ravel()
+    one, two = (steps * (b if np.isfinite(b) else USUAL_LENGTH) for b in longest)
+    joint = np.repeat(one, len(two))
+    end = joint + np.tile(two, len(one))
+    places = (GRID + 1j * GRID[:, None]).ravel()
+    gaps = limb_gaps(places[:, None], (np.zeros(1, complex), joint[None], end[None]))
+    bones = ((np.zeros(1, complex), joint), (joint, end))
+    apart = [bone_gaps(places[:, None], a[None], b[None], CORE_RADIUS) for a, b in bones]
+    core = (np.minimum(*apart) == 0).astype(np.float32)
+    return _LimbLibrary(joint, end, 1 - gaps, core)
+
+
+def _splat(
+    places: Complex[np.ndarray, "T P"], values: Float[np.ndarray, "T P"]
+) -> Float32[np.ndarray, "T G"]:
+    """Values of places on the grid, shared bilinearly."""
+    width = len(GRID)
+    grid = np.zeros(len(places) * width * width)
+    column, row = ((part - GRID[0]) / INSIDE_SPACING for part in (places.real, places.imag))
+    left, top = np.floor(column).astype(int), np.floor(row).astype(int)
+    first = np.arange(len(places))[:, None] * width * width
+    for down in (0, 1):
+        for right in (0, 1):
+            x, y = left + right, top + down
+            share = values * (1 - np.abs(column - x)) * (1 - np.abs(row - y))
+            inside = (x >= 0) & (x < width) & (y >= 0) & (y < width)
+            at = (first + y * width + x)[inside]
+            grid += np.bincount(at, share[inside], len(grid))
+    return grid.reshape(len(places), -1).astype(np.float32)
