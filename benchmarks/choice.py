@@ -3,10 +3,11 @@
     python benchmarks/choice.py [--work DIR] [--only NAME ...] [--rendered DIR]
         [--sequences NAME ...] [--draws 3]
 
-Takes the real clips of `develop` as benchmarks/draws.py does, as they are and mirrored, with
-several choices of marks each (with the same `--work` what real.py stored is found again), and the first 12 s of rendered sequences (`--rendered`, as benchmarks/accuracy.py
-left them), looks at frames whose joints are known and that nobody marked for the program, and fits
-the weights by which the right pairs of limbs are most probable (a conditional logit). Prints
+Takes the real clips of `develop` as benchmarks/draws.py does, as they are and mirrored, with some
+choices of marks each (with the same `--work` what real.py stored is found again), and the first
+12 s of rendered sequences (`--rendered`, as benchmarks/accuracy.py left them), looks at frames of
+known joints that nobody marked for the program, and fits the weights by which the right
+pairs of limbs are most probable (a conditional logit). Prints
 
     frames     of every clip, frame by frame: the share of the arms' and legs' joints in sight that
                are within 0.2 of the torso in the best pair of states that there is, in the pair
@@ -345,7 +346,9 @@ def main() -> None:
     clips = {name: list(real_draws(name, words.draws, words.work)) for name in names}
     for name in words.sequences:
         clips[name] = [rendered_clip(name, words.rendered, words.work)]
-    samples = {name: [collect(k, weigh(name, len(every))) for k in every] for name, every in clips.items()}
+    samples = {
+        name: [collect(k, weigh(name, len(every))) for k in every] for name, every in clips.items()
+    }
     print(
         f"{'clip':<26}{'arms: best':>11}{'others':>8}{'now':>8}{'legs: best':>12}"
         f"{'others':>8}{'now':>8}{'PCK':>8}{'action':>8}"

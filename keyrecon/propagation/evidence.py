@@ -3,8 +3,8 @@
 Evidence of one limb: do edges lie on its outline (`residual`), do its joints and the middles of its
 bones look like marked ones (`unlikeness`), is it where optical flow from the marks and straight
 lines between them lead, do other hypotheses agree? Evidence of two limbs: how many of the frame's
-edge elements, and how much of the silhouette, do both and the trunk leave unexplained, do both lie in one place, do they come from
-one pose, are their ends farther apart than ever marked?
+edge elements do both and the trunk leave unexplained, how much of its silhouette (`uncovered`), do
+both lie in one place, do they come from one pose, are their ends farther apart than ever marked?
 
 The weights are not set by hand: with probabilities proportional to exp(-cost), those of the right
 pairs of limbs were made as likely as they can be (a conditional logit, McFadden 1974) on frames

@@ -177,11 +177,10 @@ def _propagate_fused(
     """Both halves of the body over the whole video."""
     track, edges, fps = preparation.track, preparation.edges, preparation.video.fps
     body_frame = stabilise_shots(track, preparation.camera, preparation.shots, fps)
-    index = index_elements(edges, body_frame)
+    index, silhouettes = index_elements(edges, body_frame), gather_silhouettes(edges, body_frame)
     count, frames = len(edges), np.arange(len(edges))
     looked_at = np.union1d(regular_frames(preparation.video), annotations.frames)
     features = describe_player(preparation.video, body_frame, looked_at)
-    silhouettes = gather_silhouettes(edges, body_frame)
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
@@ -241,7 +240,9 @@ def propagate_half(
         unlikeness=appearance.unlikeness(hypotheses.joints),
         bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
     )
-    limbs_chosen = choose_limbs(templates, hypotheses, start.shots, fps, start.ways, start.silhouettes)
+    limbs_chosen = choose_limbs(
+        templates, hypotheses, start.shots, fps, start.ways, start.silhouettes
+    )
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     gain += appearance_gain(half, limbs_chosen.unlikeness, fps)

@@ -11,6 +11,7 @@ of, the other leg is where it explains most of the rest and leaves the silhouett
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Float32
@@ -114,7 +115,7 @@ def limb_gaps(
     points: Complex[np.ndarray, "..."], limb: tuple[Complex[np.ndarray, "..."], ...]
 ) -> Float32[np.ndarray, "..."]:
     """The same of a limb whose joints are given from the trunk outwards."""
-    gaps = [bone_gaps(points, a, b, LIMB_RADIUS) for a, b in zip(limb, limb[1:], strict=False)]
+    gaps = [bone_gaps(points, a, b, LIMB_RADIUS) for a, b in pairwise(limb)]
     end = points.astype(np.complex64) - limb[-1].astype(np.complex64)
     return reduce(np.minimum, gaps, _soften(np.abs(end), END_RADIUS))
 

@@ -133,9 +133,7 @@ def trace_edges(labels: UInt8[np.ndarray, "h w"], options: EdgeOptions) -> _Elem
     return _thin(elements, np.logical_and(inside, tangent.any(axis=1)), options.most)
 
 
-def sample_inside(
-    labels: UInt8[np.ndarray, "h w"], spacing: float
-) -> Float[np.ndarray, "P 2"]:
+def sample_inside(labels: UInt8[np.ndarray, "h w"], spacing: float) -> Float[np.ndarray, "P 2"]:
     """Middles of the cells of a grid that regions cover by half and more, crop pixels."""
     cell = max(1, round(spacing))
     covered = cv2.blur((labels > 0).astype(np.float32), (cell, cell))

@@ -71,9 +71,7 @@ def test_a_limb_is_found_where_the_silhouette_has_one_that_no_pose_has(half):
     silhouette, joints = seen({"lower": kicking, "upper": raising}[half.name](), half)
     longest = np.full(len(half.bones), 0.28)
     none = np.zeros(0, int)
-    poses = AnnotatedPoses(
-        half, none, joints[:0], np.zeros((0, len(half.joints)), bool), longest
-    )
+    poses = AnnotatedPoses(half, none, joints[:0], np.zeros((0, len(half.joints)), bool), longest)
     found = search_by_silhouette(silhouette, poses, on_one_limb(half, joints))
     side = list(half.sides[0])
     away = np.abs(found[0, :, side] - joints[0, side][:, None])
