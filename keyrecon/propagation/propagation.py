@@ -231,7 +231,8 @@ def propagate_half(
         parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
         missed = search_by_silhouette(start.silhouettes, poses, trunk)
-        parts.append(fit_poses(templates, index, missed, nearest))
+        if missed.shape[1]:
+            parts.append(fit_poses(templates, index, missed, nearest))
         if half.middle:
             parts.append(fit_poses(templates, index, arms, nearest))
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)

@@ -159,10 +159,16 @@ class _LimbLibrary:
 
 def search_by_silhouette(
     silhouettes: Silhouettes, poses: AnnotatedPoses, best: Complex[np.ndarray, "T J"]
-) -> Complex[np.ndarray, "T 2 J"]:
-    """The poses that are given, with the one limb and with the other looked for anew."""
-    half = poses.half
-    library = _make_library(poses)
+) -> Complex[np.ndarray, "T _ J"]:
+    """The poses that are given, with the one limb and with the other looked for anew.
+
+    What hangs from the end of a limb, toes from an ankle, moves with it. None of a skeleton whose
+    limbs are not two bones end to end.
+    """
+    half, bones = poses.half, _limb_bones(poses.half)
+    if bones is None:
+        return best[:, None][:, :0]
+    library = _make_library(poses, bones)
     joints = np.repeat(best[:, None], 2, axis=1)
     places = limb_places(silhouettes, half, best)
     for frames in _blocks(len(best)):
@@ -176,9 +182,10 @@ def search_by_silhouette(
             inside = _splat(whole.points - root, whole.there.astype(float))
             beside = (1 - np.minimum(inside, 1)) @ library.core
             chosen = (left - OUTSIDE_COST * beside).argmax(axis=1)
-            root = root[:, 0]
-            joints[frames, number, side[1]] = root + library.middle[chosen]
-            joints[frames, number, side[2]] = root + library.outer[chosen]
+            outer = root + library.outer[chosen][:, None]
+            moved = best[frames][:, side[2:]] + outer - best[frames, side[2]][:, None]
+            joints[frames, number, side[1]] = root[:, 0] + library.middle[chosen]
+            joints[frames, number][:, side[2:]] = moved
     return joints
 
 
@@ -187,11 +194,18 @@ def _blocks(count: int) -> Iterator[slice]:
         yield slice(first, first + FRAMES_AT_A_TIME)
 
 
-def _make_library(poses: AnnotatedPoses) -> _LimbLibrary:
-    half, (inner, middle, outer) = poses.half, poses.half.sides[0]
-    bones = half.bones.tolist()
-    rows = [bones.index([a, b]) for a, b in ((inner, middle), (middle, outer))]
-    longest = [max(poses.longest[row], poses.longest[half.bone_mirror[row]]) for row in rows]
+def _limb_bones(half: BodyHalf) -> list[int] | None:
+    """Rows of the first two bones of a limb."""
+    side, bones = half.sides[0], half.bones.tolist()
+    pairs = [[a, b] for a, b in pairwise(side[:3])]
+    if len(pairs) < 2 or not all(pair in bones for pair in pairs):
+        return None
+    return [bones.index(pair) for pair in pairs]
+
+
+def _make_library(poses: AnnotatedPoses, bones: list[int]) -> _LimbLibrary:
+    mirrored = poses.half.bone_mirror
+    longest = [max(poses.longest[row], poses.longest[mirrored[row]]) for row in bones]
     turns = np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
     steps = np.outer(SHORTENING, turns).ravel()
     one, two = (steps * (b if np.isfinite(b) else USUAL_LENGTH) for b in longest)
@@ -199,8 +213,8 @@ def _make_library(poses: AnnotatedPoses) -> _LimbLibrary:
     end = joint + np.tile(two, len(one))
     places = (GRID + 1j * GRID[:, None]).ravel()
     gaps = limb_gaps(places[:, None], (np.zeros(1, complex), joint[None], end[None]))
-    bones = ((np.zeros(1, complex), joint), (joint, end))
-    apart = [bone_gaps(places[:, None], a[None], b[None], CORE_RADIUS) for a, b in bones]
+    ends = ((np.zeros(1, complex), joint), (joint, end))
+    apart = [bone_gaps(places[:, None], a[None], b[None], CORE_RADIUS) for a, b in ends]
     core = (np.minimum(*apart) == 0).astype(np.float32)
     return _LimbLibrary(joint, end, 1 - gaps, core)
 

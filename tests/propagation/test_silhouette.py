@@ -1,5 +1,7 @@
 """What limbs explain of a silhouette, and limbs that it proposes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from capsule_player import scene, standing, turned
@@ -69,13 +71,18 @@ def test_both_limbs_on_one_leave_the_other_unexplained(half):
 @pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
 def test_a_limb_is_found_where_the_silhouette_has_one_that_no_pose_has(half):
     silhouette, joints = seen({"lower": kicking, "upper": raising}[half.name](), half)
-    longest = np.full(len(half.bones), 0.28)
-    none = np.zeros(0, int)
-    poses = AnnotatedPoses(half, none, joints[:0], np.zeros((0, len(half.joints)), bool), longest)
-    found = search_by_silhouette(silhouette, poses, on_one_limb(half, joints))
+    found = search_by_silhouette(
+        silhouette, marked_nowhere(half, joints), on_one_limb(half, joints)
+    )
     side = list(half.sides[0])
     away = np.abs(found[0, :, side] - joints[0, side][:, None])
     assert away.max(axis=0).min() < 0.1
+
+
+def marked_nowhere(half, joints):
+    longest, none = np.full(len(half.bones), 0.28), np.zeros(0, int)
+    known = np.zeros((0, len(half.joints)), bool)
+    return AnnotatedPoses(half, none, joints[:0], known, longest)
 
 
 def test_the_pair_of_limbs_that_explains_the_silhouette_is_chosen():
@@ -96,3 +103,9 @@ def test_without_a_silhouette_no_pair_is_better_than_another():
     left, right = limbs(LEGS, joints)
     assert uncovered(places, LEGS, joints, left, right) == 0
     assert uncovered(places, LEGS, joints, right, right) == 0
+
+
+def test_legs_without_knees_are_not_looked_for():
+    silhouette, joints = seen(standing(), LEGS)
+    half = replace(LEGS, sides=((3, 4), (2, 1)))
+    assert search_by_silhouette(silhouette, marked_nowhere(half, joints), joints).shape[1] == 0
