@@ -4,12 +4,18 @@ from fractions import Fraction
 
 import av
 import pytest
+import shape_checks
 from numbered_pictures import numbered_picture
 
 
 def pytest_collection_modifyitems(items):
     """Whole jobs first: they take longest, and what is last keeps one core waiting."""
     items.sort(key=lambda item: len(item.path.parts))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _shapes_are_checked_anew():
+    shape_checks.begin_file()
 
 
 @pytest.fixture(scope="session")
