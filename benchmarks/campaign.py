@@ -47,7 +47,7 @@ SECONDS, MEMORY = 20.0, 4 << 30
 """Limits of a case."""
 GAPS = (
     *("joints", "points2d_propagated", "expected_error", "points", "confidence"),
-    *("shafts", "keys"),
+    *("shafts", "keys", "sd_tilt"),
 )
 """Arrays in which NaN says that nothing is known there."""
 ABSURD = ("-1e9", "1e12", "nan", "inf", "-inf", "0.5.5", "x", "1e400", "", "[1]")

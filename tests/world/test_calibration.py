@@ -1,5 +1,7 @@
 """The camera of every frame of small films of a painted court."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from painted_court import camera_at, court_error, paint
@@ -101,6 +103,14 @@ def test_a_camera_file_is_read_as_it_was_written(panned, tmp_path):
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04 no")
     with pytest.raises(KeyreconError, match="is not a camera"):
         read_camera(tmp_path / "broken.npz")
+
+
+def test_a_camera_over_the_ground_without_the_spread_of_its_tilt_is_refused(panned, tmp_path):
+    for origin, tilt, word in (("ground", np.nan, "sd_tilt"), ("court", np.inf, "sd_tilt")):
+        told = replace(panned[2], origin=origin, sd_tilt=np.full(len(panned[2].found), tilt))
+        write_camera(tmp_path / "camera.npz", told)
+        with pytest.raises(KeyreconError, match=word):
+            read_camera(tmp_path / "camera.npz")
 
 
 def test_pose2sim_reads_the_same_camera(panned, tmp_path):

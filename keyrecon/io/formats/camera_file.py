@@ -14,7 +14,7 @@ import numpy as np
 
 from keyrecon import __version__
 from keyrecon.io.durable import write_durably
-from keyrecon.reading import read_arrays, reading
+from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.world.records import COURT, GROUND, Origin, WorldCamera
 
 ARRAYS = {
@@ -59,10 +59,12 @@ def read_camera(path: Path) -> WorldCamera:
         numbers = {name: data[name].astype(np.float64) for name in ARRAYS if name != "found"}
         if not all(np.isfinite(values[found]).all() for values in numbers.values()):
             raise ValueError("a camera that was found has numbers missing")
+        origin = read_origin(data)
         tilt = data.get(TILT, np.full(frames, np.nan)).astype(np.float64)
         if tilt.shape != (frames,):
             raise ValueError(f"{TILT} has shape {tilt.shape}")
-        return WorldCamera(found=found, sd_tilt=tilt, origin=read_origin(data), **numbers)
+        check_numbers(TILT, tilt[found], gaps=origin == COURT)
+        return WorldCamera(found=found, sd_tilt=tilt, origin=origin, **numbers)
 
 
 def read_origin(data: Mapping[str, np.ndarray]) -> Origin:
