@@ -294,6 +294,8 @@ HEAVY = "{'numpy', 'scipy', 'cv2', 'av', 'skimage', 'plotly', 'starlette', 'uvic
         (("new", "--help"), set()),
         (("pick", "--help"), set()),
         (("annotate", "--help"), set()),
+        (("add", "--help"), set()),
+        (("ground", "--help"), set()),
         (("relink", "nowhere", "v.mp4"), {"numpy", "jaxtyping"}),
     ],
 )

@@ -4,11 +4,7 @@ from typing import Annotated
 
 from tyro.conf import UseAppendAction, arg
 
-from keyrecon.app.console import show
-from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.commands.arguments import MaybeNumber, Project
-from keyrecon.io.workspace import Workspace
-from keyrecon.world.records import KINDS, GroundMarks
 
 ENDS = "FRAME:X,Y:X,Y[:METRES]"
 
@@ -37,6 +33,11 @@ def ground(
         fov: Angle across the width of the picture, degrees.
         forget: Take a mark out of the project: vertical-2, fov; "all" takes all of them.
     """
+    from keyrecon.app.console import show
+    from keyrecon.app.ground import find_ground, ground_mark
+    from keyrecon.io.workspace import Workspace
+    from keyrecon.world.records import KINDS, GroundMarks
+
     typed = zip(KINDS, (vertical, length, horizon), strict=True)
     marks = tuple(ground_mark(kind, text) for kind, texts in typed for text in texts)
     print(find_ground(Workspace(project), GroundMarks(marks, fov), show, forget))
