@@ -201,21 +201,23 @@ def test_joints_of_the_skeleton_are_all_there(solved):
 
 
 def test_a_skeleton_of_ones_own_goes_through(clip, tmp_path):
+    """With joints beyond the ends of the legs and of the arms."""
     toes = [("right_toe", "right_ankle", 0.11), ("left_toe", "left_ankle", 0.11)]
+    hands = [("right_hand", "right_wrist", 0.05), ("left_hand", "left_wrist", 0.05)]
     joints = [
         {"name": n, "parent": None if p < 0 else LSP14.names[p], "length": length}
         for n, p, length in zip(LSP14.names, LSP14.parents, LSP14.proportions, strict=True)
     ]
-    joints += [{"name": n, "parent": p, "length": length} for n, p, length in toes]
+    joints += [{"name": n, "parent": p, "length": length} for n, p, length in toes + hands]
     lower = [LSP14.names[i] for i in LSP14.lower] + [n for n, _, _ in toes]
     (tmp_path / "toes.json").write_text(json.dumps({"joints": joints, "lower": lower}))
     made = new_project(clip, tmp_path / "p", "--skeleton", tmp_path / "toes.json")
     Workspace(made).add_picks(read_picks(clip / "picks.json"))
     assert keyrecon("keyframes", made, "--budget", "0.06") == 0
     truth = read_truth(clip / "truth.npz")
-    ankles = [0, 5]
+    ends = [LSP14.index(parent) for _, parent, _ in toes + hands]
     points3d, points2d = (
-        np.concatenate([truth[name], truth[name][:, ankles] + step], axis=1)
+        np.concatenate([truth[name], truth[name][:, ends] + step], axis=1)
         for name, step in (("points3d", [0.1, 0.03, 0.0]), ("points2d", [10.0, 3.0]))
     )
     skeleton = Workspace(made).skeleton
@@ -225,8 +227,9 @@ def test_a_skeleton_of_ones_own_goes_through(clip, tmp_path):
     assert keyrecon("import", made, tmp_path / "marks.json") == 0
     assert keyrecon("run", made) == 0
     motion = read_motion(made / "motion.npz")
-    assert motion.skeleton.names[-2:] == ("right_toe", "left_toe")
-    assert np.median(np.abs(motion.points2d - points2d)[:, -2:]) < 0.03 * 150
+    added = ("right_toe", "left_toe", "right_hand", "left_hand")
+    assert motion.skeleton.names[-4:] == added
+    assert np.median(np.abs(motion.points2d - points2d)[:, -4:]) < 0.03 * 150
 
 
 def whole_body(truth, *frames):

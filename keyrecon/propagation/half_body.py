@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -36,6 +37,14 @@ class BodyHalf:
         child = self.bones[:, 1]
         paired = self.bone_mirror != np.arange(len(self.bones))
         return paired * (np.isin(child, self.sides[0]) + 2 * np.isin(child, self.sides[1]))
+
+    def limb_bones(self, side: tuple[int, ...]) -> tuple[int, int] | None:
+        """Rows of the first two bones of a limb; None where it has no two end to end."""
+        bones = [tuple(bone) for bone in self.bones.tolist()]
+        pairs = [*pairwise(side[:3])]
+        if len(pairs) < 2 or not all(pair in bones for pair in pairs):
+            return None
+        return bones.index(pairs[0]), bones.index(pairs[1])
 
     @property
     def middle(self) -> tuple[int, ...]:

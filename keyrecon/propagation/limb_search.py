@@ -108,9 +108,14 @@ def search_by_looks(
 ) -> Complex[np.ndarray, "T N J"]:
     """Poses with the trunk that is given and the `count` best limbs of either side.
 
-    Frames that were not described have the limbs of the nearest one that was.
+    Frames that were not described have the limbs of the nearest one that was. What hangs from the
+    end of a limb, a hand from a wrist, moves with it. None of a skeleton whose limbs are not two
+    bones end to end.
     """
-    limbs = [_limb_of(poses, side) for side in poses.half.sides]
+    sides = poses.half.sides
+    limbs = [limb for side in sides if (limb := _limb_of(poses, side)) is not None]
+    if len(limbs) < len(sides):
+        return trunk[:, None][:, :0]
     starts = [limb.joints[0] for limb in limbs]
     across = np.arange(-REACH, REACH + SPACING, SPACING)
     grid = across + 1j * across[:, None]
@@ -124,9 +129,11 @@ def search_by_looks(
             offsets[row, :, number] = _find_limbs(appearance, looks, limb, start, count)
     nearest = _nearest(described, len(trunk))
     joints = np.repeat(trunk[:, None], count, axis=1)
-    for number, limb in enumerate(limbs):
-        outer = list(limb.joints[1:])
-        joints[:, :, outer] = offsets[nearest, :, number] + trunk[:, limb.joints[0], None, None]
+    for number, (limb, side) in enumerate(zip(limbs, sides, strict=True)):
+        start, _, end = limb.joints
+        joints[:, :, limb.joints[1:]] = offsets[nearest, :, number] + trunk[:, start, None, None]
+        moved = joints[:, :, end] - trunk[:, end, None]
+        joints[:, :, side[3:]] += moved[:, :, None]
     return joints
 
 
@@ -139,17 +146,18 @@ def _nearest(described: np.ndarray, count: int) -> np.ndarray:
     return np.where(nearer, before, after)
 
 
-def _limb_of(poses: AnnotatedPoses, side: tuple[int, ...]) -> _Limb:
-    half = poses.half
-    inner, middle, outer = side
-    bones = [half.bones.tolist().index([a, b]) for a, b in ((inner, middle), (middle, outer))]
+def _limb_of(poses: AnnotatedPoses, side: tuple[int, ...]) -> _Limb | None:
+    half, bones = poses.half, poses.half.limb_bones(side)
+    if bones is None:
+        return None
+    inner, middle, outer = side[:3]
     lengths = np.abs(poses.joints[:, half.bones[:, 1]] - poses.joints[:, half.bones[:, 0]])
     lengths = np.where(poses.known[:, half.bones].all(axis=2), lengths, 0).max(axis=0)
     lengths = np.maximum(lengths, lengths[half.bone_mirror])
     turns = np.arange(DIRECTIONS)[:, None] + np.arange(len(FORESHORTENING)) / 2
     unit = (np.array(FORESHORTENING) * np.exp(2j * np.pi * turns / DIRECTIONS)).ravel()
     one, other = (unit * lengths[bone] for bone in bones)
-    return _Limb((inner, middle, outer), (bones[0], bones[1]), (one, other))
+    return _Limb((inner, middle, outer), bones, (one, other))
 
 
 def _find_limbs(

@@ -226,15 +226,13 @@ def propagate_half(
         tracked = beside.submit(track_from_keyframes, templates, index, nearest, start.shots, fps)
         appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
         trunk, count = fitted.best_joints, LIMB_HYPOTHESES
-        arms = search_by_looks(appearance, poses, trunk, count) if half.middle else trunk[:, :0]
         limbs = search_by_edges(templates, index, trunk, count)
         parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
-        missed = search_by_silhouette(start.silhouettes, poses, trunk)
-        if missed.shape[1]:
-            parts.append(fit_poses(templates, index, missed, nearest))
+        searched = [search_by_silhouette(start.silhouettes, poses, trunk)]
         if half.middle:
-            parts.append(fit_poses(templates, index, arms, nearest))
+            searched.append(search_by_looks(appearance, poses, trunk, count))
+        parts += [fit_poses(templates, index, p, nearest) for p in searched if p.shape[1]]
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
     hypotheses = replace(
         hypotheses,

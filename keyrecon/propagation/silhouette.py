@@ -165,7 +165,7 @@ def search_by_silhouette(
     What hangs from the end of a limb, toes from an ankle, moves with it. None of a skeleton whose
     limbs are not two bones end to end.
     """
-    half, bones = poses.half, _limb_bones(poses.half)
+    half, bones = poses.half, poses.half.limb_bones(poses.half.sides[0])
     if bones is None:
         return best[:, None][:, :0]
     library = _make_library(poses, bones)
@@ -194,16 +194,7 @@ def _blocks(count: int) -> Iterator[slice]:
         yield slice(first, first + FRAMES_AT_A_TIME)
 
 
-def _limb_bones(half: BodyHalf) -> list[int] | None:
-    """Rows of the first two bones of a limb."""
-    side, bones = half.sides[0], half.bones.tolist()
-    pairs = [[a, b] for a, b in pairwise(side[:3])]
-    if len(pairs) < 2 or not all(pair in bones for pair in pairs):
-        return None
-    return [bones.index(pair) for pair in pairs]
-
-
-def _make_library(poses: AnnotatedPoses, bones: list[int]) -> _LimbLibrary:
+def _make_library(poses: AnnotatedPoses, bones: tuple[int, int]) -> _LimbLibrary:
     mirrored = poses.half.bone_mirror
     longest = [max(poses.longest[row], poses.longest[mirrored[row]]) for row in bones]
     turns = np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
