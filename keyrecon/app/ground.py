@@ -13,6 +13,7 @@ from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
+from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_grid, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.ground_calibration import (
@@ -70,35 +71,17 @@ def find_ground(
     vertical-2, fov, all. Marks that contradict the rest are not kept.
     """
     video = workspace.video()
-    for mark in told.marks:
-        check_mark(mark, len(video), (video.width, video.height))
-    if told.field_of_view is not None:
-        check_field_of_view(told.field_of_view)
     kept = without_marks(workspace.ground_marks(), forget)
-    together = GroundMarks(
-        tuple(dict.fromkeys((*kept.marks, *told.marks))),
-        kept.field_of_view if told.field_of_view is None else told.field_of_view,
-    )
+    together = _with_marks(kept, told, video)
     _keep_court(workspace)
-    if not workspace.motion_file.is_file():
-        raise KeyreconError(
-            "There is no motion yet, and the player is what tells where the ground is: make it "
-            f"first with keyrecon run {quoted(workspace.folder)} --height METRES"
-        )
-    motion = read_motion(workspace.motion_file)
+    motion = _motion_of(workspace, video)
     known = _known_focal(video, together.field_of_view)
     options = workspace.options(Options(), Options()).camera
     path = workspace.stages.keep(
         "camera", estimate_camera_motion, video, options=options, progress=progress
     )
-    size = (video.width, video.height)
-    if len(motion.time) != len(video):
-        raise KeyreconError(
-            f"The motion has {len(motion.time)} frames and the video {len(video)}; run keyrecon "
-            "run again."
-        )
     try:
-        found = calibrate_ground(motion, path, size, together.marks, known)
+        found = calibrate_ground(motion, path, (video.width, video.height), together.marks, known)
     except ContradictoryMarks as fault:
         raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, told)}") from fault
     workspace.keep_ground_marks(together)
@@ -119,6 +102,34 @@ def find_ground(
             *old_report(workspace, placed),
         ]
     )
+
+
+def _with_marks(kept: GroundMarks, told: GroundMarks, video: Video) -> GroundMarks:
+    """Marks of former calls and of this one, which must lie in the video."""
+    for mark in told.marks:
+        check_mark(mark, len(video), (video.width, video.height))
+    if told.field_of_view is not None:
+        check_field_of_view(told.field_of_view)
+    return GroundMarks(
+        tuple(dict.fromkeys((*kept.marks, *told.marks))),
+        kept.field_of_view if told.field_of_view is None else told.field_of_view,
+    )
+
+
+def _motion_of(workspace: Workspace, video: Video) -> Motion:
+    """The project's motion, which must be of the whole video."""
+    if not workspace.motion_file.is_file():
+        raise KeyreconError(
+            "There is no motion yet, and the player is what tells where the ground is: make it "
+            f"first with keyrecon run {quoted(workspace.folder)} --height METRES"
+        )
+    motion = read_motion(workspace.motion_file)
+    if len(motion.time) != len(video):
+        raise KeyreconError(
+            f"The motion has {len(motion.time)} frames and the video {len(video)}; run keyrecon "
+            "run again."
+        )
+    return motion
 
 
 def _keep_court(workspace: Workspace) -> None:
