@@ -152,7 +152,7 @@ function execute(command, key) {
 }
 
 document.addEventListener("keydown", (event) => {
-  if (document.querySelector("dialog[open]") && event.key !== "?") return;
+  if (document.body.inert || (document.querySelector("dialog[open]") && event.key !== "?")) return;
   const key = interpret(event, ui.view);
   if (!key || belongsTo(event.target, event.key)) return;
   event.preventDefault();

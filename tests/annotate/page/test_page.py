@@ -580,6 +580,22 @@ INK = """
 """Whether anything is drawn over the picture."""
 
 
+def test_before_the_project_is_read_there_is_nothing_to_press(person, context):
+    held = []
+    context.route("**/api/state", lambda route: held.append(route))
+    person.page.reload()
+    for _ in range(100):
+        person.page.wait_for_timeout(20)
+        if held:
+            break
+    person.press("Alt+3")
+    assert person.page.evaluate("() => document.body.inert")
+    context.unroute("**/api/state")
+    person.page.wait_for_selector("body[data-view=keyframes]")
+    person.press("Alt+3")
+    person.page.wait_for_selector("body[data-view=motion]")
+
+
 def test_marks_wait_for_the_picture_they_belong_to(person, context):
     person.open(10)
     person.click(place_of(10, "head_top"))

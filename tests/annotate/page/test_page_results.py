@@ -109,7 +109,7 @@ def test_good_news_go_when_they_were_read_and_doubts_stay_until_they_are_closed(
             person.page.click("#notice-close")
             person.page.wait_for_selector("#notice", state="hidden")
             person.page.reload()
-            person.page.wait_for_selector("body[data-view]")
+            person.page.wait_for_selector("body[data-view]:not([inert])")
             person.press("Alt+3")
             person.await_text("#motion-doubts", "cuts the feet off in frames 3 to 9")
         else:
@@ -130,7 +130,7 @@ def test_marks_that_came_after_the_motion_are_told_when_the_page_is_opened_again
                 person.press("Alt+3")
                 person.await_text("#motion-text", "Not yet in the motion")
             person.page.reload()
-            person.page.wait_for_selector("body[data-view]")
+            person.page.wait_for_selector("body[data-view]:not([inert])")
             person.press("Alt+3")
             person.await_text("#motion-text", text)
 

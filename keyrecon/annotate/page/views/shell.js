@@ -142,6 +142,7 @@ export function createShell(model, go) {
       { undo, redo } = model.state;
     const { view } = model.ui;
     document.body.dataset.view = view;
+    document.body.inert = false; // it was from the start: before the project is read there is nothing to act on
     for (const page of document.querySelectorAll("main")) page.hidden = page.id !== view;
     document.querySelectorAll("nav [data-go]").forEach((button) => {
       const beginning = view === "pick" || (view === "keyframes" && !model.project.has.keyframes),
