@@ -1,11 +1,8 @@
 """The camera over level ground where there is no court: maximum likelihood over all evidence.
 
-For every focal length of a wide range the other numbers are fitted to all evidence together
-(`ground_evidence`), which tells how likely that focal length is (Laplace's approximation in the
-others: Tierney and Kadane, JASA 81, 1986). The range is gone over twice, the second time where it
-matters. So the spread is right also where the focal length stays open over a factor of three, as it
-does where the player stays on one spot, and what follows from that for tilt, height and place is in
-their spreads. What nothing tells comes from what cameras are like (`USUAL_*`).
+Clicked marks, the player's height and stances, and what cameras are like (`USUAL_*`) where nothing
+else tells; `ground_posterior` holds them against each other. A mark that contradicts the rest is
+named, and the camera is carried to all frames by its motion.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.optimize import least_squares
 
 from keyrecon.errors import KeyreconError
 from keyrecon.numerics.geometry import warp_points
@@ -21,16 +17,17 @@ from keyrecon.records import CameraPath, Motion
 from keyrecon.world.clicked_points import CLICK_NOISE
 from keyrecon.world.court_tracking import between, carried
 from keyrecon.world.ground_evidence import (
-    LEAN,
     LEANING,
     GroundState,
     MarkedEnds,
     Stances,
-    lean_residuals,
     mark_residuals,
     on_plane,
-    robust,
-    size_residuals,
+)
+from keyrecon.world.ground_posterior import (
+    GroundEvidence,
+    GroundPosterior,
+    explore_cameras,
 )
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import ANKLE_SHARE
@@ -40,8 +37,6 @@ from keyrecon.world.stances import STATURE, find_stances
 USUAL_FOCAL, FOCAL_SPREAD = 1.0, 0.7
 """Focal length of cameras at sports, in the picture's longer side, and the spread of its logarithm:
 phones have .7 to .85, their second lens 1.5 to 2.2, cameras on tripods up to 4."""
-FOCAL_LENGTHS = (0.35, 8.0)
-"""Shortest and longest, in the longer side."""
 USUAL_TILT, TILT_SPREAD = np.radians(5.0), np.radians(12.0)
 """How far cameras look down, and the spread."""
 ROLL_SPREAD = np.radians(2.5)
@@ -53,16 +48,6 @@ SIZE_SPREAD = 0.04
 rendered sequences."""
 STATURE_SPREAD = 0.06
 """The same for a player whose height is not known."""
-SIZE_NOISE = (0.01, 0.06)
-"""Least and most that it is off from moment to moment; in between it is taken from the fit."""
-SIZE_MEMORY = 3.0
-"""Moments over which that lasts and counts once."""
-STARTS = tuple((np.radians(tilt), np.log(high)) for tilt in (0, 12, 25, 40) for high in (1, 3, 9))
-"""Tilts and heights from which the fit may begin."""
-ENOUGH = {"ftol": 1e-4, "xtol": 1e-4, "gtol": 1e-4, "max_nfev": 40}
-"""Where a fit ends: what is left changes the likelihood by less than a hundredth."""
-COARSE, FINE, SAMPLES = 11, 11, 600
-"""Focal lengths tried at first and then, and draws from what is left open."""
 CONTRADICTION = 4.0
 """Standard deviations by which a mark may contradict the rest."""
 ALIKE = 9.0
@@ -101,58 +86,6 @@ class ContradictoryMarks(KeyreconError):
     """No camera sees the marks where they were clicked."""
 
 
-@dataclass(frozen=True, eq=False)
-class _GroundEvidence:
-    """All that is held against a camera."""
-
-    marks: MarkedEnds
-    stances: Stances
-    prior: tuple[GroundState, GroundState]
-    """Mean and spread of what is known beforehand."""
-    principal: Float[np.ndarray, "2"]
-    click: float
-    noise: float = 0.03
-    """Of the player's size in one moment."""
-
-    def residuals(self, x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "m"]:
-        """In standard deviations."""
-        state = GroundState(*x)
-        camera = state.pinhole(self.principal)
-        mean, spread = (_numbers(part) for part in self.prior)
-        parts = [(x - mean) / spread, mark_residuals(camera, self.marks, self.click).ravel()]
-        if len(self.stances.frame):
-            once = 1 / np.sqrt(SIZE_MEMORY)
-            sizes = size_residuals(camera, self.stances, state.log_size) / self.noise
-            leans = lean_residuals(camera, self.stances, state.lean) / LEAN
-            parts += [once * robust(sizes), once * robust(leans)]
-        return np.concatenate(parts)
-
-
-@dataclass(frozen=True, eq=False)
-class _Posterior:
-    """What is left open: normal distributions, one for each focal length tried."""
-
-    weight: Float[np.ndarray, "n"]
-    mean: Float[np.ndarray, "n 6"]
-    root: Float[np.ndarray, "n 5 5"]
-    """Of the covariance of all but the focal length."""
-
-    @property
-    def best(self) -> Float[np.ndarray, "6"]:
-        """The likeliest of the focal lengths tried, and what goes with it."""
-        return self.mean[int(self.weight.argmax())]
-
-    def draws(self) -> Float[np.ndarray, "s 6"]:
-        """Draws, the same each time."""
-        rng = np.random.default_rng(0)
-        chosen = rng.choice(len(self.weight), SAMPLES, p=self.weight)
-        drawn = self.mean[chosen].copy()
-        drawn[:, 1:] += np.einsum(
-            "sij,sj->si", self.root[chosen], rng.standard_normal((SAMPLES, 5))
-        )
-        return drawn
-
-
 def calibrate_ground(
     motion: Motion,
     path: CameraPath,
@@ -180,8 +113,8 @@ def calibrate_ground(
     stances = find_stances(motion, usable, to_reference, zoom / zoom[reference])
     ends = _marked(marks, usable, to_reference)
     click = CLICK_NOISE * max(size) / 1280
-    evidence = _GroundEvidence(ends, stances, _prior(motion, max(size), known), principal, click)
-    posterior, evidence = _explore(evidence, max(size))
+    evidence = GroundEvidence(ends, stances, _prior(motion, max(size), known), principal, click)
+    posterior, evidence = explore_cameras(evidence, max(size))
     if blame := _contradiction(evidence, posterior, marks, max(size)):
         raise ContradictoryMarks(blame)
     return _result(posterior, evidence, path, usable, reference)
@@ -284,63 +217,8 @@ def _prior(
     )
 
 
-def _numbers(state: GroundState) -> Float[np.ndarray, "6"]:
-    return np.array(list(vars(state).values()))
-
-
-def _explore(evidence: _GroundEvidence, longer: int) -> tuple[_Posterior, _GroundEvidence]:
-    """All focal lengths, coarsely, then the likely ones; with the noise that the fit tells."""
-    grid = np.log(np.geomspace(*FOCAL_LENGTHS, COARSE) * longer)
-    posterior = _over(evidence, grid)
-    for _ in range(2):
-        evidence = replace(evidence, noise=_size_noise(evidence, posterior.best))
-        middle = float(posterior.weight @ posterior.mean[:, 0])
-        spread = float(np.sqrt(posterior.weight @ (posterior.mean[:, 0] - middle) ** 2))
-        step = max(spread, 0.3 * (grid[1] - grid[0]))
-        low, high = max(grid[0], middle - 4 * step), min(grid[-1], middle + 4 * step)
-        posterior = _over(evidence, np.linspace(low, high, FINE), posterior.best)
-    return posterior, evidence
-
-
-def _size_noise(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
-    """Noise of the player's size from moment to moment."""
-    if len(evidence.stances.frame) < 4:
-        return evidence.noise
-    state = GroundState(*x)
-    off = size_residuals(state.pinhole(evidence.principal), evidence.stances, state.log_size)
-    return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), *SIZE_NOISE))
-
-
-def _over(
-    evidence: _GroundEvidence,
-    log_focals: Float[np.ndarray, "n"],
-    near: Float[np.ndarray, "6"] | None = None,
-) -> _Posterior:
-    """How likely each focal length is, and the rest given it, which is not far from `near`."""
-    usual = _numbers(evidence.prior[0])[1:]
-    start = usual if near is None else near[1:]
-    cost, means, roots = [], [], []
-    for log_focal in log_focals:
-
-        def residuals(rest: np.ndarray, log_focal: float = float(log_focal)) -> np.ndarray:
-            return evidence.residuals(np.concatenate([[log_focal], rest]))
-
-        if near is None:  # lines of sight over the horizon pull nowhere: begin where they do
-            others = (np.array([t, 0.0, h, *usual[3:]]) for t, h in STARTS)
-            start = min((start, *others), key=lambda rest: float((residuals(rest) ** 2).sum()))
-        spread = _numbers(evidence.prior[1])[1:]
-        solved = least_squares(residuals, start, x_scale=spread, **ENOUGH)
-        start = solved.x
-        normal = solved.jac.T @ solved.jac
-        cost.append(solved.cost + 0.5 * np.linalg.slogdet(normal)[1])
-        means.append(np.concatenate([[log_focal], solved.x]))
-        roots.append(np.linalg.inv(np.linalg.cholesky(normal)).T)
-    weight = np.exp(np.min(cost) - np.array(cost))
-    return _Posterior(weight / weight.sum(), np.array(means), np.array(roots))
-
-
 def _contradiction(
-    evidence: _GroundEvidence, posterior: _Posterior, marks: Sequence[GroundMark], longer: int
+    evidence: GroundEvidence, posterior: GroundPosterior, marks: Sequence[GroundMark], longer: int
 ) -> str:
     """Which mark contradicts the others; empty where none does.
 
@@ -356,7 +234,7 @@ def _contradiction(
         kept = [i for i in range(len(marks)) if i != k]
         ends = evidence.marks
         ends = MarkedEnds(tuple(ends.kinds[i] for i in kept), ends.ends[kept], ends.metres[kept])
-        found, without = _explore(replace(evidence, marks=ends), longer)
+        found, without = explore_cameras(replace(evidence, marks=ends), longer)
         without = replace(without, noise=evidence.noise)
         gain.append(_cost(evidence, best) - _cost(without, found.best))
         misfit.append(_misfit(evidence, found.best, k))
@@ -375,11 +253,11 @@ def _contradiction(
     )
 
 
-def _cost(evidence: _GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
+def _cost(evidence: GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
     return float((evidence.residuals(x) ** 2).sum())
 
 
-def _misfit(evidence: _GroundEvidence, x: Float[np.ndarray, "6"], number: int) -> float:
+def _misfit(evidence: GroundEvidence, x: Float[np.ndarray, "6"], number: int) -> float:
     """How far a mark is off, standard deviations."""
     camera = GroundState(*x).pinhole(evidence.principal)
     return float(np.abs(mark_residuals(camera, evidence.marks, evidence.click)[number]).max())
@@ -392,8 +270,8 @@ def describe_mark(mark: GroundMark) -> str:
 
 
 def _result(
-    posterior: _Posterior,
-    evidence: _GroundEvidence,
+    posterior: GroundPosterior,
+    evidence: GroundEvidence,
     path: CameraPath,
     usable: Bool[np.ndarray, "T"],
     reference: int,
@@ -431,14 +309,14 @@ def _result(
     return GroundCalibration(camera, state, GroundState(*sd), reference, evidence.stances, far)
 
 
-def _place(x: Float[np.ndarray, "6"], evidence: _GroundEvidence) -> Float[np.ndarray, "3"]:
+def _place(x: Float[np.ndarray, "6"], evidence: GroundEvidence) -> Float[np.ndarray, "3"]:
     """The camera's place when the origin is under the foot on which the player first stands."""
     state = GroundState(*x)
     foot = _standing_ankles(state, evidence)[0]
     return state.pinhole(evidence.principal).centre - foot * [1, 1, 0]
 
 
-def _standing_ankles(state: GroundState, evidence: _GroundEvidence) -> Float[np.ndarray, "N 3"]:
+def _standing_ankles(state: GroundState, evidence: GroundEvidence) -> Float[np.ndarray, "N 3"]:
     """Where they are, the camera being over the origin."""
     height = ANKLE_SHARE * np.exp(state.log_size) * evidence.stances.stature
     camera = state.pinhole(evidence.principal)
@@ -450,7 +328,7 @@ def _up(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
     return GroundState(*x).pinhole(np.zeros(2)).rotation[:, 2]
 
 
-def _distances(state: GroundState, evidence: _GroundEvidence) -> tuple[float, float]:
+def _distances(state: GroundState, evidence: GroundEvidence) -> tuple[float, float]:
     """Least and most distance at which the player stands, metres."""
     camera = state.pinhole(evidence.principal)
     far = np.linalg.norm(_standing_ankles(state, evidence) - camera.centre, axis=1)

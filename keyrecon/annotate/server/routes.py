@@ -20,7 +20,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from keyrecon.annotate.server import handlers
+from keyrecon.annotate.server import handlers, world_handlers
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.security import Credentials, SecurityMiddleware
 from keyrecon.annotate.server.session import Session
@@ -66,12 +66,12 @@ ROUTES = (
     ApiRoute("POST", "/api/jobs", handlers.begin_job, handlers.JobRequest),
     ApiRoute("DELETE", "/api/jobs/{job:int}", handlers.cancel_job),
     ApiRoute("POST", "/api/shots", handlers.shot, handlers.ShotRequest, alone=True),
-    ApiRoute("GET", "/api/court", handlers.court),
-    ApiRoute("GET", "/api/court/{frame:int}", handlers.court_view, alone=True),
-    ApiRoute("POST", "/api/court", handlers.court_point, handlers.CourtPointRequest),
-    ApiRoute("GET", "/api/ground", handlers.ground),
-    ApiRoute("GET", "/api/ground/{frame:int}", handlers.ground_view, alone=True),
-    ApiRoute("POST", "/api/ground", handlers.change_ground, handlers.GroundRequest),
+    ApiRoute("GET", "/api/court", world_handlers.court),
+    ApiRoute("GET", "/api/court/{frame:int}", world_handlers.court_view, alone=True),
+    ApiRoute("POST", "/api/court", world_handlers.court_point, world_handlers.CourtPointRequest),
+    ApiRoute("GET", "/api/ground", world_handlers.ground),
+    ApiRoute("GET", "/api/ground/{frame:int}", world_handlers.ground_view, alone=True),
+    ApiRoute("POST", "/api/ground", world_handlers.change_ground, world_handlers.GroundRequest),
     ApiRoute("GET", "/api/motion", handlers.motion),
     ApiRoute("GET", "/api/report", handlers.report),
     ApiRoute("GET", "/api/exports", handlers.exports),
