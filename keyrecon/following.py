@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from keyrecon.io.video import Video
-from keyrecon.keeping import Keep
+from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress, silent
 from keyrecon.records import (
     CameraPath,
@@ -97,26 +97,33 @@ def follow_player(
         )  # fmt: skip
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
-    sightings = [
-        keep(
+
+    def sight(shot: _Shot) -> Sighting:
+        return keep(
             f"find{shot.name}", sight_player, shot.video, shot.colors, shot.camera, shot.anchors,
             options=options.find, progress=silent,
-        )
-        for shot in progress(each, "Looking for the player in each shot", len(each))
-    ]  # fmt: skip
+        )  # fmt: skip
+
+    looked = work_on_each(keep, sight, each)
+    sightings = [*progress(looked, "Looking for the player in each shot", len(each))]
     picked = np.array([shot.picked for shot in each])
     shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
+
+    def follow(number: int) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
+        return _follow(each[number], _found(sightings[number]), options, keep, silent)
+
     tracks: list[Track] = []
     edges: list[Edges] = []
     verified: list[TrackVerification] = []
-    for number in progress(usable, "Following the player in each shot", len(usable)):
-        track, followed, of_track = _follow(
-            each[number], _found(sightings[number]), options, keep, silent
-        )
+    followed = work_on_each(keep, follow, usable)
+    for track, found, of_track in progress(
+        followed, "Following the player in each shot", len(usable)
+    ):
+        first = shots.first[usable[len(tracks)]]
         tracks.append(track)
-        edges += followed
-        verified.append(replace(of_track, frames=of_track.frames + shots.first[number]))
+        edges += found
+        verified.append(replace(of_track, frames=of_track.frames + first))
     return FollowedPlayer(shots, join_frames(tracks), tuple(edges), join_frames(verified))
 
 

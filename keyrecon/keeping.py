@@ -1,10 +1,12 @@
-"""How stages are called: at once, or by someone who keeps their results."""
+"""How stages are called: at once, or by someone who keeps their results or has workers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import ParamSpec, Protocol, TypeVar, runtime_checkable
 
 from keyrecon.numerics.threads import one_order_of_sums
+from keyrecon.spreading import Spread, one_by_one
 
+Item = TypeVar("Item")
 Inputs = ParamSpec("Inputs")
 Result = TypeVar("Result")
 
@@ -26,6 +28,30 @@ class Keep(Protocol):
     ) -> Result:
         """The stage's result for these inputs."""
         ...
+
+
+@runtime_checkable
+class KeepWithWorkers(Keep, Protocol):
+    """One that may have stages run elsewhere, several at a time."""
+
+    spread: Spread
+    """Hands out pieces of one stage's work."""
+
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """`work`, which calls stages, done for every item, maybe side by side; in order."""
+        ...
+
+
+def work_on_each(
+    keep: Keep, work: Callable[[Item], Result], items: Iterable[Item]
+) -> Iterator[Result]:
+    """`work`, which calls stages by `keep`, done for shots that do not hang on one another."""
+    return keep.each(work, items) if isinstance(keep, KeepWithWorkers) else map(work, items)
+
+
+def spread_of(keep: Keep) -> Spread:
+    """Who does pieces of a stage's work."""
+    return keep.spread if isinstance(keep, KeepWithWorkers) else one_by_one
 
 
 def call_stage(

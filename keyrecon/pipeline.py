@@ -19,7 +19,7 @@ from keyrecon.following import FollowOptions, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.video import Video
-from keyrecon.keeping import Keep, call_stage
+from keyrecon.keeping import Keep, call_stage, spread_of, work_on_each
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
@@ -139,6 +139,7 @@ def prepare(
         followed.track,
         options=options.compare,
         progress=progress,
+        spread=spread_of(keep),
     )
     keyframes = keep(
         "keyframes",
@@ -306,18 +307,19 @@ def follow_marks(
         return keep(
             "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
         )
-    frames, flows = [], []
-    for part in shots.parts:
-        inside = np.arange(part.start, part.stop)
-        shot_marks = part_of_marks(marks, inside)
-        if np.isfinite(shot_marks.joints).any():
-            frames.append(inside)
-            flows.append(
-                keep(
-                    f"flow@{part.start}", track_marked_joints, video.part(part),
-                    shot_marks, options=options.flow, progress=progress,
-                )
-            )  # fmt: skip
+    inside = [np.arange(part.start, part.stop) for part in shots.parts]
+    shot_marks = [part_of_marks(marks, frames) for frames in inside]
+    marked = [n for n, own in enumerate(shot_marks) if np.isfinite(own.joints).any()]
+
+    def track(number: int) -> FlowTracks:
+        part = shots.parts[number]
+        return keep(
+            f"flow@{part.start}", track_marked_joints, video.part(part), shot_marks[number],
+            options=options.flow, progress=progress,
+        )  # fmt: skip
+
+    flows = [*work_on_each(keep, track, marked)]
+    frames = [inside[number] for number in marked]
     return put_back(join_frames(flows), np.concatenate(frames), len(video))
 
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Int
 
-from keyrecon.keeping import Keep
+from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import Annotations, FlowTracks, JointTracks, Preparation, Shots
@@ -108,8 +108,8 @@ def propagate_in_groups(
             "propagate", propagate_joints, preparation, annotations, flow,
             options=options, progress=progress,
         )  # fmt: skip
-    carried = []
-    for group in progress(groups, "Propagating joints", len(groups)):
+
+    def carry(group: ShotGroup) -> JointTracks:
         tracks = keep(
             f"propagate@{group.own.start}",
             propagate_joints,
@@ -120,5 +120,7 @@ def propagate_in_groups(
         )
         span = np.searchsorted(group.frames, (group.own.start, group.own.stop)).tolist()
         tracks = take_frames(tracks, slice(*span))
-        carried.append(replace(tracks, keyframe=group.frames[tracks.keyframe]))
-    return join_frames(carried)
+        return replace(tracks, keyframe=group.frames[tracks.keyframe])
+
+    carried = work_on_each(keep, carry, groups)
+    return join_frames([*progress(carried, "Propagating joints", len(groups))])

@@ -22,6 +22,7 @@ BASE = {
     "reading",
     "ranges",
     "progress",
+    "spreading",
     "numerics",
 }
 SHARED = BASE | {"segmentation", "io"}

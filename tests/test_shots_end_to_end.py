@@ -1,7 +1,11 @@
 """A video of two points with a close-up, a replay and black between: from the file to exports."""
 
+import os
 import shutil
+import signal
+import time
 from dataclasses import replace
+from threading import Thread
 
 import cv2
 import numpy as np
@@ -172,3 +176,38 @@ def test_a_shot_that_was_left_out_can_be_asked_for_by_its_number(solved, tmp_pat
     asked = keyframes_from_json((made / "keyframes.json").read_text())
     replay = slice(LENGTH + CLOSE_UP, LENGTH + CLOSE_UP + REPLAY)
     assert asked.upper.represented[replay].any()
+
+
+def kill_a_busy_worker(address, cache):
+    """End the process of a worker while it follows the player in a shot."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        process = client.run(os.getpid)
+        while not list(cache.glob("find@*")):
+            time.sleep(0.01)
+        while not (busy := [worker for worker, tasks in client.processing().items() if tasks]):
+            time.sleep(0.01)
+        os.kill(process[busy[0]], signal.SIGKILL)
+
+
+def test_workers_of_a_cluster_make_the_same_to_the_digit_though_one_is_lost(solved, tmp_path):
+    distributed = pytest.importorskip("distributed", reason="pip install 'keyrecon[cluster]'")
+    here, made = solved[0], tmp_path / "project"
+    assert keyrecon("new", solved[3] / "match.mp4", "--project", made) == 0
+    for name in ("project.toml", "picks.json", "keyframes.json", "annotations.json"):
+        shutil.copy(here / name, made)
+    text = (made / "project.toml").read_text()
+    (made / "project.toml").write_text(text.replace("../match.mp4", str(solved[3] / "match.mp4")))
+    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        killing = Thread(target=kill_a_busy_worker, args=(address, made / "cache"))
+        killing.start()
+        assert keyrecon("run", made, "--workers", address) == 0
+        killing.join()
+    assert (made / "motion.npz").read_bytes() == (here / "motion.npz").read_bytes()
+    local, elsewhere = (
+        {file.name: file.read_bytes() for file in (project / "cache").iterdir()}
+        for project in (here, made)
+    )
+    assert local == elsewhere

@@ -246,7 +246,7 @@ def _without_misplaced(
     progress: Progress,
 ) -> ProjectPreparation:
     """With all picks, or without those that lie off the track where it is surer without them."""
-    keep = workspace.stages.keep
+    keep = workspace.stages
     asked = marks is None or workspace.picks_file.is_file()
     picks = list(workspace.picks()) if asked else []
     first = prepare(video, picks, options, keep, progress, marks)

@@ -51,7 +51,7 @@ def run(
     asked = asked_for(workspace)
     automatic = prepare_project(workspace, workspace.video(), annotations, options, progress)
     preparation = replace(automatic.preparation, keyframes=asked)
-    motion = reconstruct(preparation, annotations, options, workspace.stages.keep, progress)
+    motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
     doubts, shots = automatic.contradictions(), describe_shots(preparation.shots)
     material = ReportMaterial(

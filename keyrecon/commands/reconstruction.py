@@ -6,7 +6,8 @@ from tyro.conf import arg
 
 from keyrecon.app import keyframing, running
 from keyrecon.app.console import show
-from keyrecon.commands.arguments import MaybeNumber, MaybeWhole, Project, Switch
+from keyrecon.commands.arguments import MaybeNumber, MaybeWhole, MaybeWorkers, Project, Switch
+from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 
@@ -20,6 +21,7 @@ def keyframes(
     reach: MaybeWhole = None,
     method: Literal["best", "paper"] = "best",
     force: Switch = False,
+    workers: MaybeWorkers = None,
     options: Advanced = Options(),
 ) -> None:
     """Find the player and choose the keyframes to mark.
@@ -34,13 +36,15 @@ def keyframes(
         reach: Longest gap to interpolate, in frames at 50 frames a second (default: 10).
         method: 'paper' does it as printed, for `keyrecon run --method paper`.
         force: Make every stage again.
+        workers: A number of processes on this machine, or the address of a Dask scheduler such as
+            tcp://head:8786, whose workers make shots and parts of the comparison side by side. They
+            need keyrecon in the same version, and the project's folder and video under the same
+            paths on a drive that all share. Results are the same to the last digit.
     """
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
-    print(
-        keyframing.find_keyframes(
-            Workspace(project, force), options, chosen, show, method == "paper"
-        )
-    )
+    with open_workers(workers) as made_by:
+        workspace = Workspace(project, force, made_by)
+        print(keyframing.find_keyframes(workspace, options, chosen, show, method == "paper"))
 
 
 def run(
@@ -49,6 +53,7 @@ def run(
     method: Literal["best", "paper"] = "best",
     partial: Switch = False,
     force: Switch = False,
+    workers: MaybeWorkers = None,
     options: Advanced = Options(),
 ) -> None:
     """Carry the marked joints to every frame, lift them to 3D and refine the motion.
@@ -62,7 +67,12 @@ def run(
         method: 'paper' uses the forms printed in the paper.
         partial: Go on although keyframes are not marked yet.
         force: Make every stage again.
+        workers: A number of processes on this machine, or the address of a Dask scheduler such as
+            tcp://head:8786, whose workers make shots and parts of the comparison side by side. They
+            need keyrecon in the same version, and the project's folder and video under the same
+            paths on a drive that all share. Results are the same to the last digit.
     """
-    workspace = Workspace(project, force)
-    chosen = running.settings(workspace, options, height)
-    print(running.run(workspace, chosen, show, partial, printed=method == "paper"))
+    with open_workers(workers) as made_by:
+        workspace = Workspace(project, force, made_by)
+        chosen = running.settings(workspace, options, height)
+        print(running.run(workspace, chosen, show, partial, printed=method == "paper"))

@@ -3,57 +3,84 @@
 A result is stored under a name that is a hash of everything that made it: the stage's code, its
 options and its inputs. The same inputs and options find it again; anything else makes it anew.
 Results of earlier stages count by their own hashes, so that nothing large is hashed twice.
+
+Where there are workers, they make what is not stored, and put it where it is looked for here: which
+results there are, and what is in them, does not hang on who makes them.
 """
 
 import hashlib
-import inspect
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path, PosixPath
+from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.stage_tasks import (
+    StageTask,
+    StoredResult,
+    hash_code,
+    read_when_there,
+    store_inputs,
+)
 from keyrecon.io.storage import is_mapped, load_record, save_record
 from keyrecon.io.video import Video
+from keyrecon.io.workers import Workers
 from keyrecon.numerics.threads import one_order_of_sums
+from keyrecon.spreading import one_by_one
 
-PACKAGE = Path(__file__).parent.parent
-SHARED_CODE = (
-    "body.py",
-    "records.py",
-    "timeline.py",
-    "io/frame_reader.py",
-    "io/video.py",
-    "numerics/*.py",
-    "paper/*.py",
-    "segmentation/*.py",
-)
-"""Modules whose change makes the results of every stage anew."""
 KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""
 PLAIN_TYPES = (bool, int, float, complex, str, bytes, type(None), Path, PosixPath)
 """Values whose text tells all of them; anything else would collide or never be found again."""
 
 
+NO_INPUTS = ("progress", "spread")
+"""Named arguments that change no result: how progress is shown, and who does the work."""
+
+
 Inputs = ParamSpec("Inputs")
 Result = TypeVar("Result")
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A result that was stored or found."""
+
+    result: object
+    key: str
+    path: Path
 
 
 class StageStore:
     """Stage results in a folder that is safe to delete."""
 
-    def __init__(self, folder: Path, force: bool = False) -> None:
-        """Use `folder`; `force` makes every stage again."""
+    def __init__(self, folder: Path, force: bool = False, workers: Workers | None = None) -> None:
+        """Use `folder`; `force` makes every stage again, `workers` make them elsewhere."""
         self.folder = folder
         self.force = force
+        self.workers = workers
         self.seconds: dict[str, float] = {}
         """How long each stage took that was run, seconds."""
-        self._keys: dict[int, tuple[object, str]] = {}
+        self._kept: dict[int, _Kept] = {}
+        self._timing = Lock()
+
+    def __call__(
+        self,
+        name: str,
+        stage: Callable[Inputs, Result],
+        /,
+        *inputs: Inputs.args,
+        **named: Inputs.kwargs,
+    ) -> Result:
+        """The same as `keep`."""
+        return self.keep(name, stage, *inputs, **named)
 
     def keep(
         self,
@@ -67,17 +94,99 @@ class StageStore:
         key, path = self._place(name, stage, inputs, named)
         result = _NOTHING if self.force else _stored(path)
         if result is _NOTHING:
-            started = time.perf_counter()
-            with one_order_of_sums():
-                result = stage(*inputs, **named)
-            stage_of_shot = name.partition("@")
-            before = self.seconds.get(stage_of_shot[0], 0.0) if stage_of_shot[1] else 0.0
-            self.seconds[stage_of_shot[0]] = before + time.perf_counter() - started
-            save_record(path, result)
+            if self.workers is None or "spread" in named:  # which hands out its work by itself
+                result = self._make(name, path, stage, inputs, named)
+            else:
+                result = self._make_elsewhere(name, path, stage, inputs, named)
             self._forget(name, path)
-            result = _left_on_disk(path, result)
-        self._keys[id(result)] = (result, key)
+        self._kept[id(result)] = _Kept(result, key, path)
         return result
+
+    def _make(
+        self,
+        name: str,
+        path: Path,
+        stage: Callable[..., Result],
+        inputs: tuple[object, ...],
+        named: Mapping[str, object],
+    ) -> Result:
+        """Run a stage here and store its result."""
+        started = time.perf_counter()
+        with one_order_of_sums():
+            result = stage(*inputs, **named)
+        self._note(name, time.perf_counter() - started)
+        save_record(path, result)
+        return _left_on_disk(path, result)
+
+    def _make_elsewhere(
+        self,
+        name: str,
+        path: Path,
+        stage: Callable[..., Any],
+        inputs: tuple[object, ...],
+        named: Mapping[str, Any],
+    ) -> Any:
+        """Have a stage run by a worker; without its progress."""
+        progress = named.get("progress")
+        task = self._task(path, stage, inputs, named, path)
+        for _ in progress([name], f"{name}, by a worker", 1) if progress else [name]:
+            seconds, _ = self._carry_out(task)
+        self._note(name, seconds)
+        return read_when_there(path)
+
+    def _task(
+        self,
+        path: Path,
+        stage: Callable[..., Any],
+        inputs: tuple[object, ...],
+        named: Mapping[str, object],
+        result: Path | None,
+    ) -> StageTask:
+        """A call that workers can carry out; `path` tells its inputs from those of others."""
+        place = path.with_name(f"inputs-{path.name}")
+        store_inputs(place, tuple(self._reference(value) for value in inputs), _inputs_of(named))
+        return StageTask(stage, place, result, hash_code(stage))
+
+    def _reference(self, value: object) -> object:
+        """A stored result by its file, other values as they are."""
+        kept = self._kept.get(id(value))
+        return StoredResult(str(kept.path)) if kept and kept.path.is_file() else value
+
+    def _carry_out(self, task: StageTask) -> tuple[float, Any]:
+        assert self.workers is not None
+        try:
+            return self.workers.carry_out(task)
+        finally:
+            task.inputs.unlink(missing_ok=True)
+
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """`work`, which calls stages by this store, done for every item, in order.
+
+        With workers several items are worked on at a time, so that all of them have something to
+        do.
+        """
+        return map(work, items) if self.workers is None else self.workers.each(work, items)
+
+    def spread(
+        self, work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]
+    ) -> Iterator[Result]:
+        """Pieces of a stage's work (`spreading.Spread`), done by the workers if there are any."""
+        if self.workers is None:
+            return one_by_one(work, inputs)
+
+        def elsewhere(arguments: tuple[Any, ...]) -> Result:
+            path = self.folder / f"{work.__name__}-{self._key((hash_code(work), arguments))}.npz"
+            result: Result = self._carry_out(self._task(path, work, arguments, {}, None))[1]
+            return result
+
+        return self.workers.each(elsewhere, inputs)
+
+    def _note(self, name: str, seconds: float) -> None:
+        """Keep how long a stage took; those of shots add up."""
+        stage, of_shot, _ = name.partition("@")
+        with self._timing:
+            before = self.seconds.get(stage, 0.0) if of_shot else 0.0
+            self.seconds[stage] = before + seconds
 
     def recall(
         self,
@@ -91,7 +200,7 @@ class StageStore:
         key, path = self._place(name, stage, inputs, named)
         if (result := _stored(path)) is _NOTHING:
             raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
-        self._keys[id(result)] = (result, key)
+        self._kept[id(result)] = _Kept(result, key, path)
         return result
 
     def _place(
@@ -101,9 +210,9 @@ class StageStore:
         inputs: tuple[object, ...],
         named: Mapping[str, object],
     ) -> tuple[str, Path]:
-        """What tells this result from others, and its file. How progress is shown changes none."""
-        arguments = tuple(item for item in sorted(named.items()) if item[0] != "progress")
-        key = self._key((_code_of(stage), name, arguments, *inputs))
+        """What tells this result from others, and its file."""
+        arguments = tuple(sorted(_inputs_of(named).items()))
+        key = self._key((hash_code(stage), name, arguments, *inputs))
         return key, self.folder / f"{name}-{key}.npz"
 
     def _forget(self, name: str, made: Path) -> None:
@@ -124,9 +233,9 @@ class StageStore:
 
     def _digest(self, value: object, digest: "hashlib._Hash") -> None:
         """Feed a value's content; a result that `keep` made counts by its own key."""
-        known = self._keys.get(id(value))
+        known = self._kept.get(id(value))
         if known is not None:
-            digest.update(known[1].encode())
+            digest.update(known.key.encode())
         elif isinstance(value, Video):
             digest.update(value.fingerprint.encode() + value.stamps.tobytes())
             digest.update(value.time.tobytes() + bytes((value.turns, value.mirrored)))
@@ -151,6 +260,10 @@ _NOTHING: Any = object()
 """In place of a result; None can be one."""
 
 
+def _inputs_of(named: Mapping[str, object]) -> dict[str, object]:
+    return {name: value for name, value in named.items() if name not in NO_INPUTS}
+
+
 def _stored(path: Path) -> Any:
     """What is stored there; nothing where no file is, or what a loss of power left of one."""
     try:
@@ -165,11 +278,3 @@ def _left_on_disk(path: Path, result: Any) -> Any:
         if is_mapped(path):
             return load_record(path)
     return result
-
-
-def _code_of(stage: Callable[..., Any]) -> str:
-    """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    stage_code = Path(inspect.getfile(stage)).parent.rglob("*.py")
-    shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
-    sources = sorted({*stage_code, *shared})
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()

@@ -34,7 +34,7 @@ HEADER_BYTES = 10
 
 
 def save_record(path: Path, value: object) -> None:
-    """Write a record (or tuple, number, text, None) so that it appears whole or not at all."""
+    """Write a record, tuple, number, text, path or None; it appears whole or not at all."""
     arrays: Arrays = {}
     tree = _take_apart(value, arrays)
     text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
@@ -82,6 +82,8 @@ def _take_apart(value: object, arrays: Arrays) -> Tree:
         if _is_ragged(value):
             return _take_apart_ragged(value, arrays)
         return {"tuple": [_take_apart(part, arrays) for part in value]}
+    if isinstance(value, Path):
+        return {"path": str(value)}
     return {"value": value.item() if isinstance(value, np.generic) else value}
 
 
@@ -136,7 +138,7 @@ def _put_together(tree: Tree, stored: Any) -> Any:
             kind(**{name: column[i] for name, column in columns.items()})
             for i in range(tree["count"])
         )
-    return tree["value"]
+    return Path(tree["path"]) if "path" in tree else tree["value"]
 
 
 def _name_type(value: object) -> str:

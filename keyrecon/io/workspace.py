@@ -66,6 +66,7 @@ from keyrecon.io.project_videos import (
 )
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, open_video
+from keyrecon.io.workers import Workers
 from keyrecon.reading import read_text
 from keyrecon.records import Pick
 from keyrecon.world.records import CourtClick, GroundMarks
@@ -87,10 +88,13 @@ SECTIONS = (GOLF, COURT)
 class Workspace:
     """A project folder."""
 
-    def __init__(self, folder: Path, force: bool = False) -> None:
-        """Open the project in `folder`; `force` makes every stage again."""
-        self.folder = folder
-        self.stages = StageStore(folder / "cache", force)
+    def __init__(self, folder: Path, force: bool = False, workers: Workers | None = None) -> None:
+        """Open the project in `folder`; `force` makes every stage again, `workers` make them.
+
+        These need the whole path of the folder.
+        """
+        self.folder = folder if workers is None else folder.absolute()
+        self.stages = StageStore(self.folder / "cache", force, workers)
         if not self.project_file.is_file():
             raise KeyreconError(
                 f"{folder} is not a keyrecon project (no project.toml); "

@@ -15,6 +15,7 @@ of more than `most` frames is therefore first reduced to exemplars (see exemplar
 """
 
 import os
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -36,6 +37,7 @@ from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Edges, HalfName, PoseDistances, Track
+from keyrecon.spreading import Spread, one_by_one
 from keyrecon.timeline import take_frames
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
@@ -77,9 +79,11 @@ def compare_frames(
     track: Track,
     options: CompareOptions = CompareOptions(),
     progress: Progress = silent,
+    spread: Spread = one_by_one,
 ) -> PoseDistances:
     """C of every two frames for the upper and the lower body (Sections 4.1-4.3).
 
+    Of a long video, `spread` compares each window of neighbours and each half of the exemplars.
     Raises KeyreconError where no frame has edge elements of one half.
     """
     for half in HALVES:
@@ -89,7 +93,7 @@ def compare_frames(
                 "skin in one more frame."
             )
     if len(edges) > options.most:
-        return _compare_exemplars(edges, track, options, progress)
+        return _compare_exemplars(edges, track, options, progress, spread)
     upper, lower = (measure_matrix(edges, track, h, options, progress) for h in HALVES)
     everyone = np.arange(len(edges))
     return PoseDistances(
@@ -104,18 +108,23 @@ def compare_frames(
 
 
 def _compare_exemplars(
-    edges: tuple[Edges, ...], track: Track, options: CompareOptions, progress: Progress
+    edges: tuple[Edges, ...],
+    track: Track,
+    options: CompareOptions,
+    progress: Progress,
+    spread: Spread,
 ) -> PoseDistances:
     """The same by exemplars: linear in the length of the video, but for their own matrix."""
 
-    def compare(window: slice) -> Float32[np.ndarray, "2 W W"]:
-        part = take_frames(track, window)
-        return np.stack([measure_matrix(edges[window], part, h, options) for h in HALVES])
+    def compare(windows: Sequence[slice]) -> Iterator[Float32[np.ndarray, "2 W W"]]:
+        parts = ((edges[window], take_frames(track, window), options) for window in windows)
+        return spread(compare_window, parts)
 
     band = measure_band(compare, len(edges), progress)
     frames, row = choose_exemplars(band.max(axis=0), options.most)
     kept, track_kept = tuple(edges[t] for t in frames), take_frames(track, frames)
-    upper, lower = (measure_matrix(kept, track_kept, h, options, progress) for h in HALVES)
+    halves = spread(measure_matrix, ((kept, track_kept, half, options) for half in HALVES))
+    upper, lower = progress(halves, "Comparing exemplars", len(HALVES))
     return PoseDistances(
         upper=upper,
         lower=lower,
@@ -125,6 +134,13 @@ def _compare_exemplars(
         consecutive_distance=band[:, :-1, 0],
         visibility_score=score_visibility(edges, track),
     )
+
+
+def compare_window(
+    edges: tuple[Edges, ...], track: Track, options: CompareOptions
+) -> Float32[np.ndarray, "2 W W"]:
+    """C of every two frames of a window, upper and lower body."""
+    return np.stack([measure_matrix(edges, track, half, options) for half in HALVES])
 
 
 def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:

@@ -7,7 +7,7 @@ threshold that leaves no more than the wanted number of exemplars is found by bi
 a player waits one exemplar stands for a second; in a stroke nearly every frame is one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float32, Int
@@ -22,20 +22,23 @@ WINDOW_FRAMES = 448
 
 
 def measure_band(
-    compare: Callable[[slice], Float32[np.ndarray, "2 W W"]],
+    compare: Callable[[Sequence[slice]], Iterator[Float32[np.ndarray, "2 W W"]]],
     n_frames: int,
     progress: Progress = silent,
 ) -> Float32[np.ndarray, "2 T L"]:
     """Distance of each frame to those 1..MAX_LAG later, both halves; infinite beyond the end.
 
-    `compare` measures all distances within a window of frames.
+    `compare` measures all distances within each of some windows of frames.
     """
     band = np.full((2, n_frames, MAX_LAG), np.inf, dtype=np.float32)
-    starts = range(0, n_frames, WINDOW_FRAMES)
-    for start in progress(starts, "Comparing neighbours", len(starts)):
-        stop = min(n_frames, start + WINDOW_FRAMES + MAX_LAG)
-        square = compare(slice(start, stop))
-        for lag in range(1, min(MAX_LAG, stop - start - 1) + 1):
+    windows = [
+        slice(start, min(n_frames, start + WINDOW_FRAMES + MAX_LAG))
+        for start in range(0, n_frames, WINDOW_FRAMES)
+    ]
+    squares = progress(compare(windows), "Comparing neighbours", len(windows))
+    for window, square in zip(windows, squares, strict=True):
+        start = window.start
+        for lag in range(1, min(MAX_LAG, window.stop - start - 1) + 1):
             diagonal = np.diagonal(square, lag, axis1=1, axis2=2)[:, :WINDOW_FRAMES]
             band[:, start : start + diagonal.shape[1], lag - 1] = diagonal
     return band

@@ -1,0 +1,117 @@
+"""A stage's call as a task that another process or machine can carry out.
+
+What is sent is names alone: the stage's function and files in the folder of stage results, which
+whoever carries it out must see under the same path, as it must the video. Inputs that are results
+of earlier stages are read from where these were stored; all others are stored for the task first.
+The result is stored where the one who asks looks for it. So a task that is lost with its worker
+is done again by another, and nobody holds in memory what waits.
+"""
+
+import hashlib
+import inspect
+import platform
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.storage import load_record, save_record
+from keyrecon.numerics.threads import one_order_of_sums
+
+PACKAGE = Path(__file__).parent.parent
+SHARED_CODE = (
+    "body.py",
+    "records.py",
+    "timeline.py",
+    "io/frame_reader.py",
+    "io/video.py",
+    "numerics/*.py",
+    "paper/*.py",
+    "segmentation/*.py",
+)
+"""Modules whose change makes the results of every stage anew."""
+PATIENCE = 60.0
+"""Seconds until a file that another machine has written must be seen: network drives may go on
+telling for so long that there is none (the attribute cache of NFS: acdirmax)."""
+_ONE_AT_A_TIME = Lock()
+"""Of the stages in a process: the number of threads of linear algebra is the whole process's."""
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """In the place of an input: the result of an earlier stage."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class StageTask:
+    """A call that can be sent."""
+
+    stage: Callable[..., Any]
+    inputs: Path
+    """Where `store_inputs` has put them."""
+    result: Path | None
+    """Where the result is to be stored; None hands it back."""
+    code: str
+    """Of the stage, as `hash_code` has it here."""
+
+
+def store_inputs(path: Path, inputs: tuple[object, ...], named: dict[str, object]) -> None:
+    """Put the inputs of a task where whoever carries it out finds them."""
+    save_record(path, (inputs, tuple(named.items())))
+
+
+def carry_out(task: StageTask) -> tuple[float, Any]:
+    """Do what a task says; how many seconds it took, and the result where it is not stored.
+
+    Raises KeyreconError where folder or program are not those of the one who asks.
+    """
+    here = platform.node()
+    if hash_code(task.stage) != task.code:
+        raise KeyreconError(
+            f"The worker on {here} has another version of keyrecon; install the same everywhere."
+        )
+    if not task.inputs.parent.is_dir():
+        raise KeyreconError(
+            f"The worker on {here} does not see {task.inputs.parent}; workers need the project's "
+            "folder and its video under the same paths."
+        )
+    inputs, named = read_when_there(task.inputs)
+    inputs = [
+        read_when_there(Path(value.path)) if isinstance(value, StoredResult) else value
+        for value in inputs
+    ]
+    with _ONE_AT_A_TIME, one_order_of_sums():
+        began = time.perf_counter()
+        result = task.stage(*inputs, **dict(named))
+        seconds = time.perf_counter() - began
+    if task.result is None:
+        return seconds, result
+    save_record(task.result, result)
+    return seconds, None
+
+
+def read_when_there(path: Path) -> Any:
+    """A stored record that another machine may just have written."""
+    end = time.monotonic() + PATIENCE
+    while not path.is_file():
+        if time.monotonic() > end:
+            raise KeyreconError(
+                f"{platform.node()} does not see {path}, which another machine has written; "
+                "workers need the project's folder, on a drive that they share."
+            )
+        time.sleep(0.1)
+    return load_record(path)
+
+
+def hash_code(stage: Callable[..., Any]) -> str:
+    """Hash of the stage's folder and of what all stages share: new code makes new results."""
+    stage_code = Path(inspect.getfile(sys.modules[stage.__module__])).parent.rglob("*.py")
+    shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
+    sources = sorted({*stage_code, *shared})
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
