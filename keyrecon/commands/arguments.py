@@ -14,4 +14,4 @@ MaybeWhole = Annotated[int | None, arg(metavar="INT", help_behavior_hint="")]
 MaybeNumber = Annotated[float | None, arg(metavar="FLOAT", help_behavior_hint="")]
 MaybeFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 """Left out unless they are typed; what counts then stands in the help."""
-MaybeWorkers = Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")]
+MaybeWorkers = Annotated[str | None, arg(metavar="N|ADDRESS", help_behavior_hint="")]

@@ -29,6 +29,10 @@ def keyframes(
     Writes keyframes.json and a picture of every keyframe to mark into keyframes/. The options of
     every stage are listed by `keyrecon keyframes --help-all`; few people ever need them.
 
+    With --workers, shots and parts of the comparison are made side by side, with the same results
+    to the last digit. Workers of a Dask cluster need the same version of keyrecon, and must see the
+    project's folder and the video under the same paths, on a drive that all machines share.
+
     Args:
         project: Project folder.
         budget: Share of frames that you will mark (default: as many as the coverage needs).
@@ -36,10 +40,7 @@ def keyframes(
         reach: Longest gap to interpolate, in frames at 50 frames a second (default: 10).
         method: 'paper' does it as printed, for `keyrecon run --method paper`.
         force: Make every stage again.
-        workers: A number of processes on this machine, or the address of a Dask scheduler such as
-            tcp://head:8786, whose workers make shots and parts of the comparison side by side. They
-            need keyrecon in the same version, and the project's folder and video under the same
-            paths on a drive that all share. Results are the same to the last digit.
+        workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
     with open_workers(workers) as made_by:
@@ -61,16 +62,17 @@ def run(
     Writes motion.npz and report.html. An interrupted run goes on where it stopped. The options of
     every stage are listed by `keyrecon run --help-all`; few people ever need them.
 
+    With --workers, shots and parts of the comparison are made side by side, with the same results
+    to the last digit. Workers of a Dask cluster need the same version of keyrecon, and must see the
+    project's folder and the video under the same paths, on a drive that all machines share.
+
     Args:
         project: Project folder.
         height: The player's height, such as 1.80; without it lengths are in body heights.
         method: 'paper' uses the forms printed in the paper.
         partial: Go on although keyframes are not marked yet.
         force: Make every stage again.
-        workers: A number of processes on this machine, or the address of a Dask scheduler such as
-            tcp://head:8786, whose workers make shots and parts of the comparison side by side. They
-            need keyrecon in the same version, and the project's folder and video under the same
-            paths on a drive that all share. Results are the same to the last digit.
+        workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
     with open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
