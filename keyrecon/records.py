@@ -210,8 +210,8 @@ class Background:
 class PoseDistances:
     """Pose distances between every two frames, each half of the body apart (Section 4.2).
 
-    M frames are compared: all T of a short video, exemplars that stand for their neighbours in
-    time in a long one.
+    M frames are compared: all T of a short video, exemplars that stand for frames of poses like
+    theirs in a long one.
     """
 
     upper: Float[np.ndarray, "M M"]

@@ -4,6 +4,7 @@ A cell stands for all its members by their mean. Which cells may correspond (sam
 directions inside the cone, positions within reach) is worked out once for all frames.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +45,7 @@ class DescriptorBins:
     """Compatible cells that a member's distance may reach."""
 
 
-def gather_elements(edges: tuple[Edges, ...], track: Track, half: HalfName) -> BinnedElements:
+def gather_elements(edges: Sequence[Edges], track: Track, half: HalfName) -> BinnedElements:
     """Align and join the elements of one half of the body."""
     aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
     tangent = np.concatenate([e.tangent for e in aligned])

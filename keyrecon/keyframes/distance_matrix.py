@@ -10,18 +10,18 @@ rounded direction and rounded position share a cell. Then
 
 The elements of j stay where they are and only those of i are rounded, which costs little
 accuracy (a test holds the correlation with the exact twin above 0.997). Work grows with the
-number of elements for M and with the square of the number of frames for the product; a video
-of more than `most` frames is therefore first reduced to exemplars (see exemplars.py).
+number of elements for M and with the square of the number of frames for the product; of a video
+of more than `most` frames only exemplars are compared with one another (see exemplars.py).
 """
 
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 from scipy.sparse import csr_matrix
 
 from keyrecon.errors import KeyreconError
@@ -32,7 +32,7 @@ from keyrecon.keyframes.descriptor_bins import (
     group_elements,
 )
 from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE
-from keyrecon.keyframes.exemplars import choose_exemplars, distance_in_band, measure_band
+from keyrecon.keyframes.exemplars import find_exemplars
 from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
@@ -70,8 +70,8 @@ class CompareOptions:
     directions: Annotated[int, within(4, 360)] = 24
     """Directions that edge elements are sorted into, in a full turn."""
     most: Annotated[int, within(10, 20_000)] = 4000
-    """Frames compared with one another at most; a longer video is compared by frames that stand for
-    their neighbours. Memory and time grow with the square."""
+    """Frames compared with one another at most; of a longer video so many stand for all that are
+    like them. Memory grows with the square, time as well and with the length of the video."""
 
 
 def compare_frames(
@@ -83,7 +83,7 @@ def compare_frames(
 ) -> PoseDistances:
     """C of every two frames for the upper and the lower body (Sections 4.1-4.3).
 
-    Of a long video, `spread` compares each window of neighbours and each half of the exemplars.
+    Of a long video, `spread` compares parts with the exemplars, and each half of the exemplars.
     Raises KeyreconError where no frame has edge elements of one half.
     """
     for half in HALVES:
@@ -115,32 +115,40 @@ def _compare_exemplars(
     spread: Spread,
 ) -> PoseDistances:
     """The same by exemplars: linear in the length of the video, but for their own matrix."""
+    bounded = replace(options, largest="reach")
 
-    def compare(windows: Sequence[slice]) -> Iterator[Float32[np.ndarray, "2 W W"]]:
-        parts = ((edges[window], take_frames(track, window), options) for window in windows)
-        return spread(compare_window, parts)
+    def compare(
+        known: Int[np.ndarray, "E"], parts: Sequence[Int[np.ndarray, "N"]]
+    ) -> Iterator[Float32[np.ndarray, "2 N E+N"]]:
+        together = (np.concatenate([known, new]) for new in parts)
+        inputs = (
+            ([edges[t] for t in frames], take_frames(track, frames), bounded, len(known))
+            for frames in together
+        )
+        return spread(compare_halves, inputs)
 
-    band = measure_band(compare, len(edges), progress)
-    frames, row = choose_exemplars(band.max(axis=0), options.most)
-    kept, track_kept = tuple(edges[t] for t in frames), take_frames(track, frames)
+    shown = np.array([[getattr(e, half).any() for half in HALVES] for e in edges])
+    may_lead = np.asarray(shown.all(axis=1) if shown.all(axis=1).any() else shown.any(axis=1))
+    found = find_exemplars(compare, may_lead, options.most, progress)
+    kept, track_kept = [edges[t] for t in found.frames], take_frames(track, found.frames)
     halves = spread(measure_matrix, ((kept, track_kept, half, options) for half in HALVES))
     upper, lower = progress(halves, "Comparing exemplars", len(HALVES))
     return PoseDistances(
         upper=upper,
         lower=lower,
-        frames=frames,
-        row=row,
-        exemplar_distance=distance_in_band(band, np.arange(len(edges)), frames[row]),
-        consecutive_distance=band[:, :-1, 0],
+        frames=found.frames,
+        row=found.row,
+        exemplar_distance=found.distance,
+        consecutive_distance=found.step,
         visibility_score=score_visibility(edges, track),
     )
 
 
-def compare_window(
-    edges: tuple[Edges, ...], track: Track, options: CompareOptions
-) -> Float32[np.ndarray, "2 W W"]:
-    """C of every two frames of a window, upper and lower body."""
-    return np.stack([measure_matrix(edges, track, half, options) for half in HALVES])
+def compare_halves(
+    edges: Sequence[Edges], track: Track, options: CompareOptions, n_known: int
+) -> Float32[np.ndarray, "2 N T"]:
+    """C between new frames and all (`measure_matrix`), upper and lower body."""
+    return np.stack([measure_matrix(edges, track, h, options, n_known=n_known) for h in HALVES])
 
 
 def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:
@@ -153,60 +161,91 @@ def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray
 
 
 def measure_matrix(
-    edges: tuple[Edges, ...],
+    edges: Sequence[Edges],
     track: Track,
     half: HalfName,
     options: CompareOptions = CompareOptions(),
     progress: Progress = silent,
-) -> Float32[np.ndarray, "T T"]:
-    """C of one half of the body, player heights: symmetric, 0 on the diagonal, never NaN.
+    n_known: int = 0,
+) -> Float32[np.ndarray, "N T"]:
+    """C of every two frames for one half of the body, player heights: 0 between a frame and itself.
 
-    A frame without elements is `reach` away from every other.
+    A frame without elements is `reach` away from every other. The first `n_known` frames are not
+    compared with one another, and have no rows (not with `largest` 'observed', which is of all).
     """
     elements = gather_elements(edges, track, half)
     cells = group_elements(elements, options.cell, options.directions, options.reach)
-    total = np.empty((len(edges), len(edges)), dtype=np.float32)
-    matched = np.empty_like(total) if options.largest == "observed" else None
-    _accumulate(elements, cells, options.reach, total, matched, progress)
-    count = np.bincount(elements.frame, minlength=len(edges)).astype(np.float32)[:, None]
-    empty = count[:, 0] == 0
-    np.divide(total, count, out=total, where=count > 0)
-    total[empty] = options.reach
-    total[:, empty] = options.reach
-    if matched is not None:
-        np.divide(matched, count, out=matched, where=count > 0)
-        total = _with_observed_largest(total, matched, options.reach)
-    return _symmetric(total, options.symmetry)
+    directed = _accumulate(elements, cells, options, n_known, progress)
+    symmetric = _symmetric(directed, options.symmetry)
+    new = np.arange(n_known, elements.n_frames)
+    symmetric[new - n_known, new] = 0
+    return symmetric
+
+
+@dataclass(frozen=True, eq=False)
+class _Directed:
+    """Mean distances of the elements of one frame to another frame, between new frames and all."""
+
+    there: Float32[np.ndarray, "N T"]
+    """From each new frame to every frame."""
+    back: Float32[np.ndarray, "K N"]
+    """From each known frame to every new one."""
 
 
 def _accumulate(
     elements: BinnedElements,
     cells: DescriptorBins,
-    reach: float,
-    total: Float32[np.ndarray, "T T"],
-    matched: Float32[np.ndarray, "T T"] | None,
+    options: CompareOptions,
+    n_known: int,
     progress: Progress,
-) -> None:
-    """Fill in the summed distances and, where asked for, the numbers of matches."""
+) -> _Directed:
+    """C as it is directed."""
+    reach, n_new = options.reach, elements.n_frames - n_known
     members = csr_matrix(
         (np.ones(len(elements.frame), np.float32), (elements.frame, cells.of_element)),
         shape=(elements.n_frames, len(cells.center)),
     )
+    known, new = members[:n_known], members[n_known:]
+    there = np.empty((n_new, elements.n_frames), dtype=np.float32)
+    back = np.empty((n_known, n_new), dtype=np.float32)
+    matched = np.empty_like(there) if options.largest == "observed" else None
     start = np.searchsorted(elements.frame, np.arange(elements.n_frames + 1))
 
     def measure(first: int) -> None:
         frames = range(first, min(first + FRAMES_PER_BLOCK, elements.n_frames))
         part = slice(start[frames.start], start[frames.stop])
         offered = offer_distances(elements, cells, part, frames, reach)
-        total[:, frames.start : frames.stop] = members @ offered
+        there[:, frames.start : frames.stop] = new @ offered
+        if n_known and frames.stop > n_known:
+            since = max(frames.start, n_known)
+            back[:, since - n_known : frames.stop - n_known] = known @ offered[:, since - first :]
         if matched is not None:
             near = (offered < np.float32(reach)).astype(np.float32)
-            matched[:, frames.start : frames.stop] = members @ near
+            matched[:, frames.start : frames.stop] = new @ near
 
     blocks = range(0, elements.n_frames, FRAMES_PER_BLOCK)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         for _ in progress(pool.map(measure, blocks), "Comparing frames", len(blocks)):
             pass
+    count = np.bincount(elements.frame, minlength=elements.n_frames).astype(np.float32)
+    _take_means(there, count[n_known:], count, reach)
+    _take_means(back, count[:n_known], count[n_known:], reach)
+    if matched is not None:
+        np.divide(matched, count[:, None], out=matched, where=count[:, None] > 0)
+        there = _with_observed_largest(there, matched, reach)
+    return _Directed(there, back)
+
+
+def _take_means(
+    total: Float32[np.ndarray, "n m"],
+    count: Float32[np.ndarray, "n"],
+    other: Float32[np.ndarray, "m"],
+    reach: float,
+) -> None:
+    """Sums become means over a frame's elements; `reach` where it or the other has none."""
+    np.divide(total, count[:, None], out=total, where=count[:, None] > 0)
+    total[count == 0] = reach
+    total[:, other == 0] = reach
 
 
 def offer_distances(
@@ -236,10 +275,7 @@ def _with_observed_largest(
     return summed + (1 - matched) * mean_matched.max()
 
 
-def _symmetric(directed: Float32[np.ndarray, "T T"], symmetry: str) -> Float32[np.ndarray, "T T"]:
-    if symmetry == "max":
-        both = np.maximum(directed, directed.T)
-    else:
-        both = (directed + directed.T) / np.float32(2)
-    np.fill_diagonal(both, 0)
-    return both
+def _symmetric(directed: _Directed, symmetry: str) -> Float32[np.ndarray, "N T"]:
+    there, known = directed.there, len(directed.back)
+    other = np.concatenate([directed.back.T, there[:, known:].T], axis=1)
+    return np.maximum(there, other) if symmetry == "max" else (there + other) / np.float32(2)

@@ -7,7 +7,7 @@ from stick_figure import moving_figure
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames, measure_matrix
 from keyrecon.keyframes.edge_distance import align_edges, edge_distance
-from keyrecon.keyframes.exemplars import MAX_LAG, choose_exemplars, measure_band
+from keyrecon.keyframes.exemplars import find_exemplars
 from keyrecon.records import Edges
 
 
@@ -113,29 +113,52 @@ def test_frames_of_no_confidence_are_not_clear(some_frames):
     assert visibility_score[4] > 0.5
 
 
-def test_the_band_holds_the_matrix_along_its_diagonal():
-    rng = np.random.default_rng(0)
-    full = rng.random((2, 700, 700)).astype(np.float32)
-    band = measure_band(lambda windows: (full[:, w, w] for w in windows), 700)
-    assert band.shape == (2, 700, MAX_LAG)
-    for frame, lag in ((0, 1), (447, 1), (448, 64), (635, 64), (450, 30)):
-        assert np.array_equal(band[:, frame, lag - 1], full[:, frame, frame + lag])
-    assert np.isinf(band[:, 690, 9:]).all()
+def test_new_frames_are_compared_with_known_ones_as_all_are_with_all(clip):
+    edges, track = clip
+    full = measure_matrix(edges, track, "upper")
+    new = measure_matrix(edges, track, "upper", n_known=70)
+    assert np.array_equal(new, full[70:])
+
+
+def line_of_poses(position):
+    """Distances of poses on a line, as `find_exemplars` asks for them."""
+
+    def compare(known, parts):
+        for new in parts:
+            apart = np.abs(position[new][:, None] - position[np.concatenate([known, new])])
+            yield np.stack([apart, apart / 2]).astype(np.float32)
+
+    return compare
 
 
 def test_exemplars_gather_where_the_player_moves():
     position = np.concatenate([np.zeros(200), np.arange(100.0), np.full(200, 100.0)])
-    square = np.abs(position[:, None] - position[None]).astype(np.float32)
-    both = np.stack([square] * 2)
-    band = measure_band(lambda windows: (both[:, w, w] for w in windows), len(position))[0]
-    frames, row = choose_exemplars(band, 40)
-    assert len(frames) <= 40
-    assert (np.diff(row) >= 0).all()
-    assert np.array_equal(row[frames], np.arange(len(frames)))
-    moving = (frames >= 200) & (frames < 300)
-    assert moving.mean() > 0.6
-    apart = np.abs(position - position[frames[row]])
+    found = find_exemplars(line_of_poses(position), np.ones(500, dtype=bool), 40)
+    assert 20 <= len(found.frames) <= 40
+    assert (np.diff(found.frames) > 0).all()
+    assert np.array_equal(found.row[found.frames], np.arange(len(found.frames)))
+    moving = (found.frames >= 200) & (found.frames < 300)
+    assert moving.mean() > 0.9
+    apart = np.abs(position - position[found.frames[found.row]])
     assert apart.max() <= 3
+    assert np.allclose(found.distance, [apart, apart / 2])
+    assert np.allclose(found.step[0], np.abs(np.diff(position)))
+
+
+def test_what_recurs_takes_no_more_exemplars():
+    stroke = np.concatenate([np.arange(60.0), np.arange(60.0)[::-1]])
+    repeated = np.tile(stroke, 20)
+    found = find_exemplars(line_of_poses(repeated), np.ones(len(repeated), dtype=bool), 70)
+    assert len(found.frames) == 60
+    assert found.distance.max() == 0
+
+
+def test_frames_that_show_nothing_are_no_exemplars():
+    position = np.tile(np.arange(60.0), 3)
+    may_lead = np.arange(180) % 7 > 0
+    found = find_exemplars(line_of_poses(position), may_lead, 30)
+    assert may_lead[found.frames].all()
+    assert len(found.row) == 180
 
 
 def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(clip):
