@@ -1,113 +1,39 @@
 """Videos of several shots, made here of points, close-ups, replays and black.
 
     python benchmarks/hours.py OUT --rendered SEQUENCE OTHER
+    python benchmarks/hours.py OUT --rendered SEQUENCE OTHER --minutes 30 [--kills 10]
     python benchmarks/hours.py OUT --real CLIP CLIP ...
 
 The first joins two points of a rendered sequence with a close-up, black, a replay in slow motion
 and another player between, clicks in the first point alone, and prints what the shots are taken for
 and PA-MPJPE of each point beside the same point run by itself at the same cost. SEQUENCE and OTHER
-are folders that `accuracy.py` renders (video.mp4, picks.json, truth.npz). The second joins real
-clips with black and a close-up between; a person marks bodies in the first, as in `real.py`; prints
-the shots and writes an overlay.
+are folders that `accuracy.py` renders (video.mp4, picks.json, truth.npz). The second makes a match
+of some minutes of them and runs the commands on it (`long_match.py`). The third joins real clips
+with black and a close-up between; a person marks bodies in the first, as in `real.py`; prints the
+shots and writes an overlay.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
+import long_match
 import numpy as np
 import real
+from made_match import Piece, first_frames, join, made_match
 
 from keyrecon.app.preparing import describe_shots
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, open_video
-from keyrecon.io.video_writer import write_video
 from keyrecon.library import reconstruct
 from keyrecon.metrics import pa_mpjpe, read_truth
 from keyrecon.pipeline import Options, frames_to_mark, prepare
 from keyrecon.records import PLAYER, Keyframes, Motion, Pick
 from keyrecon.report.overlay import write_overlay
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
-
-
-@dataclass(frozen=True)
-class Piece:
-    """What one shot is made of."""
-
-    shows: str
-    """`PLAYER`, 'close-up', 'black', 'replay' or 'other'."""
-    frames: int
-    """How long it is."""
-    source: Path | None = None
-    first: int = 0
-    """Frame of the source."""
-    focus: tuple[float, float] = (0.5, 0.5)
-    """Middle of a close-up, shares of the picture."""
-
-
-CLOSE_UP = 4.0
-"""How much closer a close-up is: a player of 350 px becomes one of twice the picture's height."""
-REPEATS = 3
-"""Times that a replay shows every picture."""
-
-
-def pictures(piece: Piece, size: tuple[int, int]) -> Iterator[np.ndarray]:
-    """The pictures of a piece at a size (width, height)."""
-    if piece.source is None:
-        yield from [np.full((size[1], size[0], 3), 16, np.uint8)] * piece.frames
-        return
-    video = open_video(piece.source)
-    own = -(-piece.frames // REPEATS) if piece.shows == "replay" else piece.frames
-    repeats = REPEATS if piece.shows == "replay" else 1
-    shown = 0
-    for picture in video.frames(piece.first, piece.first + own):
-        if piece.shows == "close-up":
-            picture = _closer(picture, piece.focus)
-        fitted = picture if picture.shape[1::-1] == size else _fit(picture, size)
-        for _ in range(min(repeats, piece.frames - shown)):
-            shown += 1
-            yield fitted
-
-
-def _closer(picture: np.ndarray, focus: tuple[float, float]) -> np.ndarray:
-    height, width = picture.shape[:2]
-    x, y = focus[0] * width, focus[1] * height
-    way = np.array(
-        [[CLOSE_UP, 0, width / 2 - CLOSE_UP * x], [0, CLOSE_UP, height / 2 - CLOSE_UP * y]]
-    )
-    return cv2.warpAffine(picture, way, (width, height), borderMode=cv2.BORDER_REFLECT)
-
-
-def _fit(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """The picture at a size, black beside it where its shape is another."""
-    scale = min(size[0] / picture.shape[1], size[1] / picture.shape[0])
-    small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    whole = np.full((size[1], size[0], 3), 16, np.uint8)
-    y, x = (size[1] - small.shape[0]) // 2, (size[0] - small.shape[1]) // 2
-    whole[y : y + small.shape[0], x : x + small.shape[1]] = small[: size[1], : size[0]]
-    return whole
-
-
-def join(pieces: Sequence[Piece], path: Path, size: tuple[int, int], fps: float) -> list[int]:
-    """Write the pieces one after the other; the first frames of the shots."""
-    write_video(path, (picture for piece in pieces for picture in pictures(piece, size)), fps)
-    return np.cumsum([0, *(piece.frames for piece in pieces[:-1])]).tolist()
-
-
-def made_match(folder: Path, other: Path, length: int, starts: tuple[int, int]) -> list[Piece]:
-    """Two points of a rendered sequence with everything between that matches have."""
-    point = [Piece(PLAYER, length, folder / "video.mp4", first) for first in starts]
-    return [
-        point[0],
-        Piece("close-up", 60, folder / "video.mp4", starts[0] + 40, (0.5, 0.35)),
-        Piece("black", 25),
-        Piece("replay", 90, folder / "video.mp4", starts[0] + length // 2),
-        Piece("other", 60, other / "video.mp4", 100),
-        point[1],
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +78,8 @@ def measure_rendered(folder: Path, other: Path, out: Path, length: int = 300) ->
     pieces = made_match(folder, other, length, points.starts)
     source = open_video(folder / "video.mp4")
     file = out / "match.mp4"
-    firsts = join(pieces, file, (source.width, source.height), source.fps)
+    join(pieces, file, (source.width, source.height), source.fps)
+    firsts = first_frames(pieces)
     video = open_video(file)
     rows = np.concatenate([piece.first + np.arange(piece.frames) for piece in pieces])
     rows = np.minimum(rows, len(source) - 1)
@@ -187,7 +114,8 @@ def measure_real(names: Sequence[str], out: Path) -> None:
         ]
     pieces.append(Piece(PLAYER, len(first.video) // 2, first.video.path))
     size = first.video.width, first.video.height
-    firsts = join(pieces, out / "real.mp4", size, first.video.fps)
+    join(pieces, out / "real.mp4", size, first.video.fps)
+    firsts = first_frames(pieces)
     video = open_video(out / "real.mp4")
     store, options = StageStore(out / "real"), Options()
     body = real.choose_bodies(first, 1)
@@ -213,14 +141,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--rendered", nargs=2, type=Path)
+    parser.add_argument("--minutes", type=float)
+    parser.add_argument("--kills", type=int, default=0)
     parser.add_argument("--real", nargs="+")
     words = parser.parse_args()
     words.out.mkdir(parents=True, exist_ok=True)
-    if words.rendered:
+    if words.rendered and words.minutes:
+        long_match.measure(*words.rendered, words.out, words.minutes, words.kills)
+    elif words.rendered:
         measure_rendered(*words.rendered, words.out)
     if words.real:
         measure_real(words.real, words.out)
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["--child"]:
+        long_match.run_command(sys.argv[2:])
+    else:
+        main()

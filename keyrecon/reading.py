@@ -26,6 +26,8 @@ MAX_ARRAY_BYTES = 1 << 31
 take 0.4 GB. Uncompressed ones are as large as their file."""
 CHUNK_BYTES = 1 << 20
 """Read at a time where nothing is kept."""
+MAPPED_SHARE = 0.75
+"""Of the files that a process may have open (each mapped one counts): others need some too."""
 KINDS = "biufUS"
 """Of NumPy's types: truth values, numbers and texts."""
 
@@ -109,14 +111,30 @@ def map_arrays(path: Path) -> dict[str, np.ndarray]:
     """The same of a file that `keyrecon.io.storage` wrote, left on the disk until they are used.
 
     They take address space, no memory that the system could not take back, and cannot be written
-    to. All bytes are held against the file's checksums first.
+    to. All bytes are held against the file's checksums first. Where too many files are open, they
+    are read.
     """
     with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+        if file.fileno() >= MAPPED_SHARE * open_files_allowed():  # the lowest that is free
+            return read_arrays(path)
         whole_file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         return {
             member.filename.removesuffix(".npy"): _map_array(archive, member, whole_file)
             for member in archive.infolist()
         }
+
+
+def open_files_allowed() -> int | float:
+    """How many files this process may have open, as many as the system lets it."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return math.inf
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and soft < hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        return hard
+    return math.inf if soft == resource.RLIM_INFINITY else soft
 
 
 def _map_array(

@@ -17,6 +17,7 @@ from enum import Enum
 from pathlib import Path, PosixPath
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
+from weakref import ref
 
 import numpy as np
 
@@ -51,11 +52,12 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """A result that was stored or found."""
+    """How a result that was stored or found is known."""
 
-    result: object
     key: str
     path: Path
+    alive: object
+    """The result itself, or what notes that nobody has it any more."""
 
 
 class StageStore:
@@ -99,7 +101,7 @@ class StageStore:
             else:
                 result = self._make_elsewhere(name, path, stage, inputs, named)
             self._forget(name, path)
-        self._kept[id(result)] = _Kept(result, key, path)
+        self._note_kept(result, key, path)
         return result
 
     def _make(
@@ -181,6 +183,14 @@ class StageStore:
 
         return self.workers.each(elsewhere, inputs)
 
+    def _note_kept(self, result: object, key: str, path: Path) -> None:
+        """Know a result again as long as somebody has it; those of shots would fill the memory."""
+        number = id(result)
+        alive: object = result
+        with suppress(TypeError):  # of a tuple there are no weak references
+            alive = ref(result, lambda _: self._kept.pop(number, None))
+        self._kept[number] = _Kept(key, path, alive)
+
     def _note(self, name: str, seconds: float) -> None:
         """Keep how long a stage took; those of shots add up."""
         stage, of_shot, _ = name.partition("@")
@@ -200,7 +210,7 @@ class StageStore:
         key, path = self._place(name, stage, inputs, named)
         if (result := _stored(path)) is _NOTHING:
             raise KeyreconError(f"The result of '{name}' is not in {self.folder}; make it again.")
-        self._kept[id(result)] = _Kept(result, key, path)
+        self._note_kept(result, key, path)
         return result
 
     def _place(

@@ -25,8 +25,9 @@ from keyrecon.reading import map_arrays, read_arrays, reading
 Tree = dict[str, Any]
 Arrays = dict[str, list[np.ndarray]]
 """Parts of each array that is stored, which lie end to end."""
-MAPPED_BYTES = 1 << 22
-"""Files from this size on are mapped: below it, opening costs as much as reading."""
+MAPPED_BYTES = 1 << 18
+"""Files from this size on are mapped: the edges of a shot of one second are. Of a match of hours no
+single shot is large, all of them are."""
 ALIGNMENT = 64
 """Bytes: where arrays begin in a file."""
 HEADER_BYTES = 10

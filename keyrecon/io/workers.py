@@ -131,7 +131,9 @@ def _cluster(address: str) -> Iterator[Workers]:
         raise KeyreconError(
             "--workers with an address needs Dask: pip install 'keyrecon[cluster]'."
         ) from fault
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told in one line
+    for name in logging.root.manager.loggerDict:
+        if name.startswith("distributed"):  # what matters is told in one line
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as fault:

@@ -1,5 +1,7 @@
+import gc
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -80,6 +82,14 @@ def test_a_result_is_recalled_without_ever_being_made(tmp_path):
     power = again.recall("power", raise_to, values, options=PowerOptions())
     assert np.array_equal(again.recall("add", add_one, power), made)
     assert CALLS == [2, "add"]
+
+
+def test_a_result_that_nobody_has_any_more_is_let_go(tmp_path):
+    store = StageStore(tmp_path)
+    held = ref(store.keep("power", raise_to, np.arange(3.0)))
+    gc.collect()
+    assert held() is None
+    assert not store._kept
 
 
 @pytest.mark.parametrize("keep", [0, 30, 0.5, -1])

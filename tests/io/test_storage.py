@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from keyrecon import KeyreconError
+from keyrecon import KeyreconError, reading
 from keyrecon.body import LSP14
 from keyrecon.io.storage import is_mapped, load_record, save_record
 from keyrecon.records import Annotations, Edges, Pick
@@ -80,6 +80,15 @@ def test_a_mapped_result_outlives_its_file(tmp_path):
     back = load_record(tmp_path / "r.npz")
     (tmp_path / "r.npz").unlink()
     np.testing.assert_array_equal(back[7].points, edges(400, 7).points)
+
+
+def test_results_are_read_where_no_more_files_may_be_open(tmp_path, monkeypatch):
+    save_record(tmp_path / "r.npz", many_edges())
+    monkeypatch.setattr(reading, "open_files_allowed", lambda: 4)
+    back = load_record(tmp_path / "r.npz")
+    np.testing.assert_array_equal(back[7].points, edges(400, 7).points)
+    (tmp_path / "r.npz").write_bytes(b"")
+    np.testing.assert_array_equal(back[8].points, edges(400, 8).points)
 
 
 @pytest.mark.parametrize("place", [0.02, 0.3, 0.7, 0.999])
