@@ -55,8 +55,8 @@ class StageTask:
     stage: Callable[..., Any]
     inputs: Path
     """Where `store_inputs` has put them."""
-    result: Path | None
-    """Where the result is to be stored; None hands it back."""
+    result: Path
+    """Where the result is to be stored."""
     code: str
     """Of the stage, as `hash_code` has it here."""
 
@@ -66,8 +66,8 @@ def store_inputs(path: Path, inputs: tuple[object, ...], named: dict[str, object
     save_record(path, (inputs, tuple(named.items())))
 
 
-def carry_out(task: StageTask) -> tuple[float, Any]:
-    """Do what a task says; how many seconds it took, and the result where it is not stored.
+def carry_out(task: StageTask) -> float:
+    """Do what a task says; how many seconds it took.
 
     Raises KeyreconError where folder or program are not those of the one who asks.
     """
@@ -90,10 +90,8 @@ def carry_out(task: StageTask) -> tuple[float, Any]:
         began = time.perf_counter()
         result = task.stage(*inputs, **dict(named))
         seconds = time.perf_counter() - began
-    if task.result is None:
-        return seconds, result
     save_record(task.result, result)
-    return seconds, None
+    return seconds
 
 
 def read_when_there(path: Path) -> Any:

@@ -130,9 +130,9 @@ class StageStore:
     ) -> Any:
         """Have a stage run by a worker; without its progress."""
         progress = named.get("progress")
-        task = self._task(path, stage, inputs, named, path)
+        task = self._task(path, stage, inputs, named)
         for _ in progress([name], f"{name}, by a worker", 1) if progress else [name]:
-            seconds, _ = self._carry_out(task)
+            seconds = self._carry_out(task)
         self._note(name, seconds)
         return read_when_there(path)
 
@@ -142,19 +142,18 @@ class StageStore:
         stage: Callable[..., Any],
         inputs: tuple[object, ...],
         named: Mapping[str, object],
-        result: Path | None,
     ) -> StageTask:
-        """A call that workers can carry out; `path` tells its inputs from those of others."""
+        """A call that workers can carry out, and whose result they store at a path."""
         place = path.with_name(f"inputs-{path.name}")
         store_inputs(place, tuple(self._reference(value) for value in inputs), _inputs_of(named))
-        return StageTask(stage, place, result, hash_code(stage))
+        return StageTask(stage, place, path, hash_code(stage))
 
     def _reference(self, value: object) -> object:
         """A stored result by its file, other values as they are."""
         kept = self._kept.get(id(value))
         return StoredResult(str(kept.path)) if kept and kept.path.is_file() else value
 
-    def _carry_out(self, task: StageTask) -> tuple[float, Any]:
+    def _carry_out(self, task: StageTask) -> float:
         assert self.workers is not None
         try:
             return self.workers.carry_out(task)
@@ -178,7 +177,10 @@ class StageStore:
 
         def elsewhere(arguments: tuple[Any, ...]) -> Result:
             path = self.folder / f"{work.__name__}-{self._key((hash_code(work), arguments))}.npz"
-            result: Result = self._carry_out(self._task(path, work, arguments, {}, None))[1]
+            self._carry_out(self._task(path, work, arguments, {}))
+            result: Result = read_when_there(path)
+            with suppress(PermissionError):  # Windows keeps what is mapped
+                path.unlink(missing_ok=True)
             return result
 
         return self.workers.each(elsewhere, inputs)

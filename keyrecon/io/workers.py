@@ -49,7 +49,7 @@ class Workers:
         """Shots that are worked on at a time."""
         return min(MOST_AT_ONCE, IN_QUEUE * self.count)
 
-    def carry_out(self, task: StageTask) -> tuple[float, Any]:
+    def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
 
         Raises KeyreconError as that does, and where the workers are gone.

@@ -118,11 +118,11 @@ def _compare_exemplars(
     bounded = replace(options, largest="reach")
 
     def compare(
-        known: Int[np.ndarray, "E"], parts: Sequence[Int[np.ndarray, "N"]]
-    ) -> Iterator[Float32[np.ndarray, "2 N E+N"]]:
+        known: Int[np.ndarray, "E"], parts: Sequence[Int[np.ndarray, "_"]]
+    ) -> Iterator[Float32[np.ndarray, "2 _ _"]]:
         together = (np.concatenate([known, new]) for new in parts)
         inputs = (
-            ([edges[t] for t in frames], take_frames(track, frames), bounded, len(known))
+            (tuple(edges[t] for t in frames), take_frames(track, frames), bounded, len(known))
             for frames in together
         )
         return spread(compare_halves, inputs)
@@ -130,7 +130,7 @@ def _compare_exemplars(
     shown = np.array([[getattr(e, half).any() for half in HALVES] for e in edges])
     may_lead = np.asarray(shown.all(axis=1) if shown.all(axis=1).any() else shown.any(axis=1))
     found = find_exemplars(compare, may_lead, options.most, progress)
-    kept, track_kept = [edges[t] for t in found.frames], take_frames(track, found.frames)
+    kept, track_kept = tuple(edges[t] for t in found.frames), take_frames(track, found.frames)
     halves = spread(measure_matrix, ((kept, track_kept, half, options) for half in HALVES))
     upper, lower = progress(halves, "Comparing exemplars", len(HALVES))
     return PoseDistances(

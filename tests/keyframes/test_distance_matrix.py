@@ -1,10 +1,11 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from stick_figure import moving_figure
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.storage import load_record, save_record
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames, measure_matrix
 from keyrecon.keyframes.edge_distance import align_edges, edge_distance
 from keyrecon.keyframes.exemplars import find_exemplars
@@ -171,3 +172,19 @@ def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(clip):
         direct, by_exemplars = getattr(full, half), getattr(short, half)[spread]
         assert np.corrcoef(direct.ravel(), by_exemplars.ravel())[0, 1] > 0.97
     assert np.allclose(short.consecutive_distance, full.consecutive_distance, atol=2e-3)
+
+
+def test_parts_of_a_long_video_may_be_compared_elsewhere(clip, tmp_path):
+    def elsewhere(work, inputs):
+        for arguments in inputs:
+            save_record(tmp_path / "inputs.npz", arguments)
+            yield work(*load_record(tmp_path / "inputs.npz"))
+
+    edges, track = clip
+    options = CompareOptions(most=75)
+    here, there = (
+        compare_frames(edges, track, options),
+        compare_frames(edges, track, options, spread=elsewhere),
+    )
+    for field in fields(here):
+        np.testing.assert_array_equal(getattr(here, field.name), getattr(there, field.name))
