@@ -262,7 +262,7 @@ def find_jumps(track: Track, camera: CameraPath, shots: Shots, fps: float) -> li
     if len(track.head) <= step:
         return []
     change = np.linalg.inv(camera.to_reference[step:]) @ camera.to_reference[:-step]
-    before = warp_points(change, track.head[:-step, None])[:, 0]
+    before = warp_points(change, track.head[:-step])
     far = np.linalg.norm(track.head[step:] - before, axis=1) / track.height[step:]
     same_shot = shots.number[step:] == shots.number[:-step]
     frames = np.flatnonzero(same_shot & (far > MAX_STEP)) + step

@@ -1,5 +1,7 @@
 """Films of a drawn player: alone, cut above the ankles, and with another one passing."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from drawn_player import HEIGHT, SIZE, corners, draw_player, heads, picks, scene
@@ -25,8 +27,8 @@ def track_along(head, rows=SIZE[0]):
     """A track of that head, with feet where the picture has them, or just above its lower edge."""
     feet = head[:, None] + np.array([(-12.0, HEIGHT), (12.0, HEIGHT)])
     feet[..., 1] = np.minimum(feet[..., 1], rows - 6)
-    height = np.full(COUNT, np.median(feet[..., 1] - head[:, None, 1]))
-    return Track(head, feet, height, player_boxes(head, feet, height), np.ones(COUNT))
+    height = np.full(len(head), np.median(feet[..., 1] - head[:, None, 1]))
+    return Track(head, feet, height, player_boxes(head, feet, height), np.ones(len(head)))
 
 
 @pytest.fixture
@@ -103,6 +105,24 @@ def test_a_camera_that_turns_makes_no_jump():
     track = track_along(HEAD - turned[:, :2, 2])
     assert find_jumps(track, CameraPath(turned, np.ones(COUNT)), ONE_SHOT, 30.0) == []
     assert find_jumps(track, CAMERA, ONE_SHOT, 30.0)
+
+
+def test_a_camera_that_begins_to_turn_makes_no_jump():
+    turned = np.tile(np.eye(3), (COUNT, 1, 1))
+    turned[:, 0, 2] = 40.0 * np.maximum(np.arange(COUNT) - 30, 0)
+    track = track_along(HEAD - turned[:, :2, 2])
+    assert find_jumps(track, CameraPath(turned, np.ones(COUNT)), ONE_SHOT, 30.0) == []
+
+
+def test_memory_of_looking_for_jumps_grows_with_the_length_and_not_with_its_square():
+    count = 4000
+    camera = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
+    track = track_along(np.tile(HEAD[:1], (count, 1)))
+    tracemalloc.start()
+    assert find_jumps(track, camera, Shots.between((), count), 30.0) == []
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 2000 * count
 
 
 def test_a_long_shot_is_looked_at_part_by_part(verified, monkeypatch):
