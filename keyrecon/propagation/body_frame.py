@@ -99,3 +99,20 @@ def stabilise_player(track: Track, camera: CameraPath, fps: float) -> BodyFrame:
         total += weight * point
         weights += weight
     return BodyFrame(to_complex(total / weights), track.height.astype(float))
+
+
+def ground_path(
+    body_frame: BodyFrame, camera: CameraPath, shots: Shots
+) -> Complex[np.ndarray, "T"]:
+    """Way of the origin over the ground as the camera sees it, player heights, from 0 in each shot.
+
+    What stands on the ground keeps the sum of this and of its player coordinates, however the
+    camera turns.
+    """
+    path = np.zeros(len(body_frame.origin), complex)
+    for part in shots.parts:
+        origin, to_reference = body_frame.origin[part], camera.to_reference[part]
+        step = np.linalg.inv(to_reference[1:]) @ to_reference[:-1]
+        before = to_complex(warp_points(step, from_complex(origin[:-1])))
+        path[part][1:] = np.cumsum((origin[1:] - before) / body_frame.height[part][1:])
+    return path

@@ -30,7 +30,7 @@ from keyrecon.propagation.appearance import (
     learn_appearance,
     regular_frames,
 )
-from keyrecon.propagation.body_frame import stabilise_shots
+from keyrecon.propagation.body_frame import ground_path, stabilise_shots
 from keyrecon.propagation.bone_bounds import bound_bones
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
@@ -123,6 +123,8 @@ class HalfStart:
     ways: MarkedWays
     """Where flow and straight lines lead from marks."""
     silhouettes: Silhouettes
+    ground: Complex[np.ndarray, "T"] | None
+    """Way of the player over the ground, player heights; of legs, which stand on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +181,12 @@ def _propagate_fused(
     body_frame = stabilise_shots(track, preparation.camera, preparation.shots, fps)
     index, silhouettes = index_elements(edges, body_frame), gather_silhouettes(edges, body_frame)
     count, frames = len(edges), np.arange(len(edges))
-    looked_at = np.union1d(regular_frames(preparation.video), annotations.frames)
-    features = describe_player(preparation.video, body_frame, looked_at)
+    ground = ground_path(body_frame, preparation.camera, preparation.shots)
+    features = describe_player(
+        preparation.video,
+        body_frame,
+        np.union1d(regular_frames(preparation.video), annotations.frames),
+    )
     joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
@@ -200,7 +206,16 @@ def _propagate_fused(
         anchor = track.head if half.name == "upper" else track.mid_feet
         at = body_frame.from_pixels(anchor, frames)
         shift = at[:, None] - at[poses.frames]
-        start = HalfStart(shift, distance, fixed, features, preparation.shots, ways, silhouettes)
+        start = HalfStart(
+            shift,
+            distance,
+            fixed,
+            features,
+            preparation.shots,
+            ways,
+            silhouettes,
+            ground if half.name == "lower" else None,
+        )
         result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -244,8 +259,11 @@ def propagate_half(
     )
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
-    gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    identity = identify_in_shots(half, limbs_chosen.joints, gain, poses.frames, start.shots, fps)
+    if half.name == "upper":
+        gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
+    identity = identify_in_shots(
+        half, limbs_chosen.joints, gain, poses.frames, start.shots, fps, start.ground
+    )
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, start.shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from keyrecon.propagation.body_frame import stabilise_player
-from keyrecon.records import CameraPath, Track
+from keyrecon.propagation.body_frame import ground_path, stabilise_player, stabilise_shots
+from keyrecon.records import CameraPath, Shots, Track
 
 
 def track_of(middle):
@@ -42,3 +42,16 @@ def test_jitter_of_the_tracker_is_smoothed_away():
     middle = np.array([300.0, 200.0]) + rng.normal(0, 2, (200, 2))
     body_frame = stabilise_player(track_of(middle), camera_at(np.zeros((200, 2))), 50.0)
     assert body_frame.origin.real.std() < 0.5 * middle[:, 0].std()
+
+
+def test_what_stands_on_the_ground_keeps_its_place_while_player_and_camera_move():
+    frames = np.arange(60)[:, None]
+    cut = frames >= 35
+    shift = np.where(cut, [400.0, 90.0] + frames * [-3.0, 1.0], frames * [9.0, -2.0])
+    player = [300.0, 200.0] + 40 * np.sin(frames / 9) * [1.0, 0.2] - shift
+    track, camera, shots = track_of(player), camera_at(shift), Shots.between((35,), 60)
+    body_frame = stabilise_shots(track, camera, shots, 50.0)
+    print_of_a_foot = body_frame.from_pixels(([330.0, 290.0] - shift)[:, None], frames)[:, 0]
+    place = print_of_a_foot + ground_path(body_frame, camera, shots)
+    for shot in shots.parts:
+        np.testing.assert_allclose(place[shot], place[shot.start], atol=1e-9)

@@ -6,11 +6,7 @@ import pytest
 from keyrecon.body import LSP14
 from keyrecon.propagation.correspondence import side_confidence
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.limb_identity import (
-    exchange_price,
-    identify_limbs,
-    template_gain,
-)
+from keyrecon.propagation.limb_identity import identify_limbs, template_gain
 
 LEGS = split_body(LSP14)[0]
 ONE, OTHER = map(list, LEGS.sides)
@@ -70,15 +66,6 @@ def test_an_exchange_in_mid_air_is_moved_to_where_the_limbs_met():
     assert found.exchanged[21:32].all()
     assert not found.exchanged[:20].any()
     assert not found.exchanged[32:].any()
-
-
-def test_limbs_far_apart_are_dearer_to_exchange_than_limbs_that_meet():
-    price = exchange_price(
-        np.stack([CROSSING[:, ONE], CROSSING[:, OTHER]], axis=1), np.array([0.016, 0.032, 0.064])
-    )
-    assert price[19] < 0.5 * price[4]
-    assert price[19] < 0.5 * price[34]
-    assert (price > 0).all()
 
 
 def test_the_next_mark_decides_a_meeting_that_motion_leaves_open():
