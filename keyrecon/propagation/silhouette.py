@@ -137,13 +137,18 @@ def uncovered(
     other: Complex[np.ndarray, "T S j"],
 ) -> Float[np.ndarray, "T S S"]:
     """Share of the `limb_places` that the trunk and both limbs of a pair leave unexplained."""
-    count = np.maximum(places.there.sum(axis=1), 1)
-    free = trunk_gaps(places.points, half, trunk) * places.there
-    first, second = (
-        limb_gaps(places.points[:, None], tuple(limb.transpose(2, 0, 1)[..., None]))
-        for limb in (one, other)
-    )
-    return (first * free[:, None]) @ second.transpose(0, 2, 1) / count[:, None, None]
+    left = np.empty((*one.shape[:2], other.shape[1]))
+    for frames in _blocks(len(trunk)):
+        points, there = places.points[frames], places.there[frames]
+        count = np.maximum(there.sum(axis=1), 1)
+        free = trunk_gaps(points, half, trunk[frames]) * there
+        first, second = (
+            limb_gaps(points[:, None], tuple(limb[frames].transpose(2, 0, 1)[..., None]))
+            for limb in (one, other)
+        )
+        unexplained = (first * free[:, None]) @ second.transpose(0, 2, 1)
+        left[frames] = unexplained / count[:, None, None]
+    return left
 
 
 @dataclass(frozen=True, eq=False)
