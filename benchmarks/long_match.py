@@ -10,6 +10,8 @@ import json
 import os
 import random
 import resource
+import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -69,7 +71,8 @@ Command = Callable[..., dict[str, Any]]
 def run_all(
     project: Path, file: Path, pieces: Sequence[Piece], folder: Path, run: Command
 ) -> dict[str, dict[str, Any]]:
-    """All that a user does, with clicks and marks from the truth."""
+    """All that a user does from the beginning, with clicks and marks from the truth."""
+    shutil.rmtree(project, ignore_errors=True)
     told = {"new": run("new", file, "--project", project)}
     write_picks(project / "picks.json", clicks(pieces, folder))
     told["keyframes"] = run("keyframes", project)
@@ -254,27 +257,38 @@ def compare_killed(
 
     def run_killed(*words: object) -> dict[str, Any]:
         command = [sys.executable, "-m", "keyrecon", *map(str, words)]
-        longest = 0.0
+        longest = 20.0
         while True:
             began = time.perf_counter()
-            with subprocess.Popen(
-                command, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-            ) as process:
-                try:
-                    wait = None if not left[0] or words[0] in ("new", "import") else 0.0
-                    process.wait(wait if wait is None else rng.uniform(3.0, 20.0 + 2 * longest))
-                except subprocess.TimeoutExpired:
-                    left[0] -= 1
-                    process.kill()
+            kill = left[0] > 0 and words[0] in ("keyframes", "run")
+            ended = run_for(command, rng.uniform(3.0, 2 * longest) if kill else None)
             longest = max(longest, time.perf_counter() - began)
-            if process.returncode == 0:
+            if ended == 0:
                 return {}
-            if process.returncode != -9:
-                raise SystemExit(f"{words[0]} ended with {process.returncode}")
+            if ended != -signal.SIGKILL:
+                raise SystemExit(f"{words[0]} ended with {ended}")
+            left[0] -= 1
 
     killed, whole = out / "killed", out / "project"
     run_all(killed, file, pieces, folder, run_killed)
     names = [Path(name) for name in ("keyframes.json", "motion.npz")]
     names += [path.relative_to(whole) for path in sorted((whole / "cache").glob("*.npz"))]
-    other = [name for name in names if (whole / name).read_bytes() != (killed / name).read_bytes()]
+    other = [name for name in names if not same_bytes(whole / name, killed / name)]
     print(f"killed {kills - left[0]} times; of {len(names)} files these differ: {other or 'none'}")
+
+
+def run_for(command: Sequence[str], seconds: float | None) -> int:
+    """How a command ended that is killed after some seconds."""
+    with subprocess.Popen(
+        command, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+    return int(process.returncode)
+
+
+def same_bytes(one: Path, other: Path) -> bool:
+    """Whether both files are there, and alike."""
+    return other.is_file() and one.read_bytes() == other.read_bytes()
