@@ -17,7 +17,8 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from keyrecon.io.stages import PACKAGE, StageStore
+from keyrecon.io.stage_tasks import PACKAGE
+from keyrecon.io.stages import StageStore
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.records import Annotations
 
