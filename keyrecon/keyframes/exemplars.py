@@ -42,8 +42,6 @@ class Exemplars:
     """Which of them stands for each frame."""
     distance: Float32[np.ndarray, "2 T"]
     """How far each frame is from it, upper and lower body."""
-    step: Float32[np.ndarray, "2 S"]
-    """How far each frame is from the next; S is T - 1."""
 
 
 def find_exemplars(
@@ -81,20 +79,14 @@ def _assign(
     """Every frame's nearest exemplar."""
     row = np.empty(n_frames, dtype=np.int64)
     distance = np.empty((2, n_frames), dtype=np.float32)
-    step = np.empty((2, max(0, n_frames - 1)), dtype=np.float32)
-    # each with the frame before it, so that no step between two frames is missed
-    parts = [
-        np.arange(max(0, part[0] - 1), part[-1] + 1)
-        for part in _parts(np.arange(n_frames), len(exemplars))
-    ]
+    parts = _parts(np.arange(n_frames), len(exemplars))
     measured = progress(compare(exemplars, parts), "Assigning frames to exemplars", len(parts))
     for frames, both in zip(parts, measured, strict=True):
-        own, among = np.split(both, [len(exemplars)], axis=2)
+        own = both[:, :, : len(exemplars)]
         row[frames] = own.max(axis=0).argmin(axis=1)
         distance[:, frames] = own[:, np.arange(len(frames)), row[frames]]
-        step[:, frames[:-1]] = np.diagonal(among, 1, axis1=1, axis2=2)
     row[exemplars], distance[:, exemplars] = np.arange(len(exemplars)), 0
-    return Exemplars(exemplars, row, distance, step)
+    return Exemplars(exemplars, row, distance)
 
 
 def _parts(frames: Int[np.ndarray, "n"], size: int) -> list[Int[np.ndarray, "N"]]:
