@@ -42,7 +42,10 @@ VIEW_COUNT = 12
 
 
 def write_report(path: Path, material: ReportMaterial, progress: Progress = silent) -> None:
-    """Write the report to one HTML file; a minute of video makes it about 10 MB."""
+    """Write the report to one HTML file; a minute of video makes it about 10 MB.
+
+    Of hours, the video in it has smaller pictures (`pictures.clip_side`).
+    """
     pictures = cut_pictures(
         material.video,
         material.track,

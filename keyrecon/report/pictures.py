@@ -24,8 +24,16 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Track
 from keyrecon.report.drawing import draw_pose
 
-SIDE = 420
-"""Side of the square stills and of the small video, px."""
+SIDE, LEAST_SIDE = 420, 120
+"""Side of the square stills, and of the small video: of a video of hours it is smaller, px."""
+CLIP_BYTES = 16e6
+"""What the small video may take, as long as its side is not the least."""
+FRAME_BYTES, SIDE_POWER = 1230.0, 1.2
+"""What a frame of it takes at the whole side, bytes, and the power of the side that this grows
+with: 1230, 586, 419 and 263 at 420, 240, 168 and 120 px (a rendered rally of 25 frames a second).
+"""
+NOTHING = 16
+"""Grey value of the small video where there is no motion: such frames take 15 bytes."""
 JPEG_QUALITY = 80
 CLIP_QUALITY = 27
 """x264's crf; 27 keeps a minute of the small video under about 2 MB."""
@@ -106,8 +114,11 @@ def cut_pictures(
     """Read the video once and cut everything that the report shows of it."""
     windows = follow_player(track, motion.fps)
     count = len(motion.points2d)
-    known = np.flatnonzero(motion.known)
+    shown_motion = motion.known
+    known = np.flatnonzero(shown_motion)
     even = known[np.linspace(0, len(known) - 1, min(strip, len(known))).round().astype(int)]
+    side = clip_side(len(known))
+    nothing = np.full((side, side, 3), NOTHING, np.uint8)
     stills: dict[int, str] = {}
     marked: dict[int, str] = {}
 
@@ -116,10 +127,11 @@ def cut_pictures(
         if frame in annotations.frames:
             row = int(np.searchsorted(annotations.frames, frame))
             marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
-        crop = _posed_crop(windows, frame, picture, motion, SIDE)
         if frame in even or frame in instants:
-            stills[frame] = jpeg_uri(crop)
-        return crop
+            stills[frame] = jpeg_uri(_posed_crop(windows, frame, picture, motion, SIDE))
+        if not shown_motion[frame]:
+            return nothing
+        return _posed_crop(windows, frame, picture, motion, side)
 
     def crops() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         frames = islice(read_small(video, video.width), count)
@@ -132,6 +144,13 @@ def cut_pictures(
         clip = video_uri(path.read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
     return Pictures(shown[0], shown[1], dict(sorted(marked.items())), clip)
+
+
+def clip_side(frames: int) -> int:
+    """Side of a small video of so many frames with a motion, px."""
+    room = CLIP_BYTES / max(1.0, FRAME_BYTES * frames)
+    side = SIDE * min(1.0, room) ** (1 / SIDE_POWER)
+    return max(LEAST_SIDE, 2 * round(side / 2))
 
 
 def video_uri(content: bytes) -> str:

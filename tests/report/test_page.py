@@ -14,11 +14,12 @@ from report_material import make_material, on_court, on_ground, renamed_video, w
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
+from keyrecon.io.video import open_video
 from keyrecon.report import summary
 from keyrecon.report.headline import in_words, marked_share
 from keyrecon.report.markup import pack
 from keyrecon.report.page import build_page, write_report
-from keyrecon.report.pictures import Windows, cut_pictures
+from keyrecon.report.pictures import LEAST_SIDE, SIDE, Windows, clip_side, cut_pictures
 from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
 from keyrecon.report.views import VIEWS, pose_drawing
 from keyrecon.uncertainty import player_height, uncertain_stretches
@@ -119,6 +120,23 @@ def test_pictures_are_cut_for_the_strip_and_for_every_keyframe(material, picture
     assert len(pictures.strip) == 6
     assert set(pictures.keyframes) == set(material.annotations.frames.tolist())
     assert pictures.clip.startswith("data:video/mp4;base64,")
+
+
+def test_the_small_video_of_hours_is_smaller_and_has_no_less_frames():
+    assert clip_side(40) == clip_side(9000) == SIDE
+    assert LEAST_SIDE < clip_side(40_000) < SIDE
+    assert clip_side(1_000_000) == LEAST_SIDE
+
+
+def test_the_small_video_shows_nobody_where_there_is_no_motion(material, tmp_path):
+    nowhere = material.motion.points3d.copy()
+    nowhere[20:] = np.nan
+    motion = replace(material.motion, points3d=nowhere)
+    made = cut_pictures(material.video, material.track, material.annotations, motion, 6)
+    (tmp_path / "clip.mp4").write_bytes(base64.b64decode(made.clip.partition(",")[2]))
+    shown = np.array([picture.std() for picture in open_video(tmp_path / "clip.mp4").frames()])
+    assert len(shown) == len(motion.time)
+    assert shown[:20].min() > 5 > shown[21:].max()
 
 
 def test_without_truth_the_report_tells_the_expected_error_and_no_accuracy(
