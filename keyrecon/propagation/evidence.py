@@ -21,7 +21,12 @@ from jaxtyping import Complex, Float, Int
 
 from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates
 from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
-from keyrecon.propagation.silhouette import Silhouettes, limb_places, uncovered
+from keyrecon.propagation.silhouette import (
+    Silhouettes,
+    find_holding_hand,
+    limb_places,
+    uncovered,
+)
 
 WEIGHTS: dict[str, dict[str, float]] = {
     "upper": {
@@ -223,7 +228,8 @@ def pair_evidence(
     if silhouettes is not None:
         half, joints = templates.half, hypotheses.joints[frames, trunk]
         places = limb_places(silhouettes, half, joints)
-        yield "uncovered", uncovered(places, half, joints, one.joints, other.joints)
+        holding = find_holding_hand(silhouettes, templates.poses)
+        yield "uncovered", uncovered(places, half, joints, (one.joints, other.joints), holding)
     together = np.zeros(left.shape)
     for place in range(1, one.joints.shape[2]):
         apart = np.abs(one.joints[:, :, None, place] - other.joints[:, None, :, place])

@@ -14,6 +14,7 @@ from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.propagation.silhouette import (
     Silhouettes,
+    find_holding_hand,
     gather_silhouettes,
     limb_places,
     search_by_silhouette,
@@ -60,11 +61,11 @@ def test_both_limbs_on_one_leave_the_other_unexplained(half):
     silhouette, joints = seen({"lower": kicking, "upper": raising}[half.name](), half)
     places = limb_places(silhouette, half, joints)
     left, right = limbs(half, joints)
-    assert uncovered(places, half, joints, left, right) < 0.05
-    assert uncovered(places, half, joints, right, right) > 0.15
+    assert uncovered(places, half, joints, (left, right)) < 0.05
+    assert uncovered(places, half, joints, (right, right)) > 0.15
     # which of them is the left one it does not tell
-    assert uncovered(places, half, joints, right, left) == pytest.approx(
-        uncovered(places, half, joints, left, right), abs=0.02
+    assert uncovered(places, half, joints, (right, left)) == pytest.approx(
+        uncovered(places, half, joints, (left, right)), abs=0.02
     )
 
 
@@ -101,11 +102,54 @@ def test_without_a_silhouette_no_pair_is_better_than_another():
     nothing = Silhouettes(np.zeros((1, 1), complex), np.zeros((1, 1), bool))
     places = limb_places(nothing, LEGS, joints)
     left, right = limbs(LEGS, joints)
-    assert uncovered(places, LEGS, joints, left, right) == 0
-    assert uncovered(places, LEGS, joints, right, right) == 0
+    assert uncovered(places, LEGS, joints, (left, right)) == 0
+    assert uncovered(places, LEGS, joints, (right, right)) == 0
 
 
 def test_legs_without_knees_are_not_looked_for():
     silhouette, joints = seen(standing(), LEGS)
     half = replace(LEGS, sides=((3, 4), (2, 1)))
     assert search_by_silhouette(silhouette, marked_nowhere(half, joints), joints).shape[1] == 0
+
+
+RIGHT = 1
+"""The right side's place in `sides`."""
+
+
+def with_racket(silhouette, wrist):
+    """A racket's head above the wrist, as far as its handle is long."""
+    grid = 0.03 * np.arange(-3, 4)
+    head = (grid + 1j * grid[:, None]).ravel()
+    head = wrist - 0.3j + head[np.abs(head) < 0.1]
+    points = np.concatenate([silhouette.points, head[None]], axis=1)
+    return Silhouettes(points, np.ones(points.shape, bool))
+
+
+def marked(half, joints):
+    known = np.ones((1, len(half.joints)), bool)
+    return AnnotatedPoses(half, np.zeros(1, int), joints, known, np.full(len(half.bones), 0.28))
+
+
+def test_a_racket_speaks_for_no_arm_where_marks_show_that_a_hand_holds_it():
+    silhouette, joints = seen(raising(), ARMS)
+    right_arm = list(ARMS.sides[RIGHT])
+    armed = with_racket(silhouette, joints[0, right_arm[-1]])
+    assert find_holding_hand(armed, marked(ARMS, joints)) == RIGHT
+    places = limb_places(armed, ARMS, joints)
+    left, right = limbs(ARMS, joints)
+    assert uncovered(places, ARMS, joints, (left, right), None) > 0.1
+    assert uncovered(places, ARMS, joints, (left, right), RIGHT) < 0.05
+    along_it = right + np.array([0, -0.1j, -0.3j])
+    assert uncovered(places, ARMS, joints, (left, along_it), RIGHT) > 0.05
+
+
+def test_a_hand_holds_nothing_where_marked_limbs_leave_nothing():
+    silhouette, joints = seen(raising(), ARMS)
+    assert find_holding_hand(silhouette, marked(ARMS, joints)) is None
+    assert find_holding_hand(silhouette, marked_nowhere(ARMS, joints)) is None
+
+
+def test_a_foot_holds_nothing():
+    silhouette, joints = seen(standing(), LEGS)
+    armed = with_racket(silhouette, joints[0, LEGS.sides[RIGHT][-1]])
+    assert find_holding_hand(armed, marked(LEGS, joints)) is None
