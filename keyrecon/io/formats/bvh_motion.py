@@ -69,7 +69,8 @@ def _format(figure: Humanoid, fps: float) -> str:
     lines += _closing(depths[-1], 0)
     values = np.concatenate(columns, axis=1)
     lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {1 / fps:.10g}"]
-    lines += [" ".join(np.char.mod("%.6f", row)) for row in values]
+    rounded = np.round(values, 6) + 0.0  # no zero is negative
+    lines += [" ".join(np.char.mod("%.6f", row)) for row in rounded]
     return "\n".join(lines) + "\n"
 
 

@@ -68,6 +68,11 @@ def test_our_bvh_is_a_person_to_the_motion_capture_reader(tmp_path):
     assert np.abs(capture.joints - stand_on_floor(motion).points).max() < 0.001
 
 
+def test_no_zero_is_negative(tmp_path):
+    write_bvh(tmp_path / "a.bvh", make_motion(wildness=0.2))
+    assert "-0.000000" not in (tmp_path / "a.bvh").read_text().partition("MOTION")[2].split()
+
+
 def test_only_the_root_has_a_place_and_no_bone_is_without_length(tmp_path):
     write_bvh(tmp_path / "a.bvh", varied_hips(make_motion(), 3))
     words, offsets = channels(tmp_path / "a.bvh")
