@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass, replace
 
-from keyrecon.golf.candidates import find_candidates, find_slowed_keys, place_in_film
-from keyrecon.golf.click_checks import check_direction
+from keyrecon.golf.candidates import (
+    find_candidates,
+    find_slowed_keys,
+    gather_evidence,
+    place_in_film,
+)
+from keyrecon.golf.click_checks import check_hand
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
@@ -46,6 +51,7 @@ def find_swing(
         "scene", observe_scene, video, film, place_in_film(pose, film),
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
+    check_hand(gather_evidence(scene), place_in_film(clicked, film), model, "The clicks")
     candidates = keep("search", find_candidates, scene, pose, marks, model)
     tried: list[_Tried] = []
     for number, candidate in enumerate(candidates[: options.candidates], 1):
@@ -53,9 +59,6 @@ def find_swing(
             f"observe_{number}", observe_swing, video, scene, candidate, pose, marks, model,
             options=options.observation, progress=progress,
         )  # fmt: skip
-        if number == 1:
-            in_film = place_in_film(clicked, observed.film)
-            check_direction(observed.observations, in_film, model, "The clicks")
         tried.append(_try(observed, video, model, options, keep, progress, f"_{number}"))
         slowed = None
         if observed.slow_motion == 1 and options.method == "swing":

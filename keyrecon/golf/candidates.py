@@ -18,11 +18,11 @@ from keyrecon.golf.fit.handedness import (
     mirror_pixels,
 )
 from keyrecon.golf.fit.swing_path import SearchLimits
-from keyrecon.golf.fit.swing_search import SwingEvidence, SwingHypothesis, search_swing
+from keyrecon.golf.fit.swing_search import STYLED, SwingEvidence, SwingHypothesis, search_swing
 from keyrecon.golf.marks import place_marks
 from keyrecon.golf.observe.film import Film, frame_step
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, MotionModel, SwingMarks
+from keyrecon.golf.records import NO_MARKS, Camera, MotionModel, SwingMarks
 from keyrecon.golf.scene import SwingScene
 
 SLOW_DOWNSWING = 0.27
@@ -84,19 +84,11 @@ def find_candidates(
     `scene` is what the film shows, `pose` and `marks` are those of the file's frames; left-handers
     are mirrored. Raises KeyreconError where no swing is observed.
     """
-    film = scene.film
-    pose, marks, width = place_in_film(pose, film), place_marks(marks, film), film.size[0]
-    foreground = scene.foreground
-    evidence = SwingEvidence(
-        scene.players, foreground.shrink, foreground.height, scene.shafts, film.fps
-    )
-    joints, camera = pose.joints, pose.camera
+    evidence, width = gather_evidence(scene), scene.film.size[0]
+    marks = place_marks(marks, scene.film)
     if pose.left_handed:
-        evidence = mirror_evidence(evidence, width)
-        joints, marks = mirror_initial(joints, width), mirror_marks(marks, width)
-        camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
-    body = size_body(pose.stature)
-    hypotheses = search_swing(evidence, joints, camera, model, body, marks=marks)
+        marks = mirror_marks(marks, width)
+    hypotheses = _search(evidence, place_in_film(pose, scene.film), model, marks)
     if not hypotheses and np.isfinite(marks.keys).any():
         raise KeyreconError(
             "No swing of a pace that golfers have passes start, top, hit and finish where they "
@@ -111,3 +103,36 @@ def find_candidates(
     if pose.left_handed:
         hypotheses = [replace(h, club=mirror_pixels(h.club, width)) for h in hypotheses]
     return tuple(hypotheses)
+
+
+def gather_evidence(scene: SwingScene) -> SwingEvidence:
+    """What the swing is searched by."""
+    foreground = scene.foreground
+    return SwingEvidence(
+        scene.players, foreground.shrink, foreground.height, scene.shafts, scene.film.fps
+    )
+
+
+def least_cost(evidence: SwingEvidence, pose: ClickedPose, model: MotionModel) -> float:
+    """How badly the mean swing explains a film at best; infinite where none is long enough.
+
+    `pose` is placed in the film.
+    """
+    hypotheses = _search(evidence, pose, model, styled=0)
+    return hypotheses[0].cost if hypotheses else np.inf
+
+
+def _search(
+    evidence: SwingEvidence,
+    pose: ClickedPose,
+    model: MotionModel,
+    marks: SwingMarks = NO_MARKS,
+    styled: int = STYLED,
+) -> list[SwingHypothesis]:
+    """Swings of the clicked player, in mirrored pictures where he is left-handed."""
+    joints, camera, width = pose.joints, pose.camera, pose.size[0]
+    if pose.left_handed:
+        evidence, joints = mirror_evidence(evidence, width), mirror_initial(joints, width)
+        camera = Camera(camera.focal, mirror_pixels(camera.principal, width))
+    body = size_body(pose.stature)
+    return search_swing(evidence, joints, camera, model, body, marks=marks, styled=styled)

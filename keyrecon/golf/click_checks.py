@@ -4,9 +4,10 @@ Six clicks say more than where the player is. A standing golfer filmed by a leve
 joints of the prior's key postures as seen from some side, so that clicks which no side explains are
 wrong, and clicks that a side explains once left and right are exchanged tell what was exchanged
 (`check_pose`). From the front and from behind both readings of two straight legs look alike; there
-the swing decides. A right-hander's club rises on his right; where the observed club goes round the
-other way, and would go right for the mirrored player, either the sides or the handedness are told
-wrong (`check_direction`).
+the swing decides. A right-hander's club rises on his right; where a player of the other hand who
+stands as clicked explains silhouettes and clubs of the film far better, either the sides or the
+handedness are told wrong (`check_hand`): as soon as they are seen, before anything is tracked or
+fitted.
 
 Nothing is exchanged in silence: the person may have clicked right and the program be mistaken.
 """
@@ -14,12 +15,12 @@ Nothing is exchanged in silence: the person may have clicked right and the progr
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.candidates import least_cost
 from keyrecon.golf.clicks import STATURE, ClickedPose
-from keyrecon.golf.fit.handedness import mirror_initial, mirror_observations, mirror_pixels
+from keyrecon.golf.fit.handedness import mirror_initial, mirror_pixels
 from keyrecon.golf.fit.initial_pose import (
     JOINT_SPREAD,
     LEAN_SPREAD,
@@ -27,10 +28,11 @@ from keyrecon.golf.fit.initial_pose import (
     repeat_pose,
 )
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
+from keyrecon.golf.fit.swing_search import SwingEvidence
+from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, InitialJoints, MotionModel, Observations
+from keyrecon.golf.records import Camera, InitialJoints, MotionModel
 
 LEGS = ("right_knee", "left_knee", "right_ankle", "left_ankle")
 CLICKED = ("head_top", "root", *LEGS)
@@ -44,12 +46,12 @@ click a third of the player's height off 26 to 65, half as far 2 to 20."""
 EXCHANGE_GAIN = 0.4
 """An exchange that explains the clicks leaves at most this share of the misfit. On those swings
 0.01 to 0.35 where sides were exchanged, and no less than 0.8 where they were not."""
-WRONG_WAY, RIGHT_WAY = np.radians(65), np.radians(40)
-"""Mean angle between the observed club and that of the mean swing, placed by the clicks. On real
-swings filmed face-on or obliquely 22 to 28 degrees as told, 75 to 99 with sides or handedness
-wrong; from straight behind the hands, where both readings look alike, 40."""
-LEAST_DIRECTIONS = 8
-"""Frames in which the club must have been seen for its way to tell anything."""
+HAND_GAIN = 0.1
+"""By how much less the mean swing of the other hand costs in the search (`fit.swing_search`) where
+the hand or the sides of the clicks are told wrong. Of five real swings it cost .15 to .37 less then,
+and as much more where all was told right; a sixth, slowed down thirtyfold and not found, .05 either
+way. By silhouettes alone, ten a second, these were .01 to .47: nothing earlier than the club tells
+them all."""
 
 
 @dataclass(frozen=True)
@@ -126,54 +128,24 @@ def _misfit_at(
     return ClickMisfit(float(total), joints.names[worst], float(away[worst] / NORMAL_HEIGHT))
 
 
-def check_direction(
-    observations: Observations, pose: ClickedPose, model: MotionModel, origin: str
+def check_hand(
+    evidence: SwingEvidence, pose: ClickedPose, model: MotionModel, origin: str
 ) -> None:
-    """Raises KeyreconError where the club goes round the other way than clicks and hand tell."""
-    if _with_club(observations).sum() < LEAST_DIRECTIONS:
+    """Raises KeyreconError where a player of the other hand explains a film far better.
+
+    `evidence` is that of the film, `pose` is placed in it.
+    """
+    other = replace(pose, left_handed=not pose.left_handed)
+    if least_cost(evidence, pose, model) - least_cost(evidence, other, model) < HAND_GAIN:
         return
-    width = pose.size[0]
-    if measure_direction(observations, model, width) < WRONG_WAY:
-        return
-    other_hand = replace(observations, left_handed=not observations.left_handed)
-    if measure_direction(other_hand, model, width) > RIGHT_WAY:
-        return
-    left_handed = observations.left_handed != pose.mirrored
-    hand, other = ("left", "right") if left_handed else ("right", "left")
+    left_handed = pose.left_handed != pose.mirrored
+    hand, opposite = ("left", "right") if left_handed else ("right", "left")
     raise KeyreconError(
-        f"{origin}: the club goes round the other way than that of a {hand}-hander who stands as "
-        f'clicked. Either the player is {other}-handed (say "left_handed": '
+        f"{origin}: the swing goes round the other way than that of a {hand}-hander who stands as "
+        f'clicked. Either the player is {opposite}-handed (say "left_handed": '
         f"{'false' if left_handed else 'true'}), or left and right of the clicks are "
         "exchanged: right_ is the player's own right, on the left of a picture from the front."
     )
-
-
-def measure_direction(observations: Observations, model: MotionModel, width: int) -> float:
-    """Mean angle between the observed club and that of the mean swing, radians.
-
-    The mean swing is placed by the clicked joints and timed by the key postures; pictures are
-    `width` px wide. Raises nothing: without a club in the swing the angle is NaN.
-    """
-    if observations.left_handed:
-        observations = mirror_observations(observations, width)
-    body = size_body(observations.stature)
-    phase = float(observations.phase[observations.initial.frame])
-    place = estimate_initial_pose(observations.initial, phase, observations.camera, model, body)
-    state = repeat_pose(place, observations.phase)
-    posture = posture_at(model, state.phase, state.coefficients)
-    club = find_club(body, place_body(body, posture, state))
-    seen = _with_club(observations)
-    expected = project(club[seen].reshape(-1, 3), observations.camera)[0].reshape(-1, 2, 2)
-    ways = [ends[:, 1] - ends[:, 0] for ends in (expected, observations.club[seen])]
-    cross = ways[0][:, 0] * ways[1][:, 1] - ways[0][:, 1] * ways[1][:, 0]
-    return float(np.abs(np.arctan2(cross, (ways[0] * ways[1]).sum(axis=1))).mean())
-
-
-def _with_club(observations: Observations) -> Bool[np.ndarray, "T"]:
-    """Frames between beginning and finish in which the club was seen."""
-    frames = np.arange(len(observations.club))
-    inside = (frames >= observations.keys[0]) & (frames <= observations.keys[3])
-    return inside & np.isfinite(observations.club).all(axis=(1, 2))
 
 
 def _exchanged(pose: ClickedPose, exchanged: tuple[str, ...]) -> ClickedPose:

@@ -118,15 +118,17 @@ def search_swing(
     body: Body,
     limits: SearchLimits = SearchLimits(),
     marks: SwingMarks = NO_MARKS,
+    styled: int = STYLED,
 ) -> list[SwingHypothesis]:
     """Swings that may be in a film, the likeliest first; none where it is too short for any.
 
-    All of them pass the key postures that a person marked.
+    All of them pass the key postures that a person marked. `styled` of the largest styles are tried
+    besides the mean motion.
     """
     placement = estimate_initial_pose(clicked, 0.0, camera, model, body)
     phases = _phases(model)
     hypotheses: list[tuple[SwingPath, SwingHypothesis]] = []
-    for style in _styles(model):
+    for style in _styles(model, styled):
         drawn = draw_swing(model, body, style, phases, placement, camera)
         costs = frame_costs(evidence, drawn)
         for row, t in enumerate(marks.frames):
@@ -146,11 +148,11 @@ def _phases(model: MotionModel) -> Float[np.ndarray, "P"]:
     return np.append(np.concatenate(parts), model.keys[-1])
 
 
-def _styles(model: MotionModel) -> list[Float[np.ndarray, "m"]]:
+def _styles(model: MotionModel, styled: int) -> list[Float[np.ndarray, "m"]]:
     """The mean motion and the largest styles."""
-    several = [np.zeros(STYLED)]
-    for component in range(min(STYLED, len(model.components))):
-        several += [sign * STYLES * np.eye(STYLED)[component] for sign in (-1, 1)]
+    several = [np.zeros(styled)]
+    for component in range(min(styled, len(model.components))):
+        several += [sign * STYLES * np.eye(styled)[component] for sign in (-1, 1)]
     return several
 
 
