@@ -2,13 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from keyrecon.golf.candidates import (
-    find_candidates,
-    find_slowed_keys,
-    gather_evidence,
-    place_in_film,
-)
-from keyrecon.golf.click_checks import check_hand
+from keyrecon.golf.candidates import find_candidates, find_slowed_keys, place_in_film
+from keyrecon.golf.click_checks import check_hand, measure_hands
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
@@ -51,7 +46,8 @@ def find_swing(
         "scene", observe_scene, video, film, place_in_film(pose, film),
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
-    check_hand(gather_evidence(scene), place_in_film(clicked, film), model, "The clicks")
+    hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
+    check_hand(hands, clicked, "The clicks")
     candidates = keep("search", find_candidates, scene, pose, marks, model)
     tried: list[_Tried] = []
     for number, candidate in enumerate(candidates[: options.candidates], 1):

@@ -18,7 +18,7 @@ import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.candidates import least_cost
+from keyrecon.golf.candidates import gather_evidence, least_cost
 from keyrecon.golf.clicks import STATURE, ClickedPose
 from keyrecon.golf.fit.handedness import mirror_initial, mirror_pixels
 from keyrecon.golf.fit.initial_pose import (
@@ -28,27 +28,28 @@ from keyrecon.golf.fit.initial_pose import (
     repeat_pose,
 )
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.fit.swing_search import SwingEvidence
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import Camera, InitialJoints, MotionModel
+from keyrecon.golf.scene import SwingScene
 
 LEGS = ("right_knee", "left_knee", "right_ankle", "left_ankle")
 CLICKED = ("head_top", "root", *LEGS)
 """Joints that every file of clicks has; the arms move too much to tell anything."""
 NORMAL_HEIGHT = 300.0
 """px to which a player is scaled, so that spreads in px mean shares of his height."""
-USUAL_MISFIT, LARGEST_MISFIT = 12.0, 25.0
+USUAL_MISFIT, LARGEST_MISFIT = 12.0, 16.0
 """Half the sum of squared residuals, in standard deviations, of six clicked joints. Marks by eye on
 six real swings, anywhere in the swing: 0.7 to 10; with knees or ankles exchanged 11 to 60; with one
-click a third of the player's height off 26 to 65, half as far 2 to 20."""
+click a third of the player's height off 26 to 65, half as far 2 to 20; with the head of somebody
+half a height beside 14 to 129, all but one above 18."""
 EXCHANGE_GAIN = 0.4
 """An exchange that explains the clicks leaves at most this share of the misfit. On those swings
 0.01 to 0.35 where sides were exchanged, and no less than 0.8 where they were not."""
 HAND_GAIN = 0.1
 """By how much less the mean swing of the other hand costs in the search (`fit.swing_search`) where
-the hand or the sides of the clicks are told wrong. Of five real swings it cost .15 to .37 less then,
+the hand or the sides of the clicks are told wrong. Of five real swings it cost .15 to .37 less,
 and as much more where all was told right; a sixth, slowed down thirtyfold and not found, .05 either
 way. By silhouettes alone, ten a second, these were .01 to .47: nothing earlier than the club tells
 them all."""
@@ -128,15 +129,25 @@ def _misfit_at(
     return ClickMisfit(float(total), joints.names[worst], float(away[worst] / NORMAL_HEIGHT))
 
 
-def check_hand(
-    evidence: SwingEvidence, pose: ClickedPose, model: MotionModel, origin: str
-) -> None:
-    """Raises KeyreconError where a player of the other hand explains a film far better.
+@dataclass(frozen=True)
+class HandCosts:
+    """How badly the mean swing explains a film at best (`candidates.least_cost`)."""
 
-    `evidence` is that of the film, `pose` is placed in it.
-    """
+    told: float
+    """By the hand that was told."""
+    other: float
+
+
+def measure_hands(scene: SwingScene, pose: ClickedPose, model: MotionModel) -> HandCosts:
+    """What either hand costs a player who stands as clicked; `pose` is placed in the film."""
+    evidence = gather_evidence(scene)
     other = replace(pose, left_handed=not pose.left_handed)
-    if least_cost(evidence, pose, model) - least_cost(evidence, other, model) < HAND_GAIN:
+    return HandCosts(least_cost(evidence, pose, model), least_cost(evidence, other, model))
+
+
+def check_hand(costs: HandCosts, pose: ClickedPose, origin: str) -> None:
+    """Raises KeyreconError where a player of the other hand explains a film far better."""
+    if not costs.told - costs.other >= HAND_GAIN:
         return
     left_handed = pose.left_handed != pose.mirrored
     hand, opposite = ("left", "right") if left_handed else ("right", "left")

@@ -66,7 +66,7 @@ class GolfOptions:
     events: SwingEventOptions = field(default_factory=SwingEventOptions)
     """When hands rest."""
     proportions: ProportionOptions = field(default_factory=ProportionOptions)
-    """How annotated keyframes tell the player's proportions."""
+    """How clicks and annotated keyframes tell the player's proportions."""
 
 
 @dataclass(frozen=True, eq=False)

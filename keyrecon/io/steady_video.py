@@ -108,15 +108,26 @@ class SteadyVideo(Video):
         return dict(zip(self.numbers[rows].tolist(), rows.tolist(), strict=True))
 
     def _plate(self, pictures: Iterator[np.ndarray], chosen: dict[int, int]) -> np.ndarray:
+        """The median of some pictures, black where every frame shows the scene itself."""
         if self.warps is None:
             raise ValueError("a camera that stands still needs no plate")
-        size = (self.width, self.height)
-        warped = [
-            _warped(picture, self.warps[row], size)
-            for picture, row in zip(pictures, chosen.values(), strict=True)
-        ]
-        stack = np.stack([picture for picture, _ in warped])
-        return _masked_median(stack, np.stack([seen for _, seen in warped]))
+        size, needed = (self.width, self.height), self._filled
+        stack, seen = [], []
+        for picture, row in zip(pictures, chosen.values(), strict=True):
+            warped, there = _warped(picture, self.warps[row], size)
+            stack.append(warped[needed])
+            seen.append(there[needed])
+        plate = np.zeros((*needed.shape, *stack[0].shape[1:]), np.uint8)
+        plate[needed] = _masked_median(np.stack(stack), np.stack(seen))
+        return plate
+
+    @cached_property
+    def _filled(self) -> Bool[np.ndarray, "h w"]:
+        """Pixels that some frame does not show."""
+        everywhere = np.ones((self.height, self.width), bool)
+        for warp in self.warps if self.warps is not None else ():
+            everywhere &= _seen(warp, (self.source.width, self.source.height), everywhere.shape)
+        return ~everywhere
 
 
 def steady_video(
@@ -142,11 +153,18 @@ def _warped(
     moved = cv2.warpPerspective(
         picture, warp, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (np.array(picture.shape[1::-1]) - 1.0)
+    return moved, _seen(warp, (picture.shape[1], picture.shape[0]), (size[1], size[0]))
+
+
+def _seen(
+    warp: Float[np.ndarray, "3 3"], size: tuple[int, int], shape: tuple[int, ...]
+) -> Bool[np.ndarray, "h w"]:
+    """Where a warped picture of some size shows something in the common one of some shape."""
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (np.array(size) - 1.0)
     frame = cv2.perspectiveTransform(corners[None], warp)[0]
-    seen = np.zeros(size[::-1], np.uint8)
+    seen = np.zeros(shape, np.uint8)
     cv2.fillConvexPoly(seen, np.round(frame).astype(np.int32), 1)
-    return moved, seen > 0
+    return seen > 0
 
 
 def _fill(picture: np.ndarray, seen: Bool[np.ndarray, "h w"], plate: np.ndarray) -> np.ndarray:
@@ -155,15 +173,17 @@ def _fill(picture: np.ndarray, seen: Bool[np.ndarray, "h w"], plate: np.ndarray)
     return picture
 
 
-def _masked_median(stack: np.ndarray, seen: Bool[np.ndarray, "n h w"]) -> np.ndarray:
+def _masked_median(
+    stack: UInt8[np.ndarray, "n p *c"], seen: Bool[np.ndarray, "n p"]
+) -> UInt8[np.ndarray, "p *c"]:
     """Median over the pictures that see a pixel; over all where none does."""
     count = seen.sum(axis=0)
-    shaped = seen if stack.ndim == 3 else seen[..., None]
+    plain = stack.ndim == 2
     # Unseen values sort to the end; the middle of the first `count` is the median.
+    shaped = seen if plain else seen[..., None]
     ordered = np.sort(np.where(shaped, stack, np.uint8(255)), axis=0)
     middle = np.maximum(count - 1, 0) // 2
-    middle = middle if stack.ndim == 3 else np.repeat(middle[..., None], stack.shape[-1], axis=2)
-    median: np.ndarray = np.take_along_axis(ordered, middle[None], axis=0)[0]
+    median: np.ndarray = ordered[middle, np.arange(len(middle))]
     never = count == 0
     median[never] = np.median(stack[:, never], axis=0)
     return median

@@ -169,8 +169,8 @@ def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tm
     result.unlink()
     (project / "motion.npz").unlink()
     before = {file: file.stat().st_mtime_ns for file in (project / "cache").glob("*.npz")}
-    # camera, film, scene, search, observe_1, fit_1, guided_1_1, timing_1, found
-    assert len(before) == 9
+    # camera, film, scene, hands, search, observe_1, fit_1, guided_1_1, timing_1, found
+    assert len(before) == 10
     fit(swing, project)
     assert result.is_file() and all(f.stat().st_mtime_ns == at for f, at in before.items())
     ours, theirs = (read_motion(f / "motion.npz") for f in (project, swing / "project"))

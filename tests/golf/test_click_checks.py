@@ -10,7 +10,8 @@ from golf_truth import camera_before
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.click_checks import CLICKED, check_hand, check_pose
+from keyrecon.golf.candidates import least_cost
+from keyrecon.golf.click_checks import CLICKED, HandCosts, check_hand, check_pose
 from keyrecon.golf.clicks import GolfClicks, clicked_pose
 from keyrecon.golf.fit.handedness import mirror_evidence, mirror_initial
 from keyrecon.golf.fit.initial_pose import Placement
@@ -111,23 +112,24 @@ def seen_swing(azimuth, left_handed=False):
     return evidence, joints
 
 
-def check_seen(evidence, joints, left_handed):
+def weigh(evidence, joints, left_handed):
+    """The clicks of a player of some hand, and what this hand and the other cost."""
     places = {n: tuple(p) for n, p in zip(joints.names, joints.places, strict=True)}
-    clicks = GolfClicks(0, SIZE, places, left_handed=left_handed, stature=1.8, focal=FOCAL)
-    check_hand(evidence, clicked_pose(clicks), MODEL, "clicks.json")
-
-
-@pytest.mark.parametrize("azimuth", [180, 130, 90])
-@pytest.mark.parametrize("left_handed", [False, True])
-def test_a_swing_as_told_goes_the_way_it_should(azimuth, left_handed):
-    check_seen(*seen_swing(azimuth, left_handed), left_handed)
+    pose, other = (
+        clicked_pose(GolfClicks(0, SIZE, places, left_handed=hand, stature=1.8, focal=FOCAL))
+        for hand in (left_handed, not left_handed)
+    )
+    return pose, HandCosts(*(least_cost(evidence, p, MODEL) for p in (pose, other)))
 
 
 @pytest.mark.parametrize("azimuth", [180, 130, 90])
 @pytest.mark.parametrize("left_handed", [False, True])
 def test_a_forgotten_hand_is_told(azimuth, left_handed):
+    pose, costs = weigh(*seen_swing(azimuth, left_handed), left_handed)
+    check_hand(costs, pose, "clicks.json")
+    forgotten = replace(pose, left_handed=not left_handed)
     with pytest.raises(KeyreconError, match="the swing goes round the other way"):
-        check_seen(*seen_swing(azimuth, left_handed), not left_handed)
+        check_hand(HandCosts(costs.other, costs.told), forgotten, "clicks.json")
 
 
 def test_exchanged_sides_from_the_front_are_told_by_the_swing():
@@ -135,12 +137,22 @@ def test_exchanged_sides_from_the_front_are_told_by_the_swing():
     other = tuple(
         name.replace("right", "?").replace("left", "right").replace("?", "left") for name in CLICKED
     )
+    pose, costs = weigh(evidence, replace(joints, names=other), False)
     with pytest.raises(KeyreconError, match="or left and right of the clicks are exchanged"):
-        check_seen(evidence, replace(joints, names=other), False)
+        check_hand(costs, pose, "clicks.json")
 
 
 def test_a_film_that_shows_nothing_tells_nothing():
     evidence, joints = seen_swing(180)
     nothing = ShaftHypotheses(np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0, bool))
-    blind = replace(evidence, players=np.zeros_like(evidence.players), shafts=(nothing,) * FRAMES)
-    check_seen(blind, joints, True)
+    players = np.zeros_like(evidence.players)
+    blind = replace(evidence, players=players, shafts=(nothing,) * FRAMES)
+    pose, costs = weigh(blind, joints, True)
+    check_hand(costs, pose, "clicks.json")
+
+
+def test_a_film_too_short_for_a_swing_tells_nothing():
+    evidence, joints = seen_swing(180)
+    short = replace(evidence, players=evidence.players[:4], shafts=evidence.shafts[:4])
+    pose, costs = weigh(short, joints, True)
+    check_hand(costs, pose, "clicks.json")

@@ -187,14 +187,14 @@ def follow_observations(
 ) -> SwingFit:
     """A fitted swing that follows the observations where they depart from the model."""
     # A mark is worth as much as it is among the blocks of `_weighted_blocks`.
-    factor = max(1.0, fps / INDEPENDENT_PER_SECOND)
+    factor, own = max(1.0, fps / INDEPENDENT_PER_SECOND), replace(initial, body=fit.body)
     marks = [
         replace(block, weight=factor * block.weight)
         for block in mark_blocks(observations, fit.body, options, HELD)
     ]
     for tolerance in FOLLOW_TOLERANCES:
         wider = replace(options, robust=tolerance * options.robust)
-        blocks = residual_blocks(observations, initial, wider)
+        blocks = residual_blocks(observations, own, wider)
         fit = follow_picture(fit, [*blocks, *marks], fps)
     return fit
 

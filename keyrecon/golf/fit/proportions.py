@@ -1,8 +1,8 @@
-"""Lengths of a player's limbs from annotated keyframes.
+"""Lengths of a player's limbs from the joints that a person placed.
 
-Six clicks tell how large a player is, not how long arms and legs are, and the body begins with
-average proportions. Where a person has marked the joints of whole postures, the fitted turns of
-all segments make the marks linear in the lengths: with the player's place in every marked frame
+The body begins with average proportions. Six clicks tell how trunk and legs share its height, and
+where this person has hips; marks of whole postures tell of the arms too. The fitted turns of
+all segments make these joints linear in the lengths: with the player's place in every such frame
 they are solved for by Gauss-Newton, close to the average. In turns with the fit, both converge.
 """
 
@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.body import LSP14
 from keyrecon.golf.fit.fitting import FitOptions, refit_swing
 from keyrecon.golf.fit.residuals import MARK_SPREAD, MODEL_ERROR, project
 from keyrecon.golf.prior.kinematics import find_joints, fitted_pose, hang_segments
@@ -19,6 +20,7 @@ from keyrecon.golf.prior.skeleton import NAMES, PARENTS
 from keyrecon.golf.records import (
     Body,
     Camera,
+    InitialJoints,
     Observations,
     RootPose,
     SwingFit,
@@ -51,17 +53,37 @@ def refit_proportions(
     fit_options: FitOptions,
     options: ProportionOptions,
 ) -> SwingFit:
-    """A fitted swing with the proportions that its marks tell, and the fit with them, in turns."""
-    if not np.isfinite(observations.marks.joints).any():
-        return fit
-    average = fit.body
+    """A fitted swing with the proportions that its marks tell, and the fit with them, in turns.
+
+    Where only clicks tell them the body alone changes, and what follows the picture adapts to it:
+    six joints of one frame do not tell the time. Fitted in turns with them, one real swing in slow
+    motion had its top four frames later and was warned of. Mean errors of the joints of five real
+    swings went from .0391, .0313, .0314, .0322 and .0314 player heights to .0382, .0308, .0300,
+    .0305 and .0304.
+    """
+    average, marks, camera = fit.body, observations.marks, observations.camera
+    if not np.isfinite(marks.joints).any():
+        clicks = clicked_joints(average, pose := fitted_pose(fit), observations.initial, camera)
+        return replace(fit, body=fit_proportions(average, pose, clicks, camera, options.spread))
     for _ in range(options.rounds):
-        pose = fitted_pose(fit)
-        body = fit_proportions(
-            average, pose, observations.marks, observations.camera, options.spread
-        )
+        body = fit_proportions(average, fitted_pose(fit), marks, camera, options.spread)
         fit = refit_swing(observations, replace(initial, body=body), fit.state, fps, fit_options)
     return fit
+
+
+def clicked_joints(
+    body: Body, pose: RootPose, initial: InitialJoints, camera: Camera
+) -> SwingMarks:
+    """The clicked joints as marks; the hips as far apart as fitted, around the clicked root."""
+    fitted = project(find_joints(body, pose)[initial.frame], camera)[0]
+    hips = [LSP14.index("right_hip"), LSP14.index("left_hip")]
+    joints = np.full((1, len(LSP14.names), 2), np.nan)
+    places = dict(zip(initial.names, initial.places, strict=True))
+    if "root" in places:
+        joints[0, hips] = fitted[hips] + places.pop("root") - fitted[hips].mean(axis=0)
+    for name, place in places.items():
+        joints[0, LSP14.index(name)] = place
+    return SwingMarks.of_joints(np.array([initial.frame]), joints)
 
 
 def fit_proportions(

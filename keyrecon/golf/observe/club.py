@@ -40,6 +40,12 @@ the hit on less than any shaft is worth: behind his back a golfer holds the club
 hang, 100 degrees apart. On a real swing whose shaft lies level behind the head, clubs within 15
 degrees rose from .73 to 1."""
 
+LEAST_SHAFT, NEVER = 0.12, 1e6
+"""A shaft detected over less is not taken (player heights), and what taking it costs: such crumbs
+lie anywhere. Of 122 clubs marked by eye in five real swings the first detection had 108 right and 4
+wrong with crumbs of .05 and more, 105 and none of .12, 101 and none of .15; those that were lost
+lie between their neighbours, and the guided detection finds them."""
+
 
 @dataclass(frozen=True)
 class ClubOptions:
@@ -218,7 +224,9 @@ def choose_shafts(
     def moving(before: int, t: int) -> Float[np.ndarray, "l m"]:
         return _movement(shafts[before], shafts[t], height, (t - before) / fps, options)
 
-    costs = [-options.gain * now.weight for now in shafts]
+    costs = [
+        np.where(now.weight < LEAST_SHAFT, NEVER, -options.gain * now.weight) for now in shafts
+    ]
     if expected is not None:
         finish = expected.keys[2] + (expected.keys[2] - expected.keys[1])
         costs = [

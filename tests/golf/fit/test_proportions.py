@@ -1,4 +1,4 @@
-"""The player's proportions from postures whose every joint is marked."""
+"""The player's proportions from the joints that a person placed."""
 
 from dataclasses import replace
 
@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from golf_truth import camera_before, even_times
 
-from keyrecon.golf.fit.proportions import PARTS, fit_proportions, scale_body
+from keyrecon.body import LSP14
+from keyrecon.golf.clicks import NEEDED
+from keyrecon.golf.fit.proportions import PARTS, clicked_joints, fit_proportions, scale_body
 from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, SwingMarks, SwingState
+from keyrecon.golf.records import Camera, InitialJoints, SwingMarks, SwingState
 from keyrecon.io.formats.model_file import read_motion_model
 
 CAMERA = Camera(1000.0, np.array([640.0, 360.0]))
@@ -60,3 +62,14 @@ def test_a_longer_part_moves_what_hangs_on_it():
     thighs = [np.linalg.norm(leg[2] - leg[1]) for leg in legs]
     shanks = [np.linalg.norm(leg[1] - leg[0]) for leg in legs]
     assert thighs[1] == pytest.approx(1.1 * thighs[0]) and shanks[1] == pytest.approx(shanks[0])
+
+
+def test_six_clicks_tell_how_trunk_and_legs_share_the_height(posed):
+    body, pose, marks = posed
+    first = marks.joints[0]
+    hips = [LSP14.index("right_hip"), LSP14.index("left_hip")]
+    places = [first[hips].mean(axis=0) if n == "root" else first[LSP14.index(n)] for n in NEEDED]
+    clicks = clicked_joints(body, pose, InitialJoints(0, NEEDED, np.array(places)), CAMERA)
+    share = lengths(fit_proportions(body, pose, clicks, CAMERA)) / lengths(body)
+    trunk, thigh = (share[LSP14.index(name)] for name in ("neck", "right_knee"))
+    assert 1.02 < thigh / trunk < 1.06 / 0.96

@@ -116,3 +116,15 @@ def test_a_video_without_a_club_says_so():
     nothing = ShaftHypotheses(np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0, bool))
     with pytest.raises(KeyreconError, match="club was seen in only 0 of 30 frames"):
         track_club([nothing] * 30, HEIGHT, 30.0)
+
+
+def test_crumbs_far_from_the_way_of_the_club_are_not_the_club():
+    frames, turn = 30, np.linspace(0.0, 2.0, 30)
+    ends = HANDS + np.stack([np.zeros((30, 2)), 100 * np.stack([np.cos(turn), np.sin(turn)], 1)], 1)
+    sure = [ShaftHypotheses(e[None], np.array([0.4]), np.array([True])) for e in ends]
+    level = np.array([[HANDS, HANDS - (100.0, 0.0)]])
+    for t in range(12, 18):  # where the shaft is lost before the player's shirt
+        sure[t] = ShaftHypotheses(level, np.array([0.1]), np.array([True]))
+    club = track_club(sure, HEIGHT, 60.0)
+    assert not club.detected[12:18].any() and club.detected.sum() == frames - 6
+    assert np.abs(direction(club.ends) - np.degrees(turn)).max() < 5

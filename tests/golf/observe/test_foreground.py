@@ -10,8 +10,10 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks, clicked_pose
 from keyrecon.golf.observation import find_whole
 from keyrecon.golf.observe.foreground import separate_player
+from keyrecon.golf.observe.player_cutter import ClickedFigure
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
+from keyrecon.segmentation.color_model import to_lab
 
 SIZE = (240, 200)
 FRAMES = 24
@@ -109,3 +111,15 @@ def test_a_mask_that_lost_half_of_the_player_counts_for_nothing():
     legs = player.copy()
     legs[:30] = False
     assert find_whole([player, player, legs, player]).tolist() == [True, True, False, True]
+
+
+def test_the_player_is_where_he_stood_and_the_colours_are_the_same():
+    here, true = picture(0), true_mask(0)
+    figure_of_clicks = ClickedFigure.of(to_lab(here), true, 150.0)
+    core = figure_of_clicks.stays(to_lab(here))
+    trunk = np.zeros_like(true)
+    trunk[80:110, 108:124] = True
+    assert core[trunk].mean() > 0.9 and not (core & ~true).any()
+    gone = here.copy()
+    gone[:115] = picture(0)[:115, ::-1]  # scenery where the trunk was
+    assert not figure_of_clicks.stays(to_lab(gone))[trunk & ~true[:, ::-1]].any()
