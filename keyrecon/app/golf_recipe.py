@@ -38,7 +38,8 @@ def find_swing(
 ) -> FoundSwing:
     """Observe a video and fit the swing that explains it best, and holds what a person marked.
 
-    Raises KeyreconError where no player or no swing is observed.
+    Raises KeyreconError where no player or no swing is observed, and where hand or sides seem to be
+    told wrong by somebody who has marked nothing but the clicks.
     """
     clicked, pose = pose, replace(pose, mirrored=False)
     film = keep("film", choose_frames, video, camera, pose.frame)
@@ -46,8 +47,9 @@ def find_swing(
         "scene", observe_scene, video, film, place_in_film(pose, film),
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
-    hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
-    check_hand(hands, clicked, "The clicks")
+    if not marks.any:
+        hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
+        check_hand(hands, clicked, "The clicks")
     candidates = keep("search", find_candidates, scene, pose, marks, model)
     tried: list[_Tried] = []
     for number, candidate in enumerate(candidates[: options.candidates], 1):

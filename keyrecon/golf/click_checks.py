@@ -155,7 +155,9 @@ def check_hand(costs: HandCosts, pose: ClickedPose, origin: str) -> None:
         f"{origin}: the swing goes round the other way than that of a {hand}-hander who stands as "
         f'clicked. Either the player is {opposite}-handed (say "left_handed": '
         f"{'false' if left_handed else 'true'}), or left and right of the clicks are "
-        "exchanged: right_ is the player's own right, on the left of a picture from the front."
+        "exchanged: right_ is the player's own right, on the left of a picture from the front. "
+        "If all of it is right, mark the top of the swing on the page and fit again: who marks is "
+        "believed."
     )
 
 
