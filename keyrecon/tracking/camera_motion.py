@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from keyrecon.io.frame_reader import read_grey, shrinking
+from keyrecon.io.frame_reader import read_grey, shrinking, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
@@ -169,8 +169,9 @@ def estimate_camera_motion(
     if not cuts:
         return path
     shots = Shots.between(cuts, len(video))
-    parts = progress(shots.parts, "Estimating the camera's motion in each shot", len(shots.parts))
-    paths = [estimate_shot_motion(video.part(part), options) for part in parts]
+    parts = [video.part(part) for part in shots.parts]
+    moved = side_by_side(lambda part: estimate_shot_motion(part, options), parts)
+    paths = [*progress(moved, "Estimating the camera's motion in each shot", len(parts))]
     return CameraPath(
         np.concatenate([path.to_reference for path in paths]),
         np.concatenate([path.confidence for path in paths]),
