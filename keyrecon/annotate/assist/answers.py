@@ -244,7 +244,8 @@ def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]
     preparation, body = cache.preparation(), cache.body(annotations, wait=True)
     if preparation is None or body is None:
         return []
-    neighbours = cache.neighbours(_completed_halves(annotations))
+    completed = _completed_halves(annotations)
+    neighbours, appearance = cache.neighbours(completed), cache.appearance(completed)
     return [
         {
             "frame": check.frame,
@@ -253,7 +254,7 @@ def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]
             "suspicion": round(float(check.suspicion), 3),
             "text": check.text,
         }
-        for check in find_checks(annotations, body.size, neighbours, preparation.track)
+        for check in find_checks(annotations, body.size, neighbours, preparation.track, appearance)
     ]
 
 

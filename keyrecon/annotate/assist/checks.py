@@ -1,84 +1,79 @@
 """Marks that look wrong, the most suspicious first: annotated frames checked by one another.
 
-Where the annotated poses most similar to a frame put its joints (see `neighbours`) is what the
-other marks say about this frame.
+Where the annotated poses most similar to a frame put its joints (see `neighbours`) and what its
+joints look like on other frames (`mark_appearance`) is what the other marks say about this one.
 
+crossed  left and right of a limb look exchanged (see `side_checks`)
+far      a joint lies where none of the similar poses puts it
+unlike   a place beside the mark looks more like the joint than the marked place does
 long     a bone shows more of its length than it has, and than other frames show of it: impossible
          under scaled orthography
-crossed  left and right of a limb agree better with the other annotated frames when swapped, or
-         shoulders and hips face opposite ways
-far      a joint lies where none of the similar poses puts it
 off      head or feet are not where the program follows the player
 missing  joints of a half that was begun
 
-Silhouettes do not show left from right, so frames only say of one another whether they agree. Which
-of them is wrong is decided by the majority: the frame whose swap ends most disagreement is taken
-to be swapped, and again, until none is left worth it. Evidence on the same joints is put
-together as if independent, 1 - (1 - a)(1 - b), and reported once.
+The three residuals of a joint, far, unlike and long, are added; it is told for what is largest. A
+bone that is too long is told once, for the end that is the more suspicious otherwise. What is said
+about the same joints otherwise is put together as if independent, 1 - (1 - a)(1 - b), and reported
+once.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.annotate.assist.mark_appearance import MarkAppearance
 from keyrecon.annotate.assist.neighbours import Neighbours
+from keyrecon.annotate.assist.side_checks import find_exchanges
+from keyrecon.annotate.assist.suspicion import (
+    LEAST_EVIDENCE,
+    MIN_SUSPICION,
+    Check,
+    label,
+    suspicion,
+)
 from keyrecon.body import Skeleton
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions
 from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.records import Annotations, Track
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 
-MAX_JOINT_DISTANCE = 0.15
-"""Distance at which a joint counts as elsewhere, player heights: half a thigh."""
-EVEN_DISAGREEMENT = 1.5
-"""Frames that speak for a swap, less those against it, at which it is as likely as not."""
-EVEN_DISTANCE = 0.10
+EVEN_DISTANCE = 0.115
 """Distance from all similar poses at which a mark is as likely wrong as not, player heights: one
 joint in fifty of careful marks lies farther than half of that."""
-DISTANCE_PER_USUAL = 4.0
+DISTANCE_PER_USUAL = 4.6
 """How much farther that is, per distance that the pose's other joints have."""
-DISTANCE_PER_JOINT = 2.0
+DISTANCE_PER_JOINT = 2.3
 """The same per distance that this joint has in the median of the other frames."""
-SEEN_BREADTH = 0.08
-"""Length in the picture from which shoulders or hips tell which way they face, body heights."""
-EVEN_OPPOSITE = 0.75
-"""How opposite shoulders and hips are when they are as likely wrong as not, 0-1."""
-EVEN_OFF = 0.15
+EVEN_UNLIKE = 2.9
+"""How much more a place beside a mark looks like the joint when the mark is as likely wrong as not:
+times what one mark in ten of this video exceeds (`USUAL_QUANTILE`).
+
+Chosen with all `EVEN_` constants, by one common factor, on nine real clips with 744 planted
+mistakes (benchmarks/checks.py): 73 % found, 79 % of the warnings true, 11 warnings about the true
+marks of all nine. All four percent smaller 74, 76 % and 14, larger 71, 83 % and 11. Before marks
+were compared by looks: 67, 66 % and 13. Single ones changed by a fifth to a third: 70 to 74 % found
+and 76 to 82 % true with 13 warnings about true marks. A constant in place of the tenth: 74 and
+68 % with 13."""
+USUAL_QUANTILE = 0.9
+EVEN_OFF = 0.48
 """Distance of head and feet from the track at which they are as likely wrong as not, player
 heights."""
+EVEN_FRAME_UNLIKE = 1.25
+"""The same as `EVEN_UNLIKE` for the mean of all joints of a frame."""
+LEAST_UNLIKE = 0.1
+"""What one mark in ten exceeds at least: what two eyes make of the same frames."""
+LEAST_JOINTS = 5
+"""Joints that must be seen for their mean to say anything."""
 SURE_TRACK = 0.4
 """Confidence from which a track may doubt a mark."""
-EVEN_EXCESS = 6.0
-"""Clicks' deviations by which a bone is too long when it is as likely wrong as not. With
-`EVEN_OPPOSITE` and `EVEN_OFF` chosen on nine real clips (benchmarks/checks.py): at 6, .75 and .15
-12 warnings about true marks, 59 % of planted mistakes found, 72 % of the warnings true; at 4.5, .65
-and .12 15, 62 and 68 %; at 4, .5 and .1 18, 68 and 66 %."""
-POOR_FIT_DISTANCE = 0.06
-"""Mean distance of a fitted pose's joints, left and right as they agree better, at which it says
-half as much about left and right, player heights."""
+EVEN_EXCESS = 6.9
+"""Clicks' deviations by which a bone is too long when it is as likely wrong as not."""
 LEAST_SEEN = 4
 """Bones of other frames from which something is known of how long a bone is seen."""
 MISSING_SUSPICION, BEGUN_SUSPICION = 0.95, 0.5
 """Of joints left out of a half that is marked, and of one that is only begun."""
-MIN_SUSPICION = 0.2
-"""Suspicion below which nothing is reported."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """A mark that may be wrong."""
-
-    frame: int
-    joint: str
-    kind: Literal["long", "crossed", "far", "off", "missing"]
-    suspicion: float
-    """0-1"""
-    text: str
-    joints: tuple[str, ...]
-    """All joints that it is about."""
 
 
 def find_checks(
@@ -86,19 +81,16 @@ def find_checks(
     size: BodySize,
     neighbours: tuple[Neighbours, ...],
     track: Track | None = None,
+    appearance: MarkAppearance | None = None,
 ) -> list[Check]:
     """All marks that look wrong, evidence about the same joints put together."""
-    skeleton = annotations.skeleton
-    facing = _facing(annotations, size)
+    residuals = measure_residuals(annotations, size, neighbours, appearance)
     evidence = [
-        *_too_long(annotations, size),
+        *find_exchanges(annotations, size, neighbours, appearance),
+        *_displaced(annotations, residuals),
+        *_other_frame(annotations, track, appearance),
         *_left_out(annotations),
-        *_opposite(annotations, facing),
     ]
-    if track is not None:
-        evidence += _off_track(annotations, track)
-    for half in neighbours:
-        evidence += [*_swapped(half, skeleton, facing), *_elsewhere(half, skeleton)]
     checks: list[Check] = []
     for check in sorted(evidence, key=lambda c: (c.kind != "crossed", -c.suspicion)):
         same = [n for n, c in enumerate(checks) if _about_the_same(c, check)]
@@ -116,13 +108,58 @@ def _about_the_same(one: Check, other: Check) -> bool:
     return one.frame == other.frame and bool(set(one.joints) & set(other.joints))
 
 
-def _suspicion(value: float, even: float) -> float:
-    """0 at 0, one half at `even`, 1 far beyond."""
-    return value**4 / (value**4 + even**4)
+@dataclass(frozen=True, eq=False)
+class MarkResiduals:
+    """What speaks against the marks of K frames, in units at which they are as likely wrong as not;
+    0 where nothing is known."""
+
+    far: Float[np.ndarray, "K J"]
+    distance: Float[np.ndarray, "K J"]
+    """From where similar poses have the joint, player heights."""
+    unlike: Float[np.ndarray, "K J"]
+    long: Float[np.ndarray, "K B"]
+    stretch: Float[np.ndarray, "K B"]
+    """Length in the picture over the possible one."""
 
 
-def _label(name: str) -> str:
-    return name.replace("_", " ")
+def measure_residuals(
+    annotations: Annotations,
+    size: BodySize,
+    neighbours: tuple[Neighbours, ...],
+    appearance: MarkAppearance | None,
+) -> MarkResiduals:
+    """Of all marks, each predicted from the others."""
+    stretch = _stretch_bones(annotations, size)
+    excess = np.maximum(np.nan_to_num(measure_excess(stretch, size.lengths)), 0)
+    far, distance = np.zeros((2, *annotations.joints.shape[:2]))
+    for half in neighbours:
+        cells = np.ix_(np.searchsorted(annotations.frames, half.frames), half.members)
+        far[cells], distance[cells] = _measure_distance(half)
+    unlike = np.zeros_like(far)
+    if appearance is not None:
+        unlike = appearance.excess / (EVEN_UNLIKE * _usual_excess(annotations, appearance))
+    return MarkResiduals(far, distance, unlike, excess / EVEN_EXCESS, stretch)
+
+
+def _usual_excess(annotations: Annotations, appearance: MarkAppearance) -> float:
+    """What one seen mark in ten exceeds."""
+    seen = np.isfinite(annotations.joints[:, :, 0]) & annotations.visible
+    excess = appearance.excess[seen]
+    return max(float(np.quantile(excess, USUAL_QUANTILE)), LEAST_UNLIKE) if len(excess) else 1.0
+
+
+def _measure_distance(
+    half: Neighbours,
+) -> tuple[Float[np.ndarray, "K J"], Float[np.ndarray, "K J"]]:
+    """Of marks from where the nearest of the similar poses has them: in units of what is usual, and
+    in player heights."""
+    distance = np.diagonal(half.distance, axis1=2, axis2=3).min(axis=1)
+    # a pose that is far off as a whole says nothing about one joint: the frame is like no other;
+    # neither does one about a joint that is far off in most frames
+    usual = np.nanmedian(distance, axis=1, keepdims=True)
+    usual_of_joint = np.nanmedian(distance, axis=0, keepdims=True)
+    even = EVEN_DISTANCE + DISTANCE_PER_USUAL * usual + DISTANCE_PER_JOINT * usual_of_joint
+    return np.nan_to_num(distance / even), np.nan_to_num(distance)
 
 
 def measure_excess(
@@ -135,25 +172,15 @@ def measure_excess(
     return (stretch - 1) * lengths / (np.sqrt(2) * LengthOptions.click_noise)
 
 
-def _too_long(annotations: Annotations, size: BodySize) -> Iterator[Check]:
+def _stretch_bones(annotations: Annotations, size: BodySize) -> Float[np.ndarray, "K B"]:
+    """Lengths in the picture over the possible ones, and over what other bones are seen to have."""
     skeleton = annotations.skeleton
     ends = annotations.joints[:, skeleton.bones]
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     stretch = length / size.scale[annotations.frames][:, None] / size.lengths
     stretch /= np.maximum(1.0, _longest_elsewhere(stretch, skeleton))
     stretch /= np.maximum(1.0, _longest_beside(stretch, skeleton))
-    excess = np.nan_to_num(measure_excess(stretch, size.lengths))
-    for row, bone in np.argwhere(excess > 0):
-        parent, child = (skeleton.names[j] for j in skeleton.bones[bone])
-        yield Check(
-            frame=int(annotations.frames[row]),
-            joint=child,
-            kind="long",
-            suspicion=_suspicion(float(excess[row, bone]), EVEN_EXCESS),
-            text=f"From {_label(parent)} to {_label(child)} is {stretch[row, bone]:.1f} times as "
-            "long as it can be; check both ends.",
-            joints=(child, parent),
-        )
+    return stretch
 
 
 def _longest_elsewhere(
@@ -189,47 +216,90 @@ def _longest_beside(
     return np.where(apart, known[:, None, :], 0.0).max(axis=2)
 
 
-def _facing(annotations: Annotations, size: BodySize) -> dict[int, float]:
-    """Whether shoulders and hips of each frame point the same way from right to left, -1 to 1.
+def _displaced(annotations: Annotations, residuals: MarkResiduals) -> Iterator[Check]:
+    """Joints by the sum of their residuals; a long bone counts for the end that is told first."""
+    skeleton = annotations.skeleton
+    at_joint = (skeleton.bones[:, :, None] == np.arange(len(skeleton.names))).any(axis=1)
+    for row, frame in enumerate(annotations.frames.tolist()):
+        own, long = residuals.far[row] + residuals.unlike[row], residuals.long[row].copy()
+        while True:
+            longest = np.where(at_joint, long[:, None], 0).max(axis=0)
+            joint = int((own + longest).argmax())
+            doubt = suspicion(float(own[joint] + longest[joint]))
+            if doubt < LEAST_EVIDENCE:
+                break
+            bone = int(np.where(at_joint[:, joint], long, -1).argmax())
+            yield _describe(skeleton, frame, joint, bone, doubt, residuals, row, longest[joint])
+            own[joint] = 0
+            long[at_joint[:, joint]] = 0
 
-    A trunk twists by less than a right angle. Near 0 where they are seen end on, or not marked.
-    """
-    names = annotations.skeleton.names
-    corners = [f"{side}_{part}" for part in ("shoulder", "hip") for side in ("right", "left")]
-    if not {*corners} <= {*names}:
-        return {}
-    right_shoulder, left_shoulder, right_hip, left_hip = (
-        annotations.joints[:, names.index(corner)] for corner in corners
+
+def _describe(
+    skeleton: Skeleton,
+    frame: int,
+    joint: int,
+    bone: int,
+    doubt: float,
+    residuals: MarkResiduals,
+    row: int,
+    longest: float,
+) -> Check:
+    """The largest residual in a sentence."""
+    name = skeleton.names[joint]
+    far, unlike = residuals.far[row, joint], residuals.unlike[row, joint]
+    if longest > max(far, unlike):
+        parent, child = (skeleton.names[j] for j in skeleton.bones[bone])
+        text = (
+            f"From {label(parent)} to {label(child)} is {residuals.stretch[row, bone]:.1f} times "
+            "as long as it can be; check both ends."
+        )
+        return Check(frame, name, "long", doubt, text, (child, parent))
+    if unlike > far:
+        text = f"A place beside it looks more like the {label(name)} of other frames."
+        return Check(frame, name, "unlike", doubt, text, (name,))
+    text = (
+        f"The {label(name)} is {residuals.distance[row, joint]:.0%} of the player's height from "
+        "where similar frames have it."
     )
-    across = np.stack([left_shoulder - right_shoulder, left_hip - right_hip])
-    across /= size.scale[annotations.frames][:, None]
-    length = np.linalg.norm(across, axis=2)
-    alike = (across[0] * across[1]).sum(axis=1) / np.maximum(length[0] * length[1], 1e-9)
-    seen = np.minimum(length.min(axis=0) / SEEN_BREADTH, 1.0)
-    return {
-        int(frame): float(value)
-        for frame, value in zip(annotations.frames, alike * seen, strict=True)
-        if np.isfinite(value)
-    }
+    return Check(frame, name, "far", doubt, text, (name,))
 
 
-def _opposite(annotations: Annotations, facing: dict[int, float]) -> Iterator[Check]:
-    """Frames whose shoulders and hips point opposite ways."""
+def _other_frame(
+    annotations: Annotations, track: Track | None, appearance: MarkAppearance | None
+) -> Iterator[Check]:
+    """Frames whose marks look like those of another frame: most joints look unlike themselves, or
+    head and feet are both elsewhere than the player is followed."""
+    off, unlike = np.zeros((2, len(annotations.frames)))
+    if track is not None:
+        off = _measure_off_track(annotations, track)
+    if appearance is not None:
+        seen = np.isfinite(annotations.joints[:, :, 0]) & annotations.visible
+        count = seen.sum(axis=1)
+        known = count >= LEAST_JOINTS
+        total = np.where(seen, appearance.excess, 0).sum(axis=1)
+        unlike = np.where(known, total / np.maximum(count, 1), 0)
+        unlike /= _usual_excess(annotations, appearance)
     names = annotations.skeleton.names
-    joints = tuple(n for n in names if n.startswith(("left_", "right_")))
-    for frame, value in facing.items():
-        if value < 0:
+    for row, frame in enumerate(annotations.frames.tolist()):
+        text = "Most joints look unlike those of other frames"
+        if off[row] / EVEN_OFF > unlike[row] / EVEN_FRAME_UNLIKE:
             text = (
-                "Shoulders and hips face opposite ways; left and right of arms or legs are swapped."
+                f"Head and feet are {off[row]:.0%} of the player's height from where the program "
+                "follows the player"
             )
-            yield Check(
-                frame, "left_hip", "crossed", _suspicion(-value, EVEN_OPPOSITE), text, joints
-            )
+        yield Check(
+            frame=frame,
+            joint="head_top",
+            kind="off",
+            suspicion=suspicion(float(off[row] / EVEN_OFF + unlike[row] / EVEN_FRAME_UNLIKE)),
+            text=text + "; do these marks belong to another frame?",
+            joints=names,
+        )
 
 
-def _off_track(annotations: Annotations, track: Track) -> Iterator[Check]:
-    """Frames whose head and feet are both elsewhere than the player is followed: the marks of
-    another frame. One of them alone is more often a fault of the track."""
+def _measure_off_track(annotations: Annotations, track: Track) -> Float[np.ndarray, "K"]:
+    """How far both head and feet are from the track, player heights; 0 where it is not sure. One of
+    them alone is more often a fault of the track."""
     anchors = anchors_from_bodies(annotations)
     frames, height = anchors.frames, track.height[anchors.frames]
     head = np.linalg.norm(track.head[frames] - anchors.head, axis=1)
@@ -239,18 +309,10 @@ def _off_track(annotations: Annotations, track: Track) -> Iterator[Check]:
         for feet in (tracked, tracked[:, ::-1])
     )
     both = np.minimum(head, np.minimum(straight, crossed)) / height
-    sure = track.confidence[frames] > SURE_TRACK
-    names = annotations.skeleton.names
-    for row in np.flatnonzero(sure & np.isfinite(both)):
-        yield Check(
-            frame=int(frames[row]),
-            joint="head_top",
-            kind="off",
-            suspicion=_suspicion(float(both[row]), EVEN_OFF),
-            text=f"Head and feet are {both[row]:.0%} of the player's height from where the program "
-            "follows the player; do these marks belong to another frame?",
-            joints=names,
-        )
+    known = (track.confidence[frames] > SURE_TRACK) & np.isfinite(both)
+    off = np.zeros(len(annotations.frames))
+    off[np.searchsorted(annotations.frames, frames[known])] = both[known]
+    return off
 
 
 def _left_out(annotations: Annotations) -> Iterator[Check]:
@@ -264,7 +326,7 @@ def _left_out(annotations: Annotations) -> Iterator[Check]:
             names = tuple(name for name in open_ if (frame, name) not in absent)
             done = marked[row, half].mean() >= LEAST_MARKED
             if names:
-                listed = ", ".join(_label(name) for name in names)
+                listed = ", ".join(label(name) for name in names)
                 text = f"Not marked: {listed}; place them, or say that they are not seen."
                 yield Check(
                     frame,
@@ -274,71 +336,3 @@ def _left_out(annotations: Annotations) -> Iterator[Check]:
                     text,
                     names,
                 )
-
-
-def _elsewhere(half: Neighbours, skeleton: Skeleton) -> Iterator[Check]:
-    distance = np.diagonal(half.distance, axis1=2, axis2=3).min(axis=1)
-    # a pose that is far off as a whole says nothing about one joint: the frame is like no other;
-    # neither does one about a joint that is far off in most frames
-    usual = np.nanmedian(distance, axis=1)
-    usual_of_joint = np.nanmedian(distance, axis=0)
-    for row, place in np.argwhere(np.nan_to_num(distance) > 0):
-        name, off = skeleton.names[half.members[place]], float(distance[row, place])
-        yield Check(
-            frame=int(half.frames[row]),
-            joint=name,
-            kind="far",
-            suspicion=_suspicion(
-                off,
-                EVEN_DISTANCE
-                + DISTANCE_PER_USUAL * usual[row]
-                + DISTANCE_PER_JOINT * usual_of_joint[place],
-            ),
-            text=f"The {_label(name)} is {off:.0%} of the player's height from where similar "
-            "frames have it.",
-            joints=(name,),
-        )
-
-
-def _swapped(half: Neighbours, skeleton: Skeleton, facing: dict[int, float]) -> Iterator[Check]:
-    gain = _swap_gain(half, skeleton)
-    agreeing = np.array([max(0.0, facing.get(int(frame), 0.0)) for frame in half.frames])
-    swapped = np.zeros(len(half.frames), dtype=bool)
-    while True:
-        evidence = np.where(swapped[:, None] == swapped[half.sources], gain, -gain)
-        total = evidence.sum(axis=1)
-        np.add.at(total, half.sources, evidence)
-        total *= 1 - agreeing
-        row = int(np.where(swapped, -np.inf, total).argmax())
-        suspicion = _suspicion(max(float(total[row]), 0.0), EVEN_DISAGREEMENT)
-        if swapped[row] or suspicion < MIN_SUSPICION:
-            return
-        swapped[row] = True
-        yield _swap_check(half, skeleton, row, suspicion)
-
-
-def _swap_gain(half: Neighbours, skeleton: Skeleton) -> Float[np.ndarray, "K S"]:
-    """How much nearer the joints of a limb are to those of the other side, -1 to 1."""
-    paired = np.flatnonzero(skeleton.mirror[half.members] != half.members)
-    twin = np.array([list(half.members).index(skeleton.mirror[j]) for j in half.members[paired]])
-    straight = np.minimum(half.distance[:, :, paired, paired], MAX_JOINT_DISTANCE)
-    crossed = np.minimum(half.distance[:, :, paired, twin], MAX_JOINT_DISTANCE)
-    known = np.isfinite(straight) & np.isfinite(crossed)
-    count = np.maximum(known.sum(axis=2), 1)
-    straight, crossed = (np.where(known, a, 0).sum(axis=2) / count for a in (straight, crossed))
-    return (
-        (straight - crossed)
-        / MAX_JOINT_DISTANCE
-        / (1 + (np.minimum(straight, crossed) / POOR_FIT_DISTANCE) ** 2)
-    )
-
-
-def _swap_check(half: Neighbours, skeleton: Skeleton, row: int, suspicion: float) -> Check:
-    """Joints that lie nearer to the other side's, in a sentence."""
-    paired = [int(j) for j in half.members if skeleton.mirror[j] != j]
-    limb = "legs" if skeleton.is_lower[paired].all() else "arms"
-    others = np.unique(half.frames[half.sources[row]])[:3]
-    named = ", ".join(str(frame) for frame in others)
-    names = tuple(skeleton.names[j] for j in paired)
-    text = f"Left and right of the {limb} look swapped beside frames {named}."
-    return Check(int(half.frames[row]), names[-1], "crossed", suspicion, text, names)

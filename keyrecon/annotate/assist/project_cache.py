@@ -20,8 +20,18 @@ from jaxtyping import Float, Int
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate, estimate_body
 from keyrecon.annotate.assist.flow_suggestion import nearest_marks, surer_by_flow
+from keyrecon.annotate.assist.mark_appearance import (
+    MarkAppearance,
+    compare_appearance,
+    describe_frames,
+)
 from keyrecon.annotate.assist.neighbours import Neighbours, find_neighbours
-from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, choose_sources, suggest_joints
+from keyrecon.annotate.assist.pose_suggestion import (
+    PoseSuggestion,
+    choose_sources,
+    scene_of,
+    suggest_joints,
+)
 from keyrecon.annotate.assist.preview import Strip, cut_strip
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.coco import read_coco
@@ -30,6 +40,7 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, prepare
+from keyrecon.propagation.appearance import PlayerFeatures
 from keyrecon.records import Annotations, CameraPath, Colors, Motion, Pick, Preparation
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking.camera_motion import estimate_shot_motion
@@ -71,6 +82,10 @@ class ProjectCache:
         self._neighbours: LatestResult[str, tuple[Neighbours, ...]] = LatestResult(
             lambda _, *inputs: find_neighbours(*inputs)
         )
+        self._appearance: LatestResult[str, MarkAppearance | None] = LatestResult(
+            lambda _, *inputs: self._compare_appearance(*inputs)
+        )
+        self._described: tuple[Preparation | None, PlayerFeatures | None] = None, None
         self._colors: LatestResult[tuple[Pick, ...], Colors] = LatestResult(
             lambda picks: learn_colors(self.video, picks)
         )
@@ -148,6 +163,26 @@ class ProjectCache:
             return ()
         key = _digest(annotations.frames, annotations.joints)
         return self._neighbours.get(key, preparation, annotations)
+
+    def appearance(self, annotations: Annotations) -> MarkAppearance | None:
+        """Looks of the marks compared with those of other annotated frames."""
+        preparation = self.preparation()
+        if preparation is None or not len(annotations.frames):
+            return None
+        key = _digest(annotations.frames, annotations.joints, annotations.visible)
+        return self._appearance.get(key, preparation, annotations)
+
+    def _compare_appearance(
+        self, preparation: Preparation, annotations: Annotations
+    ) -> MarkAppearance | None:
+        """Only frames that were not described yet are read. One thread at a time is here."""
+        described_for, features = self._described
+        if described_for is not preparation:
+            features = None
+        body_frame = scene_of(preparation, annotations).body_frame
+        features = describe_frames(preparation, body_frame, annotations.frames, features)
+        self._described = preparation, features
+        return compare_appearance(preparation, body_frame, annotations, features)
 
     def body(self, annotations: Annotations, wait: bool = False) -> BodyEstimate | None:
         """The player's body: the latest estimate, or with `wait` that from all these marks."""
