@@ -54,7 +54,7 @@ class VariantStore(StageStore):
         known = {} if changed is None else json.loads(self._index.read_text())
         self._known: dict[str, list[str]] = known
         """Stage and digest of every result as it was, by the key of its inputs."""
-        self._left = {key for key, (name, _) in known.items() if name in (changed or ())}
+        self._left = {key for key, (name, _) in known.items() if stage_of(name) in (changed or ())}
         self._differs = "" in (changed or ())
         self._made: dict[str, object] = {}
         self.held: frozenset[str] = frozenset()
@@ -72,7 +72,7 @@ class VariantStore(StageStore):
     ) -> Result:
         """The stage's result: stored, made before in this run, or made now."""
         bare = inputs  # and no options: a number in them is a change like any other
-        if name in WITHOUT_SIGNS:
+        if stage_of(name) in WITHOUT_SIGNS:
             bare = tuple(without_signs(i) if isinstance(i, Annotations) else i for i in inputs)
         key = self._key((name, *bare))
         if key not in self._made:
@@ -114,13 +114,13 @@ class VariantStore(StageStore):
         if name in self.held and self.changed is not None:
             key = next(known for known, (stage, _) in self._known.items() if stage == name)
         path = self.folder / f"{name}-{key}.npz"
-        if key in self._known and name not in self.changed:
+        if key in self._known and stage_of(name) not in (self.changed or ()):
             result = load_record(path)
-            self._keys[id(result)] = (result, self._known[key][1])
+            self._note_kept(result, self._known[key][1], path)
             return result
-        result = self._run(name, run)
+        result = self._run(stage_of(name), run)
         digest = self._key(result)
-        self._keys[id(result)] = (result, digest)
+        self._note_kept(result, digest, path)
         if self.changed is None:
             save_record(path, result)
             self._known[key] = [name, digest]
@@ -145,6 +145,11 @@ class VariantStore(StageStore):
     def _watch(self, frame: object, event: str, _: object) -> None:
         if event == "call":
             self._codes.add((self._stage, frame.f_code))
+
+
+def stage_of(name: str) -> str:
+    """The stage that is kept under a name: of one shot, what stands before the shot."""
+    return name.partition("@")[0]
 
 
 def without_signs(marks: Annotations) -> Annotations:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
@@ -250,3 +251,47 @@ def test_the_rendered_clips_are_sequences_of_the_other_benchmarks(numbers):
         check=True,
     )
     assert {c.removesuffix("-body") for c in sensitivity.CLIPS[:2]} <= set(found.stdout.split())
+
+
+@pytest.fixture
+def store(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import variant_store
+
+    yield lambda changed: variant_store.VariantStore(tmp_path, changed)
+    sys.modules.pop("variant_store")
+
+
+def run_stages(keep, doubled=1.0, added=0.0, made=None):
+    """Three stages one after the other; what was made is noted."""
+
+    def note(name, result):
+        (made if made is not None else []).append(name)
+        return result
+
+    first = keep("find@0", lambda video: note("find", doubled * video), np.arange(3.0))
+    second = keep("track", lambda found: note("track", np.round(found + added)), first)
+    return keep("lift", lambda track: note("lift", track + 1), second)
+
+
+def test_a_variant_makes_only_what_its_change_reaches(store):
+    whole, made = store(None), []
+    with whole.watched():
+        as_it_is = run_stages(whole.keep)
+    varied = run_stages(store(frozenset({"track"})).keep, added=5.0, made=made)
+    assert made == ["track", "lift"]
+    assert np.array_equal(varied, as_it_is + 5)
+
+
+def test_a_variant_ends_where_what_it_changes_gives_the_same_bits(store):
+    from variant_store import Unchanged
+
+    whole, made = store(None), []
+    with whole.watched():
+        run_stages(whole.keep)
+    with pytest.raises(Unchanged):
+        run_stages(store(frozenset({"track"})).keep, added=0.1, made=made)
+    assert made == ["track"]
+    made.clear()
+    run_stages(store(frozenset({"find"})).keep, doubled=2.0, made=made)
+    assert made == ["find", "track", "lift"]
