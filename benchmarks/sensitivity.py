@@ -1,17 +1,24 @@
 """How much the result hangs on each number that somebody set.
 
     python benchmarks/sensitivity.py [--work DIR] [--mocap DIR] [--clips CLIP ...] [--frames N]
-        [--package FOLDER ...] [--constants NAME ...] [--clicks] [--workers N] [--out CSV]
+        [--package FOLDER ...] [--constants NAME ...] [--wide | --clicks] [--workers N] [--out CSV]
         [--plan | --summary]
 
-Every tuned number (see tuned_numbers.py) on rendered sequences and real clips: change of carried
-PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs from the person and, for numbers of lifting,
-without (`auto`). Each is run as if it had been written so in the source, through the stages that it
-can reach (see variant_store.py). To spend the time where it tells something,
+Every tuned number (see tuned_numbers.py) by a quarter up and down, on rendered sequences and real
+clips: change of carried PCK@0.2 (points) and of PA-MPJPE (mm), with depth signs from the person
+and, for numbers of lifting, without (`auto`). Each is run as if it had been written so in the
+source, through the stages that it can reach (see variant_store.py). Of hundreds of numbers few
+matter, so many are changed at once (see screening.py), in three rounds:
 
-1. numbers are halved, and doubled, some at once; a group that changes a clip by more than
-   `SMALL_PCK` or `SMALL_PA` is split, until it is known which number does;
-2. those are measured by +-25 %, one by one, on every clip.
+1. on every clip every number goes up and down in a group, drawn anew for each clip;
+2. a group that changes its clip by more than `MUCH_PCK` points or `MUCH_PA` mm is halved until it
+   is known which number does;
+3. those numbers are changed alone, up and down, on every clip.
+
+Where all numbers of a folder by no more than a hundredth change a clip by more than these limits
+(its unsteadiness: a leg is told from the other by a hair), nothing is looked for below that.
+Numbers of which rows of earlier versions let expect more are in smaller groups. With `--constants`
+numbers are changed alone at once, and `--wide` halves and doubles.
 
 For numbers of tracking and segmentation the keyframes stay as they are: which frames are marked
 moves PA-MPJPE by millimetres, and would hide what those numbers do.
@@ -26,44 +33,74 @@ not measured again. `--summary` prints the table that is kept as benchmarks/sens
 import argparse
 import ast
 import csv
+import hashlib
 import json
 import multiprocessing
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
-from sensitivity_rows import SMALL_PA, SMALL_PCK, Row, print_summary, read_rows, shorten
+from screening import Group, draw_directions, draw_groups, locate
+from sensitivity_rows import (
+    QUARTERS,
+    SHAKEN,
+    WIDE,
+    Row,
+    expected_sizes,
+    name_change,
+    print_summary,
+    read_rows,
+    shorten,
+)
 from tuned_numbers import (
     FOLDERS,
     TunedNumber,
     code_digest,
     find_numbers,
     find_stages,
+    reached_from,
     read_package,
     stages_using,
-    vary,
 )
 from varied_import import vary_imports
 
 ROOT = Path(__file__).parent.parent
 DATA = ROOT.parent / "shared" / "data"
-CLIPS = ("all-oblique-small", "ground-oblique-pan-body", "tennis_broadcast_purple")
-"""Seen from above and small, from picks; a moving camera, from a marked body; a real one."""
-WIDE = (0.5, 2.0)
-FACTORS = (0.75, 1.25)
-BEFORE_KEYFRAMES = ("tracking", "segmentation")
+CLIPS = (
+    "all-oblique-small",
+    "tennis_rally",
+    "serve-side-static",
+    "tennis_broadcast_purple",
+    "ground-oblique-pan",
+    "mixed-front-static",
+    "golf_faceon",
+    "ground-back-static",
+    "mixed-side-pan",
+    "tennis_broadcast_indoor",
+    "volley-above-static",
+    "serve-back-pan",
+    "golf_dtl_slow",
+)
+"""All rendered sequences, and real clips that may be looked at; of different kinds at first."""
+TOGETHER = 1.0
+"""Of what is much: the change that is expected of a group, at most. As large groups cost fewest
+runs as are mostly found to do nothing."""
+BEFORE_KEYFRAMES = ("tracking", "segmentation", "numerics")
+KINDS = (BEFORE_KEYFRAMES, ("keyframes",), ("propagation",), ("lifting",))
+"""Folders whose numbers are changed together."""
 MOVE = 0.15
 """Of a head or a shin: how far picks are moved."""
 OTHER_SEEDS = (100, 200, 300)
-PATIENCE = 10.0
-"""A variant that takes so many times as long as foreseen, and two minutes, is given up."""
+PATIENCE = 5.0
+"""A variant that takes so many times as long as foreseen, and a minute, is given up."""
 HEAVY = ("numpy", "cv2", "scipy.interpolate", "scipy.optimize", "scipy.ndimage", "scipy.signal")
 """Imported once, not by every process."""
 
@@ -73,14 +110,14 @@ class Change:
     """Something to be changed and measured on one clip."""
 
     clip: str
-    change: str
-    """'x0.5', '+0.15', ..."""
     stages: tuple[str, ...]
     """That it reaches by itself, in order."""
     numbers: tuple[TunedNumber, ...] = ()
     """Changed together ..."""
-    factor: float = 1.0
-    """... by this."""
+    factors: tuple[float, ...] = ()
+    """... by these."""
+    change: str = ""
+    """'+0.15', ..., where no number is changed."""
     name: str = ""
     """Where no number is changed."""
     task: dict = field(default_factory=dict)
@@ -89,6 +126,15 @@ class Change:
     def names(self) -> tuple[str, ...]:
         """What stands in the rows."""
         return tuple(n.key for n in self.numbers) or (self.name,)
+
+    def changes(self) -> tuple[str, ...]:
+        """How each is changed."""
+        return tuple(name_change(f) for f in self.factors) or (self.change,)
+
+    def run(self) -> str:
+        """Tells it from others of the same numbers."""
+        told = sorted(zip(self.names(), self.changes(), strict=True))
+        return hashlib.sha256(repr(told).encode()).hexdigest()[:10]
 
 
 @dataclass(frozen=True)
@@ -129,8 +175,7 @@ class Bench:
 
     def base(self, clip: str) -> Base:
         """The clip as it is: measured once for this code, with all stages kept."""
-        folder = self.words.work / clip / "sensitivity"
-        file = folder / f"base-{self.code}-{self.frames}.json"
+        file = self.base_file(clip)
         if not file.is_file():
             print(f"{clip}: as it is ...", flush=True)
             found = self.run(clip, {"changed": None}, {}, None)
@@ -143,6 +188,11 @@ class Bench:
             for stage, modules in found["called"].items()
         }
         return Base(*scores_of(found), found["seconds"], called)
+
+    def base_file(self, clip: str) -> Path:
+        """Where what is known of a clip as it is is kept."""
+        folder = self.words.work / clip / "sensitivity"
+        return folder / f"base-{self.code}-{self.frames}.json"
 
     def run(self, clip: str, more: dict, new: dict, limit: float | None) -> dict:
         """Scores and seconds, or the fault, of one clip in a process of its own."""
@@ -165,20 +215,20 @@ class Bench:
 
     def measure(self, change: Change) -> list[Row]:
         """The rows of a change, one for each number in it; those of the file where they are."""
-        keys = [(self.code, change.clip, str(self.frames), name, change.change)
-                for name in change.names()]  # fmt: skip
-        if all(key in self.known and self.known[key].others < len(keys) for key in keys):
+        run = change.run()
+        keys = [(self.code, change.clip, str(self.frames), name, run) for name in change.names()]
+        if all(key in self.known for key in keys):
             return [self.known[key] for key in keys]
         base, started = self.base(change.clip), time.perf_counter()
         folders = {n.module.split("/")[0] for n in change.numbers}
         signs = not folders or "lifting" in folders
         held = ("keyframes",) if folders and folders <= set(BEFORE_KEYFRAMES) else ()
-        limit = 120 + PATIENCE * foresee(base, change.stages)
+        limit = 60 + PATIENCE * foresee(base, change.stages)
         task = {"changed": change.stages, "unsigned": signs, "held": held, **change.task}
         new: dict[str, dict] = {}
-        for number in change.numbers:
-            values = [vary(value, change.factor) for value in number.values]
-            new.setdefault(number.module, {}).update(zip(number.places, values, strict=True))
+        for number, factor in zip(change.numbers, change.factors, strict=True):
+            values = zip(number.places, number.varied(factor), strict=True)
+            new.setdefault(number.module, {}).update(values)
         found = self.run(change.clip, task, new, limit)
         same = found.get("pck") is None and "fault" not in found
         pck, pa, unsigned = (base.pck, base.pa, base.pa_unsigned) if same else scores_of(found)
@@ -187,11 +237,11 @@ class Bench:
         rows = [
             Row(
                 self.code, change.clip, self.frames, name, number.line if number else 0,
-                shorten(number.values) if number else "", change.change, " ".join(change.stages),
+                shorten(number.values) if number else "", how, " ".join(change.stages),
                 len(keys) - 1, int(same), pck, pa, unsigned, 100 * (pck - base.pck), pa - base.pa,
-                unsigned - base.pa_unsigned, seconds, found.get("fault", ""),
+                unsigned - base.pa_unsigned, seconds, found.get("fault", ""), run,
             )
-            for name, number in zip(change.names(), told, strict=True)
+            for name, number, how in zip(change.names(), told, change.changes(), strict=True)
         ]  # fmt: skip
         for row in rows:
             self.add(row)
@@ -199,6 +249,10 @@ class Bench:
         print(f"{time.perf_counter() - self.began:6.0f} s {self.done:4d} {describe(rows)}",
               flush=True)  # fmt: skip
         return rows
+
+    def broken(self) -> set[tuple[str, str]]:
+        """Numbers and changes of them with which the code cannot run."""
+        return {(row.number, row.change) for row in self.rows if row.fault and not row.others}
 
     def measure_all(self, changes: Iterable[Change]) -> list[list[Row]]:
         """The rows of many changes."""
@@ -242,7 +296,9 @@ def describe(rows: list[Row]) -> str:
     scores = " ".join(f"{value:+.2f} {unit}" for value, unit in losses if np.isfinite(value))
     others = f" and {row.others} others" if row.others else ""
     told = row.fault or ("same" if row.same else scores)
-    return f"{row.clip:<24}{row.number}{others} {row.change}  {told}  ({row.seconds:.0f} s)"
+    return (
+        f"{row.clip:<24}{rows[-1].number}{others} {rows[-1].change}  {told}  ({row.seconds:.0f} s)"
+    )
 
 
 class Study:
@@ -251,28 +307,29 @@ class Study:
     def __init__(self, bench: Bench, clips: list[str]) -> None:
         """Runs the clips as they are, if that was not done yet."""
         self.bench, self.clips, trees = bench, clips, read_package()
+        self.factors = WIDE if bench.words.wide else QUARTERS
         self.numbers = [n for n in find_numbers(trees) if wanted(n, bench.words)]
         if not self.numbers:
             raise SystemExit("No tuned number is called so; see tuned_numbers.py on their names.")
         self.stages = find_stages(trees)
+        earlier = [row for row in bench.rows if row.code != bench.code]
+        self.expected = expected_sizes(earlier, self.numbers)
+        reach = {stage: reached_from(file, trees) for stage, file in self.stages.items()}
         self.using = {
-            clip: {
-                n.key: stages_using(n, trees, self.stages, bench.base(clip).called)
-                for n in self.numbers
-            }
-            for clip in clips
+            clip: {n.key: stages_using(n, trees, reach, called) for n in self.numbers}
+            for clip, called in ((clip, bench.base(clip).called) for clip in clips)
         }
 
     def users(self, number: TunedNumber) -> list[str]:
         """Clips whose code uses the number."""
         return [clip for clip in self.clips if self.using[clip][number.key]]
 
-    def change(self, clip: str, factor: float, *numbers: TunedNumber) -> Change:
-        """Numbers times a factor."""
-        reached = {stage for n in numbers for stage in self.using[clip][n.key]}
+    def change(self, clip: str, group: Group, factors: tuple[float, float]) -> Change:
+        """Numbers times the lower or the upper factor."""
+        reached = {stage for n in group.numbers for stage in self.using[clip][n.key]}
         order = [*self.stages, ""]
         stages = tuple(sorted(reached, key=order.index))
-        return Change(clip, f"x{factor:g}", stages, numbers, factor)
+        return Change(clip, stages, group.numbers, tuple(factors[up] for up in group.ups))
 
     def in_order(self) -> list[TunedNumber]:
         """Numbers that some clip uses, the folders in the order asked for."""
@@ -282,44 +339,88 @@ class Study:
 
     def run(self) -> None:
         """Measure all of them."""
-        for folder in self.bench.words.package or FOLDERS:
-            numbers = [n for n in self.in_order() if n.module.split("/")[0] == folder]
-            self.run_some(numbers)
-
-    def run_some(self, numbers: list[TunedNumber]) -> None:
-        """Halve and double them in groups, and look closely at those that this changes."""
-        much: set[str] = set()
+        if self.bench.words.constants:
+            self.run_alone(self.in_order())
+            return
+        found: dict[str, TunedNumber] = {}
         for clip in self.clips:
-            for factor in WIDE:
-                little = [n for n in numbers if clip in self.users(n) and n.key not in much]
-                much |= {n.key for n in self.split(clip, factor, little)}
-        for number in numbers:
-            if number.key in much:
-                self.bench.measure_all(
-                    self.change(clip, factor, number)
-                    for clip in self.users(number)
-                    for factor in FACTORS
-                )
+            found |= {number.key: number for number in self.screen(clip)}
+        self.run_alone(found.values())
 
-    def split(self, clip: str, factor: float, numbers: list[TunedNumber]) -> Iterator[TunedNumber]:
-        """Numbers that change the clip, found by changing many at once."""
-        together = self.bench.words.together
-        by_stages: dict[tuple[str, ...], list[TunedNumber]] = {}
-        for number in numbers:
-            by_stages.setdefault(self.using[clip][number.key][:1], []).append(number)
-        for group in by_stages.values():
-            for start in range(0, len(group), together):
-                yield from self._halve(clip, factor, group[start : start + together])
+    def screen(self, clip: str) -> list[TunedNumber]:
+        """Numbers that change a clip much."""
+        pairs = [part for group in self.draw(clip) for part in (group, group.mirrored())]
+        broken = self.bench.broken()
+        groups = [
+            group.without({(number, up) for number, change in broken for up in (False, True)
+                           if change == name_change(self.factors[up])})
+            for group in pairs
+        ]  # fmt: skip
+        groups = [group for group in groups if group.numbers]
+        self.bench.measure_all(self.change(clip, group, self.factors) for group in groups)
+        large = [group for group in groups if self.is_large(clip, group)]
+        located = self.bench.pool.map(
+            lambda group: [*locate(group, lambda part: self.is_large(clip, part))], large
+        )
+        return [one.numbers[0] for found in located for one in found]
 
-    def _halve(self, clip: str, factor: float, group: list[TunedNumber]) -> Iterator[TunedNumber]:
-        rows = self.bench.measure(self.change(clip, factor, *group))
-        if not all(row.is_small for row in rows):
-            if len(group) == 1:
-                yield group[0]
-            else:
-                middle = len(group) // 2
-                yield from self._halve(clip, factor, group[:middle])
-                yield from self._halve(clip, factor, group[middle:])
+    def run_alone(self, numbers: Iterable[TunedNumber]) -> None:
+        """Each up and down, on every clip that uses it."""
+        self.bench.measure_all(
+            self.change(clip, Group((number,), (up,)), self.factors)
+            for number in numbers
+            for clip in self.users(number)
+            for up in (False, True)
+        )
+
+    def draw(self, clip: str) -> list[Group]:
+        """All numbers that a clip uses, in groups that begin with the same stages.
+
+        Those of which much is expected do not spoil the groups of the others.
+        """
+        chance = random.Random(clip)
+        order = [*self.stages, ""]
+        groups = []
+        for kind in KINDS:
+            numbers = [n for n in self.in_order() if kind_of(n) == kind and self.using[clip][n.key]]
+            ranks = {n.key: self.expected[n.key] * chance.uniform(0.5, 2.0) for n in numbers}
+            numbers.sort(key=lambda n: (order.index(self.using[clip][n.key][0]), ranks[n.key]))
+            groups += draw_groups(numbers, self.expected, TOGETHER, chance)
+        return groups
+
+    def is_large(self, clip: str, group: Group) -> bool:
+        """Whether a change is much, and more than the clip's unsteadiness."""
+        size = self.bench.measure(self.change(clip, group, self.factors))[0].size
+        return size > 1 and size > self.unsteadiness(clip, kind_of(group.numbers[0]))
+
+    def unsteadiness(self, clip: str, kind: tuple[str, ...]) -> float:
+        """What the smallest changes of all numbers of a kind do."""
+        numbers = [
+            n for n in self.numbers
+            if kind_of(n) == kind and self.using[clip][n.key]
+            and all(isinstance(value, float) for value in n.values)
+        ]  # fmt: skip
+        group = draw_directions(numbers, self.expected, random.Random(clip))
+        return self.bench.measure(self.change(clip, group, SHAKEN))[0].size
+
+    def print_plan(self) -> None:
+        """Every number with the stages that it reaches, and what the first round will take."""
+        for number in self.in_order():
+            clips = self.users(number)
+            stages = " ".join(stage or "between" for stage in self.using[clips[0]][number.key])
+            expected = f"{self.expected[number.key]:.2f}"
+            print(f"{number.key:<70}{shorten(number.values):<24}{len(clips):2d} clips  "
+                  f"{expected}  {stages}")  # fmt: skip
+        total = 0.0
+        for clip in self.clips:
+            groups = self.draw(clip)
+            base = self.bench.base(clip)
+            stages = [self.change(clip, group, self.factors).stages for group in groups]
+            seconds = 2 * sum(foresee(base, own) for own in stages)
+            total += seconds
+            sizes = " ".join(str(len(group.numbers)) for group in groups)
+            print(f"{clip}: {2 * len(groups)} runs, {seconds:.0f} s; numbers together: {sizes}")
+        print(f"{total:.0f} s in all")
 
     def move_clicks(self) -> None:
         """Picks of heads and feet moved along either axis; other clicks on the joints."""
@@ -329,14 +430,14 @@ class Study:
                     offset = tuple(move if a == axis else 0.0 for a in range(2))
                     told = f"clicks:{part} {name}, of a {of}"
                     self.bench.measure_all(
-                        Change(clip, f"{move:+}", (), name=told,
+                        Change(clip, (), change=f"{move:+}", name=told,
                                task={"part": part, "offset": offset})
                         for clip in self.clips
                     )  # fmt: skip
         rendered = [clip for clip in self.clips if "_" not in clip]
         for seed in OTHER_SEEDS:  # a real clip's marks cannot be made again
             self.bench.measure_all(
-                Change(clip, f"seed +{seed}", (), name="clicks:other clicks on joints",
+                Change(clip, (), change=f"seed +{seed}", name="clicks:other clicks on joints",
                        task={"seed": seed})
                 for clip in rendered
             )  # fmt: skip
@@ -344,10 +445,8 @@ class Study:
 
 def headline(bench: Bench, study: Study) -> str:
     """What was measured on what."""
-    commits = {}
-    for file in bench.words.work.glob("*/sensitivity/base-*.json"):
-        commits[file.stem.split("-")[1]] = json.loads(file.read_text()).get("commit", "?")
-    used = dict.fromkeys(commits.get(row.code, "?") for row in bench.rows)
+    file = bench.base_file(study.clips[0])
+    commit = json.loads(file.read_text())["commit"]
     clips = []
     for clip in study.clips:
         base = bench.base(clip)
@@ -355,14 +454,16 @@ def headline(bench: Bench, study: Study) -> str:
         clips.append(f"- {clip}: PCK {base.pck:.1%}{solid if np.isfinite(base.pa) else ''}")
     return "\n".join([
         "# What hangs on each number that somebody set", "",
-        "Made by `python benchmarks/sensitivity.py --summary`; measured at commits",
-        f"{', '.join(used)} (a number's rows count while its value is the same). Largest changes,",
-        "either way, of carried PCK@0.2 and of PA-MPJPE (with depth signs from the person and, for",
-        "numbers of lifting, without) over these clips:", "",
+        f"Made by `python benchmarks/sensitivity.py --summary`; measured at commit {commit}.",
+        "Largest changes, either way, of carried PCK@0.2 and of PA-MPJPE (with depth signs from",
+        "the person and, for numbers of lifting, without) over these clips:", "",
         *clips, "",
-        f"Of rendered clips the first {bench.frames} frames. Numbers of tracking and segmentation",
-        "are measured with the keyframes as they are. '-': not measured; a quarter more or less",
-        f"where halving or doubling changes over {SMALL_PCK:g} points or {SMALL_PA:g} mm.",
+        f"Of rendered clips the first {bench.frames} frames; of real ones nothing is known in 3D.",
+        "Numbers of tracking and segmentation are measured with the keyframes as they are. Many",
+        "numbers are changed at once, each up or down by chance and then the other way round, in",
+        "groups drawn anew for each clip; what changes much is taken apart. 'with others': the",
+        "change is that of a group. Halved or doubled: by earlier versions, while the value is the",
+        "same; '-': not measured.",
     ])  # fmt: skip
 
 
@@ -370,6 +471,11 @@ def commit_of_code() -> str:
     """The commit that is checked out."""
     call = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
     return subprocess.run(call, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def kind_of(number: TunedNumber) -> tuple[str, ...]:
+    """Folders whose numbers are measured alike."""
+    return next(kind for kind in KINDS if number.module.split("/")[0] in kind)
 
 
 def wanted(number: TunedNumber, words: argparse.Namespace) -> bool:
@@ -389,7 +495,7 @@ def main() -> None:
     parser.add_argument("--package", nargs="*", choices=FOLDERS)
     parser.add_argument("--constants", nargs="*", help="NAME, Record.field or file:name")
     parser.add_argument("--clicks", action="store_true", help="move clicks, and no number")
-    parser.add_argument("--together", type=int, default=5, help="numbers varied at once")
+    parser.add_argument("--wide", action="store_true", help="half and double")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("benchmarks/work/sensitivity.csv"))
     parser.add_argument("--plan", action="store_true", help="print what would be measured")
@@ -400,18 +506,16 @@ def main() -> None:
     bench = Bench(words, code_digest({**read_package(), **scoring}))
     study = Study(bench, list(words.clips))
     if words.plan:
-        for number in study.in_order():
-            using = {clip: study.using[clip][number.key] for clip in study.users(number)}
-            stages = " ".join(stage or "between" for stage in next(iter(using.values())))
-            print(f"{number.key:<70}{shorten(number.values):<24}{len(using)} clips  {stages}")
+        study.print_plan()
         return
     if not words.summary:
         (study.move_clicks if words.clicks else study.run)()
     values = {n.key: shorten(n.values) for n in study.numbers}
+    wide = {name_change(factor) for factor in WIDE}
     rows = [
         row
         for row in bench.rows
-        if row.number.startswith("clicks:") or row.old == values.get(row.number)
+        if row.code == bench.code or (row.change in wide and row.old == values.get(row.number))
     ]
     print_summary(rows, [n for n in study.numbers if not study.users(n)], headline(bench, study))
 

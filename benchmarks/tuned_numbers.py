@@ -36,9 +36,28 @@ FORMS = (
     "lifting/priors/depth_model.py:TERMS",
     "lifting/priors/depth_model.py:_INPUTS",
     "numerics/banded_least_squares.py:STENCIL",
+    "propagation/correspondence.py:BODY_PARTS",
     "propagation/correspondence.py:WORKERS",
+    "propagation/limb_motion.py:SWINGING",
+    "segmentation/background_model.py:COVERED",
+    "segmentation/background_model.py:FREE",
+    "segmentation/background_model.py:UNKNOWN",
+    "segmentation/color_model.py:BINS",
+    "segmentation/contours.py:SMOOTHING_KERNEL",
+    "segmentation/player_crops.py:DIRECTIONS",
+    "tracking/radial_symmetry.py:CIRCLE",
 )
-"""Formulas and what a file says of itself: there is nothing to tune."""
+"""Formulas, shapes that code is written for, and what a file says of itself: there is nothing to
+tune."""
+ENDS = {
+    "keyframes/selection.py:BETA_FACTOR": 1,
+    "keyframes/selection.py:KeyframeOptions.coverage": 1,
+    "propagation/hypotheses.py:VELOCITY_PERSISTENCE": 1,
+    "segmentation/repeated_frames.py:CHANGED": 100,
+    "segmentation/static_overlay.py:MIN_PERSISTENCE": 1,
+    "tracking/detection.py:BEST_SCORE_PERCENTILE": 100,
+}
+"""Shares and percentiles of nearly all: what is missing to the whole is varied."""
 SHAPES = ("dtype", "axis", "shape")
 """Arguments that are no numbers to be tuned."""
 Place = tuple[int, int, int, int]
@@ -63,6 +82,12 @@ class TunedNumber:
     def key(self) -> str:
         """Tells it from all others: file:name."""
         return f"{self.module}:{self.name}"
+
+    def varied(self, factor: float) -> list[float]:
+        """The values times a factor."""
+        if end := ENDS.get(self.key):
+            return [end - vary(end - value, factor) for value in self.values]
+        return [vary(value, factor) for value in self.values]
 
 
 def read_package(package: Path = PACKAGE) -> dict[str, ast.Module]:
@@ -161,13 +186,14 @@ def _is_recipe(module: str, function: str, trees: dict[str, ast.Module]) -> bool
 def stages_using(
     number: TunedNumber,
     trees: dict[str, ast.Module],
-    stages: dict[str, str],
+    reach: dict[str, set[str]],
     called: dict[str, dict[str, set[str]]],
 ) -> tuple[str, ...]:
     """Stages in which code that ran mentions the number, in order; '' last for code between them.
 
-    `called`: names in the functions run, by stage and module. Code at the top level of a module
-    and defaults of arguments count for all stages that import it, however indirectly.
+    `reach`: modules that each stage of the pipeline can use (`reached_from` its own), the stages
+    in order. `called`: names in the functions run, by stage and module. Code at the top level of a
+    module and defaults of arguments count for all stages that import it, however indirectly.
     """
     homes = {number.module} | {m for m, t in trees.items() if _imports(t, number)}
     if CONSTANT.match(number.symbol):
@@ -177,10 +203,10 @@ def stages_using(
     found = []
     for stage, modules in called.items():
         used = any(number.symbol in modules.get(module, ()) for module in homes)
-        reached = _reached(stages[stage], trees) if stage else {number.module}
+        reached = reach[stage] if stage else {number.module}
         if (used and number.module in reached) or (stage and at_import & reached):
             found.append(stage)
-    order = [*stages, ""]
+    order = [*reach, ""]
     return tuple(sorted(found, key=order.index))
 
 
@@ -319,7 +345,7 @@ def _file_of(module: str) -> str:
     return "/".join(module.split(".")[1:]) + ".py"
 
 
-def _reached(file: str, trees: dict[str, ast.Module]) -> set[str]:
+def reached_from(file: str, trees: dict[str, ast.Module]) -> set[str]:
     """A module and all that it imports, however indirectly."""
     found, waiting = set(), [file]
     while waiting:

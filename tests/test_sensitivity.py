@@ -2,6 +2,7 @@
 
 import ast
 import json
+import random
 import re
 import subprocess
 import sys
@@ -129,8 +130,9 @@ def test_a_change_reaches_the_stages_whose_code_names_it(numbers, trees):
         "lift": {"lifting/lift.py": {"OTHER", "speed"}},
         "": {"tracking/find.py": {"RIGHT"}},
     }
+    reach = {stage: numbers.reached_from(file, trees) for stage, file in stages.items()}
     reached = {
-        n.name: numbers.stages_using(n, trees, stages, called) for n in numbers.find_numbers(trees)
+        n.name: numbers.stages_using(n, trees, reach, called) for n in numbers.find_numbers(trees)
     }
     assert {name: found for name, found in reached.items() if found} == {
         "RADIUS": ("find",),
@@ -250,7 +252,7 @@ def test_the_rendered_clips_are_sequences_of_the_other_benchmarks(numbers):
         text=True,
         check=True,
     )
-    assert {c.removesuffix("-body") for c in sensitivity.CLIPS[:2]} <= set(found.stdout.split())
+    assert {c for c in sensitivity.CLIPS if "_" not in c} == set(found.stdout.split())
 
 
 @pytest.fixture
@@ -295,3 +297,103 @@ def test_a_variant_ends_where_what_it_changes_gives_the_same_bits(store):
     made.clear()
     run_stages(store(frozenset({"find"})).keep, doubled=2.0, made=made)
     assert made == ["find", "track", "lift"]
+
+
+@pytest.fixture
+def screening(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import screening
+
+    yield screening
+    for name in ("screening", "tuned_numbers"):
+        sys.modules.pop(name, None)
+
+
+def many_numbers(screening, count):
+    return [
+        screening.TunedNumber("a.py", f"N{at:03}", "N", at, ((at, 0, at, 1),), (1.0,))
+        for at in range(count)
+    ]
+
+
+def response(effects, runs):
+    """How much a group changes a result that is the sum of its numbers' effects."""
+
+    def is_large(group):
+        runs.append(group)
+        pairs = zip(group.numbers, group.ups, strict=True)
+        return abs(sum((1 if up else -1) * effects.get(n.name, 0.01) for n, up in pairs)) > 1
+
+    return is_large
+
+
+def test_screening_finds_the_few_numbers_that_matter(screening):
+    numbers, runs = many_numbers(screening, 120), []
+    effects = {"N007": 3.0, "N050": -2.0, "N051": 4.5, "N119": 1.5}
+    expected = dict.fromkeys((n.key for n in numbers), 0.2)
+    is_large = response(effects, runs)
+    found = set()
+    for group in screening.draw_groups(numbers, expected, 1.0, random.Random(3)):
+        for part in (group, group.mirrored()):
+            if is_large(part):
+                found |= {one.numbers[0].name for one in screening.locate(part, is_large)}
+    assert found == set(effects)
+    assert len(runs) < len(numbers)
+
+
+def test_a_number_alone_is_measured_before_it_is_told(screening):
+    pair = screening.Group(tuple(many_numbers(screening, 2)), (True, True))
+    runs = []
+    effects = {"N000": 0.6, "N001": 0.6}  # together, and neither alone
+    is_large = response(effects, runs)
+    assert is_large(pair)
+    assert not list(screening.locate(pair, is_large))
+
+
+def test_numbers_of_which_much_is_expected_have_small_groups(screening):
+    numbers = many_numbers(screening, 40)
+    expected = {n.key: 0.9 if n.line < 4 else 0.1 for n in numbers}  # .81 + 18 x .01 < 1
+    groups = screening.draw_groups(numbers, expected, 1.0, random.Random(0))
+    assert [len(group.numbers) for group in groups] == [1, 1, 1, 19, 18]
+    assert sorted(n.key for group in groups for n in group.numbers) == sorted(expected)
+
+
+def test_mirrored_every_number_goes_the_other_way(screening):
+    numbers = many_numbers(screening, 30)
+    group = screening.draw_directions(numbers, dict.fromkeys((n.key for n in numbers), 1.0),
+                                      random.Random(1))  # fmt: skip
+    ways = zip(group.ups, group.mirrored().ups, strict=True)
+    assert {up != mirrored for up, mirrored in ways} == {True}
+    assert 5 < sum(group.ups) < 25
+
+
+def test_what_is_missing_to_the_whole_is_varied_of_a_share_of_nearly_all(numbers):
+    found = {n.key: n for n in numbers.find_numbers(numbers.read_package())}
+    for key, whole in numbers.ENDS.items():
+        (value,) = found[key].values
+        (more,), (less,) = (found[key].varied(factor) for factor in (0.75, 1.25))
+        assert less < value < more < whole
+
+
+def test_the_table_tells_what_a_number_does_alone_and_what_its_groups_do(make_row, capsys):
+    from sensitivity_rows import print_summary
+
+    nan = float("nan")
+    print_summary(
+        [
+            make_row("a.py:LARGE", "x0.75", "one", (0.0, 5.0, 6.0), others=1),
+            make_row("a.py:QUIET", "x1.25", "one", (0.0, 5.0, 6.0), others=1),
+            make_row("a.py:LARGE", "x0.75", "one", (0.1, 4.5, 5.5)),
+            make_row("a.py:LARGE", "x0.75", "real", (-0.5, nan, nan)),
+            make_row("a.py:QUIET", "x1.25", "one", (0.0, 0.5, 0.5), others=2),
+            make_row("a.py:PAIR", "x1.25", "two", (2.5, 0.5, 0.5), others=1),
+            make_row("b.py:ALL", "x1.01", "one", (0.0, 1.5, 0.5), others=90),
+        ],
+        [],
+        "# Head",
+    )
+    table = capsys.readouterr().out.splitlines()
+    assert "| `a.py:LARGE` | 1 | x0.75 | -0.2 +4.5 +5.5 | +0.1 +4.5 +5.5 on one | 2 |" in table
+    assert "| `a.py:QUIET` | 1 | 0.0 points, 0.5 mm (x1.25 alone, with others) | - | 1 |" in table
+    assert "| two | 1, `a.py:PAIR` | +2.5 | +0.5 | +0.5 |" in table
+    assert "| one | b.py:ALL | 91 | +0.0 | +1.5 | +0.5 |" in table
