@@ -15,12 +15,18 @@ and holds the refined joints against the marks by eye that nobody made for the p
                    above UNCERTAIN): how many of them have a joint that is off by more than .2 of
                    the trunk, and how many of those that have are reported; the same for whole
                    frames, of all clips and of each
+    shipped        the same as `reliability` for the tables that are there, by groups and by the
+                   confidence of joints: what it was over what was expected
+    told           frames with a joint off by more than .2 of the trunk that lie in one of the three
+                   worst stretches that `keyrecon run` tells, and in any that it names, and how many
+                   of the frames in these are off
     tables         to be put into keyrecon/uncertainty.py
 
 With `--half report` nothing is fitted: the tables that are there are measured on those clips.
 """
 
 import argparse
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +44,7 @@ from keyrecon.uncertainty import (
     find_bins,
     player_height,
     predict_error,
+    uncertain_stretches,
 )
 
 EDGES = {
@@ -54,6 +61,9 @@ USED = "correction", "part_correction", "part_confidence", "speed"
 PRIOR = 20
 """Joints of the mean error that every bin is begun with, so that a rare one is not overrated."""
 GROUPS = 8
+CLASSES = 0.0, 0.1, 0.3, 0.5, 0.7, 1.01
+"""Confidences of joints."""
+COST = 0.06
 OFF = 0.2
 """Error that counts as off, in trunks: as in PCK@0.2."""
 
@@ -64,7 +74,7 @@ def collect(name: str, work: Path) -> Sample:
     """Errors and what may tell of them, for all joints of a clip that can be seen and were not
     marked for the program."""
     clip = real.load_clip(name)
-    result = real.solve(clip, 0.06, work)
+    result = real.solve(clip, COST, work)
     motion, frames = result.motion, clip.truth.frames
     height = player_height(motion)[:, None]
     used = real.held_out(clip, result.marks) & clip.seen
@@ -160,6 +170,47 @@ def print_reported(sample: Sample, expected: np.ndarray) -> None:
         print(f"  {name:<26}frames reported {told.mean():4.0%}, off {wrong.mean():4.0%}")
 
 
+def print_shipped(sample: Sample) -> None:
+    """Actual over expected errors by the tables that are there."""
+    expected, error = predict_error({name: sample[name] for name in ERROR_TABLES}), sample["error"]
+    order = np.array_split(np.argsort(expected, kind="stable"), GROUPS)
+    ratios = "".join(f"{error[rows].mean() / expected[rows].mean():8.2f}" for rows in order)
+    print(f"shipped: actual / expected by groups{ratios}")
+    for least, most in pairwise(CLASSES):
+        own = (sample["confidence"] >= least) & (sample["confidence"] < most)
+        if own.any():
+            ratio = error[own].mean() / expected[own].mean()
+            print(f"  confidence {least:.1f}-{most:.1f} {own.sum():>6} joints: {ratio:.2f}")
+
+
+def print_told(samples: list[Sample], work: Path) -> None:
+    """Frames that are off and lie in stretches that a run tells, and the other way about."""
+    total = np.zeros(6, int)
+    for sample in samples:
+        name = str(sample["clip"][0])
+        motion = real.solve(real.load_clip(name), COST, work).motion
+        off = sample["error"] > OFF * sample["trunk"]
+        frames, group = np.unique(sample["frame"], return_inverse=True)
+        wrong = np.bincount(group, off) > 0
+        inside = [
+            np.any([(frames >= s.first) & (frames <= s.last) for s in stretches], axis=0)
+            if stretches
+            else np.zeros(len(frames), bool)
+            for stretches in (
+                uncertain_stretches(motion),
+                uncertain_stretches(motion, count=len(motion.time)),
+            )
+        ]
+        counts = [len(frames), wrong.sum()]
+        counts += [number for told in inside for number in (told.sum(), (told & wrong).sum())]
+        total += np.array(counts)
+    print(
+        f"told: of {total[1]} frames (of {total[0]}) that are off, {total[3]} lie in the three "
+        f"worst stretches and {total[5]} in any; of {total[2]} and {total[4]} frames in them "
+        f"{total[3] / max(total[2], 1):.0%} and {total[5] / max(total[4], 1):.0%} are off"
+    )
+
+
 def any_of_group(
     keys: tuple[np.ndarray, ...], expected: np.ndarray, off: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -188,6 +239,8 @@ def main() -> None:
         print_reliability(sample, expected)
         print_reported(sample, expected)
         return
+    print_shipped(sample)
+    print_told(samples, words.work)
     left_out = leave_one_out(sample, USED)
     print_reliability(sample, left_out)
     print_reported(sample, left_out)

@@ -9,6 +9,7 @@ from keyrecon import uncertainty
 from keyrecon.body import LSP14
 from keyrecon.records import Motion, Track
 from keyrecon.uncertainty import (
+    describe_uncertainty,
     expected_error,
     measure_correction,
     player_height,
@@ -123,6 +124,18 @@ def test_a_sure_motion_and_one_of_a_former_version_tell_nothing():
     former = replace(with_lost_arms(41, 50), expected_error=None)
     assert uncertain_stretches(former) == []
     assert worst_frames(former) == []
+
+
+def test_stretches_after_the_worst_are_named_in_one_line():
+    """Whoever reads the output of a run sees every frame that is uncertain."""
+    lines = describe_uncertainty(with_lost_arms(5, 94))
+    every = uncertain_stretches(with_lost_arms(5, 94), count=FRAMES)
+    assert len(every) > 3 and len(lines) == 1 + 3 + 1
+    assert all(
+        stretch.text in lines or f"{stretch.first}-{stretch.last} (arms)" in lines[-1]
+        for stretch in every
+    )
+    assert describe_uncertainty(make_motion()) == []
 
 
 def test_a_stretch_that_was_marked_since_is_no_longer_told():

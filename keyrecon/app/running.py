@@ -19,7 +19,7 @@ from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
-from keyrecon.uncertainty import uncertain_share, uncertain_stretches
+from keyrecon.uncertainty import describe_uncertainty
 
 
 def settings(workspace: Workspace, given: Options, height: float | None = None) -> Options:
@@ -72,7 +72,7 @@ def run(
     note_run(workspace, RunNotes(evidence, tuple(doubts)))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    lines = [*placed.lines, *shots, *doubts, *_describe_doubt(motion)]
+    lines = [*placed.lines, *shots, *doubts, *describe_uncertainty(motion)]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
@@ -84,17 +84,6 @@ def _describe_files(workspace: Workspace, motion: Motion) -> list[str]:
         f"{workspace.motion_file}: {len(motion.time)} frames, lengths in {motion.units}.",
         f"{workspace.report_file}: open it in a browser.",
     ]
-
-
-def _describe_doubt(motion: Motion) -> list[str]:
-    """How much of the motion is uncertain, and the worst stretches."""
-    stretches = uncertain_stretches(motion)
-    if not stretches:
-        return []
-    share = (
-        f"Arms, legs or head are uncertain in {uncertain_share(motion):.0%} of the frames. Worst:"
-    )
-    return [share, *(stretch.text for stretch in stretches)]
 
 
 def _waiting_choices(workspace: Workspace) -> list[str]:
