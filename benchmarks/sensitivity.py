@@ -343,13 +343,15 @@ class Study:
             self.run_alone(self.in_order())
             return
         found: dict[str, TunedNumber] = {}
-        for clip in self.clips:
-            found |= {number.key: number for number in self.screen(clip)}
+        for kind in reversed(KINDS):  # the last stages take least time
+            for clip in self.clips:
+                found |= {number.key: number for number in self.screen(clip, kind)}
         self.run_alone(found.values())
 
-    def screen(self, clip: str) -> list[TunedNumber]:
-        """Numbers that change a clip much."""
-        pairs = [part for group in self.draw(clip) for part in (group, group.mirrored())]
+    def screen(self, clip: str, kind: tuple[str, ...]) -> list[TunedNumber]:
+        """Numbers of a kind that change a clip much."""
+        drawn = [group for group in self.draw(clip) if kind_of(group.numbers[0]) == kind]
+        pairs = [part for group in drawn for part in (group, group.mirrored())]
         broken = self.bench.broken()
         groups = [
             group.without({(number, up) for number, change in broken for up in (False, True)

@@ -32,10 +32,14 @@ ARITHMETIC = {
     ast.LShift: operator.lshift,
 }
 FORMS = (
+    "lifting/preprocessing.py:MAD_TO_SIGMA",
+    "lifting/preprocessing.py:RAYLEIGH_MEDIAN",
     "lifting/priors/depth_model.py:DEPTH_MODEL_VERSION",
     "lifting/priors/depth_model.py:TERMS",
     "lifting/priors/depth_model.py:_INPUTS",
     "numerics/banded_least_squares.py:STENCIL",
+    "propagation/appearance.py:DIAGONAL",
+    "propagation/bone_bounds.py:MIN_FRAMES",
     "propagation/correspondence.py:BODY_PARTS",
     "propagation/correspondence.py:WORKERS",
     "propagation/limb_motion.py:SWINGING",

@@ -74,7 +74,11 @@ class CompareOptions:
     """Width of the cells in which edge elements are compared, player heights; smaller is slower and
     closer to exact."""
     directions: Annotated[int, within(4, 360)] = 24
-    """Directions that edge elements are sorted into, in a full turn."""
+    """Directions that edge elements are sorted into, in a full turn.
+
+    A quarter fewer: other frames are marked, and on one of four clips of 6 s this costs 3.2 mm; a
+    hundredth of all numbers of the choice moves that clip by 2.6.
+    """
     most: Annotated[int, within(10, 20_000)] = 4000
     """Frames compared with one another at most; of a longer video so many stand for all that are
     like them. Memory grows with the square, time as well and with the length of the video."""

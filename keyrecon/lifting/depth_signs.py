@@ -39,8 +39,8 @@ from keyrecon.numerics.viterbi import find_cheapest_path
 
 _EXPECTED_DEPTH_SPREAD = 0.4
 """Error of a depth model, in lengths of the bone: root mean square over players whose captures a
-model had not learnt from. A quarter more costs 3.3 mm without depth signs on a clip of 5 s, a
-quarter less nothing; a video does not show the depths that would tell it."""
+model had not learnt from. A quarter more costs 3.8 mm without depth signs on one of eight clips of
+6 s, a quarter less nothing; a video does not show the depths that would tell it."""
 _CHUNK_FRAMES = 200
 """Frames whose transitions are computed at once: 7 MB."""
 

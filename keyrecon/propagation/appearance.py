@@ -31,7 +31,8 @@ PLAYER_HEIGHT = 96
 REACH = 80
 """Half of such a picture's side, px: a raised arm is .75 player heights above the middle."""
 STRIDE = 2
-"""Descriptions are made at every second pixel."""
+"""Descriptions are made at every second pixel. At every third: 2.3 points more (five joints) on one
+real rally."""
 SPACING = 2
 """Cells around a place lie so many descriptions apart: 4 px, .04 player heights."""
 CELLS = 3
