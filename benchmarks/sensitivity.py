@@ -464,8 +464,8 @@ def headline(bench: Bench, study: Study) -> str:
         "Numbers of tracking and segmentation are measured with the keyframes as they are. Many",
         "numbers are changed at once, each up or down by chance and then the other way round, in",
         "groups drawn anew for each clip; what changes much is taken apart. 'with others': the",
-        "change is that of a group. Halved or doubled: by earlier versions, while the value is the",
-        "same; '-': not measured.",
+        "change is that of a group. Halved or doubled, and clicks: by earlier versions, while the",
+        "value is the same; '-': not measured.",
     ])  # fmt: skip
 
 
@@ -517,7 +517,9 @@ def main() -> None:
     rows = [
         row
         for row in bench.rows
-        if row.code == bench.code or (row.change in wide and row.old == values.get(row.number))
+        if row.code == bench.code
+        or row.number.startswith("clicks:")
+        or (row.change in wide and row.old == values.get(row.number))
     ]
     print_summary(rows, [n for n in study.numbers if not study.users(n)], headline(bench, study))
 

@@ -191,6 +191,7 @@ def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None
     """The table as markdown: unsteadiness, clicks, then every number."""
     print(head)
     quarters, wide, shaken = ({name_change(f) for f in of} for of in (QUARTERS, WIDE, SHAKEN))
+    print_coverage([row for row in rows if row.change in quarters])
     print_unsteadiness([row for row in rows if row.change in shaken])
     print_clicks([row for row in rows if row.number.startswith("clicks:")])
     of = by_number(row for row in rows if row.change in quarters | wide)
@@ -208,6 +209,16 @@ def print_summary(rows: list[Row], unused: list[TunedNumber], head: str) -> None
     print(f"\n## In no code that these clips run ({len(unused)})\n")
     for number in unused:
         print(f"- `{number.key}` = {shorten(number.values)}")
+
+
+def print_coverage(rows: list[Row]) -> None:
+    """Which folders' numbers were changed on which clips, and in how many runs."""
+    print("\n| folder | runs | clips |\n|---|---|---|")
+    for folder in sorted({row.number.split("/")[0] for row in rows}):
+        own = [row for row in rows if row.number.startswith(folder + "/")]
+        clips = dict.fromkeys(row.clip for row in own)
+        runs = len({(row.clip, row.run) for row in own})
+        print(f"| {folder} | {runs} | {len(clips)}: {', '.join(clips)} |")
 
 
 def print_unsteadiness(rows: list[Row]) -> None:

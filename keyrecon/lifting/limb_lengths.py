@@ -57,8 +57,8 @@ class LengthOptions:
     """How exact surely propagated joints are, player heights (standard deviation).
 
     Of full confidence; it grows with the inverse root of the confidence. A quarter more or less,
-    others with it: at most 1.4 mm with signs on seven clips of 6 s; without signs 4.6 on one. Errors of
-    tracks last, so no video shows them as roughness.
+    others with it: at most 1.4 mm with signs on seven clips of 6 s; without signs 4.6 on one.
+    Errors of tracks last, so no video shows them as roughness.
     """
     correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which errors of propagated joints stay alike and count once."""
