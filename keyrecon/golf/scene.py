@@ -12,7 +12,12 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.observe.film import Film
-from keyrecon.golf.observe.foreground import Foreground, ForegroundOptions, separate_player
+from keyrecon.golf.observe.foreground import (
+    Foreground,
+    ForegroundOptions,
+    FrameForeground,
+    separate_player,
+)
 from keyrecon.golf.observe.line_segments import (
     LineSegmentOptions,
     LineSegments,
@@ -72,7 +77,8 @@ def observe_scene(
     """
     shown = film.open(video)
     foreground = separate_player(shown, pose, options.foreground, progress)
-    players = np.stack([foreground.frame(t).player() for t in range(len(shown))])
+    frames = (foreground.frame(t) for t in range(len(shown)))
+    players = np.stack(list(side_by_side(FrameForeground.player, frames)))
     shafts = detect_shafts(shown, foreground, players, pose.shoulders, options, progress)
     return SwingScene(film, foreground, np.packbits(players, axis=2), tuple(shafts))
 

@@ -12,6 +12,7 @@ its wrist to the grip the model's way is kept, in the club's axes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -21,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.parameterisation import ROOT, spline_matrix
-from keyrecon.golf.fit.solver import ResidualBlock, SegmentEquations, robust_weights
+from keyrecon.golf.fit.solver import ResidualBlock, sum_blocks
 from keyrecon.golf.prior.kinematics import PoseRates, find_joints, place_body, pose_rates
 from keyrecon.golf.prior.motion_model import left_jacobian, posture_at, turn_posture
 from keyrecon.golf.prior.skeleton import CLUB, SEGMENTS
@@ -109,6 +110,18 @@ class _Problem:
     spline: Float[np.ndarray, "T B"]
     fps: float
 
+    @cached_property
+    def learnt(self) -> Posture:
+        """The model's postures, from which segments turn away."""
+        state = self.fit.state
+        return posture_at(self.fit.model, state.phase, state.coefficients)
+
+    @cached_property
+    def usual_grip(self) -> Float[np.ndarray, "T 3"]:
+        """From the grip to the right wrist as the model has it, in the club's axes."""
+        body = self.fit.body
+        return _grip_offset(body, place_body(body, self.learnt, self.fit.state))
+
     def state(self, knots: Float[np.ndarray, "B C"]) -> SwingState:
         """The fitted state with the segments' own turns, and the player moved."""
         values, state = self.spline @ knots, self.fit.state
@@ -122,11 +135,9 @@ class _Problem:
 
     def posture(self, state: SwingState) -> Posture:
         """Postures with their rates by the segments' own turns alone."""
-        model = self.fit.model
-        learnt = posture_at(model, state.phase, state.coefficients)
         if state.deviation is None:
             raise ValueError("a state without turns of its own")
-        turned = turn_posture(learnt, state.deviation)
+        turned = turn_posture(self.learnt, state.deviation)
         frames, segments = state.deviation.shape[:2]
         rates = np.zeros((frames, segments, 3, 3 * segments))
         slopes = left_jacobian(state.deviation)
@@ -140,14 +151,8 @@ class _Problem:
         posture = self.posture(state)
         pose = place_body(body, posture, state)
         rates = _by_values(pose_rates(body, posture, state, pose), self.spline @ knots)
-        equations = SegmentEquations.none(pose)
-        share, cost = min(1.0, INDEPENDENT_PER_SECOND / self.fps), 0.0
-        for block in self.blocks:
-            rows = block.residuals(pose)
-            robust = robust_weights(rows, block.robust)
-            weight = share * block.weight
-            cost += weight * robust.cost
-            equations.add(rows, pose, weight * robust.weights)
+        share = min(1.0, INDEPENDENT_PER_SECOND / self.fps)
+        equations, cost = sum_blocks(self.blocks, pose, share)
         normal, slope = equations.by_unknowns(rates)
         cost += self._add_grip(normal, slope, pose, rates, share)
         lags, gradient = _on_knots(self.spline, normal, slope)
@@ -163,9 +168,7 @@ class _Problem:
         share: float,
     ) -> float:
         """The right wrist keeps its place at the grip, in the club's axes."""
-        body, state = self.fit.body, self.fit.state
-        learnt = posture_at(self.fit.model, state.phase, state.coefficients)
-        usual = _grip_offset(body, place_body(body, learnt, state))
+        body, usual = self.fit.body, self.usual_grip
         off = _grip_offset(body, pose) - usual
         turn = np.swapaxes(pose.rotations[:, CLUB], 1, 2)
         segment = int(body.joint_segment[RIGHT_WRIST])

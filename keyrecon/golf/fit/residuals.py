@@ -204,11 +204,12 @@ def foreground_residuals(
     nearest = passing.distance.argmin(axis=1)
     rows = np.flatnonzero(passing.distance.min(axis=1) > 0)
     frame, nearest = frame[rows], nearest[rows]
-    share = passing.place[rows, nearest][:, None]
+    share = passing.place[rows, nearest].astype(float)[:, None]
     point = (1 - share) * axes.starts[frame, nearest] + share * axes.ends[frame, nearest]
     across = _reject(point, lines.directions[rows])
+    radii = (1 - share[:, 0]) * axes.radii[nearest, 0] + share[:, 0] * axes.radii[nearest, 1]
     return Residuals(
-        passing.distance[rows, nearest], frame, capsules.segment[nearest], point,
+        np.linalg.norm(across, axis=1) - radii, frame, capsules.segment[nearest], point,
         unit_vectors(across, 0.0), np.arange(len(rows)),
     )  # fmt: skip
 
@@ -321,18 +322,19 @@ def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
     ways = axes.ends - starts
     first, along = _along(lines, starts), _along(lines, ways)
     long, both, away = _dot(ways, ways), _dot(starts, ways), _dot(starts, starts)
-    k = radii[:, 1] - radii[:, 0]
+    radius, k = (values.astype(np.float32) for values in (radii[:, 0], np.diff(radii)[:, 0]))
 
     def pass_some(some: slice) -> Passing:
         frame = lines.frame[some]
-        g = np.maximum(long[frame] - along[some] ** 2, 1e-12)
-        slope = both[frame] - first[some] * along[some]
-        square = away[frame] - first[some] ** 2
+        # Differences of squares need doubles, their roots to a tenth of a millimetre do not.
+        g = np.maximum(long[frame] - along[some] ** 2, 1e-12).astype(np.float32)
+        slope = (both[frame] - first[some] * along[some]).astype(np.float32)
+        square = (away[frame] - first[some] ** 2).astype(np.float32)
         h = np.sqrt(np.maximum(square - slope**2 / g, 0.0))
-        slant = k * h / np.sqrt(g * np.maximum(g - k**2, 1e-12))
+        slant = k * h / np.sqrt(g * np.maximum(g - k**2, np.float32(1e-12)))
         q = np.clip(slant - slope / g, 0.0, 1.0)
         reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
-        return Passing(q, reach - (radii[:, 0] + q * k))
+        return Passing(q, reach - (radius + q * k))
 
     parts = [slice(a, a + LINES_AT_ONCE) for a in range(0, max(1, len(first)), LINES_AT_ONCE)]
     done = list(side_by_side(pass_some, parts) if len(parts) > 1 else map(pass_some, parts))

@@ -59,8 +59,10 @@ class LinearisedProblem:
 DAMPING = Damping(start=1e-2, increase=8.0, decrease=4.0, largest=1e5)
 """Chosen on rendered swings; see benchmarks/golf.py."""
 LEAST_FALL = 1e-3
-"""Share of the cost by which the last step lowers it. Chosen on rendered swings; see
-benchmarks/golf.py."""
+"""Share of the cost by which the last step lowers it: costs of whole swings are 200 to 500, so that
+it stops at a fall of less than a standard deviation. Valleys are long, though: 4e-3 and 1e-2 saved
+5 % of the time, and moved joints within a fifth of the trunk of a real swing from .94 to .93 and
+.92; 1e-2 for the coarse levels alone those of another from .92 to .91."""
 
 
 def solve(problem: Problem, start: SwingState, steps: int = 15) -> SwingState:
@@ -91,18 +93,27 @@ def _linearise(problem: Problem, state: SwingState) -> LinearisedProblem:
     if state.deviation is not None:
         posture = turn_posture(posture, state.deviation)
     pose = place_body(problem.body, posture, state)
+    equations, cost = sum_blocks(problem.blocks, pose)
     rates = pose_rates(problem.body, posture, state, pose)
-    equations, cost = SegmentEquations.none(pose), 0.0
-    for block in problem.blocks:
-        rows = block.residuals(pose)
-        robust = robust_weights(rows, block.robust)
-        cost += block.weight * robust.cost
-        equations.add(rows, pose, block.weight * robust.weights)
     expected = problem.regulariser(state)
     matrix, gradient = problem.basis.gather(*equations.by_unknowns(rates))
     matrix += expected.slopes.T @ expected.slopes
     gradient += expected.slopes.T @ expected.values
     return LinearisedProblem(cost + float(expected.values @ expected.values), matrix, gradient)
+
+
+def sum_blocks(
+    blocks: Sequence[ResidualBlock], pose: RootPose, share: float = 1.0
+) -> tuple["SegmentEquations", float]:
+    """Equations of all residuals of a pose, and their cost; each counts by a `share`."""
+    equations, cost = SegmentEquations.none(pose), 0.0
+    for block in blocks:
+        rows = block.residuals(pose)
+        robust = robust_weights(rows, block.robust)
+        weight = share * block.weight
+        cost += weight * robust.cost
+        equations.add(rows, pose, weight * robust.weights)
+    return equations, cost
 
 
 TWIST = 6

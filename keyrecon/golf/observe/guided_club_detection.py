@@ -77,9 +77,8 @@ class LineOptions:
 class SearchedFrame:
     """A frame in which lines are searched for."""
 
-    picture: Picture
-    change: Picture
-    """Its difference to the temporal median."""
+    layers: tuple[Picture, ...]
+    """The picture, and its difference to the temporal median unless the club rests in that."""
     height: float
     """Of the player, px."""
     swept: Float[np.ndarray, "2"]
@@ -207,26 +206,30 @@ def _contrast(
     way = ends[:, 1] - ends[:, 0]
     across = unit_vectors(np.stack([-way[:, 1], way[:, 0]], axis=1), 1e-9)
     blur = SHUTTER / 2 * (searched.swept[0] + share * (searched.swept[1] - searched.swept[0]))
-    widths = [np.full(SAMPLES_ALONG, w) for w in options.widths]
+    widths = [np.full(1, w) for w in options.widths]
     widths += [options.widths[0] + share * blur for share in BLUR_SHARES]
     sides = [searched.height * width[:, None] * across[:, None] for width in widths]
-    in_picture = _stand_out(searched.picture, searched.height * points, sides)
-    if searched.change is searched.picture:
-        return in_picture
-    return np.minimum(in_picture, _stand_out(searched.change, searched.height * points, sides))
+    return _stand_out(searched.layers, searched.height * points, sides)
 
 
 def _stand_out(
-    picture: Picture, points: Float[np.ndarray, "n p 2"], sides: list[Float[np.ndarray, "n p 2"]]
+    layers: Sequence[Picture],
+    points: Float[np.ndarray, "n p 2"],
+    sides: list[Float[np.ndarray, "n #p 2"]],
 ) -> Float[np.ndarray, "n p"]:
-    """Grey levels by which points differ from what is on both sides, at the best of distances."""
-    middle = _read(picture, points)
-    best = np.zeros_like(middle)
+    """Grey levels by which points differ in all layers from what is on both sides, at the best of
+    distances."""
+    middle = [_read(layer, points) for layer in layers]
+    best = [np.zeros_like(of_layer) for of_layer in middle]
     for side in sides:
-        one, other = middle - _read(picture, points - side), middle - _read(picture, points + side)
-        alike = np.where(one * other > 0, np.minimum(np.abs(one), np.abs(other)), 0.0)
-        best = np.maximum(best, alike)
-    return best
+        left, right = points - side, points + side
+        for layer, here, most in zip(layers, middle, best, strict=True):
+            one, other = here - _read(layer, left), here - _read(layer, right)
+            low, high = np.minimum(one, other), np.maximum(one, other, out=one)
+            # The smaller one where both are of one sign, else below 0.
+            np.maximum(most, np.maximum(low, np.negative(high, out=high), out=low), out=most)
+    least: Float[np.ndarray, "n p"] = np.minimum(best[0], best[-1])
+    return least
 
 
 def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndarray, "n p"]:
@@ -321,8 +324,8 @@ def detect_clubs(
     def detect(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> ClubLines:
         frame, grey = numbered
         picture = grey.astype(np.float32)
-        change = picture if clubs.resting[frame] else picture - median
-        searched = SearchedFrame(picture, change, height, swept[frame])
+        layers = (picture,) if clubs.resting[frame] else (picture, picture - median)
+        searched = SearchedFrame(layers, height, swept[frame])
         return find_lines(searched, clubs.first[frame], expected[frame], options.lines)
 
     lines = list(side_by_side(detect, enumerate(video.grey_frames())))

@@ -7,6 +7,7 @@ and a picture has his colours, he is for sure.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from jaxtyping import Bool, Int, UInt8
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import ClickedPose
-from keyrecon.io.frame_reader import reduce_picture
+from keyrecon.io.frame_reader import reduce_picture, side_by_side
 from keyrecon.segmentation.color_model import to_lab
 
 SEED_LINES = (
@@ -160,13 +161,16 @@ def learn_cutter(picture: UInt8[np.ndarray, "h w 3"], pose: ClickedPose) -> Play
     middle = int(np.clip(root, MIN_ROWS, len(small) - MIN_ROWS))
     both = slice(0, middle + overlap), slice(max(0, middle - overlap), len(small))
     # Half a picture is soon told apart from half a figure, of whatever scene: the whole is not.
-    whole = PlayerCutter(pose, width, (_learn_half(small, trimap, slice(0, len(small))),))
-    _check_player(whole(small), pose)
-    best = whole
-    if _covers(whole(small), trimap) <= LEAST_COVERED:
-        halves = PlayerCutter(pose, width, tuple(_learn_half(small, trimap, rows) for rows in both))
-        best = max((whole, halves), key=lambda cutter: _covers(cutter(small), trimap))
-    return replace(best, clicked=ClickedFigure.of(to_lab(small), best(small), pose.height * shrink))
+    best = PlayerCutter(pose, width, (_learn_half(small, trimap, slice(0, len(small))),))
+    figure = best(small)
+    _check_player(figure, pose)
+    if _covers(figure, trimap) <= LEAST_COVERED:
+        learn = partial(_learn_half, small, trimap)
+        halves = PlayerCutter(pose, width, tuple(side_by_side(learn, both)))
+        other = halves(small)
+        if _covers(other, trimap) > _covers(figure, trimap):
+            best, figure = halves, other
+    return replace(best, clicked=ClickedFigure.of(to_lab(small), figure, pose.height * shrink))
 
 
 def _reduce_mask(mask: Bool[np.ndarray, "h w"], shape: tuple[int, ...]) -> Bool[np.ndarray, "y x"]:
