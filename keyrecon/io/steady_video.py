@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.io.held_video import HeldVideo, hold_frames
 from keyrecon.io.video import Video
+from keyrecon.numerics.order_statistics import value_of_rank
 
 PLATE_FRAMES = 15
 """Frames whose median fills what another frame does not show."""
@@ -178,12 +179,10 @@ def _masked_median(
 ) -> UInt8[np.ndarray, "p *c"]:
     """Median over the pictures that see a pixel; over all where none does."""
     count = seen.sum(axis=0)
-    plain = stack.ndim == 2
-    # Unseen values sort to the end; the middle of the first `count` is the median.
-    shaped = seen if plain else seen[..., None]
-    ordered = np.sort(np.where(shaped, stack, np.uint8(255)), axis=0)
     middle = np.maximum(count - 1, 0) // 2
-    median: np.ndarray = ordered[middle, np.arange(len(middle))]
+    colors = stack.reshape(*seen.shape, -1)
+    channels = [value_of_rank(colors[..., c], middle, seen) for c in range(colors.shape[2])]
+    median: np.ndarray = np.stack(channels, axis=-1).reshape(stack.shape[1:])
     never = count == 0
     median[never] = np.median(stack[:, never], axis=0)
     return median
