@@ -79,17 +79,19 @@ def radial_symmetry(
     length = np.maximum(np.hypot(across, along), np.float32(1e-12))
     vx, vy = (a * across + b * along) / length, (c * across + d * along) / length
     size = np.hypot(slope.gx, slope.gy)
-    total = np.zeros((rows, columns), np.float32)
+    total = np.zeros(rows * columns, np.float32)
     for radius in np.array(radii, np.float32):
         x = np.rint(slope.x + radius * vx).astype(np.int32)
         y = np.rint(slope.y + radius * vy).astype(np.int32)
         inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
         spot = (y * columns + x)[inside]
-        count = np.bincount(spot, minlength=rows * columns).astype(np.float32)
-        strength = np.bincount(spot, weights=size[inside], minlength=rows * columns)
+        # Few places get votes; one that gets several is worked out as often, with the same result.
+        count = np.bincount(spot, minlength=rows * columns)[spot].astype(np.float32)
+        strength = np.bincount(spot, weights=size[inside], minlength=rows * columns)[spot]
         cap = 8.0 if radius <= 1 else 9.9
         symmetry = strength.astype(np.float32) * (np.minimum(count, cap) / cap) ** strictness / cap
-        total += symmetry.reshape(rows, columns) * radius
+        total[spot] += symmetry * radius
+    total = total.reshape(rows, columns)
     # The radii differ little, so one Gaussian does for all of them.
     return cv2.GaussianBlur(total, (0, 0), 0.25 * float(np.mean(radii))) / len(radii)
 
