@@ -60,8 +60,9 @@ MIN_RECURRENCE = 0.08
 """The same as a share of the sampled frames: a player may cover a place nearly all the time."""
 MAX_CANDIDATES = 24
 """Sampled frames whose colours are tried behind the player."""
-STRIPS = 8
-"""Parts in which these are tried, side by side; changes nothing but time and memory."""
+STRIP = 4096
+"""Pixels behind the player that are tried at a time, several strips side by side; changes nothing
+but time and memory."""
 NORMAL_QUARTILE = 0.6745
 """Distance of the quartiles of a normal distribution from its mean, standard deviations."""
 CHROMA_WEIGHT = 1.6
@@ -300,7 +301,7 @@ def _inpaint_behind_player(
     if not hidden.any() or not known.any():
         return
     around = cv2.inpaint(color, (~known).astype(np.uint8), 5, cv2.INPAINT_TELEA)[hidden]
-    strips = np.array_split(np.arange(len(around)), STRIPS)
+    strips = np.array_split(np.arange(len(around)), -(-len(around) // STRIP))
     observed = layers[:, hidden]
     parts = side_by_side(lambda part: _recurring_color(observed[:, part], around[part]), strips)
     chosen, filled = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -314,24 +315,30 @@ def _recurring_color(
     observed: UInt8[np.ndarray, "n p 4"], around: UInt8[np.ndarray, "p 3"]
 ) -> tuple[UInt8[np.ndarray, "p 3"], Bool[np.ndarray, "p"]]:
     """The colour that recurs most and resembles what is around, and whether it recurs enough."""
-    values, valid = observed[..., :3], observed[..., 3] > COVERED // 2
+    valid = observed[..., 3] > COVERED // 2
+    channels = [np.ascontiguousarray(observed[..., c]) for c in range(3)]
+    number = np.uint8 if len(valid) <= np.iinfo(np.uint8).max else np.uint16
     best = np.zeros(len(around), np.float32)
     chosen, recurrence = np.zeros_like(around), np.zeros(len(around), np.int64)
     most = recurrence
-    tried = np.linspace(0, len(values) - 1, min(MAX_CANDIDATES, len(values))).astype(int)
+    tried = np.linspace(0, len(valid) - 1, min(MAX_CANDIDATES, len(valid))).astype(int)
     for index in tried:
-        candidate = values[index]
-        difference = np.where(values > candidate, values - candidate, candidate - values)
-        same = (difference <= MAX_SAME_DIFFERENCE).all(axis=2) & valid & valid[index]
-        count = same.sum(axis=0)
+        candidate = observed[index, :, :3]
+        least = candidate - np.minimum(candidate, MAX_SAME_DIFFERENCE)
+        width = candidate + np.minimum(255 - candidate, MAX_SAME_DIFFERENCE) - least
+        same = valid & valid[index]
+        for values, low, range_ in zip(channels, least.T, width.T, strict=True):
+            same &= values - low <= range_  # what is below wraps around and is far above
+        count = np.add.reduce(same.view(np.uint8), axis=0, dtype=number).astype(np.int64)
         most = np.maximum(most, count)
         strange = (candidate.astype(np.float32) - around) / SURROUNDINGS_SPREAD
         score = count * np.exp(-0.5 * np.square(strange).sum(axis=1))
-        total = np.einsum("npc,np->pc", values, same, dtype=np.float32)
-        mean = total / np.maximum(count, 1)[:, None]
         better = score > best
         best[better], recurrence[better] = score[better], count[better]
-        chosen[better] = mean[better].round()
+        part = same[:, better]
+        for c, values in enumerate(channels):
+            total = np.add.reduce(values[:, better] * part, axis=0, dtype=np.uint32)
+            chosen[better, c] = (total / count[better]).round()
     # A colour that recurs far more often is the scene, or a trunk that never leaves: nobody knows.
     min_recurrence = max(MIN_OBSERVATIONS, MIN_RECURRENCE * len(values))
     return chosen, recurrence >= np.maximum(0.5 * most, min_recurrence)
