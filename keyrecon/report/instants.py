@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 
 from keyrecon.body import Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor, stature
@@ -42,6 +41,8 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
     hands = [n for n in ("right_wrist", "left_wrist") if n in motion.skeleton.names]
     if not hands or len(motion.time) < 5:
         return []
+    from scipy.signal import find_peaks  # which loads all of scipy.stats: half a second
+
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
     peaks, properties = find_peaks(
