@@ -91,9 +91,9 @@ def radial_symmetry(
         cap = 8.0 if radius <= 1 else 9.9
         symmetry = strength.astype(np.float32) * (np.minimum(count, cap) / cap) ** strictness / cap
         total[spot] += symmetry * radius
-    total = total.reshape(rows, columns)
     # The radii differ little, so one Gaussian does for all of them.
-    return cv2.GaussianBlur(total, (0, 0), 0.25 * float(np.mean(radii))) / len(radii)
+    score = total.reshape(rows, columns)
+    return cv2.GaussianBlur(score, (0, 0), 0.25 * float(np.mean(radii))) / len(radii)
 
 
 def find_peaks(
