@@ -1,6 +1,7 @@
 // Plotly charts over the frames, in the colours of the present scheme, with the page's cursor.
 import { painted } from "./colors.js";
-import { byId, read, data, unpack, count, frame, show, followers, restyled } from "./cursor.js";
+import { byId, read, data, count, frame, show, followers, restyled } from "./cursor.js";
+import { unpack } from "./packed.js";
 
 const config = { displaylogo: false, responsive: true, displayModeBar: false };
 const charts = new Map(); // element -> figure whose colours are still names

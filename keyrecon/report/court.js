@@ -1,7 +1,8 @@
 // The court, or the ground in squares of a metre, from above with the player's way, at the frame of the page's cursor. Metres on the court:
 // x along the net to the right, y up the court, the camera's end below.
 import { cssColor } from "./colors.js";
-import { byId, data, unpack, count, frame, show, followers, restyled } from "./cursor.js";
+import { byId, data, count, seconds, frame, show, followers, restyled } from "./cursor.js";
+import { unpack } from "./packed.js";
 import { prepareCanvas } from "./figure3d.js";
 
 const SURFACE = "#34548a",
@@ -32,11 +33,10 @@ function createMap(canvas, court) {
   let kind = "speed",
     place = null;
 
-  const time = unpack(data.time).values,
-    last = time[count - 1];
+  const last = seconds(count - 1);
   const KINDS = {
     speed: { share: (t) => speed[t] / top, ends: ["0", `${top.toFixed(1)} m/s`] },
-    time: { share: (t) => time[t] / last, ends: ["start", `${last.toFixed(1)} s`] },
+    time: { share: (t) => seconds(t) / last, ends: ["start", `${last.toFixed(1)} s`] },
     heat: { ends: ["0", `${warmest.toFixed(1)} s/m²`] },
   };
 

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from keyrecon.records import Motion
 from keyrecon.report.charts import stack_charts, style_chart
 from keyrecon.report.court_drawing import metre_grid
-from keyrecon.report.markup import ReportMaterial, note, pack, section, text
+from keyrecon.report.markup import ReportMaterial, note, pack, section, text, thinning
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, tennis_court
 from keyrecon.world.records import COURT, WorldCamera, WorldMotion
 from keyrecon.world.run_measures import ON_BASELINE, ZONES, RunMeasures, measure_run
@@ -153,14 +153,15 @@ def court_numbers(material: ReportMaterial) -> dict[str, object] | None:
     ends = tennis_court().ends if on_court else metre_grid(world.root[:, :2])
     half = -1.0 if np.nanmedian(world.root[:, 1]) <= 0 else 1.0
     frame = _map_frame(world.root) if on_court else _around(ends)
+    every = thinning(len(world.points))
     return {
         "lines": ends.round(3).tolist(),
-        "points": pack(world.points),
-        "root": pack(world.root[:, :2]),
-        "speed": pack(way.speed),
-        "contact": pack(world.contact.astype(float)),
+        "points": pack(world.points, every),
+        "root": pack(world.root[:, :2], every),
+        "speed": pack(way.speed, every),
+        "contact": pack(world.contact.astype(float), every),
         "feet": _feet(material.motion),
-        "camera": pack(camera.centre),
+        "camera": pack(camera.centre, every),
         "origin": camera.origin,
         "umpire": list(UMPIRE) if on_court else None,
         "opponent": [OPPONENT[0], -half * OPPONENT[1], OPPONENT[2]] if on_court else None,

@@ -1,20 +1,14 @@
 // The page's one cursor, a frame number that everything shows, and what moves it.
+import { unpack } from "./packed.js";
 export const byId = (id) => document.getElementById(id);
 export const read = (id) => JSON.parse(byId(id).textContent);
 export const data = read("motion-data");
 export const followers = []; // called with the frame number whenever it changes
 export const restyled = []; // called when the colour scheme changes
 
-// An array packed as 16-bit steps; unknown numbers become NaN.
-export function unpack(packed) {
-  if (!packed) return null;
-  const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
-  const whole = new Int16Array(bytes.buffer);
-  const values = Float32Array.from(whole, (n) => (n === -32768 ? NaN : n * packed.step));
-  return { values, shape: packed.shape };
-}
-const time = unpack(data.time).values;
-export const count = time.length;
+const late = unpack(data.late).values; // seconds after those of an even frame rate
+export const count = late.length;
+export const seconds = (number) => number / data.fps + late[number];
 
 const slider = byId("frame"),
   play = byId("play"),
@@ -36,7 +30,7 @@ function startClock() {
 export function show(number, seek = true) {
   now = Math.max(0, Math.min(count - 1, Math.round(number)));
   slider.value = now;
-  output.textContent = `frame ${now}, ${time[now].toFixed(2)} s`;
+  output.textContent = `frame ${now}, ${seconds(now).toFixed(2)} s`;
   if (seek) {
     if (clip.readyState) clip.currentTime = (now + 0.5) / data.fps;
     startClock();

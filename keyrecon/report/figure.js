@@ -1,6 +1,7 @@
 // The motion as a figure in space, at the frame of the page's cursor.
 import { cssColor } from "./colors.js";
-import { byId, data, unpack, count, frame, followers, restyled } from "./cursor.js";
+import { byId, data, count, frame, followers, restyled } from "./cursor.js";
+import { unpack } from "./packed.js";
 import { createFigure3d } from "./figure3d.js";
 
 const SIDES = ["left", "right", "trunk"];

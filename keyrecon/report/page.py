@@ -9,6 +9,7 @@ distance matrices and the turning figure are small scripts of our own.
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
@@ -22,7 +23,16 @@ from keyrecon.report.court_section import court_numbers, court_section, run_char
 from keyrecon.report.drawing import bone_sides, drawn_bones, head_bone, trunk_outline
 from keyrecon.report.headline import figures, opening
 from keyrecon.report.instants import key_instants
-from keyrecon.report.markup import ReportMaterial, data_block, note, pack, section, text, to_json
+from keyrecon.report.markup import (
+    ReportMaterial,
+    data_block,
+    note,
+    pack,
+    section,
+    text,
+    thinning,
+    to_json,
+)
 from keyrecon.report.pictures import Pictures, cut_pictures
 from keyrecon.report.scripts import bundle_scripts
 from keyrecon.report.summary import (
@@ -220,7 +230,19 @@ def _figure_player(pictures: Pictures, material: ReportMaterial) -> str:
                 f"lies on it; off the {material.court[1].origin} the body is held at its root, and "
                 "the grid lies at the lower foot."
             )
+            + _every_few(len(material.motion.time))
         ),
+    )
+
+
+def _every_few(frames: int) -> str:
+    """What a report of hours leaves out."""
+    every = thinning(frames)
+    return (
+        f" So that this file stays small, pictures and figure are those of one frame in {every}, "
+        "and straight lines between."
+        if every > 1
+        else ""
     )
 
 
@@ -285,20 +307,21 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
     """What the page's script draws from."""
     motion, skeleton = material.motion, material.motion.skeleton
     truth, marks = material.true_joints, material.annotations
+    every = thinning(len(motion.time))
     return {
         "fps": motion.fps,
-        "time": pack(motion.time),
+        "late": pack(motion.time - np.arange(len(motion.time)) / motion.fps, every),
         "bones": drawn_bones(skeleton).tolist(),
         "sides": bone_sides(skeleton).tolist(),
         "stature": stature(motion),
         "units": motion.units,
         "trunk": trunk_outline(skeleton),
         "head": head_bone(skeleton),
-        "points3d": pack(center_on_root(motion.points3d, skeleton.root)),
-        "truth3d": None if truth is None else pack(scale_truth(motion, truth.points3d)),
-        "refined": pack(motion.points2d),
-        "raw": pack(motion.points2d_propagated),
-        "truth2d": None if truth is None else pack(truth.points2d),
+        "points3d": pack(center_on_root(motion.points3d, skeleton.root), every),
+        "truth3d": None if truth is None else pack(scale_truth(motion, truth.points3d), every),
+        "refined": pack(motion.points2d, every),
+        "raw": pack(motion.points2d_propagated, every),
+        "truth2d": None if truth is None else pack(truth.points2d, every),
         "court": court_numbers(material),
         "marked": {"frames": marks.frames.tolist(), "points": pack(marks.joints)},
     }

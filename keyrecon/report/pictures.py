@@ -23,6 +23,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Track
 from keyrecon.report.drawing import draw_pose
+from keyrecon.report.markup import thinning
 
 SIDE, LEAST_SIDE = 420, 120
 """Side of the square stills, and of the small video: of a video of hours it is smaller, px."""
@@ -117,7 +118,8 @@ def cut_pictures(
     shown_motion = motion.known
     known = np.flatnonzero(shown_motion)
     even = known[np.linspace(0, len(known) - 1, min(strip, len(known))).round().astype(int)]
-    side = clip_side(len(known))
+    every = thinning(count)
+    side = clip_side(len(known) // every)
     nothing = np.full((side, side, 3), NOTHING, np.uint8)
     stills: dict[int, str] = {}
     marked: dict[int, str] = {}
@@ -129,18 +131,19 @@ def cut_pictures(
             marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
         if frame in even or frame in instants:
             stills[frame] = jpeg_uri(_posed_crop(windows, frame, picture, motion, SIDE))
-        if not shown_motion[frame]:
+        if not shown_motion[frame] or frame % every:
             return nothing
         return _posed_crop(windows, frame, picture, motion, side)
 
     def crops() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         frames = islice(read_small(video, video.width), count)
         shown = progress(frames, "Cutting pictures for the report", count)
-        yield from side_by_side(cut, enumerate(shown))
+        pictures = side_by_side(cut, enumerate(shown))
+        yield from (crop for frame, crop in enumerate(pictures) if frame % every == 0)
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
-        write_video(path, crops(), motion.fps, CLIP_QUALITY)
+        write_video(path, crops(), motion.fps / every, CLIP_QUALITY)
         clip = video_uri(path.read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
     return Pictures(shown[0], shown[1], dict(sorted(marked.items())), clip)

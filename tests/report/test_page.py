@@ -17,7 +17,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
 from keyrecon.report import summary
 from keyrecon.report.headline import in_words, marked_share
-from keyrecon.report.markup import pack
+from keyrecon.report.markup import MOST_FRAMES, pack, thinning
 from keyrecon.report.page import build_page, write_report
 from keyrecon.report.pictures import LEAST_SIDE, SIDE, Windows, clip_side, cut_pictures
 from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
@@ -213,6 +213,25 @@ def test_packed_numbers_come_back_and_unknown_ones_stay_unknown():
     assert whole[7, 1] == -32768
     known = np.isfinite(values)
     assert np.abs(whole * packed["step"] - values)[known].max() <= packed["step"]
+
+
+def test_of_hours_the_report_holds_every_few_frames():
+    values = np.arange(21.0).reshape(7, 3)
+    packed = pack(values, 3)
+    held = np.frombuffer(base64.b64decode(packed["data"]), "<i2").reshape(-1, 3)
+    assert packed["every"] == 3 and packed["shape"] == [7, 3]
+    np.testing.assert_allclose(held * packed["step"], values[::3], atol=packed["step"])
+    assert thinning(MOST_FRAMES) == 1 and thinning(MOST_FRAMES + 1) == 2
+    assert thinning(50 * 3600) == 3
+
+
+def test_its_small_video_lasts_as_long_with_fewer_pictures(material, tmp_path, monkeypatch):
+    monkeypatch.setattr("keyrecon.report.markup.MOST_FRAMES", len(material.motion.time) // 2)
+    made = cut_pictures(material.video, material.track, material.annotations, material.motion, 6)
+    (tmp_path / "clip.mp4").write_bytes(base64.b64decode(made.clip.partition(",")[2]))
+    clip, whole = open_video(tmp_path / "clip.mp4"), len(material.motion.time)
+    assert len(clip) == -(-whole // thinning(whole)) < whole
+    assert len(clip) / clip.fps == pytest.approx(whole / material.motion.fps, abs=1 / clip.fps)
 
 
 def test_a_point_and_its_crop_agree():
