@@ -137,7 +137,9 @@ def spread_distances(
     known = np.isin(np.arange(count), frames)
     farthest = np.array([[distances.upper.max()], [distances.lower.max()]])
     steps = distances.consecutive_distance
-    usual = np.median(steps, axis=1, keepdims=True) if steps.size else np.zeros((2, 1))
+    usual = np.zeros((2, 1))
+    if np.isfinite(steps).any():
+        usual = np.nanmedian(steps, axis=1, keepdims=True)
     follows = np.minimum(before[:-1], max(steps.shape[1] - 1, 0))
     both = known[:-1] & known[1:]
     return PoseDistances(

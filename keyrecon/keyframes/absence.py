@@ -42,13 +42,15 @@ def select_frames(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> Pose
     )
     first = order[np.unique(row[order], return_index=True)[1]]
     square = np.ix_(rows, rows)
+    follows = np.diff(kept) == 1
+    steps = comparison.consecutive_distance[:, kept[:-1]]
     return PoseDistances(
         upper=comparison.upper[square],
         lower=comparison.lower[square],
         frames=first,
         row=row,
         exemplar_distance=exemplar_distance,
-        consecutive_distance=comparison.consecutive_distance[:, kept[:-1][np.diff(kept) == 1]],
+        consecutive_distance=np.where(follows, steps, steps.dtype.type(np.nan)),
         visibility_score=comparison.visibility_score[kept],
     )
 

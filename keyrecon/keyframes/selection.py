@@ -223,6 +223,7 @@ def half_distances(
 ) -> HalfDistances:
     """One half of the body, the upper one with `index` 0."""
     step = comparison.consecutive_distance[index]
+    step = step[np.isfinite(step)]
     same_pose = float(np.quantile(step, options.smoothing)) if step.size else 0.0
     return HalfDistances(
         pose_distances=comparison,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
 
-from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.keyframes.absence import absent_frames, list_stretches, select_frames
 from keyrecon.keyframes.adoption import adopt_keyframes
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Track
@@ -42,6 +42,21 @@ def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
     alone = choose_keyframes(cut, 50.0, KeyframeOptions(budget=0.02 * 400 / len(kept)))
     assert len(whole.upper.frames) == len(alone.upper.frames)
     assert whole.upper.beta == pytest.approx(alone.upper.beta, rel=0.1)
+
+
+def test_some_of_some_frames_are_those_frames(poses):
+    """As in long videos: the usable shots of a file, and of these a group of shots."""
+    whole = comparison_of(*poses)
+    usable, group = np.flatnonzero(~AWAY), np.r_[100:120, 200:320]
+    twice, once = (
+        select_frames(select_frames(whole, usable), group),
+        select_frames(whole, usable[group]),
+    )
+    for field in fields(twice):
+        np.testing.assert_array_equal(getattr(twice, field.name), getattr(once, field.name))
+    steps = twice.consecutive_distance
+    assert steps.shape == (2, len(group) - 1)
+    assert np.flatnonzero(np.isnan(steps[0])).tolist() == [19]
 
 
 def test_a_player_missed_for_a_moment_is_not_away():
