@@ -136,7 +136,7 @@ def walk_about(name: str, seed: int) -> Scene:
     state = GroundState(np.log(focal), np.radians(tilt), 0.0, np.log(height), 0.0, 0.0)
     pinhole = state.pinhole((np.array(SIZE) - 1) / 2)
     pixels = np.stack([pinhole.project(frame) for frame in points])
-    truth = Truth([pinhole] * len(points), points, pixels)
+    truth = Truth([pinhole] * len(points), points, pixels, np.ones((len(points), 2), dtype=bool))
     camera = true_camera(truth)
     motion = lift_truth(truth, camera, seed)
     slow = gaussian_filter1d(np.random.default_rng(seed).standard_normal(len(points)), 25.0)

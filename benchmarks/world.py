@@ -12,8 +12,10 @@ Rendered, 6 s each, views of which the court is to be found without a click:
     focal     off by %
     root      root where a foot stands, off by so many cm, median
     slip      speed of feet that stand, cm/s, median
-    contact   F1 of standing feet, as it is / where two frames off count as right; truth: ankle
-              within 3 cm of its rest and slower than .3 m/s
+    contact   F1 of standing feet, as it is / where two frames off count as right; truth: toes or
+              ankle within 3 cm of their rest and slower than .3 m/s (`synthetic/contacts.py`)
+    apex      height of jumps (hips above where they are while a foot stands), off by so many cm,
+              median, of so many; truth: the body falls freely for .08 s, and rises by 5 cm
     W-MPJPE   joints in the world, mm
     N-MPJPE   pose after the best scale of each frame, mm: as lifted > on the court
     PA-MPJPE  the same after the best similarity
@@ -59,9 +61,10 @@ from keyrecon.world.court import CourtOptions, tennis_court
 from keyrecon.world.court_tracking import SPACING, check_still
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import place_motion
-from keyrecon.world.records import WorldCamera
+from keyrecon.world.records import WorldCamera, WorldMotion
 from keyrecon.world.refinement import OF_FRAMES
 from keyrecon.world.sight import sight_axes
+from keyrecon.world.world_terms import joint_masses
 
 FPS, SECONDS, SIZE = 50.0, 6.0, (1280, 720)
 NET = -11.885
@@ -70,6 +73,8 @@ TO_COURT = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 TO_MIDDLES = CalibrationOptions(CourtOptions(0.0, 0.0))
 """Rendered lines are measured to their middles."""
 
+FALL, JUMP = -6.5, 0.05
+"""Acceleration of a body that nothing holds, m/s^2 after smoothing, and metres that are a jump."""
 HIPS, ANKLES = (
     [LSP14.index(f"{side}_{part}") for side in ("right", "left")] for part in ("hip", "ankle")
 )
@@ -132,6 +137,7 @@ class Truth:
     cameras: list[Pinhole]
     points: np.ndarray
     points2d: np.ndarray
+    contact: np.ndarray
 
     @classmethod
     def read(cls, file: Path) -> "Truth":
@@ -145,7 +151,9 @@ class Truth:
         ]
         world = np.einsum("tji,tnj->tni", stored["rotation"], stored["points3d"])
         world = (world + stored["center"]) @ TO_COURT.T + shift
-        return cls(cameras, world, stored["points2d"])
+        if "contact" not in stored:
+            raise SystemExit(f"{file} is of a former version and tells no contacts; render it anew")
+        return cls(cameras, world, stored["points2d"], stored["contact"])
 
 
 def lift_truth(truth: Truth, camera: WorldCamera, seed: int) -> Motion:
@@ -212,7 +220,7 @@ def measure(setting: Setting, work: Path) -> str:
     return (
         f"{setting.name:<18}{camera.found.mean():7.1%}{np.median(off):9.2f}"
         f"{np.linalg.norm(away) / distance:8.2%} ({deviations:.1f} sd){focal:+8.2%}"
-        f"{seconds:7.1f}{_place(truth.points, camera, motion)}"
+        f"{seconds:7.1f}{_place(truth.points, truth.contact, camera, motion)}"
     )
 
 
@@ -223,19 +231,17 @@ def measure_lift(folder: Path, frames: int) -> str:
     motion, camera = lifted(folder, fps), true_camera(truth)
     motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
     camera = camera.part(own)
-    return f"{folder.name:<24}{_place(truth.points[own], camera, motion)}"
+    return f"{folder.name:<24}{_place(truth.points[own], truth.contact[own], camera, motion)}"
 
 
-def _place(true: np.ndarray, camera: WorldCamera, motion: Motion) -> str:
-    """Root, slip, contact, joints in the world, and the pose before and after."""
+def _place(true: np.ndarray, stands: np.ndarray, camera: WorldCamera, motion: Motion) -> str:
+    """Root, slip, contact, jumps, joints in the world, and the pose before and after."""
     began = time.process_time()
     world = place_motion(motion, camera)
     pace = (time.process_time() - began) / len(true) * 1000
     if world is None:
         return "  no foot stands"
-    root, feet = true[:, HIPS].mean(axis=1), true[:, ANKLES]
-    speed = np.linalg.norm(np.gradient(feet, axis=0), axis=2) * motion.fps
-    stands = (feet[..., 2] < np.percentile(feet[..., 2], 5) + 0.03) & (speed < 0.3)
+    root = true[:, HIPS].mean(axis=1)
     error = np.linalg.norm(world.root - root, axis=1)
     steps = np.linalg.norm(np.diff(world.points[:, ANKLES, :2], axis=0), axis=2) * motion.fps
     both = world.contact[1:] & world.contact[:-1]
@@ -249,17 +255,36 @@ def _place(true: np.ndarray, camera: WorldCamera, motion: Motion) -> str:
     return (
         f"{np.nanmedian(error[world.contact.any(axis=1)]) * 100:7.1f}"
         f"{np.nanmedian(steps[both]) * 100:7.2f}{_f1(world.contact, stands, 0):6.2f} /"
-        f"{_f1(world.contact, stands, 2):5.2f}"
+        f"{_f1(world.contact, stands, 2):5.2f}{_apex(world, true, stands, motion.fps)}"
         f"{np.nanmean(np.linalg.norm(world.points - true, axis=2)) * 1000:9.0f}"
         f"{''.join(pairs)}{pace:7.1f}"
     )
 
 
 PLACED = (
-    f"{'root':>7}{'slip':>7}{'contact':>13}{'W-MPJPE':>9}{'N-MPJPE':>14}{'PA-MPJPE':>14}"
+    f"{'root':>7}{'slip':>7}{'contact':>13}{'apex':>11}{'W-MPJPE':>9}{'N-MPJPE':>14}{'PA-MPJPE':>14}"
     f"{'lean':>14}{'ms':>7}"
 )
 """Heads of what `_place` prints; ms: milliseconds of processor time a frame."""
+
+
+def _apex(world: WorldMotion, true: np.ndarray, stands: np.ndarray, fps: float) -> str:
+    """By how much heights of jumps are off, cm, and how many there are."""
+    body = (joint_masses(LSP14.names)[:, None] * true).sum(axis=1)[:, 2]
+    body = gaussian_filter1d(body, 0.02 * fps)
+    falls = np.gradient(np.gradient(body)) * fps**2 < FALL
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], falls.astype(int), [0]])))
+    hips = true[:, HIPS, 2].mean(axis=1)
+    before, after = (
+        height - np.nanmedian(height[standing.any(axis=1)])
+        for height, standing in ((hips, stands), (world.root[:, 2], world.contact))
+    )
+    around, off = round(0.1 * fps), []
+    for first, end in zip(ends[::2], ends[1::2], strict=True):
+        jump = slice(max(first - around, 0), end + around)
+        if end - first >= 0.08 * fps and before[jump].max() > JUMP:
+            off.append(abs(np.nanmax(after[jump]) - before[jump].max()) * 100)
+    return f"{np.median(off):6.1f} ({len(off):2d})" if off else f"{'-':>6} ( 0)"
 
 
 def _f1(found: np.ndarray, true: np.ndarray, off: int) -> float:

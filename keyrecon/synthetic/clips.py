@@ -4,7 +4,8 @@ Every clip is brought to the same rate, body and floor, and turned so that the p
 net on average. Clips follow one another where pose and velocity agree best: for all pairs of
 frames near the end of one and the start of the next, distance of all joints after the best
 shift along the floor, in the manner of motion graphs (Kovar, Gleicher and Pighin, SIGGRAPH
-2002), with a short blend that keeps the bones' lengths.
+2002), with a short blend that keeps the bones' lengths. Captured toes go with their ankles, and
+have no say in where clips are cut.
 """
 
 from collections.abc import Sequence
@@ -23,9 +24,17 @@ from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, estimate_stature, j
 
 SHORTEST = 18
 """Frames that a clip has at least."""
+SIDES = ("right", "left")
 SPELL = 3.0
 """Seconds that every clip gets at least, as long as there is time for all."""
+JOINTS = len(LSP14.names)
+BONES = np.array(
+    [*LSP14.bones, *((LSP14.index(f"{side}_ankle"), JOINTS + k) for k, side in enumerate(SIDES))]
+)
+"""Those of the skeleton, and the feet from ankle to toes."""
 Points = Float[np.ndarray, "_ 14 3"]
+Footed = Float[np.ndarray, "_ 16 3"]
+"""Joints, then right and left toes; NaN where no toes were captured."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +57,11 @@ def join_clips(captures: Sequence[Capture], options: JoinOptions = JoinOptions()
     Short clips are searched and blended over a third and a sixth of their length. Raises
     KeyreconError when a clip is too short even for that.
     """
+    return join_with_toes(captures, options)[:, :JOINTS]
+
+
+def join_with_toes(captures: Sequence[Capture], options: JoinOptions = JoinOptions()) -> Footed:
+    """The same motion with the toes that were captured."""
     clips = [_prepare(capture, options) for capture in captures]
     lengths = bone_lengths(clips[0])
     clips = [clips[0]] + [_fit_body(clip, lengths) for clip in clips[1:]]
@@ -67,17 +81,17 @@ def join_clips(captures: Sequence[Capture], options: JoinOptions = JoinOptions()
         starts[index] = first + len(piece)
         motion = _append(motion, piece, blend, reach)
     motion = motion[:wanted].copy()
-    motion[..., [0, 2]] -= motion[..., [0, 2]].mean(axis=(0, 1))
+    motion[..., [0, 2]] -= motion[:, :JOINTS, [0, 2]].mean(axis=(0, 1))
     return motion
 
 
-def bone_lengths(points: Points) -> Float[np.ndarray, "B"]:
-    """Median bone lengths, metres."""
-    bones = LSP14.bones
+def bone_lengths(points: Float[np.ndarray, "_ n 3"]) -> Float[np.ndarray, "B"]:
+    """Median bone lengths, metres, with those of the feet where the points have toes."""
+    bones = BONES[(points.shape[1] > BONES).all(axis=1)]
     return np.median(np.linalg.norm(points[:, bones[:, 1]] - points[:, bones[:, 0]], axis=-1), 0)
 
 
-def _prepare(capture: Capture, options: JoinOptions) -> Points:
+def _prepare(capture: Capture, options: JoinOptions) -> Footed:
     """Resample a clip, stand it on the floor and turn it to the net."""
     seconds = (len(capture.joints) - 1) / capture.fps
     if seconds * options.fps < SHORTEST or len(capture.joints) < 4:
@@ -85,24 +99,30 @@ def _prepare(capture: Capture, options: JoinOptions) -> Points:
             f"A clip lasts {seconds:.2f} s; it needs {SHORTEST / options.fps:.2f} s to be joined."
         )
     times = np.arange(int(seconds * options.fps) + 1) / options.fps
-    spline = CubicSpline(np.arange(len(capture.joints)) / capture.fps, capture.joints)
-    points = spline(times)
+    captured = np.arange(len(capture.joints)) / capture.fps
+    points = CubicSpline(captured, capture.joints)(times)
+    toes = np.full((len(times), 2, 3), np.nan)
+    if capture.toes is not None:
+        toes = CubicSpline(captured, capture.toes)(times)
     ankles = np.stack([joint(points, f"{s}_ankle")[:, 1] for s in ("right", "left")])
     rest = ANKLE_HEIGHT * estimate_stature(points) / STATURE
-    points[..., 1] -= np.percentile(ankles, 5) - rest
+    floor = np.percentile(ankles, 5) - rest
+    points[..., 1] -= floor
+    toes[..., 1] -= floor
     across = joint(points, "left_shoulder") - joint(points, "right_shoulder")
     trunk = joint(points, "neck") - (joint(points, "left_hip") + joint(points, "right_hip")) / 2
     front = np.cross(across, trunk).mean(axis=0)
-    return _turn(points, np.arctan2(-front[0], -front[2]))
+    footed = np.concatenate([points, toes], axis=1)
+    return _turn(footed, np.arctan2(-front[0], -front[2]))
 
 
-def _turn(points: Points, angle: float) -> Points:
+def _turn(points: Footed, angle: float) -> Footed:
     """Turn about the vertical so that the heading `angle` (from -z towards -x) becomes -z."""
     c, s = np.cos(-angle), np.sin(-angle)
     return points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
 
 
-def _fit_body(points: Points, lengths: Float[np.ndarray, "B"]) -> Points:
+def _fit_body(points: Footed, lengths: Float[np.ndarray, "B"]) -> Footed:
     """The same motion by a person with other bones; steps scale with the legs."""
     ratio = lengths / bone_lengths(points)
     legs = [b for b, (_, child) in enumerate(LSP14.bones) if "knee" in LSP14.names[child]
@@ -112,38 +132,37 @@ def _fit_body(points: Points, lengths: Float[np.ndarray, "B"]) -> Points:
     return scaled + (pelvis - _pelvis(scaled))[:, None]
 
 
-def _pelvis(points: Points) -> Float[np.ndarray, "T 3"]:
+def _pelvis(points: Footed) -> Float[np.ndarray, "T 3"]:
     return (joint(points, "left_hip") + joint(points, "right_hip")) / 2
 
 
-def _stretch(points: Points, ratio: Float[np.ndarray, "t B"]) -> Points:
+def _stretch(points: Footed, ratio: Float[np.ndarray, "t B"]) -> Footed:
     """Multiply every bone's length, from the root outwards."""
     result = points.copy()
-    for bone, (parent, child) in enumerate(LSP14.bones):
+    for bone, (parent, child) in enumerate(BONES):
         step = points[:, child] - points[:, parent]
         result[:, child] = result[:, parent] + step * ratio[:, bone, None]
     return result
 
 
-def _append(motion: Points, piece: Points, blend: int, reach: int) -> Points:
+def _append(motion: Footed, piece: Footed, blend: int, reach: int) -> Footed:
     """Continue a motion with another piece where they agree best."""
     out, into = _find_cut(motion, piece, blend, reach)
     before, after = motion[out : out + blend], piece[into : into + blend]
-    shift = (before - after).mean(axis=(0, 1)) * [1, 0, 1]
+    shift = (before - after)[:, :JOINTS].mean(axis=(0, 1)) * [1, 0, 1]
     share = np.linspace(0, 1, blend + 2)[1:-1]
     share = (share**2 * (3 - 2 * share))[:, None, None]
     mixed = before * (1 - share) + (after + shift) * share
-    bones = LSP14.bones
 
-    def lengths(points: Points) -> np.ndarray:
-        return np.linalg.norm(points[:, bones[:, 1]] - points[:, bones[:, 0]], axis=-1)
+    def lengths(points: Footed) -> np.ndarray:
+        return np.linalg.norm(points[:, BONES[:, 1]] - points[:, BONES[:, 0]], axis=-1)
 
     wanted = lengths(before) * (1 - share[..., 0]) + lengths(after) * share[..., 0]
     mixed = _stretch(mixed, wanted / lengths(mixed))
     return np.concatenate([motion[:out], mixed, piece[into + blend :] + shift])
 
 
-def _find_cut(motion: Points, piece: Points, blend: int, reach: int) -> tuple[int, int]:
+def _find_cut(motion: Footed, piece: Footed, blend: int, reach: int) -> tuple[int, int]:
     """Frames at which to leave a motion and to enter a piece."""
     outs = np.arange(max(0, len(motion) - reach), len(motion) - blend, 2)
     intos = np.arange(0, min(reach, len(piece) - blend), 2)
@@ -154,8 +173,8 @@ def _find_cut(motion: Points, piece: Points, blend: int, reach: int) -> tuple[in
     return int(outs[best[0]]), int(intos[best[1]])
 
 
-def _features(points: Points, frames: np.ndarray, blend: int) -> Float[np.ndarray, "n F"]:
+def _features(points: Footed, frames: np.ndarray, blend: int) -> Float[np.ndarray, "n F"]:
     """Poses at the start, middle and end of a blend, without their place on the floor."""
-    window = points[frames[:, None] + np.array([0, blend // 2, blend - 1])]
+    window = points[frames[:, None] + np.array([0, blend // 2, blend - 1]), :JOINTS]
     place = window.mean(axis=(1, 2), keepdims=True) * [1, 0, 1]
     return (window - place).reshape(len(frames), -1)

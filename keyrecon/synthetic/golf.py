@@ -166,7 +166,7 @@ def _hold_club(stage: Stage, played: Played) -> Stage:
     reach = float(np.median(np.linalg.norm(head - grip, axis=1)))
     return replace(
         stage, pointers=pointers, racket=np.stack([grip, way, across], axis=1),
-        held=golf_club(reach), look=replace(stage.look, racket=STEEL),
+        held=golf_club(reach), look=replace(stage.look, racket=STEEL), toes=played.toes,
     )  # fmt: skip
 
 

@@ -28,9 +28,10 @@ from keyrecon.progress import Progress, silent
 from keyrecon.ranges import SEEDS, within
 from keyrecon.records import Pick
 from keyrecon.synthetic.cameras import CameraMove, CameraPlanOptions, plan_camera
-from keyrecon.synthetic.clips import JoinOptions, join_clips
+from keyrecon.synthetic.clips import JOINTS, JoinOptions, join_with_toes
+from keyrecon.synthetic.contacts import find_contacts
 from keyrecon.synthetic.court import CourtPicture, draw_background
-from keyrecon.synthetic.figure import PARTS, point_figure
+from keyrecon.synthetic.figure import FOOT_LENGTH, PARTS, STATURE, point_figure
 from keyrecon.synthetic.looks import Look, choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 from keyrecon.synthetic.racket import RACKET, racket_frames
@@ -79,16 +80,19 @@ def synthesize(
     """Render a sequence into a folder, from motion capture or from the built-in tennis motion."""
     check_options(options)
     scene, clips = options.scene, options.clips
+    toes = None
     if mocap:
-        points = join_clips(read_mocap([Path(p) for p in mocap], options.trim), clips)
+        joined = join_with_toes(read_mocap([Path(p) for p in mocap], options.trim), clips)
+        points, toes = joined[:, :JOINTS], joined[:, JOINTS:]
         if scene.left_handed:
             points = points[:, LSP14.mirror] * np.array([-1.0, 1, 1])
+            toes = toes[:, ::-1] * np.array([-1.0, 1, 1])
     else:
         play = MotionOptions(
             clips.seconds, clips.fps, left_handed=scene.left_handed, seed=scene.seed
         )
         points = play_tennis(play)
-    render_sequence(points, clips.fps, scene, out, progress)
+    render_sequence(points, clips.fps, scene, out, progress, toes)
 
 
 def draw_court(
@@ -129,9 +133,15 @@ def render_sequence(
     options: SceneOptions,
     out: Path,
     progress: Progress = silent,
+    toes: Float[np.ndarray, "T 2 3"] | None = None,
 ) -> None:
-    """Film a motion and write the sequence into a folder, which is made if need be."""
-    film_stage(set_stage(points, fps, options), fps, options, out, progress)
+    """Film a motion and write the sequence into a folder, which is made if need be.
+
+    `toes` are those that were captured, of which the truth tells; NaN, or none, where they were
+    not. The feet that are drawn point where the knees do.
+    """
+    stage = replace(set_stage(points, fps, options), toes=toes)
+    film_stage(stage, fps, options, out, progress)
 
 
 def film_stage(
@@ -204,13 +214,16 @@ def write_truth(path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np
 
     `seen` tells in every frame which joints are visible, and how much of the racket or club.
     """
-    move = stage.move
+    move, toes = stage.move, _toes(stage)
+    ankles = stage.points[:, [LSP14.index(f"{side}_ankle") for side in ("right", "left")]]
     np.savez(
         path,
         points3d=move.to_camera(stage.points),
         points2d=move.project(stage.points),
         joint_names=np.array(LSP14.names),
         fps=fps,
+        toes3d=move.to_camera(toes),
+        contact=find_contacts(ankles, toes, fps),
         visible=seen[0],
         club_visible=seen[1],
         height_m=stage.pointers.stature,
@@ -219,6 +232,14 @@ def write_truth(path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np
         center=move.center,
         principal=move.principal,
     )
+
+
+def _toes(stage: Stage) -> Float[np.ndarray, "T 2 3"]:
+    """Right and left toes in the world: captured ones, else those of the feet that are drawn."""
+    if stage.toes is not None and np.isfinite(stage.toes).all():
+        return stage.toes
+    ankles = stage.points[:, [LSP14.index(f"{side}_ankle") for side in ("right", "left")]]
+    return ankles + FOOT_LENGTH * stage.pointers.stature / STATURE * stage.pointers.toes
 
 
 _CLICKS: dict[str, tuple[Sequence[str], ...]] = {

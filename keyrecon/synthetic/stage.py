@@ -33,6 +33,8 @@ class Stage:
     exposure: float
     """Share of the time between frames that the shutter is open."""
     seed: int
+    toes: Float[np.ndarray, "T 2 3"] | None = None
+    """Captured ones, world, metres."""
 
     def in_camera(self, world: Float[np.ndarray, "*n 3"], frame: int) -> np.ndarray:
         """World points in the camera axes of a frame, metres."""

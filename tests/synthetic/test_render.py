@@ -10,7 +10,7 @@ from keyrecon.io.video import open_video
 from keyrecon.numerics.geometry import project_perspective
 from keyrecon.synthetic.cameras import CameraPlanOptions, View, plan_camera
 from keyrecon.synthetic.clips import JoinOptions
-from keyrecon.synthetic.figure import PARTS
+from keyrecon.synthetic.figure import FOOT_LENGTH, PARTS, STATURE
 from keyrecon.synthetic.looks import choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 from keyrecon.synthetic.raster import FAR, Solids, draw_solids
@@ -183,5 +183,12 @@ def test_a_written_sequence_holds_together(tmp_path):
     depth = truth["points3d"][..., 2:]
     seen = truth["points3d"][..., :2] / depth * truth["focal"][:, None, None] + truth["principal"]
     np.testing.assert_allclose(seen, truth["points2d"], atol=1e-6)
+    foot = np.linalg.norm(
+        truth["toes3d"]
+        - truth["points3d"][:, [LSP14.index(f"{s}_ankle") for s in ("right", "left")]],
+        axis=2,
+    )
+    np.testing.assert_allclose(foot, FOOT_LENGTH * truth["height_m"] / STATURE)
+    assert truth["contact"].shape == (20, 2) and truth["contact"].any(axis=1).all()
     assert len({p.frame for p in read_picks(tmp_path / "picks.json")}) == 3
     assert json.loads((tmp_path / "scene.json").read_text())["options"]["seed"] == 2
