@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import Motion
 from keyrecon.world.ground_evidence import Stances
-from keyrecon.world.placement import REACH, STANDING_SPEED, stature_in_units
+from keyrecon.world.placement import REACH, HELD_SPEED, stature_in_units
 from keyrecon.world.world_terms import joint_masses
 
 APART = 0.5
@@ -50,7 +50,7 @@ def find_stances(
         feet[..., 1].max(axis=1, keepdims=True) - feet[..., 1] < UPPER * (scale * stature)[:, None]
     )
     with np.errstate(invalid="ignore"):
-        still = (speed < STANDING_SPEED) & lower & seen[:, None]
+        still = (speed < HELD_SPEED) & lower & seen[:, None]
     speed = np.where(still, speed, np.inf)
     frames = _stillest(speed.min(axis=1), motion)
     foot = speed[frames].argmin(axis=1)
