@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import Motion
 from keyrecon.world.ground_evidence import Stances
-from keyrecon.world.placement import REACH, HELD_SPEED, stature_in_units
+from keyrecon.world.placement import HELD_SPEED, REACH, stature_in_units
 from keyrecon.world.world_terms import joint_masses
 
 APART = 0.5
