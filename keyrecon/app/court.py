@@ -53,7 +53,7 @@ def calibrate(
         check_click(click, len(video), (video.width, video.height))
     together = merge_clicks(kept, clicks)
     try:
-        camera = _find_camera(workspace, video, together, options, progress)
+        camera, cuts = _find_camera(workspace, video, together, options, progress)
     except ContradictoryClicks as fault:
         raise KeyreconError(f"{fault}{_whose(clicks, kept)}") from fault
     except KeyreconError as fault:
@@ -71,6 +71,7 @@ def calibrate(
     return "\n".join(
         [
             *describe_camera(camera),
+            *_describe_cuts(cuts),
             f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
@@ -87,11 +88,13 @@ def _find_camera(
     clicks: tuple[CourtClick, ...],
     options: CalibrationOptions,
     progress: Progress,
-) -> WorldCamera:
+) -> tuple[WorldCamera, tuple[int, ...]]:
+    """The camera, and the frames with which other shots begin."""
     keep = workspace.stages.keep
     motion = workspace.options(Options(), Options()).camera
     path = keep("camera", estimate_camera_motion, video, options=motion, progress=progress)
-    return keep("court", calibrate_court, video, path, clicks, options=options, progress=progress)
+    camera = keep("court", calibrate_court, video, path, clicks, options=options, progress=progress)
+    return camera, path.cuts
 
 
 def _forgotten(kept: Sequence[CourtClick], names: Sequence[str]) -> list[CourtClick]:
@@ -147,7 +150,21 @@ def describe_camera(camera: WorldCamera) -> list[str]:
     ]
     if not camera.found.all():
         lost = np.flatnonzero(np.diff(np.concatenate([[True], camera.found, [True]]).astype(int)))
-        stretches = [f"{a}-{b - 1}" for a, b in zip(lost[::2], lost[1::2], strict=True)]
-        more = f" and {len(stretches) - 6} more" if len(stretches) > 6 else ""
-        lines.append(f"No court seen in frames {', '.join(stretches[:6])}{more}.")
+        ends = zip(lost[::2], lost[1::2] - 1, strict=True)
+        stretches = [f"{a}-{b}" if b > a else f"{a}" for a, b in ends]
+        lines.append(f"No court seen in frames {_first_few(stretches)}.")
     return lines
+
+
+def _describe_cuts(cuts: Sequence[int]) -> list[str]:
+    """What becomes of a video with cuts; nothing of one without."""
+    if not cuts:
+        return []
+    return [
+        f"The picture is cut at frame {_first_few([str(cut) for cut in cuts])}: each shot was "
+        "looked at by itself, and those that show the court from the same place have a camera."
+    ]
+
+
+def _first_few(words: Sequence[str]) -> str:
+    return ", ".join(words[:6]) + (f" and {len(words) - 6} more" if len(words) > 6 else "")

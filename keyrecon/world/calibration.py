@@ -17,7 +17,8 @@ from keyrecon.io.frame_reader import read_grey, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
-from keyrecon.records import CameraPath
+from keyrecon.records import CameraPath, Shots
+from keyrecon.timeline import part_of_path
 from keyrecon.world.clicked_points import (
     FEWEST,
     TOLERANCE,
@@ -48,7 +49,7 @@ from keyrecon.world.court_tracking import (
 from keyrecon.world.joint_fit import JointFit, fit_views
 from keyrecon.world.line_fit import FIXED_CENTRE, LOOSE, evaluate, fit_lines
 from keyrecon.world.pinhole import Pinhole
-from keyrecon.world.records import CourtClick, WorldCamera
+from keyrecon.world.records import OF_CAMERA, CourtClick, WorldCamera
 
 MEASURED_WIDTH = 1280
 """Width of the pictures in which lines are measured, px."""
@@ -106,11 +107,86 @@ def calibrate_court(
     """The camera of every frame of a clip that shows a tennis court.
 
     `camera_path` is the camera's motion (`estimate_camera_motion`). Clicks on named points
-    (`keyrecon.world.court.POINTS`) help where the lines alone do not tell; four are enough.
+    (`keyrecon.world.court.POINTS`) help where the lines alone do not tell; four are enough. Of a
+    video with cuts every shot is looked at by itself, and those from one place are found.
     Raises KeyreconError where no court is found or the clicks contradict one another.
     """
     for click in clicks:
         check_click(click, len(video), (video.width, video.height))
+    if camera_path.cuts:
+        return _calibrate_shots(video, camera_path, clicks, options, progress)
+    return _calibrate_shot(video, camera_path, clicks, options, progress)
+
+
+def _calibrate_shots(
+    video: Video,
+    path: CameraPath,
+    clicks: Sequence[CourtClick],
+    options: CalibrationOptions,
+    progress: Progress,
+) -> WorldCamera:
+    """The same for shots between cuts, those of one place.
+
+    Of clicked shots the one with most clicks says which place that is, else the longest that shows
+    a court. Raises what was wrong with the first of them where none does.
+    """
+    parts = Shots.between(path.cuts, len(video)).parts
+    inside = [[c for c in clicks if p.start <= c.frame < p.stop] for p in parts]
+    order = sorted(
+        range(len(parts)), key=lambda k: (-len(inside[k]), parts[k].start - parts[k].stop)
+    )
+    cameras: dict[int, WorldCamera] = {}
+    faults: list[KeyreconError] = []
+    for k in order:
+        part, first = parts[k], parts[k].start
+        own = [replace(click, frame=click.frame - first) for click in inside[k]]
+        try:
+            camera = _calibrate_shot(
+                video.part(part), part_of_path(path, part), own, options, progress
+            )
+        except KeyreconError as fault:
+            if own:
+                raise
+            faults.append(fault)
+            continue
+        if all(_same_place(camera, other) for other in cameras.values()):
+            cameras[k] = camera
+    if not cameras:
+        raise faults[0]
+    return _joined([cameras.get(k) for k in range(len(parts))], parts)
+
+
+def _same_place(one: WorldCamera, other: WorldCamera) -> bool:
+    """Whether both are of one camera that turned and zoomed."""
+    here, there = (c.centre[np.flatnonzero(c.found)[0]] for c in (one, other))
+    return bool(np.linalg.norm(here - there) <= MAX_SPREAD * np.linalg.norm(there))
+
+
+def _joined(cameras: Sequence[WorldCamera | None], parts: Sequence[slice]) -> WorldCamera:
+    """Cameras of shots one after another; None where there is none."""
+    known = next(camera for camera in cameras if camera is not None)
+
+    def values(name: str) -> np.ndarray:
+        like = getattr(known, name)
+        blank = False if like.dtype == bool else np.nan
+        rows = [
+            np.full((part.stop - part.start, *like.shape[1:]), blank, dtype=like.dtype)
+            if camera is None
+            else getattr(camera, name)
+            for camera, part in zip(cameras, parts, strict=True)
+        ]
+        return np.concatenate(rows)
+
+    return replace(known, **{name: values(name) for name in OF_CAMERA})
+
+
+def _calibrate_shot(
+    video: Video,
+    camera_path: CameraPath,
+    clicks: Sequence[CourtClick],
+    options: CalibrationOptions,
+    progress: Progress,
+) -> WorldCamera:
     court = tennis_court(options.court)
     width = min(MEASURED_WIDTH, video.width)
     pictures = _read_pictures(video, camera_path, width, {click.frame for click in clicks})

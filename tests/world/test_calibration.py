@@ -78,6 +78,23 @@ def test_world_axes_are_those_of_the_convention(panned):
     assert up[0, 1] < 0
 
 
+def test_each_shot_of_a_cut_video_is_looked_at_by_itself(tmp_path):
+    here, there = camera_at((-4, -24, 4), (-2, -5, 0), 1.25), camera_at((5, -20, 8), (0, 0, 0), 1.1)
+    court = [paint(here, SIZE, t) for t in range(8)]
+    plain = [
+        np.random.default_rng(t).integers(90, 110, SIZE[::-1]).astype(np.uint8) for t in range(12)
+    ]
+    other = [paint(there, SIZE, t) for t in range(6)]
+    pictures = [*plain, *court, *other, *court]
+    write_video(tmp_path / "v.mp4", [np.repeat(p[..., None], 3, axis=2) for p in pictures], 25.0)
+    count = len(pictures)
+    path = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count), (12, 20, 26))
+    found = keyrecon.calibrate_court(keyrecon.open_video(tmp_path / "v.mp4"), path)
+    np.testing.assert_array_equal(np.flatnonzero(found.found), [*range(12, 20), *range(26, 34)])
+    assert np.median(court_error(pinhole(found, 30), here, SIZE)) < 0.5
+    assert np.isnan(found.K[:12]).all() and np.isnan(found.sd_centre[20:26]).all()
+
+
 def test_a_cut_is_not_followed(tmp_path):
     court, elsewhere = camera_at((0, -26, 7), (0, -2, 0), 1.4), camera_at((0, 60, 7), (0, 90, 0))
     video, path = film(tmp_path, [court] * 10 + [elsewhere] * 6)
