@@ -177,7 +177,7 @@ def _joined(cameras: Sequence[WorldCamera | None], parts: Sequence[slice]) -> Wo
         ]
         return np.concatenate(rows)
 
-    return replace(known, **{name: values(name) for name in OF_CAMERA})
+    return WorldCamera(**{name: values(name) for name in OF_CAMERA})
 
 
 def _calibrate_shot(
