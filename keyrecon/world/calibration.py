@@ -177,7 +177,8 @@ def _joined(cameras: Sequence[WorldCamera | None], parts: Sequence[slice]) -> Wo
         ]
         return np.concatenate(rows)
 
-    return WorldCamera(**{name: values(name) for name in OF_CAMERA})
+    inner, turn, shift, found, centre, focal, tilt = (values(name) for name in OF_CAMERA)
+    return WorldCamera(inner, turn, shift, found, centre, focal, tilt)
 
 
 def _calibrate_shot(
