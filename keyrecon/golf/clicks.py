@@ -5,7 +5,7 @@ joint of the Leeds skeleton may be added. `root` is the middle between the hips.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -22,6 +22,13 @@ and the paper used a rough estimate too (Section 5.2)."""
 FOCAL = 1.2
 """Focal length where nobody knows it, picture widths: between a phone's (0.7 to 0.8) and a camera
 that was zoomed in from behind the range."""
+NEAREST_CAMERA = 2.5
+"""Metres from the player to a camera that has all of a swing in its picture: hands and club reach
+2.7 m high, and a phone's lens sees as much in an upright picture from there. A clip that is cropped
+to the player seems nearer by its width, and perspective comes out too strong."""
+ADDRESS_HEIGHT = 0.84
+"""From the top of the head to the ankles of a player at address, statures: .84 to .85 in five real
+swings whose joints were marked by eye."""
 HEAD_DEPTH = 0.06
 """From the top of the head to its centre, player heights: half of a head's, an eighth."""
 SHOULDERS = 0.2
@@ -121,7 +128,7 @@ def clicked_pose(clicks: GolfClicks) -> ClickedPose:
     """The pose that was clicked, before a camera as far as it is known."""
     width, height = clicks.size
     principal = clicks.principal or ((width - 1) / 2, (height - 1) / 2)
-    return ClickedPose(
+    pose = ClickedPose(
         joints=InitialJoints(
             clicks.frame, tuple(clicks.joints), np.array(list(clicks.joints.values()), float)
         ),
@@ -131,6 +138,11 @@ def clicked_pose(clicks: GolfClicks) -> ClickedPose:
         stature=clicks.stature,
         camera=Camera(clicks.focal or FOCAL * width, np.array(principal, float)),
     )
+    if clicks.focal:
+        return pose
+    least = NEAREST_CAMERA * pose.height / (ADDRESS_HEIGHT * clicks.stature)
+    camera = replace(pose.camera, focal=max(pose.camera.focal, least))
+    return replace(pose, camera=camera)
 
 
 def check_clicks(clicks: GolfClicks, n_frames: int, size: tuple[int, int]) -> None:

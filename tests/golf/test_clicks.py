@@ -3,7 +3,13 @@ import json
 import pytest
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.clicks import GolfClicks, check_clicks, clicked_pose
+from keyrecon.golf.clicks import (
+    ADDRESS_HEIGHT,
+    NEAREST_CAMERA,
+    GolfClicks,
+    check_clicks,
+    clicked_pose,
+)
 from keyrecon.io.formats.clicks import read_clicks, write_clicks
 
 JOINTS = {
@@ -74,9 +80,26 @@ def test_a_file_that_cannot_start_a_fit_says_why(tmp_path, changes, message):
 
 
 def test_what_nobody_knows_may_be_left_out(tmp_path):
-    clicks = read_clicks(file_of(tmp_path, stature=None, focal=None, principal=None))
+    size = [1280, 720]
+    clicks = read_clicks(file_of(tmp_path, size=size, stature=None, focal=None, principal=None))
     assert clicks.stature == 1.75
-    assert clicked_pose(clicks).camera.focal == 1.2 * 200
+    assert clicked_pose(clicks).camera.focal == 1.2 * 1280
+
+
+def test_a_clip_cropped_to_the_player_was_not_filmed_from_beside_him():
+    """His depth hardly changes his size, however narrow the picture is that was left of it."""
+    pose = clicked_pose(GolfClicks(0, (200, 300), JOINTS))
+    metres = pose.camera.focal * ADDRESS_HEIGHT * pose.stature / pose.height
+    assert metres == pytest.approx(NEAREST_CAMERA)
+    told = clicked_pose(GolfClicks(0, (200, 300), JOINTS, focal=250.0))
+    assert told.camera.focal == 250
+
+
+def test_the_same_clip_twice_as_large_was_filmed_from_as_far():
+    larger = {name: (2 * x, 2 * y) for name, (x, y) in JOINTS.items()}
+    one, two = (clicked_pose(GolfClicks(0, s, j)) for s, j in
+                (((200, 300), JOINTS), ((400, 600), larger)))  # fmt: skip
+    assert two.camera.focal == pytest.approx(2 * one.camera.focal)
 
 
 def test_clicks_of_another_video_are_noticed():

@@ -220,13 +220,12 @@ class _Problem:
         count = len(knots)
         reach = min(len(here.lags), count)
         band = np.zeros((reach * CHANNELS, count * CHANNELS))
-        i, j = np.indices((CHANNELS, CHANNELS))
-        columns = np.arange(count)[:, None, None] * CHANNELS + j
         for lag in range(reach):
-            below = lag * CHANNELS + i - j
-            keep = below >= 0
             first = here.lags[lag, : count - lag]
-            band[below[keep][None], columns[: count - lag, keep]] = first[:, keep]
+            for j in range(CHANNELS):
+                row, top = lag * CHANNELS - j, j if lag == 0 else 0
+                below = band[row + top : row + CHANNELS, j : (count - lag) * CHANNELS : CHANNELS]
+                below[:] = first[:, top:, j].T
         band[0] += damping * band[0] + 1e-9 * band[0].max()
         return knots - solveh_banded(band, here.gradient.ravel(), lower=True).reshape(knots.shape)
 

@@ -124,10 +124,10 @@ INDEPENDENT_PER_SECOND = 3.0
 """Independent observations of a joint per second: trackers drift and proportions are wrong for a
 third of a second or longer, so that more frames do not make these errors smaller. Chosen on
 rendered swings; see benchmarks/golf.py."""
-ROBUST_FOREGROUND, ROBUST_SILHOUETTE, ROBUST_MATCH = 0.06, 12.0, 3.0
-"""Residuals beyond which a line of sight (m: the radius of a thigh), a limb off the mask (px) and a
-match (px: the accuracy of Lucas-Kanade on cloth) count less. Chosen on rendered swings; see
-benchmarks/golf.py."""
+ROBUST_FOREGROUND, ROBUST_SILHOUETTE, ROBUST_MATCH = 0.06, 0.039, 0.0096
+"""Residuals beyond which a line of sight (m: the radius of a thigh), a limb off the mask (player
+heights) and a match (player heights: the accuracy of Lucas-Kanade on cloth) count less. Chosen on
+rendered swings (12 and 3 px of 310); see benchmarks/golf.py."""
 HELD = 100.0
 """Standard deviations beyond which a mark counts less where the fit follows the picture: no mark is
 an outlier, however far the model was from it."""
@@ -275,14 +275,14 @@ def surface_blocks(
     observations: Observations, body: Body, options: FitOptions
 ) -> list[ResidualBlock]:
     """Mask and matched points; their weights are shares of the influence of the points."""
-    weights, capsules = options.weights, build_capsules(body)
+    weights, capsules, height = options.weights, build_capsules(body), observations.height
     foreground = partial(foreground_residuals, observations, capsules)
     silhouette = partial(silhouette_residuals, observations, capsules)
     matches = partial(match_residuals, observations, capsules)
     blocks = [
         ResidualBlock(foreground, weights.foreground, ROBUST_FOREGROUND),
-        ResidualBlock(silhouette, weights.silhouette, ROBUST_SILHOUETTE),
-        ResidualBlock(matches, weights.matches, ROBUST_MATCH),
+        ResidualBlock(silhouette, weights.silhouette, ROBUST_SILHOUETTE * height),
+        ResidualBlock(matches, weights.matches, ROBUST_MATCH * height),
     ]
     return [block for block in blocks if block.weight]
 

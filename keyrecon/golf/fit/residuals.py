@@ -246,7 +246,7 @@ def match_residuals(observations: Observations, capsules: Capsules, pose: RootPo
     matches = observations.matches
     axes, at = place_capsules(capsules, pose), matches.frame
     lines = SightLines(sight_directions(matches.start, observations.camera), at)
-    hits = _first_hits(lines, axes, pass_capsules(lines, axes))
+    hits = _first_hits(pass_capsules(lines, axes), axes.radii)
     rows = np.flatnonzero(np.isfinite(hits.depth))
     at, segment = at[rows], capsules.segment[hits.capsule[rows]]
     surface = hits.depth[rows, None] * lines.directions[rows] - pose.origins[at, segment]
@@ -282,6 +282,10 @@ class Passing:
     """q: share of the way along each axis at which the surface is nearest."""
     distance: Float[np.ndarray, "n Q"]
     """From there to the surface, metres; negative inside."""
+    start: Float[np.ndarray, "n Q"]
+    """How far along the line of sight each axis begins, metres."""
+    way: Float[np.ndarray, "n Q"]
+    """How far along it the axis leads from there, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +328,7 @@ def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
     long, both, away = _dot(ways, ways), _dot(starts, ways), _dot(starts, starts)
     radius, k = (values.astype(np.float32) for values in (radii[:, 0], np.diff(radii)[:, 0]))
 
-    def pass_some(some: slice) -> Passing:
+    def pass_some(some: slice) -> tuple[np.ndarray, np.ndarray]:
         frame = lines.frame[some]
         # Differences of squares need doubles, their roots to a tenth of a millimetre do not.
         g = np.maximum(long[frame] - along[some] ** 2, 1e-12).astype(np.float32)
@@ -334,14 +338,12 @@ def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
         slant = k * h / np.sqrt(g * np.maximum(g - k**2, np.float32(1e-12)))
         q = np.clip(slant - slope / g, 0.0, 1.0)
         reach = np.sqrt(np.maximum(square + q * (2 * slope + q * g), 0.0))
-        return Passing(q, reach - (radius + q * k))
+        return q, reach - (radius + q * k)
 
     parts = [slice(a, a + LINES_AT_ONCE) for a in range(0, max(1, len(first)), LINES_AT_ONCE)]
     done = list(side_by_side(pass_some, parts) if len(parts) > 1 else map(pass_some, parts))
-    return Passing(
-        np.concatenate([part.place for part in done]),
-        np.concatenate([part.distance for part in done]),
-    )
+    place, distance = (np.concatenate(of_parts) for of_parts in zip(*done, strict=True))
+    return Passing(place, distance, first, along)
 
 
 def _along(lines: SightLines, vectors: Float[np.ndarray, "T Q 3"]) -> Float[np.ndarray, "n Q"]:
@@ -360,13 +362,12 @@ def _dot(
     return np.einsum("tqi,tqi->tq", one, other)
 
 
-def _first_hits(lines: SightLines, axes: CapsuleAxes, passing: Passing) -> _Hits:
+def _first_hits(passing: Passing, radii: Float[np.ndarray, "Q 2"]) -> _Hits:
     """The capsule that each line of sight meets first."""
-    q, distance, radii = passing.place, passing.distance, axes.radii
+    q, distance = passing.place, passing.distance
     radius = radii[:, 0] + q * (radii[:, 1] - radii[:, 0])
     inside = np.sqrt(np.maximum(radius**2 - (distance + radius) ** 2, 0.0))
-    depth = (1 - q) * _along(lines, axes.starts) + q * _along(lines, axes.ends) - inside
-    depth = np.where(distance < 0, depth, np.inf)
+    depth = np.where(distance < 0, passing.start + q * passing.way - inside, np.inf)
     first = depth.argmin(axis=1)
     return _Hits(first, depth[np.arange(len(depth)), first])
 

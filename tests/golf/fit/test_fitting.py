@@ -8,7 +8,7 @@ from golf_truth import camera_before, even_times, observe
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
-from keyrecon.golf.fit.fitting import fit_swing
+from keyrecon.golf.fit.fitting import FitOptions, fit_swing, surface_blocks
 from keyrecon.golf.fit.handedness import mirror_initial, mirror_observations
 from keyrecon.golf.fit.initial_pose import Placement, estimate_initial_pose, repeat_pose
 from keyrecon.golf.fit.result import describe_fit
@@ -112,3 +112,12 @@ def test_a_left_hander_is_the_mirror_image(model, played):
 def test_a_repeated_pose_stays_in_one_place_in_all_frames():
     state = repeat_pose(Placement(np.eye(3), np.arange(3.0)), np.linspace(0, 1, 5))
     assert state.rotation.shape == (5, 3, 3) and (state.position == np.arange(3.0)).all()
+
+
+def test_what_is_an_outlier_does_not_depend_on_the_size_of_the_pictures(played):
+    _, joints, club = played
+    small = observe(joints, club, CAMERA, noise=0.5)
+    large = replace(small, height=2 * small.height)
+    blocks = [surface_blocks(o, size_body(1.8), FitOptions()) for o in (small, large)]
+    shares = [two.robust / one.robust for one, two in zip(*blocks, strict=True)]
+    assert shares == [1, 2, 2]  # lines of sight are in metres, masks and matches in px
