@@ -37,7 +37,7 @@ from keyrecon.golf.observe.swing_events import (
     order_keys,
 )
 from keyrecon.golf.plausibility import SwingDoubt
-from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.prior.skeleton import mark_neck, size_body
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingMarks, SwingState
 from keyrecon.io.video import Video
 from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
@@ -102,7 +102,7 @@ def fit_observations(
     mirrored = observations
     if observations.left_handed:
         mirrored = mirror_observations(observations, video.width)
-    initial = initial_fit(mirrored, model, size_body(observations.stature))
+    initial = initial_fit(mirrored, model, mark_neck(size_body(observations.stature)))
     if previous is not None:
         learnt = replace(previous, deviation=None)
         fit = refit_swing(mirrored, initial, learnt, video.fps, options.fit)

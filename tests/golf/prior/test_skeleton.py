@@ -10,8 +10,10 @@ from keyrecon.golf.prior.motion_model import left_jacobian, posture_at
 from keyrecon.golf.prior.skeleton import (
     CLUB,
     LENGTHS,
+    NECK_MARK,
     REST,
     SEGMENTS,
+    mark_neck,
     size_body,
     turns_from_swing,
 )
@@ -137,3 +139,16 @@ def test_the_slope_by_normalised_time_is_continuous(model):
     rates = posture_at(model, times, np.zeros(2)).turn_rates[:, CLUB, :, -1]
     jumps = np.abs(np.diff(rates, axis=0)).max()
     assert jumps < 0.01 * np.abs(rates).max()
+
+
+def test_a_marked_neck_lies_above_the_shoulders_and_nothing_hangs_on_it(model, state):
+    posture = posture_at(model, state.phase, state.coefficients)
+    bodies = size_body(1.8), mark_neck(size_body(1.8))
+    plain, marked = (find_joints(body, place_body(body, posture, state)) for body in bodies)
+    neck = LSP14.index("neck")
+    moved = np.linalg.norm(marked - plain, axis=2)
+    assert moved[:, neck] == pytest.approx(NECK_MARK * 1.8)
+    assert not np.delete(moved, neck, axis=1).any()
+    hips = plain[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    spine = plain[:, neck] - hips
+    assert np.cross(spine, marked[:, neck] - plain[:, neck]) == pytest.approx(0, abs=1e-9)
