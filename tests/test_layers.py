@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections import defaultdict
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -28,14 +29,22 @@ BASE = {
 SHARED = BASE | {"segmentation", "io"}
 
 
+@cache
 def modules():
     """Every module's name and its parsed source."""
-    for path in sorted(PACKAGE.rglob("*.py")):
-        yield path.relative_to(PACKAGE).with_suffix("").parts, ast.parse(path.read_text())
+    return [
+        (path.relative_to(PACKAGE).with_suffix("").parts, ast.parse(path.read_text()))
+        for path in sorted(PACKAGE.rglob("*.py"))
+    ]
 
 
+@cache
 def imported(tree):
     """The package's modules that a module imports, as tuples of names."""
+    return frozenset(_imports(tree))
+
+
+def _imports(tree):
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "keyrecon":
             inside = tuple(node.module.split(".")[1:])
@@ -56,7 +65,7 @@ def test_stages_know_neither_one_another_nor_what_calls_them(stage):
         if name[0] == stage:
             found = {target[0] for target in imported(tree) if target}
             assert not banned & found, name
-            assert ("io", "workspace") not in set(imported(tree)), name
+            assert ("io", "workspace") not in imported(tree), name
 
 
 def test_the_base_layer_knows_only_itself():

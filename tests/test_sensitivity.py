@@ -80,6 +80,22 @@ def trees():
     return {file: ast.parse(text) for file, text in SOURCES.items()}
 
 
+@pytest.fixture(scope="module")
+def package():
+    """The parsed source of the package itself."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        import tuned_numbers
+
+        yield tuned_numbers.read_package()
+    sys.modules.pop("tuned_numbers", None)
+
+
+@pytest.fixture
+def package_numbers(numbers, package):
+    return numbers.find_numbers(package)
+
+
 def test_every_number_is_found_by_file_and_name(numbers, trees):
     found = {number.key: number.values for number in numbers.find_numbers(trees)}
     assert found == {
@@ -152,24 +168,24 @@ def test_prose_makes_no_other_version(numbers, trees):
     assert numbers.code_digest(code) != digest
 
 
-def test_the_package_itself_has_stages_and_numbers_for_all_of_them(numbers):
-    trees = numbers.read_package()
-    names = list(numbers.find_stages(trees))
+def test_the_package_itself_has_stages_and_numbers_for_all_of_them(
+    numbers, package, package_numbers
+):
+    names = list(numbers.find_stages(package))
     assert (names[0], names[-1]) == ("camera", "lift")
     recipes = "\n".join(file.read_text() for file in numbers.PACKAGE.glob("*.py"))
     assert set(names) == set(re.findall(r'keep\(\s*f?"(\w+)', recipes))
-    found = numbers.find_numbers(trees)
-    assert len({number.key for number in found}) == len(found) > 200
-    for number in found:
-        new = {place: 1.0 for place in number.places}
-        numbers.rewrite(ast.parse((numbers.PACKAGE / number.module).read_text()), new)
+    assert len({number.key for number in package_numbers}) == len(package_numbers) > 200
+    for module in {number.module for number in package_numbers}:
+        own = [number for number in package_numbers if number.module == module]
+        new = {place: 1.0 for number in own for place in number.places}
+        assert len(new) == sum(len(number.places) for number in own)
+        numbers.rewrite(ast.parse((numbers.PACKAGE / module).read_text()), new)
 
 
-def test_the_package_is_imported_with_the_other_number(numbers):
+def test_the_package_is_imported_with_the_other_number(package_numbers):
     number = next(
-        n
-        for n in numbers.find_numbers(numbers.read_package())
-        if n.name == n.symbol and isinstance(n.values[0], float)
+        n for n in package_numbers if n.name == n.symbol and isinstance(n.values[0], float)
     )
     module = "keyrecon." + number.module.removesuffix(".py").replace("/", ".")
     code = (
@@ -367,8 +383,10 @@ def test_mirrored_every_number_goes_the_other_way(screening):
     assert 5 < sum(group.ups) < 25
 
 
-def test_what_is_missing_to_the_whole_is_varied_of_a_share_of_nearly_all(numbers):
-    found = {n.key: n for n in numbers.find_numbers(numbers.read_package())}
+def test_what_is_missing_to_the_whole_is_varied_of_a_share_of_nearly_all(
+    numbers, package_numbers
+):
+    found = {n.key: n for n in package_numbers}
     for key, whole in numbers.ENDS.items():
         (value,) = found[key].values
         (more,), (less,) = (found[key].varied(factor) for factor in (0.75, 1.25))

@@ -1,3 +1,5 @@
+from bisect import bisect_left, bisect_right
+
 import numpy as np
 import pytest
 
@@ -22,12 +24,12 @@ def random_near(rng, n):
 def literal_eq2(represented):
     """Eq. 2 frame by frame, with represented frames just outside the sequence."""
     n = len(represented)
-    inside = [f for f in range(n) if represented[f]]
+    inside = [-1, *np.flatnonzero(represented).tolist(), n]
     total = 0
     for i in range(n):
-        before = [f for f in inside if f < i] + [-1]
-        after = [f for f in inside if f > i] + [n]
-        total += (i - max(before)) + (min(after) - i)
+        before = inside[bisect_left(inside, i) - 1]
+        after = inside[bisect_right(inside, i)]
+        total += (i - before) + (after - i)
     return total
 
 

@@ -35,9 +35,27 @@ def some_frames(clip):
     )
 
 
-def exact_parts(edges, track, half):
-    aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
-    return [[edge_distance(one, other) for other in aligned] for one in aligned]
+@pytest.fixture(scope="module")
+def exact_parts(some_frames):
+    """What every frame misses of every other, by half of the body: the slow twin."""
+    edges, track = some_frames
+    parts = {}
+    for half in ("upper", "lower"):
+        aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
+        parts[half] = [[edge_distance(one, other) for other in aligned] for one in aligned]
+    return parts
+
+
+@pytest.fixture(scope="module")
+def compared(clip):
+    """All frames of the clip compared with all."""
+    return compare_frames(*clip)
+
+
+@pytest.fixture(scope="module")
+def by_exemplars(clip):
+    """The clip compared as a long video is."""
+    return compare_frames(*clip, CompareOptions(most=75))
 
 
 def off_diagonal(matrix):
@@ -45,16 +63,16 @@ def off_diagonal(matrix):
 
 
 @pytest.mark.parametrize("half", ["upper", "lower"])
-def test_the_fast_matrix_agrees_with_its_exact_twin(some_frames, half):
-    exact = np.array([[d.pooled() for d in row] for row in exact_parts(*some_frames, half)])
+def test_the_fast_matrix_agrees_with_its_exact_twin(some_frames, exact_parts, half):
+    exact = np.array([[d.pooled() for d in row] for row in exact_parts[half]])
     exact = off_diagonal((exact + exact.T) / 2)
     fast = off_diagonal(measure_matrix(*some_frames, half))
     assert np.corrcoef(fast, exact)[0, 1] > 0.997
     assert np.abs(fast - exact).mean() < 0.05 * exact.mean()
 
 
-def test_max_b_can_be_the_largest_mean_distance_of_the_video(some_frames):
-    parts = exact_parts(*some_frames, "upper")
+def test_max_b_can_be_the_largest_mean_distance_of_the_video(some_frames, exact_parts):
+    parts = exact_parts["upper"]
     largest = max(
         d.mean for i, row in enumerate(parts) for j, d in enumerate(row) if i != j and d.matched
     )
@@ -65,8 +83,8 @@ def test_max_b_can_be_the_largest_mean_distance_of_the_video(some_frames):
     assert np.abs(fast - exact).mean() < 0.06 * exact.mean()
 
 
-def test_smaller_cells_come_closer_to_the_twin(some_frames):
-    exact = np.array([[d.pooled() for d in row] for row in exact_parts(*some_frames, "upper")])
+def test_smaller_cells_come_closer_to_the_twin(some_frames, exact_parts):
+    exact = np.array([[d.pooled() for d in row] for row in exact_parts["upper"]])
     exact = (exact + exact.T) / 2
     np.fill_diagonal(exact, 0)
     coarse, fine = (
@@ -76,15 +94,14 @@ def test_smaller_cells_come_closer_to_the_twin(some_frames):
     assert fine < coarse / 2
 
 
-def test_distances_are_symmetric_bounded_and_zero_to_themselves(clip):
-    comparison = compare_frames(*clip)
-    for matrix in (comparison.upper, comparison.lower):
+def test_distances_are_symmetric_bounded_and_zero_to_themselves(compared):
+    for matrix in (compared.upper, compared.lower):
         assert matrix.dtype == np.float32
         assert np.array_equal(matrix, matrix.T)
         assert (np.diag(matrix) == 0).all()
         assert matrix.min() >= 0
         assert matrix.max() <= np.float32(0.12)
-    assert np.array_equal(comparison.consecutive_distance[0], np.diag(comparison.upper, 1))
+    assert np.array_equal(compared.consecutive_distance[0], np.diag(compared.upper, 1))
 
 
 def test_a_frame_without_edges_is_as_far_as_can_be_from_all_others(some_frames):
@@ -115,9 +132,8 @@ def test_frames_of_no_confidence_are_not_clear(some_frames):
 
 
 def test_new_frames_are_compared_with_known_ones_as_all_are_with_all(clip):
-    edges, track = clip
-    full = measure_matrix(edges, track, "upper")
-    new = measure_matrix(edges, track, "upper", n_known=70)
+    full = measure_matrix(*clip, "upper")
+    new = measure_matrix(*clip, "upper", n_known=70)
     assert np.array_equal(new, full[70:])
 
 
@@ -161,29 +177,23 @@ def test_frames_that_show_nothing_are_no_exemplars():
     assert len(found.row) == 180
 
 
-def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(clip):
-    edges, track = clip
-    full = compare_frames(edges, track)
-    short = compare_frames(edges, track, CompareOptions(most=75))
-    assert len(short.frames) <= 75
-    spread = np.ix_(short.row, short.row)
+def test_a_long_video_is_compared_by_exemplars_as_it_would_be_in_full(compared, by_exemplars):
+    assert len(by_exemplars.frames) <= 75
+    spread = np.ix_(by_exemplars.row, by_exemplars.row)
     for half in ("upper", "lower"):
-        direct, by_exemplars = getattr(full, half), getattr(short, half)[spread]
-        assert np.corrcoef(direct.ravel(), by_exemplars.ravel())[0, 1] > 0.97
-    assert np.allclose(short.consecutive_distance, full.consecutive_distance, atol=2e-3)
+        direct, indirect = getattr(compared, half), getattr(by_exemplars, half)[spread]
+        assert np.corrcoef(direct.ravel(), indirect.ravel())[0, 1] > 0.97
+    steps = by_exemplars.consecutive_distance, compared.consecutive_distance
+    assert np.allclose(*steps, atol=2e-3)
 
 
-def test_parts_of_a_long_video_may_be_compared_elsewhere(clip, tmp_path):
+def test_parts_of_a_long_video_may_be_compared_elsewhere(clip, by_exemplars, tmp_path):
     def elsewhere(work, inputs):
         for arguments in inputs:
             save_record(tmp_path / "inputs.npz", arguments)
             yield work(*load_record(tmp_path / "inputs.npz"))
 
-    edges, track = clip
-    options = CompareOptions(most=75)
-    here, there = (
-        compare_frames(edges, track, options),
-        compare_frames(edges, track, options, spread=elsewhere),
-    )
-    for field in fields(here):
-        np.testing.assert_array_equal(getattr(here, field.name), getattr(there, field.name))
+    there = compare_frames(*clip, CompareOptions(most=75), spread=elsewhere)
+    for field in fields(there):
+        here = getattr(by_exemplars, field.name)
+        np.testing.assert_array_equal(here, getattr(there, field.name))

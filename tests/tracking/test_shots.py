@@ -1,5 +1,7 @@
 """Cuts are found to the frame, and nothing else is taken for one."""
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from keyrecon.tracking.shots import FLASH_FRAMES, CutDetector
 SIZE = 320, 180
 
 
+@cache
 def scene(seed):
     """A place, larger than the picture."""
     noise = np.random.default_rng(seed).integers(0, 255, (500, 900)).astype(np.float32)

@@ -50,12 +50,13 @@ def messages():
             continue
         for text in texts(ast.parse(path.read_text())):
             if " " in text.strip() and COMMAND_LINE.search(text):
-                yield pytest.param(text, id=f"{path.stem}: {text[:40]}")
+                yield path.stem, text
 
 
-@pytest.mark.parametrize("text", [*messages()])
-def test_no_message_names_a_command_or_an_option_to_somebody_on_the_page(text):
-    assert not COMMAND_LINE.search(in_page_words(text)), in_page_words(text)
+def test_no_message_names_a_command_or_an_option_to_somebody_on_the_page():
+    read = [(module, in_page_words(text)) for module, text in messages()]
+    assert len(read) > 50
+    assert [(module, text) for module, text in read if COMMAND_LINE.search(text)] == []
 
 
 @pytest.mark.parametrize(
