@@ -67,6 +67,7 @@ HELP, HELP_ALL = ("-h", "--help"), "--help-all"
 
 def main() -> None:
     """Run the command line."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # read with numpy, by a command: numerics.threads
     former = signal.signal(signal.SIGTERM, _stop)
     try:
         try:

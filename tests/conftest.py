@@ -1,11 +1,17 @@
 """Small videos with known frames, shared by the tests."""
 
+import os
 from fractions import Fraction
 
 import av
 import pytest
 import shape_checks
 from numbered_pictures import numbered_picture
+
+
+def pytest_configure():
+    """Workers of pytest-xdist have a core each: linear algebra on more would only wait for them."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 def pytest_collection_modifyitems(items):

@@ -310,6 +310,23 @@ def test_a_command_imports_only_what_it_needs(words, allowed):
     assert set(told.stdout.splitlines()[-1].split()) - {"loaded"} <= allowed
 
 
+def test_a_command_does_its_linear_algebra_on_one_thread():
+    """Threads of it wait for one another without rest, and sums are formed in another order."""
+    code = (
+        "import sys; sys.argv = ['keyrecon', 'relink', 'nowhere', 'v.mp4']\n"
+        "from keyrecon import cli\n"
+        "try:\n    cli.main()\nexcept SystemExit:\n"
+        "    import scipy.linalg, threadpoolctl\n"
+        "    libraries = threadpoolctl.threadpool_info()\n"
+        "    print({own['num_threads'] for own in libraries if own['user_api'] == 'blas'})"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert told.stdout.splitlines()[-1] == "{1}"
+
+
 def test_the_help_shows_every_command_by_the_first_line_of_its_docstring(keyrecon):
     _, out, _ = keyrecon("--help")
     shown = " ".join(re.sub(r"[│•]", " ", out).split())

@@ -71,11 +71,12 @@ TIMED = ("report.html", "project.toml", "annotator.json")
 def made_by(script: str, video: Path, folder: Path, cores: set[int]) -> dict[str, str]:
     """Digests of all files that a script makes in a folder, on some cores."""
     support = [path for path in sys.path if path]
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
     ran = subprocess.run(
         [sys.executable, "-c", script, str(video), str(folder)],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([*support, str(ASSIST)])},
+        env={**environment, "PYTHONPATH": os.pathsep.join([*support, str(ASSIST)])},
         preexec_fn=lambda: os.sched_setaffinity(0, cores),
     )
     assert ran.returncode == 0, ran.stderr

@@ -2,7 +2,8 @@
 
 Libraries of linear algebra split products among the cores there are, and a sum in another order has
 other last bits; fits that go on from them end up elsewhere. Work is spread over cores by frames and
-blocks instead (`io.frame_reader`, `TemplateFits.in_blocks`).
+blocks instead (`io.frame_reader`, `TemplateFits.in_blocks`). The command line does all its work so;
+in other programs every stage does.
 """
 
 from threadpoolctl import threadpool_limits
