@@ -28,7 +28,7 @@ from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
 
 SIZE = (480, 270)
-FRAMES = 120
+FRAMES = 90
 
 
 @pytest.fixture(scope="module")
@@ -254,11 +254,11 @@ def test_one_marked_body_serves_in_place_of_clicks(clip, tmp_path, capsys):
     assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
     assert keyrecon("keyframes", made) == 1
     assert "no picks yet, and no marked body" in capsys.readouterr().err
-    write_coco(tmp_path / "body.json", whole_body(truth, 30, 90), SIZE)
+    write_coco(tmp_path / "body.json", whole_body(truth, 25, 70), SIZE)
     assert keyrecon("import", made, tmp_path / "body.json") == 0
     assert keyrecon("keyframes", made, "--budget", "0.06") == 0
     asked = keyframes_from_json((made / "keyframes.json").read_text())
-    assert {30, 90} <= set(asked.upper.frames.tolist()) & set(asked.lower.frames.tolist())
+    assert {25, 70} <= set(asked.upper.frames.tolist()) & set(asked.lower.frames.tolist())
     marks = mark_from_truth(
         asked, truth["points2d"], truth["points3d"], truth["visible"], MarkOptions(noise=1.0)
     )

@@ -29,9 +29,9 @@ from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import SceneOptions, SynthOptions, synthesize
 
 SIZE, FPS = (480, 270), 30.0
-LENGTH, STARTS = 60, (20, 95)
+LENGTH, STARTS = 45, (20, 70)
 """Frames of each point, and where the points begin in what was rendered."""
-CLOSE_UP, BLACK, REPLAY = 24, 20, 30
+CLOSE_UP, BLACK, REPLAY = 20, 16, 30
 FIRST_OF_SECOND = LENGTH + CLOSE_UP + BLACK + REPLAY
 FRAMES = FIRST_OF_SECOND + LENGTH
 BUDGET = 0.1
