@@ -1,11 +1,13 @@
 """Small videos with known frames, shared by the tests."""
 
 import os
+import shutil
 from fractions import Fraction
 
 import av
 import pytest
 import shape_checks
+from filelock import FileLock
 from numbered_pictures import numbered_picture
 
 
@@ -42,6 +44,33 @@ def write_numbered(tmp_path_factory):
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """Make a folder once for all files of tests, whichever worker they run in; it is only read."""
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+    def once(name, make):
+        folder, whole = root / name, root / f"{name}.whole"
+        with FileLock(root / f"{name}.lock"):
+            if not whole.exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                make(folder)
+                whole.touch()
+        return folder
+
+    return once
+
+
+@pytest.fixture(scope="session")
+def fitted_swing(made_once):
+    """A folder with a film of a swing, its truth and clicks, and a quick fit of it in `project`."""
+    from small_swing import fit_small_swing
+
+    return made_once("fitted_swing", fit_small_swing)
 
 
 @pytest.fixture(scope="session")

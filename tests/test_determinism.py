@@ -4,18 +4,12 @@ import hashlib
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from drawn_player import film
 
-from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
-from keyrecon.io.formats.clicks import write_clicks
-from keyrecon.io.formats.model_file import read_motion_model
-from keyrecon.metrics import read_truth
-from keyrecon.synthetic.golf import SwingFilm, film_swing
 from keyrecon.tracking.radial_symmetry import gradient_field
 
 ASSIST = Path(__file__).parent / "annotate" / "assist"
@@ -57,12 +51,10 @@ SWING = """
 import sys
 from pathlib import Path
 from keyrecon.app.golf import fit_file
-from keyrecon.golf.fit.fitting import FitOptions
-from keyrecon.golf.swing_fit import GolfOptions
+from small_swing import QUICK
 
-options = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 video, folder = Path(sys.argv[1]), Path(sys.argv[2])
-fit_file(video, video.with_name("clicks.json"), folder, options=options)
+fit_file(video, video.with_name("clicks.json"), folder, options=QUICK)
 """
 TIMED = ("report.html", "project.toml", "annotator.json")
 """Files that tell how long something took, or where the video lies from there."""
@@ -80,6 +72,11 @@ def made_by(script: str, video: Path, folder: Path, cores: set[int]) -> dict[str
         preexec_fn=lambda: os.sched_setaffinity(0, cores),
     )
     assert ran.returncode == 0, ran.stderr
+    return digests(folder)
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Of all files in a folder, by name."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.name not in TIMED)
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
@@ -87,32 +84,34 @@ def made_by(script: str, video: Path, folder: Path, cores: set[int]) -> dict[str
     }
 
 
-@pytest.fixture(scope="module")
-def videos(tmp_path_factory):
-    """A drawn player before a panning camera, and a rendered swing with its clicks."""
-    folder = tmp_path_factory.mktemp("videos")
-    film(folder / "rally.mp4", 24, True)
-    swing = SwingFilm(fps=24.0, before=0.3, after=0.2)
-    camera = replace(swing.scene.camera, width=400, height=300, player_px=190.0)
-    swing = replace(swing, scene=replace(swing.scene, camera=camera, workers=1))
-    film_swing(draw_swing(read_motion_model(), SEED), swing, folder)
-    write_clicks(folder / "clicks.json", click_first_frame(read_truth(folder / "truth.npz")))
-    return folder
+def differing(one: dict[str, str], other: dict[str, str]) -> set[str]:
+    """Files that are not the same, or not there."""
+    return {file for file in one.keys() | other.keys() if one.get(file) != other.get(file)}
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
-@pytest.mark.parametrize(("script", "video"), [(RALLY, "rally.mp4"), (SWING, "video.mp4")])
-def test_one_core_and_all_cores_make_the_same_files_and_so_does_a_second_time(
-    videos, tmp_path, script, video
-):
+several_cores = pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here"
+)
+
+
+@several_cores
+def test_one_core_and_all_cores_make_the_same_files_and_so_does_a_second_time(tmp_path):
+    film(tmp_path / "rally.mp4", 24, True)
     cores = os.sched_getaffinity(0)
-    one = made_by(script, videos / video, tmp_path / "one", {min(cores)})
+    one = made_by(RALLY, tmp_path / "rally.mp4", tmp_path / "one", {min(cores)})
     assert len(one) > 5
     for name in ("all", "again"):
-        other = made_by(script, videos / video, tmp_path / name, cores)
-        assert {file for file in one.keys() | other.keys() if one.get(file) != other.get(file)} == (
-            set()
-        )
+        other = made_by(RALLY, tmp_path / "rally.mp4", tmp_path / name, cores)
+        assert differing(one, other) == set()
+
+
+@several_cores
+def test_so_they_do_of_a_swing_and_so_does_another_program(fitted_swing, tmp_path):
+    here, cores = digests(fitted_swing / "project"), os.sched_getaffinity(0)
+    assert len(here) > 5
+    for name, some in (("one", {min(cores)}), ("all", cores)):
+        other = made_by(SWING, fitted_swing / "video.mp4", tmp_path / name, some)
+        assert differing(here, other) == set()
 
 
 def test_gradients_do_not_depend_on_where_their_picture_lies_in_memory():

@@ -383,9 +383,7 @@ def test_mirrored_every_number_goes_the_other_way(screening):
     assert 5 < sum(group.ups) < 25
 
 
-def test_what_is_missing_to_the_whole_is_varied_of_a_share_of_nearly_all(
-    numbers, package_numbers
-):
+def test_what_is_missing_to_the_whole_is_varied_of_a_share_of_nearly_all(numbers, package_numbers):
     found = {n.key: n for n in package_numbers}
     for key, whole in numbers.ENDS.items():
         (value,) = found[key].values

@@ -1,31 +1,31 @@
 """A golf fit in its project folder: kept, resumed, exported, and read from the video once."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from small_swing import QUICK, count_decoded, fit
 
 from keyrecon.app import golf as app
 from keyrecon.app.exporting import export
 from keyrecon.app.golf import fit_file, fit_video
 from keyrecon.app.golf_comparing import compare
-from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
 from keyrecon.app.project import start
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
-from keyrecon.io.formats.clicks import read_clicks, write_clicks
+from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.golf_marks import write_golf_marks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
 from keyrecon.io.held_video import mirror_video
 from keyrecon.io.stages import StageStore
-from keyrecon.io.video import Video, open_video
+from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.lifting.lifting import LiftOptions
@@ -33,67 +33,39 @@ from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.records import SOURCES
-from keyrecon.synthetic.golf import SwingFilm, film_swing
-
-QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 
 
 @pytest.fixture(scope="module")
-def swing(tmp_path_factory):
-    """A small film of a swing, its clicks, and a finished fit."""
-    folder = tmp_path_factory.mktemp("golf")
-    film = SwingFilm(fps=24.0, before=0.3, after=0.2)
-    camera = replace(film.scene.camera, width=400, height=300, player_px=190.0)
-    film = replace(film, scene=replace(film.scene, camera=camera, workers=1))
-    film_swing(draw_swing(read_motion_model(), SEED), film, folder)
-    clicks = click_first_frame(read_truth(folder / "truth.npz"))
-    joints = {name: (round(4 * x) / 4, round(4 * y) / 4) for name, (x, y) in clicks.joints.items()}
-    write_clicks(folder / "clicks.json", replace(clicks, joints=joints))
-    return folder
-
-
-def fit(swing, out, **more):
-    options = more.pop("options", QUICK)
-    return fit_file(swing / "video.mp4", swing / "clicks.json", out, options=options, **more)
+def swing(tmp_path_factory, fitted_swing):
+    """A small film of a swing, its clicks, and in `project` a finished fit that may be changed."""
+    return shutil.copytree(fitted_swing, tmp_path_factory.mktemp("golf") / "swing")
 
 
 @pytest.fixture(scope="module")
-def decoded_at_first(swing):
-    """A finished fit in PROJECT, and how many frames it decoded."""
-    counts, original = [], Video._decoded
-
-    def spy(self, start, stop):
-        for frame in original(self, start, stop):
-            counts.append(1)
-            yield frame
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Video, "_decoded", spy)
-        text = fit(swing, swing / "project")
-        first = len(counts)
-        assert fit(swing, swing / "project").split("\n")[0] == text.split("\n")[0]
-        again = len(counts) - first
-    return text, first, again
+def first_fit(swing):
+    """What the fit in `project` told, and how many frames it decoded."""
+    told = json.loads((swing / "told.json").read_text())
+    return told["said"], told["decoded"]
 
 
-def test_a_fit_decodes_its_video_at_most_twice(swing, decoded_at_first):
+def test_a_fit_decodes_its_video_at_most_twice(swing, first_fit):
     frames = len(open_video(swing / "video.mp4"))
-    assert frames <= decoded_at_first[1] <= 2 * frames
+    assert frames <= first_fit[1] <= 2 * frames
 
 
-def test_a_fit_that_is_repeated_decodes_nothing(decoded_at_first):
-    assert decoded_at_first[2] == 0
+def test_a_fit_that_is_repeated_tells_the_same_and_decodes_nothing(swing, first_fit):
+    with count_decoded() as decoded:
+        assert fit(swing, swing / "project").split("\n")[0] == first_fit[0].split("\n")[0]
+    assert len(decoded) == 0
 
 
-def test_a_fit_tells_the_frames_of_the_key_postures(swing, decoded_at_first):
-    assert decoded_at_first[0].startswith("Upswing from frame ")
-    keys = np.array(
-        [float(part.split(" ")[-1]) for part in decoded_at_first[0].split(";")[0].split(",")]
-    )
+def test_a_fit_tells_the_frames_of_the_key_postures(swing, first_fit):
+    assert first_fit[0].startswith("Upswing from frame ")
+    keys = np.array([float(part.split(" ")[-1]) for part in first_fit[0].split(";")[0].split(",")])
     assert np.abs(keys - read_truth(swing / "truth.npz")["keys"]).max() < 8
 
 
-def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
+def test_a_fit_lives_in_a_project_like_any_other(swing):
     folder = swing / "project"
     names = {file.name for file in folder.iterdir()}
     assert names >= {
@@ -106,7 +78,7 @@ def test_a_fit_lives_in_a_project_like_any_other(swing, decoded_at_first):
     assert len((folder / "swing.csv").read_text().splitlines()) > len(workspace.video())
 
 
-def test_motion_npz_tells_club_and_key_postures(swing, decoded_at_first):
+def test_motion_npz_tells_club_and_key_postures(swing):
     kept = read_swing(swing / "project" / "motion.npz")
     assert np.abs(kept.keys - read_truth(swing / "truth.npz")["keys"]).max() < 8
     length = np.linalg.norm(kept.club[:, 1] - kept.club[:, 0], axis=1)
@@ -114,7 +86,7 @@ def test_motion_npz_tells_club_and_key_postures(swing, decoded_at_first):
     assert not kept.left_handed
 
 
-def test_two_fits_stand_side_by_side_on_a_page(swing, decoded_at_first, tmp_path, chromium):
+def test_two_fits_stand_side_by_side_on_a_page(swing, tmp_path, chromium):
     """The page shows both swings in the same posture, and its script has nothing to complain of."""
     project = swing / "project"
     page, complaints = chromium.new_page(), []
@@ -132,9 +104,7 @@ def test_two_fits_stand_side_by_side_on_a_page(swing, decoded_at_first, tmp_path
     assert complaints == []
 
 
-def test_a_mirrored_film_of_a_left_hander_gives_the_mirrored_swing_to_the_digit(
-    swing, decoded_at_first, tmp_path
-):
+def test_a_mirrored_film_of_a_left_hander_gives_the_mirrored_swing_to_the_digit(swing, tmp_path):
     """Its stages are those of the film as it was: all are found, none is run."""
     store = StageStore(shutil.copytree(swing / "project" / "cache", tmp_path / "cache"))
     clicks = read_clicks(swing / "clicks.json")
@@ -157,13 +127,13 @@ def test_a_mirrored_film_of_a_left_hander_gives_the_mirrored_swing_to_the_digit(
     assert ours.observations.left_handed
 
 
-def test_a_page_never_takes_the_place_of_a_report(swing, decoded_at_first):
+def test_a_page_never_takes_the_place_of_a_report(swing):
     project = swing / "project"
     with pytest.raises(KeyreconError, match="belongs to the project"):
         compare(project, project, project / "report.html", silent)
 
 
-def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tmp_path):
+def test_an_interrupted_fit_goes_on_where_it_stopped(swing, tmp_path):
     project = shutil.copytree(swing / "project", tmp_path / "p")
     (result,) = (project / "cache").glob("result_1-*.npz")
     result.unlink()
@@ -177,7 +147,7 @@ def test_an_interrupted_fit_goes_on_where_it_stopped(swing, decoded_at_first, tm
     assert np.array_equal(ours.points3d, theirs.points3d)
 
 
-def test_a_project_of_another_video_is_left_alone(swing, decoded_at_first, tmp_path):
+def test_a_project_of_another_video_is_left_alone(swing, tmp_path):
     other = tmp_path / "other.mp4"
     size = open_video(swing / "video.mp4")
     picture = np.zeros((size.height, size.width, 3), np.uint8)
@@ -186,9 +156,7 @@ def test_a_project_of_another_video_is_left_alone(swing, decoded_at_first, tmp_p
         fit_file(other, swing / "clicks.json", swing / "project", options=QUICK)
 
 
-def test_a_project_with_keyframes_takes_a_fit_too_and_keeps_the_options_of_both(
-    swing, decoded_at_first, tmp_path
-):
+def test_a_project_with_keyframes_takes_a_fit_too_and_keeps_the_options_of_both(swing, tmp_path):
     video = open_video(swing / "video.mp4")
     workspace = Workspace.create(tmp_path / "p", video, Path(swing / "video.mp4"), {})
     assert not workspace.is_golf
@@ -238,9 +206,9 @@ def test_without_clicks_a_project_is_made_and_it_says_where_to_click(swing, tmp_
     assert Workspace(tmp_path / "p").is_golf
 
 
-def test_a_fit_without_a_file_takes_the_clicks_of_its_project(swing, decoded_at_first):
+def test_a_fit_without_a_file_takes_the_clicks_of_its_project(swing, first_fit):
     told = fit_file(swing / "video.mp4", None, swing / "project", options=QUICK)
-    assert told.split("\n")[0] == decoded_at_first[0].split("\n")[0]
+    assert told.split("\n")[0] == first_fit[0].split("\n")[0]
 
 
 def test_a_new_golf_project_tells_of_its_page(swing, tmp_path):
@@ -251,7 +219,7 @@ def test_a_new_golf_project_tells_of_its_page(swing, tmp_path):
         start(swing / "video.mp4", tmp_path / "q", skeleton=tmp_path / "s.json", golf=True)
 
 
-def test_what_a_person_marked_holds(swing, decoded_at_first, tmp_path):
+def test_what_a_person_marked_holds(swing, tmp_path):
     """Joints to 5 px though they are marked 17 px off, instants exactly, others in order."""
     project = shutil.copytree(swing / "project", tmp_path / "p")
     video, truth = open_video(swing / "video.mp4"), read_truth(swing / "truth.npz")
@@ -276,14 +244,14 @@ def test_what_a_person_marked_holds(swing, decoded_at_first, tmp_path):
     assert way @ theirs > np.cos(np.radians(8)) * np.linalg.norm(way) * np.linalg.norm(theirs)
 
 
-def test_marks_of_another_video_are_refused(swing, decoded_at_first, tmp_path):
+def test_marks_of_another_video_are_refused(swing, tmp_path):
     project = shutil.copytree(swing / "project", tmp_path / "p")
     write_golf_marks(Workspace(project).golf_marks_file, NO_MARKS, (64, 48))
     with pytest.raises(KeyreconError, match="marks were made on pictures of 64 x 48"):
         fit(swing, project)
 
 
-def test_another_slow_motion_needs_another_folder(swing, decoded_at_first):
+def test_another_slow_motion_needs_another_folder(swing):
     with pytest.raises(KeyreconError, match="was made with --slowmo 1"):
         fit(swing, swing / "project", slow_motion=1.5)
 

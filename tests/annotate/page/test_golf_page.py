@@ -1,42 +1,32 @@
 """A golf swing on the page alone, from the first click to the exported file."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from golfer import Golfer
 from page_driver import BROWSER, serving
+from small_swing import QUICK
 
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.app.annotator import job_commands
-from keyrecon.app.golf_demo import SEED, click_first_frame, draw_swing
+from keyrecon.app.golf_demo import click_first_frame
 from keyrecon.app.project import start
 from keyrecon.body import LSP14
-from keyrecon.golf.fit.fitting import FitOptions
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.clicks import read_clicks
-from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.swing_file import read_swing
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.metrics import read_truth
-from keyrecon.synthetic.golf import SwingFilm, film_swing
 
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
-QUICK = GolfOptions(fit=FitOptions(components=4, steps=3), guided_rounds=1, candidates=1)
 ORDER = ("head_top", "root", "right_knee", "left_knee", "right_ankle", "left_ankle")
 
 
 @pytest.fixture(scope="module")
-def film(tmp_path_factory):
+def film(fitted_swing):
     """A small film of a swing, and its truth."""
-    folder = tmp_path_factory.mktemp("film")
-    film = SwingFilm(fps=24.0, before=0.3, after=0.2)
-    camera = replace(film.scene.camera, width=400, height=300, player_px=190.0)
-    film = replace(film, scene=replace(film.scene, camera=camera, workers=1))
-    film_swing(draw_swing(read_motion_model(), SEED), film, folder)
-    return folder / "video.mp4", read_truth(folder / "truth.npz")
+    return fitted_swing / "video.mp4", read_truth(fitted_swing / "truth.npz")
 
 
 @pytest.fixture
