@@ -9,28 +9,39 @@ import hashlib
 import sys
 from pathlib import Path
 
-from sequences import Sequence, mocap_files
+from sequences import TENNIS, Sequence, mocap_files
 
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import learn_from_files
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
-from keyrecon.lifting.priors.depth_model import DepthModel, DepthTrainingOptions
+from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions
+from keyrecon.lifting.priors.depth_model import DepthModel
 
 
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:
-    """A model learnt without the players of a sequence, and its file in the work folder."""
-    players = {player(file) for file in mocap_files(sequence, mocap)}
-    folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
-    others = [file for file in find_captures(folders) if player(file) not in players]
+    """A model learnt without the players of a sequence, and its file in the work folder.
+
+    One model serves all sequences of the first table, and has seen none of their players.
+    """
+    table = TENNIS if sequence in TENNIS else (sequence,)
+    players = {player(file) for member in table for file in mocap_files(member, mocap)}
+    _, others = captures_without(players, mocap)
     made_of = repr((DepthTrainingOptions(), [file.name for file in others]))
     tag = hashlib.sha256(made_of.encode()).hexdigest()[:8]
     path = work / f"depths-without-{'-'.join(sorted(players))}-{tag}.npz"
     if not path.is_file():
-        readable_ones = [file for file in others if readable(file)]
-        write_depth_model(path, learn_from_files(readable_ones, progress=show))
+        write_depth_model(path, learn_from_files(others, progress=show))
     return path, read_depth_model(path)
+
+
+def captures_without(players: set[str], mocap: Path) -> tuple[list[Path], list[Path]]:
+    """Readable captures of these players, and all others."""
+    folders = sorted(folder for folder in mocap.iterdir() if folder.is_dir())
+    files = [file for file in find_captures(folders) if readable(file)]
+    theirs = [file for file in files if player(file) in players]
+    return theirs, [file for file in files if file not in theirs]
 
 
 def readable(file: Path) -> bool:

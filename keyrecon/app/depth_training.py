@@ -10,7 +10,8 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import write_depth_model
 from keyrecon.io.option_tables import check_options
-from keyrecon.lifting.priors.depth_model import DepthModel, DepthTrainingOptions, train_depth_model
+from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions, train_depth_model
+from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
@@ -46,7 +47,7 @@ def learn_from_files(
     captures += [play_tennis(MotionOptions(fps=RATE, seed=seed)) for seed in range(PLAYED)]
     names = ", ".join(file.stem for file in files)
     provenance = f"learnt from {len(files)} captures ({names}) and the built-in tennis"
-    return train_depth_model(captures, provenance, options, progress)
+    return train_depth_model(captures, RATE, provenance, options, progress)
 
 
 def read_poses(file: Path) -> Float[np.ndarray, "_ 14 3"]:

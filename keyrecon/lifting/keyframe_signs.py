@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSignOptions, DepthSigns, at_rate
 from keyrecon.lifting.depth_signs import track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks, smooth_joints
-from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
 from keyrecon.records import Shots
@@ -44,7 +45,14 @@ def infer_keyframe_signs(
     joints = _smoothed_joints(observed, marks, shots, fps)
     noise = np.full(joints.shape[:2], _SMOOTHED_NOISE)
     noise[frames] = np.where(marks.marked, observed.spread[frames], _SMOOTHED_NOISE)
-    bones = foreshorten_bones(joints, noise, size.lengths, skeleton, model)
+    bones = foreshorten_bones(joints, noise, size.lengths, skeleton)
+    expected = shots.in_each(
+        lambda part: expected_depth(
+            model, bone_vectors(part, skeleton), size.lengths, skeleton, fps
+        ),
+        joints,
+    )
+    bones = replace(bones, expected_depth=expected)
     vectors = np.concatenate([bones.in_plane, bones.depth[..., None]], axis=-1)[frames]
     vectors[..., 2] *= -nearer
     hidden = np.zeros(observed.joints.shape[:2], dtype=bool)

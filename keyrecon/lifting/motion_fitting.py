@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSignOptions, at_rate
 from keyrecon.lifting.depth_signs import track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks, smooth_joints
-from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.refinement import RefineOptions, refine_motion
 from keyrecon.lifting.solver import MotionState
@@ -118,7 +119,11 @@ def _fit_window(
     initial_depth = lengths * initial.directions[..., 2]
     for _ in range(2):
         blur = np.full(joints.shape[:2], noise)
-        bones = foreshorten_bones(joints, blur, lengths, skeleton, player.depth_model)
+        vectors = bone_vectors(joints, skeleton)
+        bones = replace(
+            foreshorten_bones(joints, blur, lengths, skeleton),
+            expected_depth=expected_depth(player.depth_model, vectors, lengths, skeleton, fps),
+        )
         exemplars = ExemplarPrior(
             lengths[:, None] * directions, keys.frames, keys.confidence, initial_depth, skeleton
         )

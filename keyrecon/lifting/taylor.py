@@ -16,7 +16,6 @@ from keyrecon.lifting.depth_evidence import DepthSigns, ForeshortenedBones
 from keyrecon.lifting.foreshortening import depth_share, depth_share_spread
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks
-from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.numerics.geometry import unit_vectors
 
 _INFERRED_CONFIDENCE = 0.3
@@ -65,12 +64,11 @@ def foreshorten_bones(
     noise: Float[np.ndarray, "T J"],
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
-    model: DepthModel | None = None,
 ) -> ForeshortenedBones:
     """Everything about bones but the sign of their depth; joints and noise in units of length.
 
     A bone with a missing end may lie in any direction: the picture says nothing of it, and it is
-    as deep as such bones are on average. `model` gives the expected depths.
+    as deep as such bones are on average. Nothing is expected of depths.
     """
     vectors = bone_vectors(joints, skeleton)
     missing = np.isnan(vectors[..., 0])
@@ -85,7 +83,7 @@ def foreshorten_bones(
         in_plane=lengths[:, None] * in_plane,
         depth=lengths * share,
         depth_spread=lengths * depth_share_spread(foreshortening, blur),
-        expected_depth=expected_depth(model, vectors, lengths, skeleton),
+        expected_depth=np.full(share.shape, np.nan),
     )
 
 

@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.prior.skeleton import SEGMENTS
 from keyrecon.golf.prior.training import SWING_PRIOR_VERSION
 from keyrecon.golf.records import MotionModel
 from keyrecon.io.durable import make_folder, replacing
-from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, TERMS, DepthModel
+from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, DepthModel
 from keyrecon.reading import check_numbers, read_arrays, reading
 
 TURN_ERROR = 1e-4
@@ -68,19 +67,24 @@ BUILT_IN_DEPTH_MODEL = PACKAGE / "lifting" / "priors" / "depths.npz"
 _DEPTH_MODEL = ModelKind("depth model", "keyrecon depths", DEPTH_MODEL_VERSION)
 
 
+_LAYERS = tuple(f"{kind}{layer}" for kind in ("weights", "biases") for layer in range(4))
+"""Names of the arrays in the file; three layers of rectified units and the depths."""
+
+
 def write_depth_model(path: Path, model: DepthModel) -> None:
     """Write a model; the folder is made if need be."""
-    arrays = {"coefficients": model.coefficients}
-    write_model(path, model.version, model.provenance, arrays)
+    layers = [*model.weights, *model.biases]
+    write_model(path, model.version, model.provenance, dict(zip(_LAYERS, layers, strict=True)))
 
 
 def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
-    provenance, arrays = read_model(path, _DEPTH_MODEL, ("coefficients",))
-    with reading(path, f"a {_DEPTH_MODEL.name}", f"make one with: {_DEPTH_MODEL.command}"):
-        if arrays["coefficients"].shape != (TERMS, len(LSP14.bones)):
-            raise ValueError(f"its coefficients are not {TERMS} x {len(LSP14.bones)}")
-        return DepthModel(arrays["coefficients"], provenance)
+    provenance, arrays = read_model(path, _DEPTH_MODEL, _LAYERS)
+    layers = tuple(arrays[name] for name in _LAYERS)
+    try:
+        return DepthModel(layers[:4], layers[4:], provenance)
+    except KeyreconError as fault:
+        raise KeyreconError(f"{path} is not a depth model: {fault}") from fault
 
 
 BUILT_IN_SWING_PRIOR = PACKAGE / "golf" / "prior" / "prior.npz"

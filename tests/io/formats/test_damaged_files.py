@@ -247,7 +247,7 @@ def test_one_array_alone_and_a_header_of_eight_gigabytes_are_refused(arrays, tmp
         ("motion", "joint_names", 3.0),
         ("motion", "joint_names", "neck"),
         ("motion", "mirrored", 99),
-        ("depths", "coefficients", np.nan),
+        ("depths", "weights1", np.nan),
         ("prior", "mean", np.inf),
         ("prior", "centre", 0.0),
         ("prior", "keys", 0.5),
@@ -261,7 +261,7 @@ def test_values_that_nothing_has_are_refused(arrays, tmp_path, name, array, valu
     refused(ARRAYS[name], tmp_path / "a.npz")
 
 
-@pytest.mark.parametrize(("name", "array"), [("depths", "coefficients"), ("prior", "components")])
+@pytest.mark.parametrize(("name", "array"), [("depths", "weights1"), ("prior", "components")])
 def test_models_of_another_shape_are_refused(arrays, tmp_path, name, array):
     with np.load(arrays / f"{name}.npz") as stored:
         content = dict(stored)
