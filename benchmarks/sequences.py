@@ -90,16 +90,17 @@ def mocap_files(sequence: Sequence, folder: Path = DATA / "mocap") -> list[Path]
     return found
 
 
+def options_of(sequence: Sequence) -> SynthOptions:
+    """What a sequence is rendered with."""
+    size = sequence.width, round(sequence.width * 9 / 16)
+    camera = CameraPlanOptions(View(sequence.camera), sequence.pan, *size, float(sequence.player))
+    clips = JoinOptions(sequence.seconds, sequence.fps)
+    return SynthOptions(SceneOptions(sequence.seed, camera), clips)
+
+
 def render(sequence: Sequence, work: Path, mocap: Path) -> Path:
     """The folder of the rendered sequence; rendered if it is not there."""
     folder = work / sequence.name
     if not (folder / "truth.npz").is_file():
-        size = sequence.width, round(sequence.width * 9 / 16)
-        camera = CameraPlanOptions(
-            View(sequence.camera), sequence.pan, *size, float(sequence.player)
-        )
-        options = SynthOptions(
-            SceneOptions(sequence.seed, camera), JoinOptions(sequence.seconds, sequence.fps)
-        )
-        synthesize(folder, mocap_files(sequence, mocap), options, show)
+        synthesize(folder, mocap_files(sequence, mocap), options_of(sequence), show)
     return folder

@@ -9,7 +9,7 @@ import hashlib
 import sys
 from pathlib import Path
 
-from sequences import TENNIS, Sequence, mocap_files
+from sequences import OTHER, TENNIS, Sequence, mocap_files
 
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import learn_from_files
@@ -23,9 +23,10 @@ from keyrecon.lifting.priors.depth_model import DepthModel
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:
     """A model learnt without the players of a sequence, and its file in the work folder.
 
-    One model serves all sequences of the first table, and has seen none of their players.
+    One model serves all sequences of the first table, and has seen none of their players; so it is
+    with motion that is no tennis.
     """
-    table = TENNIS if sequence in TENNIS else (sequence,)
+    table = next((t for t in (TENNIS, OTHER) if sequence in t), (sequence,))
     players = {player(file) for member in table for file in mocap_files(member, mocap)}
     _, others = captures_without(players, mocap)
     made_of = repr((DepthTrainingOptions(), [file.name for file in others]))
