@@ -28,6 +28,8 @@ OFFSETS = (-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4)
 """Moments that the rule is shown, seconds from the frame."""
 _BONES = len(LSP14.bones)
 INPUTS = 3 * _BONES * len(OFFSETS)
+_AT_ONCE = 10_000
+"""Frames whose windows are held at a time: 22 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,10 @@ class DepthModel:
         Frames of one shot, `fps` of them a second; beyond its ends it is held still.
         """
         steps = np.round(np.array(OFFSETS) * fps).astype(int)
-        near = np.clip(np.arange(len(flat))[:, None] + steps, 0, max(len(flat) - 1, 0))
-        return self.propagate(frame_inputs(flat)[near].reshape(len(flat), INPUTS))
+        inputs = frame_inputs(flat)
+        parts = np.array_split(np.arange(len(flat)), max(len(flat) // _AT_ONCE, 1))
+        near = [np.clip(part[:, None] + steps, 0, max(len(flat) - 1, 0)) for part in parts]
+        return np.concatenate([self.propagate(inputs[rows].reshape(-1, INPUTS)) for rows in near])
 
     def propagate(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n 13"]:
         """Depth shares from what the rule is shown, the inputs of all moments."""

@@ -78,8 +78,8 @@ def test_what_a_model_learns_from_are_unit_bones_and_what_the_picture_leaves_of_
     np.testing.assert_allclose(left, np.abs(depth), atol=2e-3)
 
 
-def test_motion_around_a_frame_tells_more_than_the_frame(model):
-    points = filmed(seed=5, yaw=110.0)
+def test_motion_around_a_frame_tells_more_than_the_frame():
+    model, points = read_depth_model(), filmed(seed=45, yaw=110.0)
     vectors = bone_vectors(points, LSP14)
     lengths = np.linalg.norm(vectors, axis=-1).mean(axis=0)
     moving = expected_depth(model, vectors[..., :2], lengths, LSP14, FPS)
@@ -87,7 +87,7 @@ def test_motion_around_a_frame_tells_more_than_the_frame(model):
         [expected_depth(model, frame[None], lengths, LSP14, FPS) for frame in vectors[..., :2]]
     )
     off = [np.sqrt(((told - vectors[..., 2]) ** 2).mean()) for told in (moving, held)]
-    assert off[0] < 0.95 * off[1]
+    assert off[0] < 0.8 * off[1]
 
 
 def test_joints_besides_change_nothing_and_have_no_usual_depth(model):
