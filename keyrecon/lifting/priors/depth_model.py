@@ -122,13 +122,13 @@ def depth_spread(skeleton: Skeleton) -> Float[np.ndarray, "B"]:
 _SPREAD = {
     "hip": 0.10,
     "shoulder": 0.12,
-    "top": 0.13,
-    "knee": 0.17,
+    "top": 0.12,
+    "knee": 0.16,
     "ankle": 0.16,
-    "elbow": 0.18,
+    "elbow": 0.16,
     "wrist": 0.18,
 }
-"""By the far end of the bone: for instance 0.17 for a thigh, whose end is the knee."""
+"""By the far end of the bone: for instance 0.16 for a thigh, whose end is the knee."""
 
 
 def _places(skeleton: Skeleton) -> list[int] | None:
