@@ -11,13 +11,14 @@ bone out of the plane by 25 degrees.
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import block_diag
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
@@ -27,8 +28,19 @@ from keyrecon.records import Annotations, JointTracks, Shots
 
 logger = logging.getLogger(__name__)
 
+_Cost = Callable[[Float[np.ndarray, "n"]], tuple[float, Float[np.ndarray, "n"]]]
+"""Value and slope of what is minimised."""
+
 _MIN_CONFIDENCE = 0.05
 """Confidence below which a joint's noise grows no more."""
+_JUMPS = (0.6, 0.7, 0.8, 0.87, 1.15, 1.25, 1.4, 1.6)
+"""Other lengths of a bone that are tried, as shares: from the shortest of adults to the longest."""
+_ESCAPES, _LEAST_GAIN, _SEARCHED = 4, 0.5, 1200
+"""How often the search goes on from another place, by how much the cost falls then, nats, and from
+how many observations at most valleys are told apart.
+
+On volleys that hide the upper arms (one drawing of eight sequences) the first valley had them 1.42
+times too long, 205 nats above the lowest: PA-MPJPE 66 mm instead of 40."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +99,11 @@ class _ObservedLengths:
     """px"""
     group: Int[np.ndarray, "n"]
     frame: Int[np.ndarray, "n"]
+
+    def part(self, rows: slice) -> "_ObservedLengths":
+        """Some of the observations."""
+        values = (self.log_length, self.noise, self.group, self.frame)
+        return _ObservedLengths(*(value[rows] for value in values))
 
 
 def estimate_lengths(
@@ -230,32 +247,36 @@ def _fit(
     scale_drift: _ScaleDrift,
     options: LengthOptions,
 ) -> _LengthFit:
-    """Maximise the posterior by L-BFGS-B."""
-    groups = len(log_table)
-    blend = scale_drift.blend
-    at_observation = blend[observations.frame]
+    """Maximise the posterior by L-BFGS-B: the valley by some of the observations, then by all."""
+    groups, blend = len(log_table), scale_drift.blend
     factor = _initial_factor(observations, log_table, log_height)
     start = np.concatenate([log_table, [factor], np.zeros(blend.shape[1])])
     prior = _prior(ties, scale_drift.steps, options)
     expected = prior[:, :groups] @ log_table
 
-    def cost(x: Float[np.ndarray, "n"]) -> tuple[float, Float[np.ndarray, "n"]]:
-        lengths, factor, drift = x[:groups], x[groups], x[groups + 1 :]
-        log_full = (
-            log_height[observations.frame]
-            + factor
-            + at_observation @ drift
-            + lengths[observations.group]
-        )
-        foreshortening = np.exp(observations.log_length - log_full)
-        noise = observations.noise / np.exp(log_full)
-        value, pull = _log_likelihood(observations.group, foreshortening, noise, groups)
-        off = prior @ x - expected
-        by_group = np.bincount(observations.group, pull, groups)
-        slope = np.concatenate([by_group, [pull.sum()], at_observation.T @ pull])
-        return float(-value + 0.5 * off @ off), slope + prior.T @ off
+    def posterior(seen: _ObservedLengths) -> _Cost:
+        at_observation = blend[seen.frame]
 
-    optimum = minimize(cost, start, jac=True, method="L-BFGS-B")
+        def cost(x: Float[np.ndarray, "n"]) -> tuple[float, Float[np.ndarray, "n"]]:
+            lengths, factor, drift = x[:groups], x[groups], x[groups + 1 :]
+            log_full = (
+                log_height[seen.frame] + factor + at_observation @ drift + lengths[seen.group]
+            )
+            foreshortening = np.exp(seen.log_length - log_full)
+            noise = seen.noise / np.exp(log_full)
+            value, pull = _log_likelihood(seen.group, foreshortening, noise, groups)
+            off = prior @ x - expected
+            by_group = np.bincount(seen.group, pull, groups)
+            slope = np.concatenate([by_group, [pull.sum()], at_observation.T @ pull])
+            return float(-value + 0.5 * off @ off), slope + prior.T @ off
+
+        return cost
+
+    cost = posterior(observations)
+    thinned = observations.part(slice(None, None, -(-len(observations.frame) // _SEARCHED)))
+    optimum = _minimize_escaping(posterior(thinned), start, groups)
+    if len(thinned.frame) < len(observations.frame):
+        optimum = minimize(cost, optimum.x, jac=True, method="L-BFGS-B")
     best = optimum.x
     if not optimum.success:
         if not optimum.fun < cost(start)[0]:
@@ -266,6 +287,42 @@ def _fit(
             "the table's proportions are used" if best is start else "its last step is used",
         )
     return _LengthFit(best[:groups], log_height + best[groups] + blend @ best[groups + 1 :])
+
+
+def _minimize_escaping(
+    cost: _Cost,
+    start: Float[np.ndarray, "n"],
+    lengths: int,
+) -> OptimizeResult:
+    """L-BFGS-B from a start, and on from where a single length is quite another.
+
+    A bone that is always seen short may be short or always point at the camera, so the cost has
+    more than one valley. From the bottom of one each of the first `lengths` unknowns is moved along
+    by itself; the valley of the lowest place is searched too.
+    """
+    best = minimize(cost, start, jac=True, method="L-BFGS-B")
+    for _ in range(_ESCAPES):
+        jumps = (_cheapest_jump(cost, best.x, length) for length in range(lengths))
+        _, place = min(jumps, key=lambda jump: jump[0])
+        other = minimize(cost, place, jac=True, method="L-BFGS-B")
+        if other.fun > best.fun - _LEAST_GAIN:
+            break
+        best = other
+    return best
+
+
+def _cheapest_jump(
+    cost: _Cost,
+    place: Float[np.ndarray, "n"],
+    length: int,
+) -> tuple[float, Float[np.ndarray, "n"]]:
+    """Cost and place of the best other value of one log length, all else as it is."""
+    jumps = []
+    for factor in _JUMPS:
+        there = place.copy()
+        there[length] += np.log(factor)
+        jumps.append((cost(there)[0], there))
+    return min(jumps, key=lambda jump: jump[0])
 
 
 def _prior(
