@@ -3,7 +3,7 @@
     python benchmarks/depth_error.py [--mocap DIR] [--without PLAYER ...] [--poses N]
 
 Learns from all captures but those of the players (jarua and adorozco unless told otherwise), films
-theirs from all around as `keyrecon.lifting.priors.depth_learning` does, without turned limbs, and
+theirs from all around as `keyrecon.lifting.priors.depth_training` does, without turned limbs, and
 prints the root mean square error of depth in lengths of the bone: what `depth_spread` holds.
 """
 
@@ -17,7 +17,7 @@ from unseen import captures_without
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import RATE, learn_from_files, read_poses
 from keyrecon.body import LSP14
-from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions, draw_windows, gather
+from keyrecon.lifting.priors.depth_training import DepthTrainingOptions, draw_windows, gather
 
 FILMED = 20_000
 
@@ -35,7 +35,7 @@ def main() -> None:
     source = gather([read_poses(file) for file in theirs])
     rng = np.random.default_rng(1)
     seen, true = draw_windows(source, RATE, FILMED, rng, as_they_are)
-    error = np.sqrt(((model.propagate(seen) - true) ** 2).mean(axis=0))
+    error = np.sqrt(((model.forward(seen) - true) ** 2).mean(axis=0))
     for (_, child), off in zip(LSP14.bones, error, strict=True):
         print(f"{LSP14.names[child]:<16}{off:6.3f}")
     print(f"{'all':<16}{np.sqrt((error**2).mean()):6.3f}")

@@ -16,8 +16,8 @@ from keyrecon.app.depth_training import learn_from_files
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
-from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions
 from keyrecon.lifting.priors.depth_model import DepthModel
+from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
 
 
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:

@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 from keyrecon.app import depth_training as depth_job
 from keyrecon.app.console import show
 from keyrecon.commands.arguments import Files
-from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions
+from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
 

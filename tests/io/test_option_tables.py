@@ -8,7 +8,7 @@ from keyrecon import KeyreconError
 from keyrecon.golf.prior.training import TrainOptions
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.option_tables import OptionRecord, changed_options, check_options, with_changes
-from keyrecon.lifting.priors.depth_learning import DepthTrainingOptions
+from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.synthetic.sequence import SynthOptions
 

@@ -8,7 +8,7 @@ much is left for depth (Taylor's sqrt(1 - q^2)), and gives their depths with the
 over captured people, filmed from all around. It helps to choose signs, and its expectation is a
 prior on depth itself (`depth_spread`): near the picture's plane, where legs and trunks mostly are,
 foreshortening tells less. A value near zero may also say that the picture fits both signs.
-`depth_learning.py` learns it. Of players that it has not seen it is off by .15 lengths of a bone, a
+`depth_training.py` learns it. Of players that it has not seen it is off by .15 lengths of a bone, a
 polynomial of second degree of the frame alone, which it took the place of, by .21.
 """
 
@@ -65,9 +65,9 @@ class DepthModel:
         inputs = frame_inputs(flat)
         parts = np.array_split(np.arange(len(flat)), max(len(flat) // _AT_ONCE, 1))
         near = [np.clip(part[:, None] + steps, 0, max(len(flat) - 1, 0)) for part in parts]
-        return np.concatenate([self.propagate(inputs[rows].reshape(-1, INPUTS)) for rows in near])
+        return np.concatenate([self.forward(inputs[rows].reshape(-1, INPUTS)) for rows in near])
 
-    def propagate(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n 13"]:
+    def forward(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n 13"]:
         """Depth shares from what the rule is shown, the inputs of all moments."""
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             shown = shown @ weight + bias

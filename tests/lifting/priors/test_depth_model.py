@@ -11,13 +11,13 @@ from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
 from keyrecon.lifting.bone_directions import bone_vectors
-from keyrecon.lifting.priors.depth_learning import (
+from keyrecon.lifting.priors.depth_model import INPUTS, DepthModel, expected_depth
+from keyrecon.lifting.priors.depth_training import (
     DepthTrainingOptions,
     draw_windows,
     gather,
     train_depth_model,
 )
-from keyrecon.lifting.priors.depth_model import INPUTS, DepthModel, expected_depth
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
 FPS = 50.0

@@ -179,7 +179,7 @@ def draw_windows(
     mirrored = poses[:, :, _MIRROR] * np.array([-1, 1, 1], np.float32)
     poses = np.where((rng.random(count) < 0.5)[:, None, None, None], mirrored, poses)
     filmed = _film(_vary(poses, rng, options.limb_turn), rng, options)
-    flat = _misjudge(filmed[..., :2], pace, rng, options)
+    flat = _add_errors(filmed[..., :2], pace, rng, options)
     inputs = frame_inputs(flat.astype(np.float32)).reshape(count, INPUTS)
     return inputs, filmed[:, OFFSETS.index(0.0), :, 2]
 
@@ -227,7 +227,7 @@ _WANDER_SECONDS = 0.24
 errors come and go with the limbs that are mistaken."""
 
 
-def _misjudge(
+def _add_errors(
     flat: Float[np.ndarray, "n W 13 2"],
     pace: Float[np.ndarray, "n"],
     rng: np.random.Generator,
