@@ -109,7 +109,8 @@ class RefineOptions:
     """Seconds over which errors of `--depths` stay alike and count once.
 
     Of a depth model. Eight sequences of 12 s, with and without signs: 41.6 and 47.3 mm at .15, 38.7
-    and 43.4 at .06, 39.0 and 41.9 at .03, where straight knees are bent by 4 degrees.
+    and 43.4 at .06, 39.0 and 41.9 at .03, where straight knees are bent by 4 degrees (with a first
+    network of the same inputs; `benchmarks/projected.py` measures the one that ships).
     """
     key_spread: Annotated[float, within(0.02, 8)] = 0.4
     """How far a bone may turn away from the motion between marked poses, radians.
