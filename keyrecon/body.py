@@ -165,6 +165,12 @@ class Skeleton:
         return np.array([child_to_bone[int(self.mirror[c])] for _, c in self.bones])
 
     @cached_property
+    def length_group(self) -> Int[np.ndarray, "B"]:
+        """Which length each bone has: left and right share one."""
+        first = np.minimum(np.arange(len(self.bones)), self.bone_mirror)
+        return np.unique(first, return_inverse=True)[1]
+
+    @cached_property
     def is_lower(self) -> Bool[np.ndarray, "J"]:
         """Which joints belong to the lower body."""
         return np.isin(np.arange(len(self.names)), self.lower)

@@ -149,8 +149,8 @@ def joint_noise(
 def _length_groups(skeleton: Skeleton) -> tuple[Int[np.ndarray, "n"], Float[np.ndarray, "m"]]:
     """Which length each bone and breadth has (left and right share one), and the table of them,
     in statures."""
-    first = np.minimum(np.arange(len(skeleton.bones)), skeleton.bone_mirror)
-    names, group = np.unique(first, return_inverse=True)
+    group = skeleton.length_group
+    _, names = np.unique(group, return_index=True)
     group_of = np.concatenate([group, len(names) + np.arange(len(skeleton.breadths))])
     table = np.concatenate(
         [skeleton.lengths[names], [breadth.length for breadth in skeleton.breadths]]

@@ -1,11 +1,12 @@
 """Levenberg-Marquardt on a motion in the world, banded in time.
 
 Unknowns of frame t: the place of the skeleton's root (3, metres) and a small turn of every bone in
-the plane tangent to its direction (2 each), so bones keep their lengths; one more for all frames is
-the logarithm of the body's size. Directions are kept in axes about the line of sight to the player,
-where the third one is the depth that a picture hardly tells. Terms are sums of squares of functions
-of the joints in up to three frames in a row; the normal matrix is banded but for the one column of
-the size, which is eliminated (Schur complement).
+the plane tangent to its direction (2 each), so bones keep their lengths; a few more for all frames
+are logarithms of the body's size and of bones' lengths beside it, left and right alike. Directions
+are kept in axes about the line of sight to the player, where the third one is the depth that a
+picture hardly tells. Terms are sums of squares of functions of the joints in up to three frames in
+a row; the normal matrix is banded but for the columns of the sizes, which are eliminated (Schur
+complement).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,6 +41,12 @@ class Figure:
     axes: Float[np.ndarray, "T 3 3"]
     """Columns: the axes of directions in the world; the third is the line of sight."""
 
+    @property
+    def growth(self) -> Float[np.ndarray, "B P"]:
+        """What the logarithm of each bone's length gains by each of `WorldState.log_sizes`."""
+        group = self.skeleton.length_group
+        return np.column_stack([np.ones(len(group)), np.eye(group.max() + 1)[group]])
+
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
@@ -49,13 +56,22 @@ class WorldState:
     """Place of the skeleton's root, metres."""
     directions: Float[np.ndarray, "T B 3"]
     """Unit vectors of bones in the figure's axes."""
-    log_size: float = 0.0
+    log_sizes: Float[np.ndarray, "P"]
+    """Of the body, and of each length beside it (`Skeleton.length_group`)."""
+
+    @property
+    def log_size(self) -> float:
+        """Of the body."""
+        return float(self.log_sizes[0])
+
+    def reach(self, figure: Figure) -> Float[np.ndarray, "J B"]:
+        """Lengths of the bones on the way to each joint, metres."""
+        return figure.reach * np.exp(figure.growth @ self.log_sizes)
 
     def points(self, figure: Figure) -> Float[np.ndarray, "T J 3"]:
         """Joints in the world, metres."""
-        pose = np.einsum("jb,tbk->tjk", figure.reach, self.directions)
-        turned = np.einsum("tik,tjk->tji", figure.axes, pose)
-        return self.root[:, None] + np.exp(self.log_size) * turned
+        pose = np.einsum("jb,tbk->tjk", self.reach(figure), self.directions)
+        return self.root[:, None] + np.einsum("tik,tjk->tji", figure.axes, pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,23 +115,21 @@ def solve(
     figure: Figure,
     terms: Sequence[Term],
     prior: DirectionPrior,
-    size: tuple[float, float],
+    size_spread: Float[np.ndarray, "P"],
     rounds: int,
 ) -> WorldState:
-    """Lower the sum of all terms.
-
-    `size` is what the logarithm of the size is expected to be, and its standard deviation.
-    """
+    """Lower the sum of all terms; `size_spread`: standard deviations of `log_sizes`."""
 
     def evaluate(state: WorldState) -> _Evaluation:
         points = state.points(figure)
         rows = [term(points, state.log_size) for term in terms]
         cost = sum(0.5 * float((r.residual**2).sum()) for r in rows)
-        cost += 0.5 * ((state.log_size - size[0]) / size[1]) ** 2 + _prior_cost(state, prior)
+        cost += 0.5 * float(((state.log_sizes / size_spread) ** 2).sum())
+        cost += _prior_cost(state, prior)
         return _Evaluation(rows, cost)
 
     def step(state: WorldState, here: _Evaluation, damping: float) -> WorldState:
-        return _moved(state, *_step(state, figure, here.rows, prior, size, damping))
+        return _moved(state, *_step(state, figure, here.rows, prior, size_spread, damping))
 
     return minimise(
         start,
@@ -142,14 +156,16 @@ def _tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 
     return np.stack([first, np.cross(directions, first)], axis=-1)
 
 
-def _moved(state: WorldState, step: Float[np.ndarray, "T D"], growth: float) -> WorldState:
+def _moved(
+    state: WorldState, step: Float[np.ndarray, "T D"], growth: Float[np.ndarray, "P"]
+) -> WorldState:
     turn = step[:, 3:].reshape(len(step), -1, 2)
     moved = state.directions + np.einsum("tbik,tbk->tbi", _tangents(state.directions), turn)
     return replace(
         state,
         root=state.root + step[:, :3],
         directions=unit_vectors(moved),
-        log_size=state.log_size + growth,
+        log_sizes=state.log_sizes + growth,
     )
 
 
@@ -159,12 +175,19 @@ def _joint_slopes(
     """How the joints' coordinates, J x 3 in a row, change with the unknowns of their frame."""
     frames, bones = basis.shape[:2]
     joints = len(figure.reach)
-    turned = np.einsum("tik,tbkd->tbid", np.exp(state.log_size) * figure.axes, basis)
+    turned = np.einsum("tik,tbkd->tbid", figure.axes, basis)
     slope = np.zeros((frames, joints, 3, 3 + 2 * bones))
     slope[..., :3] = np.eye(3)
-    by_bone = figure.reach[:, :, None, None] * turned[:, None]  # (T, J, B, 3, 2)
+    by_bone = state.reach(figure)[:, :, None, None] * turned[:, None]  # (T, J, B, 3, 2)
     slope[..., 3:] = by_bone.swapaxes(2, 3).reshape(frames, joints, 3, 2 * bones)
     return slope.reshape(frames, joints * 3, -1)
+
+
+def _size_slopes(state: WorldState, figure: Figure) -> Float[np.ndarray, "T n P"]:
+    """How the joints' coordinates, J x 3 in a row, change with the sizes."""
+    turned = np.einsum("tik,tbk->tbi", figure.axes, state.directions)
+    slope = np.einsum("jb,bp,tbi->tjip", state.reach(figure), figure.growth, turned, optimize=True)
+    return slope.reshape(len(slope), -1, slope.shape[-1])
 
 
 def _step(
@@ -172,44 +195,43 @@ def _step(
     figure: Figure,
     rows: Sequence[JointRows],
     prior: DirectionPrior,
-    expected_size: tuple[float, float],
+    size_spread: Float[np.ndarray, "P"],
     damping: float,
-) -> tuple[Float[np.ndarray, "T D"], float]:
-    basis = _tangents(state.directions)
+) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "P"]]:
+    basis, grown = _tangents(state.directions), _size_slopes(state, figure)
     by_unknowns = _joint_slopes(state, figure, basis)
     frames, _, size = by_unknowns.shape
-    grown = (state.points(figure) - state.root[:, None]).reshape(frames, -1)
     blocks = [np.zeros((frames, size, size)) for _ in range(3)]
-    gradient, border = np.zeros((frames, size)), np.zeros((frames, size))
-    corner = 1 / expected_size[1] ** 2
-    slant = (state.log_size - expected_size[0]) / expected_size[1] ** 2
+    gradient, border = np.zeros((frames, size)), np.zeros((frames, size, len(size_spread)))
+    corner = np.diag(1 / size_spread**2)
+    slant = state.log_sizes / size_spread**2
     for part in rows:
         slopes = {}
-        by_size = np.zeros_like(part.residual) if part.by_size is None else part.by_size.copy()
+        by_size = np.zeros((*part.residual.shape, len(size_spread)))
+        if part.by_size is not None:
+            by_size[..., 0] = part.by_size
         for later, by_joint in part.slope.items():
             flat = by_joint.reshape(*by_joint.shape[:2], -1)
             there = np.clip(np.arange(frames) + later, 0, frames - 1)
             slopes[later] = flat @ by_unknowns[there]
-            by_size += (flat @ grown[there][..., None])[..., 0]
-        corner += float((by_size**2).sum())
-        slant += float((by_size * part.residual).sum())
+            by_size += flat @ grown[there]
+        corner += np.einsum("tmp,tmq->pq", by_size, by_size, optimize=True)
+        slant += np.einsum("tmp,tm->p", by_size, part.residual)
         for one, first in slopes.items():
             across = first.swapaxes(1, 2)
             _add_shifted(gradient, (across @ part.residual[..., None])[..., 0], one)
-            _add_shifted(border, (across @ by_size[..., None])[..., 0], one)
+            _add_shifted(border, across @ by_size, one)
             for other, second in slopes.items():
                 if other >= one:
                     _add_shifted(blocks[other - one], across @ second, one)
     _add_prior(blocks, gradient, state, prior, basis)
-    diagonal = np.arange(size)
-    blocks[0][:, diagonal, diagonal] *= 1 + damping
-    blocks[0][:, diagonal, diagonal] += 1e-9
-    band = band_from_blocks(blocks, 3 * size)
-    right = np.column_stack([gradient.ravel(), border.ravel()])
-    solved = solve_banded(band, right)
-    rest = corner * (1 + damping) - float(border.ravel() @ solved[:, 1])
-    growth = -(slant - float(border.ravel() @ solved[:, 0])) / max(rest, 1e-9)
-    return -(solved[:, 0] + growth * solved[:, 1]).reshape(frames, size), growth
+    blocks[0] += np.eye(size) * (damping * blocks[0] + 1e-9)
+    edge = border.reshape(frames * size, -1)
+    right = np.column_stack([gradient.ravel(), edge])
+    solved = solve_banded(band_from_blocks(blocks, 3 * size), right)
+    rest = corner + damping * np.diag(np.diag(corner)) - edge.T @ solved[:, 1:]
+    growth = -np.linalg.solve(rest, slant - edge.T @ solved[:, 0])
+    return -(solved[:, 0] + solved[:, 1:] @ growth).reshape(frames, size), growth
 
 
 def _add_shifted(into: np.ndarray, values: np.ndarray, later: int) -> None:

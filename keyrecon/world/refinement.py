@@ -12,18 +12,21 @@ unknowns of `motion_solver`, holds together
   that shrinks from round to round: what slides is found before it is held);
 - the centre of mass: free fall while no foot is on the ground, else no acceleration that players do
   not have, and over the feet along the line of sight, where the picture does not show a lean;
-- the breadths of hips and shoulders, and one size of the body for all frames.
+- the breadths of hips and shoulders, and one length of each bone for all frames, near the lifted
+  one: legs are as long as standing feet and hips show them, a trunk that is put upright as its
+  picture.
 
 First every foot that may stand is held in its place but not at its height, which tells heels that
 are up from feet that stand; then those that stand are held on the ground too.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from keyrecon.body import Skeleton
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 from keyrecon.world import world_terms as terms
@@ -47,6 +50,12 @@ PIXEL_MEMORY = 0.08
 """Seconds that it lasts: its autocorrelation is .64 after .1 s, .32 after .2."""
 SIZE_ERROR = 0.03
 """Error of the body's size as standing feet tell it, logarithm."""
+LENGTH_ERROR = {"hip": 0.015, "shoulder": 0.05, "head": 0.03, "knee": 0.025, "ankle": 0.025}
+LENGTH_ERROR |= {"elbow": 0.035, "wrist": 0.065}
+"""Error of lifted bone lengths beside that of the body's size, logarithms, by their outer joint:
+root mean squares over eight rendered sequences. Lengths that may not change gave the root at
+contact 7.0 cm off in place of 6.3, joints in the world 87 mm in place of 83; twice as much changed
+nothing more from above, where lifted lengths are furthest off."""
 SLIPS = (1.0, 0.2, 0.03)
 """Metres per second that a foot may move while it stands, from round to round."""
 HEIGHT_ERROR = 0.012
@@ -142,7 +151,7 @@ class Placed:
 def refine_placed(
     placed: Placed, standing: Standing, log_size: float = 0.0
 ) -> tuple[Float[np.ndarray, "T J 3"], float]:
-    """Joints on the court, metres, and the logarithm of the size by which the body was changed.
+    """Joints on the court, metres, and the logarithm of how much longer all bones together became.
 
     `log_size` is where that logarithm starts.
     """
@@ -211,14 +220,29 @@ def _refine_window(
     ankles = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
     hips = [skeleton.index(f"{side}_hip") for side in ("right", "left")]
     prior = _direction_prior(body.directions, motion)
-    state = WorldState(np.zeros_like(placed.root), body.directions, log_size)
+    spread = _size_spread(skeleton)
+    log_sizes = np.append(log_size, np.zeros(len(spread) - 1))
+    state = WorldState(np.zeros_like(placed.root), body.directions, log_sizes)
     state = replace(state, root=placed.root - state.points(figure)[:, hips].mean(axis=1))
     steady = _steady_terms(placed, body, standing)
     for slip in SLIPS:
         feet = state.points(figure)[:, ankles]
         recipe = [*steady, *_foot_terms(placed, standing, feet, slip)]
-        state = solve(state, figure, recipe, prior, (0.0, SIZE_ERROR), STEPS)
-    return state.points(figure), state.log_size
+        state = solve(state, figure, recipe, prior, spread, STEPS)
+    grown = state.reach(figure).max(axis=0).sum() / figure.reach.max(axis=0).sum()
+    return state.points(figure), float(np.log(grown))
+
+
+def _size_spread(skeleton: Skeleton) -> Float[np.ndarray, "P"]:
+    """Standard deviations of `WorldState.log_sizes`."""
+    _, bones = np.unique(skeleton.length_group, return_index=True)
+    ends = [skeleton.names[child] for child in skeleton.bones[bones, 1]]
+    return np.array([SIZE_ERROR, *_by_joint(LENGTH_ERROR, ends, 0.04)])
+
+
+def _by_joint(values: Mapping[str, float], names: Sequence[str], other: float) -> list[float]:
+    """The value of each joint, whose key is a part of its name; `other` where none is."""
+    return [next((values[key] for key in values if key in name), other) for name in names]
 
 
 def _lasting(seconds: float, fps: float) -> float:
@@ -232,8 +256,8 @@ def _lasting(seconds: float, fps: float) -> float:
 
 def _direction_prior(before: Float[np.ndarray, "T B 3"], motion: Motion) -> DirectionPrior:
     ends = [motion.skeleton.names[child] for child in motion.skeleton.bones[:, 1]]
-    depth = [next((DEPTH_ERROR[k] for k in DEPTH_ERROR if k in end), 0.2) for end in ends]
-    spread = np.array([[FLAT_ERROR, FLAT_ERROR, one] for one in depth])
+    depths = _by_joint(DEPTH_ERROR, ends, 0.2)
+    spread = np.array([[FLAT_ERROR, FLAT_ERROR, depth] for depth in depths])
     weight = 1 / (spread**2 * _lasting(MEMORY, motion.fps))
     return DirectionPrior(before, weight, MEMORY * motion.fps)
 

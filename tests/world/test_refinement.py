@@ -141,3 +141,17 @@ def test_a_player_of_another_size_than_said_is_as_large_as_the_court_says():
     ours = np.linalg.norm(world.points[:, NECK] - world.points[:, HIPS].mean(axis=1), axis=1)
     assert abs(ours.mean() / true - 1) < 0.04
     assert abs(world.height_ratio - 1 / 1.05) < 0.04
+
+
+def test_standing_feet_tell_how_long_legs_are():
+    points, _ = walk()
+    motion = guessed(points, depth=0.02, pixels=0.5)
+    shanks = np.isin(LSP14.bones[:, 1], FEET)
+    bones = motion.points3d[:, LSP14.bones[:, 1]] - motion.points3d[:, LSP14.bones[:, 0]]
+    bones[:, shanks] *= 0.94
+    world = placed(replace(motion, points3d=LSP14.ancestry @ bones), points)
+
+    def shank(joints):
+        return np.linalg.norm(joints[:, FEET[0]] - joints[:, LSP14.index("right_knee")], axis=1)
+
+    assert np.median(shank(world.points)) > 0.97 * np.median(shank(points))
