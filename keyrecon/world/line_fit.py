@@ -128,12 +128,11 @@ def solve_robustly(
 
     Cauchy's weights, their scale from the median residual.
     """
-    change = np.zeros(rows.shape[1])
+    change, beforehand = np.zeros(rows.shape[1]), np.diag(1 / spread**2)
     for _ in range(3):
         residual = offsets - rows @ change
         scale = max(MIN_SCALE, 1.48 * float(np.median(np.abs(residual))))
-        weight = 1 / (scale**2 + residual**2)
-        normal = (rows * weight[:, None]).T @ rows + np.diag(1 / spread**2)
-        right = (rows * weight[:, None]).T @ offsets - gone / spread**2
-        change = np.linalg.solve(normal, right)
+        weighted = (rows * (1 / (scale**2 + residual**2))[:, None]).T
+        right = weighted @ offsets - gone / spread**2
+        change = np.linalg.solve(weighted @ rows + beforehand, right)
     return change

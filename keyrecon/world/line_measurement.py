@@ -54,27 +54,54 @@ def choose_samples(
     camera: Pinhole, court: CourtModel, shape: tuple[int, int], spacing: float = SPACING
 ) -> LineSamples:
     """Points in the picture, evenly spaced in it along every line."""
-    local = camera.local(court.points)
-    depth = np.maximum(local[:, 2], NEAREST)
-    flat = local[:, :2] / depth[:, None]
-    pixels = camera.focal * flat + camera.principal
-    way = court.direction @ camera.rotation.T
-    slope = (way[:, :2] - flat * way[:, 2:]) * (camera.focal / depth)[:, None]
-    speed = np.maximum(np.hypot(slope[:, 0], slope[:, 1]), 1e-9)
-    normals = np.column_stack([-slope[:, 1], slope[:, 0]]) / speed[:, None]
-    side = court.across @ camera.rotation.T
-    stripe = (side[:, :2] - flat * side[:, 2:]) * (2 * camera.focal / depth)[:, None]
-    width = np.abs((stripe * normals).sum(axis=1))
-    size = np.array(shape[::-1])
-    inside = ((pixels > MARGIN) & (pixels < size - 1 - MARGIN)).all(axis=1)
-    inside &= (local[:, 2] > NEAREST) & (width < MAX_WIDTH)
-    step = np.linalg.norm(np.diff(pixels, axis=0, prepend=pixels[:1]), axis=1)
-    step = np.where(inside & np.roll(inside, 1), np.minimum(step, spacing), 0)
-    mark = np.floor(np.cumsum(step) / spacing) + 1e6 * court.line
-    chosen = np.flatnonzero(inside & (np.diff(mark, prepend=-1) > 0))
-    return LineSamples(
-        court.points[chosen], court.line[chosen], pixels[chosen], normals[chosen], width[chosen]
+    across, down, depth = camera.local(court.points).T
+    ahead = np.maximum(depth, NEAREST)
+    flat = across / ahead, down / ahead
+    x, y = (camera.focal * f + p for f, p in zip(flat, camera.principal, strict=True))
+    height, width = shape
+    inside = (x > MARGIN) & (x < width - 1 - MARGIN) & (y > MARGIN) & (y < height - 1 - MARGIN)
+    shown = np.flatnonzero(inside & (depth > NEAREST))
+    normals, widths = _appearance(
+        camera, court, shown, (flat[0][shown], flat[1][shown]), depth[shown]
     )
+    narrow = np.zeros(len(x), dtype=bool)
+    narrow[shown] = widths < MAX_WIDTH
+    step = np.zeros(len(x))
+    step[1:] = np.sqrt(np.diff(x) ** 2 + np.diff(y) ** 2)
+    step[1:] = np.where(narrow[1:] & narrow[:-1], np.minimum(step[1:], spacing), 0)
+    mark = np.floor(np.cumsum(step) / spacing) + 1e6 * court.line
+    begins = np.ones(len(mark), dtype=bool)
+    begins[1:] = mark[1:] > mark[:-1]
+    taken = np.flatnonzero((narrow & begins)[shown])
+    chosen = shown[taken]
+    return LineSamples(
+        court.points[chosen],
+        court.line[chosen],
+        np.column_stack([x[chosen], y[chosen]]),
+        normals[taken],
+        widths[taken],
+    )
+
+
+def _appearance(
+    camera: Pinhole,
+    court: CourtModel,
+    chosen: Int[np.ndarray, "n"],
+    flat: tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]],
+    depth: Float[np.ndarray, "n"],
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n"]]:
+    """Normals and widths, px, of stripes at points of the court.
+
+    The points are seen at `flat` times the focal length, `depth` metres before the camera.
+    """
+    right, down, away = (court.direction[chosen] @ camera.rotation.T).T
+    per_metre = camera.focal / depth
+    along = (right - flat[0] * away) * per_metre, (down - flat[1] * away) * per_metre
+    speed = np.maximum(np.hypot(*along), 1e-9)
+    normal = -along[1] / speed, along[0] / speed
+    right, down, away = (court.across[chosen] @ camera.rotation.T).T
+    stripe = (right - flat[0] * away) * (2 * per_metre), (down - flat[1] * away) * (2 * per_metre)
+    return np.column_stack(normal), np.abs(stripe[0] * normal[0] + stripe[1] * normal[1])
 
 
 def measure_offsets(
@@ -107,23 +134,21 @@ def _contrast(
     gap = 0.6 + 0.1 * samples.width
     far = reach + int(np.ceil((half + gap + flank).max())) + 2
     steps = np.arange(-far, far + 1)
-    grid = samples.pixels[:, None] + steps[:, None] * samples.normals[:, None]
-    profile = cv2.remap(  # type: ignore[call-overload]  # stubs lack the missing second map
-        grey, grid.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    ).astype(np.float32)
+    x, y = (
+        (at[:, None] + steps * normal[:, None]).astype(np.float32)
+        for at, normal in zip(samples.pixels.T, samples.normals.T, strict=True)
+    )
+    profile = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     total = np.zeros((len(profile), profile.shape[1] + 1), np.float32)
-    np.cumsum(profile, axis=1, out=total[:, 1:])
-    centres = np.arange(-reach, reach + 1) + far + 0.5  # in the running total
-
-    def up_to(shift: np.ndarray) -> np.ndarray:
-        place = centres[0] + shift
-        low = np.floor(place).astype(int)
-        share = (place - low).astype(np.float32)[:, None]
-        index = low[:, None] + np.arange(len(centres) + 1)
-        values = np.take_along_axis(total, index, axis=1)
-        return values[:, :-1] * (1 - share) + values[:, 1:] * share
-
-    inner = (up_to(half) - up_to(-half)) / (2 * half)[:, None]
-    right = (up_to(half + gap + flank) - up_to(half + gap)) / flank[:, None]
-    left = (up_to(-half - gap) - up_to(-half - gap - flank)) / flank[:, None]
+    np.cumsum(profile, axis=1, dtype=np.float32, out=total[:, 1:])
+    near, wide = half + gap, half + gap + flank
+    place = far - reach + 0.5 + np.stack([half, -half, wide, near, -near, -near - flank])
+    low = np.floor(place).astype(int)
+    share = (place - low).astype(np.float32)[..., None]
+    row = np.arange(len(total)) * total.shape[1]
+    values = total.ravel().take((low + row)[..., None] + np.arange(2 * reach + 2))
+    up_to = values[..., :-1] * (1 - share) + values[..., 1:] * share
+    inner = (up_to[0] - up_to[1]) / (2 * half)[:, None]
+    right = (up_to[2] - up_to[3]) / flank[:, None]
+    left = (up_to[4] - up_to[5]) / flank[:, None]
     return inner - np.maximum(left, right)
