@@ -34,8 +34,9 @@ def main() -> None:
     as_they_are = DepthTrainingOptions(limb_turn=0.0, pace=0.0, still=0.0)
     source = gather([read_poses(file) for file in theirs])
     rng = np.random.default_rng(1)
-    seen, true = draw_windows(source, RATE, FILMED, rng, as_they_are)
-    error = np.sqrt(((model.forward(seen) - true) ** 2).mean(axis=0))
+    windows = draw_windows(source, RATE, FILMED, rng, as_they_are)
+    told = model.forward(windows.inputs)[:, : len(LSP14.bones)]
+    error = np.sqrt(((told - windows.depth_shares) ** 2).mean(axis=0))
     for (_, child), off in zip(LSP14.bones, error, strict=True):
         print(f"{LSP14.names[child]:<16}{off:6.3f}")
     print(f"{'all':<16}{np.sqrt((error**2).mean()):6.3f}")

@@ -16,6 +16,7 @@ from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import DepthSignOptions
 from keyrecon.lifting.interpolation import Interpolation, interpolate_poses
 from keyrecon.lifting.keyframe_signs import infer_keyframe_signs
+from keyrecon.lifting.length_correction import correct_lengths
 from keyrecon.lifting.limb_lengths import (
     BodySize,
     LengthOptions,
@@ -123,6 +124,9 @@ def lift_motion(
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths, shots)
     marks = keyframe_marks(annotations)
     tracks = replace(tracks, joints=marked_joints(tracks, annotations))
+    if priors.depth_model is not None:
+        rounds = options.lengths.corrections
+        size = correct_lengths(size, tracks.joints, priors.depth_model, fps, rounds, shots)
     observed = prepare_tracks(tracks, marks, size, fps, options.lengths)
     signs = infer_keyframe_signs(
         observed, marks, size, shots, fps, options.depth_signs, priors.depth_model

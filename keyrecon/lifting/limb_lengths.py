@@ -70,6 +70,11 @@ class LengthOptions:
     """
     correlation: Annotated[float, within(0, 5)] = 0.15
     """Seconds over which errors of propagated joints stay alike and count once."""
+    corrections: Annotated[int, within(0, 100)] = 4
+    """How often lengths are corrected by what the depth model has learnt of bodies; 0 is never.
+
+    0, 1, 2, 4 and 8 times: 39.2, 38.3, 37.9, 37.7 and 37.7 mm, eight captures that are projected.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +138,19 @@ def estimate_lengths(
     fit = _fit(observations, np.log(table), ties, np.log(height_px), drift, options)
     bones = len(skeleton.bones)
     lengths = np.exp(fit.log_lengths)[group_of]
-    size = _standing(lengths[:bones], skeleton) / _standing(skeleton.lengths, skeleton)
+    tall = standing_length(skeleton.lengths, skeleton)
+    size = standing_length(lengths[:bones], skeleton) / tall
     return BodySize(
         skeleton, lengths[:bones] / size, lengths[bones:] / size, np.exp(fit.log_scale) * size
     )
+
+
+def standing_length(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
+    """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
+    reach = skeleton.ancestry @ lengths
+    midline = skeleton.mirror == np.arange(len(reach))
+    lower = skeleton.is_lower
+    return float(reach[lower].max(initial=0.0) + reach[midline].max(initial=0.0))
 
 
 def joint_noise(
@@ -373,11 +387,3 @@ def _initial_factor(
     """Log ratio of stature to tracked height at which most bones fit into their length."""
     ratio = observations.log_length - log_table[observations.group] - log_height[observations.frame]
     return float(np.quantile(ratio, 0.75))
-
-
-def _standing(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
-    """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
-    reach = skeleton.ancestry @ lengths
-    midline = skeleton.mirror == np.arange(len(reach))
-    lower = skeleton.is_lower
-    return float(reach[lower].max(initial=0.0) + reach[midline].max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Expected depth of bones given how the whole body moves in the picture: learnt from captures.
+"""Expected depth and lengths of bones given how a body moves in the picture: learnt from captures.
 
 A flat picture of a whole body says more about depth than joint limits can put into words: which
 way an arm reaches depends on how hips, shoulders and the other limbs are placed, and on where they
@@ -8,8 +8,13 @@ much is left for depth (Taylor's sqrt(1 - q^2)), and gives their depths with the
 over captured people, filmed from all around. It helps to choose signs, and its expectation is a
 prior on depth itself (`depth_spread`): near the picture's plane, where legs and trunks mostly are,
 foreshortening tells less. A value near zero may also say that the picture fits both signs.
-`depth_training.py` learns it. Of players that it has not seen it is off by .15 lengths of a bone, a
-polynomial of second degree of the frame alone, which it took the place of, by .21.
+`depth_training.py` learns it. Of players that it has not seen it is off by .15 lengths of a bone
+(.16 where lengths are wrong by a tenth), a polynomial of second degree of the frame alone, which it
+took the place of, by .21.
+
+It also tells by how much bones look longer or shorter than their lengths let them: a body that
+stands as bodies do, seen with thighs that are always too short, has other thighs. A frame tells
+little of it, a video more (`lifting/length_correction.py`).
 """
 
 from collections.abc import Sequence
@@ -22,19 +27,28 @@ from jaxtyping import Float
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
 
-DEPTH_MODEL_VERSION = 2
+DEPTH_MODEL_VERSION = 3
 """Of the bones and inputs that a model has weights for."""
 OFFSETS = (-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4)
 """Moments that the rule is shown, seconds from the frame."""
 _BONES = len(LSP14.bones)
-INPUTS = 3 * _BONES * len(OFFSETS)
+_PAIRED, _LENGTH_OF = np.unique(
+    np.minimum(np.arange(_BONES), LSP14.bone_mirror), return_inverse=True
+)
+"""First bone of each length, and the length of each bone: left and right share one."""
+LENGTHS = len(_PAIRED)
+LENGTH_OF_BONE = tuple(_LENGTH_OF.tolist())
+"""Which of the lengths each of LSP14's bones has."""
+INPUTS, OUTPUTS = 3 * _BONES * len(OFFSETS), _BONES + LENGTHS
+LENGTH_UNIT = 0.2
+"""Errors of lengths are learnt in this unit, which gives them about the spread of depths."""
 _AT_ONCE = 10_000
 """Frames whose windows are held at a time: 22 MB."""
 
 
 @dataclass(frozen=True, eq=False)
 class DepthModel:
-    """A rule for the depth shares of LSP14's bones: layers of a perceptron, rectified between."""
+    """A rule for depths and lengths of LSP14's bones: layers of a perceptron, rectified between."""
 
     weights: Sequence[Float[np.ndarray, "_ _"]]
     """Of each layer, from what comes in (rows) to what goes out."""
@@ -47,11 +61,11 @@ class DepthModel:
         """Raise KeyreconError for layers that do not fit one another, or these bones."""
         sizes = [INPUTS, *(len(bias) for bias in self.biases)]
         wanted = list(pairwise(sizes))
-        if [weight.shape for weight in self.weights] != wanted or sizes[-1] != _BONES:
+        if [weight.shape for weight in self.weights] != wanted or sizes[-1] != OUTPUTS:
             told = ", ".join("x".join(map(str, weight.shape)) for weight in self.weights)
             raise KeyreconError(
-                f"A depth model leads from {INPUTS} inputs to {_BONES} depths; this one's layers "
-                f"are {told or 'missing'}."
+                f"A depth model leads from {INPUTS} inputs to {_BONES} depths and {LENGTHS} "
+                f"lengths; this one's layers are {told or 'missing'}."
             )
 
     def depth_shares(
@@ -61,19 +75,30 @@ class DepthModel:
 
         Frames of one shot, `fps` of them a second; beyond its ends it is held still.
         """
-        steps = np.round(np.array(OFFSETS) * fps).astype(int)
-        inputs = frame_inputs(flat)
-        parts = np.array_split(np.arange(len(flat)), max(len(flat) // _AT_ONCE, 1))
-        near = [np.clip(part[:, None] + steps, 0, max(len(flat) - 1, 0)) for part in parts]
-        return np.concatenate([self.forward(inputs[rows].reshape(-1, INPUTS)) for rows in near])
+        return self._of_frames(flat, fps)[:, :_BONES]
 
-    def forward(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n 13"]:
-        """Depth shares from what the rule is shown, the inputs of all moments."""
+    def length_errors(
+        self, flat: Float[np.ndarray, "T 13 2"], fps: float
+    ) -> Float[np.ndarray, "T 13"]:
+        """Expected log of how much too long LSP14's bones look in each frame, as `depth_shares`."""
+        return LENGTH_UNIT * self._of_frames(flat, fps)[:, _BONES:][:, _LENGTH_OF]
+
+    def forward(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n outputs"]:
+        """Depth shares and errors of lengths from what the rule is shown, inputs of all moments."""
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             shown = shown @ weight + bias
             if layer < len(self.weights) - 1:
                 shown = np.maximum(shown, 0.0)
         return shown
+
+    def _of_frames(
+        self, flat: Float[np.ndarray, "T 13 2"], fps: float
+    ) -> Float[np.ndarray, "T outputs"]:
+        steps = np.round(np.array(OFFSETS) * fps).astype(int)
+        inputs = frame_inputs(flat)
+        parts = np.array_split(np.arange(len(flat)), max(len(flat) // _AT_ONCE, 1))
+        near = [np.clip(part[:, None] + steps, 0, max(len(flat) - 1, 0)) for part in parts]
+        return np.concatenate([self.forward(inputs[rows].reshape(-1, INPUTS)) for rows in near])
 
 
 def frame_inputs(flat: Float[np.ndarray, "*n 13 2"]) -> Float[np.ndarray, "*n 39"]:
@@ -107,13 +132,37 @@ def expected_depth(
     return expected
 
 
+def length_errors(
+    model: DepthModel | None,
+    vectors: Float[np.ndarray, "T B 2"],
+    lengths: Float[np.ndarray, "B"],
+    skeleton: Skeleton,
+    fps: float,
+) -> Float[np.ndarray, "T B"]:
+    """Log of how much too long bones look in the frames of one shot, as the model expects.
+
+    NaN where a bone is not observed, and for bones that the model does not know, as in
+    `expected_depth`.
+    """
+    expected = np.full(vectors.shape[:2], np.nan)
+    places = _places(skeleton)
+    if model is None or places is None:
+        return expected
+    flat = vectors[:, places] / lengths[places, None]
+    known = np.isfinite(flat).all(axis=-1)
+    errors = model.length_errors(np.nan_to_num(flat), fps)
+    expected[:, places] = np.where(known, errors, np.nan)
+    return expected
+
+
 def depth_spread(skeleton: Skeleton) -> Float[np.ndarray, "B"]:
     """Error of a depth model for each bone, in lengths of the bone; infinite for unknown bones.
 
     Root mean square over eight captures of two players, filmed from all around, with a model learnt
-    from the other captures (`benchmarks/depth_error.py`). A spread of its own for every bone of
-    every frame, learnt besides, changed nothing: 42.2 and 48.8 mm instead of 42.1 and 48.5 with and
-    without signs.
+    from the other captures (`benchmarks/depth_error.py`), before models learnt lengths too; since
+    then .01 less for hips and knees, .01 more for shoulders and elbows and .02 for wrists. A spread
+    of its own for every bone of every frame, learnt besides, changed nothing: 42.2 and 48.8 mm
+    instead of 42.1 and 48.5 with and without signs.
     """
     ends = [skeleton.names[child].split("_")[-1] for _, child in skeleton.bones]
     return np.array([_SPREAD.get(end, np.inf) for end in ends])

@@ -20,7 +20,15 @@ from scipy.spatial.transform import Rotation
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.bone_directions import bone_vectors
-from keyrecon.lifting.priors.depth_model import INPUTS, OFFSETS, DepthModel, frame_inputs
+from keyrecon.lifting.priors.depth_model import (
+    INPUTS,
+    LENGTH_OF_BONE,
+    LENGTH_UNIT,
+    LENGTHS,
+    OFFSETS,
+    DepthModel,
+    frame_inputs,
+)
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import SEEDS, within
@@ -83,15 +91,16 @@ class DepthTrainingOptions:
 
     Standard deviation.
     """
-    length_error: Annotated[float, within(0, 1)] = 0.06
-    """How far bone lengths are wrong, as a share.
+    length_error: Annotated[float, within(0, 1)] = 0.08
+    """How far bone lengths are wrong at most, as a share.
 
-    Standard deviation.
+    Standard deviation: once more for all bones of a body together. Every window draws how much of
+    it there is, from nothing to all, so that lengths that are right are left alone.
     """
-    joint_error: Annotated[float, within(0, 1)] = 0.04
-    """How far joints are wrong in the picture, in lengths of the bone.
+    joint_error: Annotated[float, within(0, 0.2)] = 0.009
+    """How far joints are wrong in the picture, in statures.
 
-    Standard deviation of a bone's vector: most of it stays alike within a window.
+    Standard deviation in x and in y: most of it stays alike within a window.
     """
     seed: Annotated[int, SEEDS] = 0
     """Number from which the poses are drawn; another one gives others."""
@@ -116,7 +125,9 @@ def train_depth_model(
     network, first = _network(options), draws - max(round(_AVERAGED * draws), 1)
     sums: list[np.ndarray] = []
     for draw in progress(range(draws), "Learning depths", draws):
-        network.partial_fit(*draw_windows(source, rate, min(_DRAWN, options.poses), rng, options))
+        windows = draw_windows(source, rate, min(_DRAWN, options.poses), rng, options)
+        targets = [windows.depth_shares, windows.length_errors / LENGTH_UNIT]
+        network.partial_fit(windows.inputs, np.concatenate(targets, axis=1, dtype=np.float32))
         if draw >= first:
             layers = [*network.coefs_, *network.intercepts_]
             sums = [np.add(*pair) for pair in zip(sums, layers, strict=True)] if sums else layers
@@ -166,10 +177,20 @@ def gather(captures: Sequence[Float[np.ndarray, "_ 14 3"]]) -> Poses:
     )
 
 
+class Windows(NamedTuple):
+    """What a model is shown of windows in the picture, and what it is to tell of them."""
+
+    inputs: Float[np.ndarray, "n inputs"]
+    depth_shares: Float[np.ndarray, "n 13"]
+    """In their middles."""
+    length_errors: Float[np.ndarray, "n 7"]
+    """Log of how much too long each length looks."""
+
+
 def draw_windows(
     source: Poses, rate: float, count: int, rng: np.random.Generator, options: DepthTrainingOptions
-) -> tuple[Float[np.ndarray, "n inputs"], Float[np.ndarray, "n 13"]]:
-    """What a model is shown of windows in the picture, and the depth shares in their middles."""
+) -> Windows:
+    """Windows of captures as they are seen, with lengths and joints that are wrong."""
     rows = rng.choice(len(source.chance), count, p=source.chance)
     pace = 1 + options.pace * rng.uniform(-1, 1, count)
     pace[rng.random(count) < options.still] = 0
@@ -179,9 +200,17 @@ def draw_windows(
     mirrored = poses[:, :, _MIRROR] * np.array([-1, 1, 1], np.float32)
     poses = np.where((rng.random(count) < 0.5)[:, None, None, None], mirrored, poses)
     filmed = _film(_vary(poses, rng, options.limb_turn), rng, options)
-    flat = _add_errors(filmed[..., :2], pace, rng, options)
+    lengths = _length_errors(count, rng, options.length_error)
+    seen = filmed[..., :2] * np.exp(lengths[:, LENGTH_OF_BONE])[:, None, :, None]
+    flat = _add_errors(seen, pace, rng, options)
     inputs = frame_inputs(flat.astype(np.float32)).reshape(count, INPUTS)
-    return inputs, filmed[:, OFFSETS.index(0.0), :, 2]
+    return Windows(inputs, filmed[:, OFFSETS.index(0.0), :, 2], lengths)
+
+
+def _length_errors(count: int, rng: np.random.Generator, spread: float) -> Float[np.ndarray, "n 7"]:
+    """Logs of errors of lengths, alike for both sides, with a part that all have in common."""
+    alike, own = rng.standard_normal((count, 1)), rng.standard_normal((count, LENGTHS))
+    return spread * rng.random((count, 1)) * (alike + own)
 
 
 def _vary(
@@ -221,7 +250,9 @@ def _turned(
 
 
 _LASTING, _WANDERING, _NOISE = 0.6, 0.75, 0.28
-"""Parts of the error of a bone's vector, as shares of its standard deviation: squares add to 1."""
+"""Parts of the error of a joint, as shares of its standard deviation: squares add to 1."""
+_SIDES_DIFFER = 0.25
+"""How far a bone's length differs from its pair's mean, as a share of what pairs are wrong by."""
 _WANDER_SECONDS = 0.24
 """Time within which the wandering part stays alike: joints are propagated from keyframes, and their
 errors come and go with the limbs that are mistaken."""
@@ -233,15 +264,18 @@ def _add_errors(
     rng: np.random.Generator,
     options: DepthTrainingOptions,
 ) -> Float[np.ndarray, "n W 13 2"]:
-    """In-plane vectors over lengths that are wrong, of joints that are found with errors."""
+    """In-plane vectors over lengths: joints are found with errors, and sides differ a little."""
     count, width = flat.shape[:2]
     apart = np.abs(np.subtract.outer(OFFSETS, OFFSETS)) / _WANDER_SECONDS
     root = np.linalg.cholesky(np.exp(-apart) + 1e-9 * np.eye(width))
-    wander = np.tensordot(root, rng.standard_normal((width, count, 13, 2)), 1).transpose(1, 0, 2, 3)
+    joints = len(LSP14.names)
+    wander = rng.standard_normal((width, count, joints, 2))
+    wander = np.tensordot(root, wander, 1).transpose(1, 0, 2, 3)
     wander = np.where(pace[:, None, None, None] > 0, wander, wander[:, :1])
-    noise = rng.standard_normal(flat.shape)
+    noise = rng.standard_normal((count, width, joints, 2))
     noise = np.where(pace[:, None, None, None] > 0, noise, noise[:, :1])
-    lasting = rng.standard_normal((count, 1, 13, 2))
+    lasting = rng.standard_normal((count, 1, joints, 2))
     error = _LASTING * lasting + _WANDERING * wander + _NOISE * noise
-    lengths = 1 + options.length_error * rng.standard_normal((count, 1, 13, 1))
-    return flat * lengths + options.joint_error * error
+    bones = bone_vectors(error.reshape(-1, joints, 2), LSP14) / LSP14.lengths[:, None]
+    sides = 1 + _SIDES_DIFFER * options.length_error * rng.standard_normal((count, 1, 13, 1))
+    return flat * sides + options.joint_error * bones.reshape(flat.shape)

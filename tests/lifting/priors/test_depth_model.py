@@ -71,8 +71,8 @@ def test_the_same_captures_give_the_same_model():
 def test_what_a_model_learns_from_are_unit_bones_and_what_the_picture_leaves_of_them():
     exact = DepthTrainingOptions(length_error=0.0, joint_error=0.0)
     source = gather([play_tennis(MotionOptions(4.0, seed=3))])
-    shown, depth = draw_windows(source, FPS, 50, np.random.default_rng(0), exact)
-    now = shown.reshape(50, -1, 39)[:, 3]
+    windows = draw_windows(source, FPS, 50, np.random.default_rng(0), exact)
+    depth, now = windows.depth_shares, windows.inputs.reshape(50, -1, 39)[:, 3]
     flat, left = now[:, :26].reshape(50, 13, 2), now[:, 26:]
     np.testing.assert_allclose((flat**2).sum(axis=-1) + depth**2, 1, atol=1e-5)
     np.testing.assert_allclose(left, np.abs(depth), atol=2e-3)
@@ -145,7 +145,9 @@ def test_files_that_are_no_depth_models_are_refused(model, tmp_path):
 
 
 def test_a_model_whose_layers_do_not_fit_is_refused():
-    with pytest.raises(KeyreconError, match=f"{INPUTS} inputs to 13 depths.* are 5x13"):
+    with pytest.raises(
+        KeyreconError, match=f"{INPUTS} inputs to 13 depths and 7 lengths.* are 5x13"
+    ):
         DepthModel((np.zeros((5, 13)),), (np.zeros(13),), "")
 
 
