@@ -177,7 +177,7 @@ def gather(captures: Sequence[Float[np.ndarray, "_ 14 3"]]) -> Poses:
     )
 
 
-class Windows(NamedTuple):
+class FilmedWindows(NamedTuple):
     """What a model is shown of windows in the picture, and what it is to tell of them."""
 
     inputs: Float[np.ndarray, "n inputs"]
@@ -189,7 +189,7 @@ class Windows(NamedTuple):
 
 def draw_windows(
     source: Poses, rate: float, count: int, rng: np.random.Generator, options: DepthTrainingOptions
-) -> Windows:
+) -> FilmedWindows:
     """Windows of captures as they are seen, with lengths and joints that are wrong."""
     rows = rng.choice(len(source.chance), count, p=source.chance)
     pace = 1 + options.pace * rng.uniform(-1, 1, count)
@@ -204,7 +204,7 @@ def draw_windows(
     seen = filmed[..., :2] * np.exp(lengths[:, LENGTH_OF_BONE])[:, None, :, None]
     flat = _add_errors(seen, pace, rng, options)
     inputs = frame_inputs(flat.astype(np.float32)).reshape(count, INPUTS)
-    return Windows(inputs, filmed[:, OFFSETS.index(0.0), :, 2], lengths)
+    return FilmedWindows(inputs, filmed[:, OFFSETS.index(0.0), :, 2], lengths)
 
 
 def _length_errors(count: int, rng: np.random.Generator, spread: float) -> Float[np.ndarray, "n 7"]:
