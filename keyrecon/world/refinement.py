@@ -55,7 +55,9 @@ LENGTH_ERROR |= {"elbow": 0.035, "wrist": 0.065}
 """Error of lifted bone lengths beside that of the body's size, logarithms, by their outer joint:
 root mean squares over eight rendered sequences. Lengths that may not change gave the root at
 contact 7.0 cm off in place of 6.2, joints in the world 87 mm in place of 83; twice as much changed
-nothing more from above, where lifted lengths are furthest off."""
+nothing more from above, where lifted lengths are furthest off. Where they are exact, the freedom
+costs pose from above: a trunk put upright wrongly passes for a shorter one (benchmarks/results.md).
+"""
 SLIPS = (1.0, 0.2, 0.03)
 """Metres per second that a foot may move while it stands, from round to round."""
 HEIGHT_ERROR = 0.012
