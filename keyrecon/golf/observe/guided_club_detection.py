@@ -41,6 +41,13 @@ SHUTTER = 0.5
 """Share of the time between frames for which a camera's shutter is open: half, as in cinema."""
 BLUR_SHARES = (0.5, 1.0)
 """A blur seems narrower where it is pale, and where the club is slower than expected."""
+EARLY = 0.01
+"""Seconds by which a fit usually is early or late: a fast club is turned by more than one that
+rests. Of 134 clubs marked by eye in five real swings 91 % were detected within 5 degrees without
+it, 92.5 % with .005, .01 and .02; of 23 in one of them at half the size 74 and 91 %."""
+TEXTURE = 3.0
+"""By how many times what the lines that are tried stand out by on the average, a sure shaft does:
+leaves and rails stand out too. Of the same clubs 94 % instead of 92.5."""
 Picture = Float[np.ndarray, "h w"]
 
 
@@ -83,6 +90,9 @@ class SearchedFrame:
     """Of the player, px."""
     swept: Float[np.ndarray, "2"]
     """How far hands and head are expected to move from frame to frame, heights."""
+    usual: Float[np.ndarray, "2"]
+    """How far a club is usually turned from where it is expected, degrees, and how far beside it
+    passes, heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,34 +117,50 @@ def find_lines(
 
     Where nothing can be expected, NaN, the one detected at first has to stand out alone.
     """
-    ends, expected = np.zeros((0, 2, 2)), expected / searched.height
+    ends, expected, sure = np.zeros((0, 2, 2)), expected / searched.height, options.contrast
     if np.linalg.norm(expected[1] - expected[0]) > options.shortest:
-        ends = _best_lines(searched, expected, options)
+        tried = _try_lines(searched, expected, options)
+        sure = max(sure, TEXTURE * float(tried.contrast.mean()))
+        departure = measure_departure(expected, tried.ends, searched.usual)
+        ends = _best_lines(tried, _weigh(departure, tried.contrast, sure, options), options.most)
     detected = int(np.isfinite(first).all())
     if detected:
         line = _sharpen(searched, lay_on(first / searched.height, expected), options)
         ends = np.concatenate([ends, line[None]])
-    departure = measure_departure(expected, ends, options)
-    worth = _weigh(departure, _contrast(searched, ends, options), options)
+    departure = measure_departure(expected, ends, searched.usual)
+    worth = _weigh(departure, _contrast(searched, ends, options), sure, options)
     if np.isfinite(expected).all():
         worth[len(ends) - detected :] += options.detected
     return ClubLines(ends, departure, worth)
 
 
-def _best_lines(
+@dataclass(frozen=True, eq=False)
+class _TriedLines:
+    """Lines at all turns and offsets."""
+
+    ends: Float[np.ndarray, "n 2 2"]
+    contrast: Float[np.ndarray, "n p"]
+
+
+def _try_lines(
     searched: SearchedFrame, expected: Float[np.ndarray, "2 2"], options: LineOptions
-) -> Float[np.ndarray, "n 2 2"]:
-    """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
+) -> _TriedLines:
+    """Lines around the expected one: a row for every turn, a column for every offset."""
     turns = np.arange(-options.turn, options.turn + 0.5)
     offsets = np.linspace(-options.offset, options.offset, N_OFFSETS)
     turn, offset = (grid.ravel() for grid in np.meshgrid(turns, offsets, indexing="ij"))
     ends = _shift(expected, turn, offset)
-    contrast = _contrast(searched, ends, options)
-    worth = _weigh(measure_departure(expected, ends, options), contrast, options)
-    worth, sharp = (v.reshape(len(turns), N_OFFSETS) for v in (worth, contrast.mean(axis=1)))
+    return _TriedLines(ends, _contrast(searched, ends, options))
+
+
+def _best_lines(
+    tried: _TriedLines, worth: Float[np.ndarray, "n"], most: int
+) -> Float[np.ndarray, "m 2 2"]:
+    """Lines that are worth more than all their neighbours, moved to the sharpest one among them."""
+    worth, sharp = (v.reshape(-1, N_OFFSETS) for v in (worth, tried.contrast.mean(axis=1)))
     peaks = np.flatnonzero(worth >= cv2.dilate(worth, np.ones((PEAK_TURNS, PEAK_OFFSETS))))
-    best = peaks[np.argsort(-worth.ravel()[peaks])][: options.most]
-    return ends[[_sharpest(sharp, *divmod(peak, N_OFFSETS)) for peak in best.tolist()]]
+    best = peaks[np.argsort(-worth.ravel()[peaks])][:most]
+    return tried.ends[[_sharpest(sharp, *divmod(peak, N_OFFSETS)) for peak in best.tolist()]]
 
 
 def _sharpest(sharp: Float[np.ndarray, "a b"], turn: int, offset: int) -> int:
@@ -181,7 +207,7 @@ def _shift(
 def measure_departure(
     expected: Float[np.ndarray, "2 2"],
     ends: Float[np.ndarray, "n 2 2"],
-    options: LineOptions,
+    usual: Float[np.ndarray, "2"],
 ) -> Float[np.ndarray, "n 2"]:
     """Turn of lines from the expected one, and how far aside of its hands they pass, in usual ones.
 
@@ -194,7 +220,7 @@ def measure_departure(
     off = ends[:, 0] - expected[0]
     length = np.maximum(np.linalg.norm(theirs, axis=1), 1e-9)
     offset = (theirs[:, 0] * off[:, 1] - theirs[:, 1] * off[:, 0]) / length
-    return np.stack([np.degrees(turn) / options.usual_turn, offset / options.usual_offset], axis=1)
+    return np.stack([np.degrees(turn), offset], axis=1) / usual
 
 
 def _contrast(
@@ -239,10 +265,13 @@ def _read(picture: Picture, points: Float[np.ndarray, "n p 2"]) -> Float[np.ndar
 
 
 def _weigh(
-    departure: Float[np.ndarray, "n 2"], contrast: Float[np.ndarray, "n p"], options: LineOptions
+    departure: Float[np.ndarray, "n 2"],
+    contrast: Float[np.ndarray, "n p"],
+    sure: float,
+    options: LineOptions,
 ) -> Float[np.ndarray, "n"]:
     """What lines gain by standing out, less what they pay for departing from expectation."""
-    share = np.minimum(contrast / options.contrast, 1.0).mean(axis=1)
+    share = np.minimum(contrast / sure, 1.0).mean(axis=1)
     off = np.minimum((departure**2).sum(axis=1), options.far**2)
     return options.gain * share - 0.5 * off
 
@@ -309,7 +338,8 @@ def _find_same(
 ) -> Int[np.ndarray, "n"]:
     """Frames in which the club is what was detected at first."""
     pairs = zip(ends / height, first / height, strict=True)
-    apart = [measure_departure(e, f[None], options)[0] for e, f in pairs]
+    usual = np.array([options.usual_turn, options.usual_offset])
+    apart = [measure_departure(e, f[None], usual)[0] for e, f in pairs]
     both = np.isfinite(ends + first).all(axis=(1, 2))
     return np.flatnonzero(both & (np.abs(apart).max(axis=1) < SAME_CLUB))
 
@@ -320,12 +350,13 @@ def detect_clubs(
     """Hand end and head of the club, px, NaN where it is not detected."""
     median, height, expected = median_picture(video), clubs.height, clubs.expected
     swept = np.nan_to_num(np.linalg.norm(np.gradient(expected / height, axis=0), axis=2))
+    usual = _usual_departures(expected, swept, video.fps, options.lines)
 
     def detect(numbered: tuple[int, UInt8[np.ndarray, "h w"]]) -> ClubLines:
         frame, grey = numbered
         picture = grey.astype(np.float32)
         layers = (picture,) if clubs.resting[frame] else (picture, picture - median)
-        searched = SearchedFrame(layers, height, swept[frame])
+        searched = SearchedFrame(layers, height, swept[frame], usual[frame])
         return find_lines(searched, clubs.first[frame], expected[frame], options.lines)
 
     lines = list(side_by_side(detect, enumerate(video.grey_frames())))
@@ -334,6 +365,23 @@ def detect_clubs(
     for t in np.flatnonzero(chosen >= 0):
         ends[t] = height * lines[t].ends[chosen[t]]
     return ends
+
+
+def _usual_departures(
+    expected: Float[np.ndarray, "T 2 2"],
+    swept: Float[np.ndarray, "T 2"],
+    fps: float,
+    options: LineOptions,
+) -> Float[np.ndarray, "T 2"]:
+    """How far clubs are usually turned from where they are expected, degrees, and how far beside
+    they pass, heights: by more where they move fast, since the fit is early or late."""
+    way = expected[:, 1] - expected[:, 0]
+    before, after = way[:-1], way[1:]
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = np.abs(np.degrees(np.arctan2(cross, (before * after).sum(axis=1))))
+    turned = np.nan_to_num(np.fmax(np.append(turn[:1], turn), np.append(turn, turn[-1:])))
+    moved = EARLY * fps * np.stack([turned, swept[:, 0]], axis=1)
+    return np.hypot([options.usual_turn, options.usual_offset], moved)
 
 
 def median_picture(video: Video) -> Float[np.ndarray, "h w"]:

@@ -111,3 +111,42 @@ def test_a_club_laid_on_a_line_keeps_its_length_and_its_hands_along_it():
     line, club = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[3.0, 4.0], [3.0, 24.0]])
     np.testing.assert_allclose(lay_on(line, club), [[3.0, 0.0], [23.0, 0.0]])
     np.testing.assert_allclose(lay_on(line, np.full((2, 2), np.nan)), line)
+
+
+def written(path, ends, ground):
+    """A film of a bright club before what `ground` gives for every frame."""
+
+    def pictures():
+        for t, club in enumerate(ends):
+            picture = ground(t)
+            draw(picture, club)
+            yield picture
+
+    write_video(path, pictures(), 30.0, 12)
+    return open_video(path)
+
+
+def smooth_ground(_):
+    return np.random.default_rng(0).normal(100, 3, (300, 320, 3)).astype(np.uint8)
+
+
+def test_a_fast_club_is_found_by_a_fit_that_is_half_a_frame_early(tmp_path):
+    angles = np.cumsum(np.r_[np.full(18, 2.0), 70.0, np.full(21, 2.0)]) - 200
+    early = np.interp(np.arange(FRAMES) + 0.5, np.arange(FRAMES), angles)
+    film = written(tmp_path / "fast.mp4", clubs(angles), smooth_ground)
+    found = detect(film, NOWHERE, clubs(early))
+    assert (off(found, clubs(angles)) < 3).all()
+
+
+def test_leaves_that_stand_out_everywhere_are_not_taken_for_a_club(tmp_path):
+    random = np.random.default_rng(1)
+
+    def leaves(_):
+        spots = cv2.GaussianBlur(random.normal(0, 1, (300, 320)), (0, 0), 1.0)
+        grey = np.clip(90 + 45 * spots / spots.std(), 0, 255)
+        return grey[..., None].repeat(3, axis=2).astype(np.uint8)
+
+    film = written(tmp_path / "leaves.mp4", clubs(ANGLES), leaves)
+    wrong = np.where(np.isin(np.arange(FRAMES), [10, 20, 30]), 22.0, 0.0)
+    found = detect(film, NOWHERE, clubs(ANGLES + wrong))
+    assert (off(found, clubs(ANGLES)) < 3).all()
