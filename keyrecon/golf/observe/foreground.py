@@ -230,6 +230,7 @@ def _learn_background(
         changed = scenery & (cv2.absdiff(picture, clicked).max(axis=2) > PIXEL_NOISE)
         either = (player | changed).astype(np.uint8)
         come = changed & (cv2.morphologyEx(either, cv2.MORPH_OPEN, limb) > 0)
+        come &= has_outline(come & ~player, picture, clicked)
         free: Bool[np.ndarray, "h w"] = cv2.dilate((player | come).astype(np.uint8), rim) == 0
         return free
 
@@ -238,6 +239,32 @@ def _learn_background(
         [to_lab(p) for p in pictures], free, _still(len(numbers)).to_reference,
         width / video.width, min_share=LEAST_FREE,
     )  # fmt: skip
+
+
+def has_outline(
+    differs: Bool[np.ndarray, "h w"],
+    picture: UInt8[np.ndarray, "h w 3"],
+    other: UInt8[np.ndarray, "h w 3"],
+) -> Bool[np.ndarray, "h w"]:
+    """Which parts of what differs between two pictures have their outline in the first.
+
+    What is there has an outline; where it was, or will be, the scene goes on across it. An arm that
+    GrabCut missed in the clicked picture would else make scenery of itself, and the grass that it
+    uncovers a player: on a rendered swing PA-MPJPE was 52 instead of 39 mm.
+    """
+    _, parts = cv2.connectedComponents(differs.astype(np.uint8))
+    rim = differs & (cv2.erode(differs.astype(np.uint8), np.ones((3, 3))) == 0)
+    here, there = (
+        np.bincount(parts[rim], _contrast(shown)[rim], parts.max() + 1)
+        for shown in (picture, other)
+    )
+    return differs & (here >= there)[parts]
+
+
+def _contrast(picture: UInt8[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w"]:
+    """How much a picture changes from each pixel to the next, grey levels."""
+    across, down = (cv2.Sobel(picture, cv2.CV_64F, x, 1 - x) for x in (1, 0))
+    return np.hypot(across, down).max(axis=2)
 
 
 def _eventful_frames(video: Video, cutter: PlayerCutter, count: int) -> Int[np.ndarray, "n"]:

@@ -9,7 +9,7 @@ import pytest
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks, clicked_pose
 from keyrecon.golf.observation import find_whole
-from keyrecon.golf.observe.foreground import separate_player
+from keyrecon.golf.observe.foreground import has_outline, separate_player
 from keyrecon.golf.observe.player_cutter import ClickedFigure
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
@@ -123,3 +123,15 @@ def test_the_player_is_where_he_stood_and_the_colours_are_the_same():
     gone = here.copy()
     gone[:115] = picture(0)[:115, ::-1]  # scenery where the trunk was
     assert not figure_of_clicks.stays(to_lab(gone))[trunk & ~true[:, ::-1]].any()
+
+
+def test_what_has_come_has_an_outline_and_where_it_was_the_scene_goes_on():
+    before = picture(0)
+    after = before.copy()
+    cv2.circle(after, (200, 40), 14, (150, 30, 30), -1)  # comes before the sky
+    after[60:110, 20:40] = picture(1)[60:110, 20:40]
+    before[60:110, 20:40] = (60, 40, 30)  # leaves sky and grass behind
+    differs = (before != after).any(axis=2)
+    came = has_outline(differs, after, before)
+    assert came[40, 200] and not came[80, 30]
+    np.testing.assert_array_equal(has_outline(differs, before, after), differs & ~came)
