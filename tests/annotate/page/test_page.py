@@ -522,6 +522,20 @@ def test_what_is_uncertain_is_asked_for_anew_when_a_run_has_ended(context, folde
     assert person.complaints == []
 
 
+def test_the_end_of_work_that_was_never_seen_to_run_is_news(context, folder):
+    with serving(folder, Assistant(), {"run": partial(follow_at_once, folder)}) as server:
+        person = Person(context, server.credentials.address)
+        person.open(40)
+        person.mark_joints(partial(place_of, 40))
+        person.await_saved()
+        person.press("Alt+3")
+        person.page.evaluate("() => { self.requestAnimationFrame = (draw) => setTimeout(draw, 3000); }")
+        person.press("Enter")
+        person.await_text("#notice", "Followed")
+        context.close()
+    assert person.complaints == []
+
+
 def test_a_page_that_can_tell_nothing_of_the_body_says_why(person):
     person.await_text("#pose-empty", "stored results are missing.* Make the motion")
 

@@ -173,6 +173,7 @@ export function createShell(model, go) {
 // Long work on the server: starting it, and what its end means for the page.
 function createJobs(model) {
   const states = new Map(); // job -> last state that was acted on
+  let listed = false; // whether it is known which jobs are older than the page
 
   async function startJob(kind, options = {}) {
     try {
@@ -189,7 +190,11 @@ function createJobs(model) {
   }
 
   async function refreshJobs() {
-    for (const job of await api.read("jobs")) model.jobs.set(job.id, job);
+    for (const job of await api.read("jobs")) {
+      model.jobs.set(job.id, job);
+      if (!listed) states.set(job.id, job.state);
+    }
+    listed = true;
     model.redraw();
   }
 
@@ -208,10 +213,12 @@ function createJobs(model) {
     });
   }
 
-  // Ends that happened before the page was opened are no news.
+  // Ends that happened before the page was opened are no news; what ends at once is never seen to run.
   function noteEnds() {
+    if (!listed) return;
     for (const job of model.jobs.values()) {
-      if (states.get(job.id) === "running" && job.state !== "running") ended(job);
+      const before = states.get(job.id) ?? "running";
+      if (before === "running" && job.state !== "running") ended(job);
       states.set(job.id, job.state);
     }
   }
