@@ -529,7 +529,7 @@ def test_the_end_of_work_that_was_never_seen_to_run_is_news(context, folder):
         person.mark_joints(partial(place_of, 40))
         person.await_saved()
         person.press("Alt+3")
-        person.page.evaluate("() => { self.requestAnimationFrame = (draw) => setTimeout(draw, 3000); }")
+        person.page.evaluate("() => { requestAnimationFrame = (draw) => setTimeout(draw, 3000); }")
         person.press("Enter")
         person.await_text("#notice", "Followed")
         context.close()
