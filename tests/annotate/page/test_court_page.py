@@ -50,6 +50,7 @@ def test_a_court_is_found_looked_at_and_mended_by_dragging(folder, chromium):
         person.page.click("#court-primary")
         person.await_text("#court-text", "Do the pink lines lie on the painted ones?")
         person.await_text("#court-more", "found in 100 %")
+        person.page.wait_for_selector("#court-picture[data-lines=camera]")
         assert not person.page.is_visible("#court-primary")
         for name in ("near-left", "near-right", "far-left", "far-right"):
             person.page.mouse.move(*on_screen(person, place_of(name)))
@@ -57,8 +58,7 @@ def test_a_court_is_found_looked_at_and_mended_by_dragging(folder, chromium):
             moved = on_screen(person, place_of(name) + ASIDE)
             person.page.mouse.move(*moved, steps=3)
             person.page.mouse.up()
-            person.await_text("#court-points", name.split("-")[1])
-            person.page.wait_for_timeout(100)
+            person.await_text("#court-points", "the {} {} corner".format(*name.split("-")))
         person.await_text("#court-text", "Do the yellow lines lie on the painted ones?")
         assert person.page.is_visible("#court-primary")
         context.close()

@@ -147,6 +147,7 @@ export function createCourt(model, { frames, shell }) {
   function drawPicture() {
     viewer.drawPicture(selection.frame, [undefined, SMALL_WIDTH]);
     const [pen] = viewer.overlay();
+    byId("court-picture").dataset.lines = (view?.frame === viewer.shown() && view.source) || "";
     if (view?.frame === viewer.shown()) {
       pen.lineCap = "round";
       for (const [color, width] of [[CASING, 3.5], [view.source === "clicks" ? PREVIEW : LINE, 1.5]]) {
