@@ -1,25 +1,27 @@
 // A clock that plays frames. A frame whose picture is not here yet holds the clock up, so that the
 // picture and what is drawn over it always belong together.
 export function createPlayer({ fps, last, ready, load, show, active }) {
-  let playing = null; // {frame, since}: where and when the clock was set
+  let playing = null; // {frame, since, shown}: where and when the clock was set, what it shows now
 
   function step(now) {
     if (!playing || !active()) {
       playing = null;
       return;
     }
-    const due = playing.frame + Math.floor(((now - playing.since) * fps) / 1000);
-    const frame = Math.min(last, due);
-    if (ready(frame)) {
-      show(frame);
-    } else {
-      load(playing.frame + 1);
-      if (ready(playing.frame + 1)) playing.frame += 1;
-      playing.since = now;
-      show(playing.frame);
-    }
-    if (frame >= last) playing = null;
-    requestAnimationFrame(step);
+    const due = Math.min(last, playing.frame + Math.floor(((now - playing.since) * fps) / 1000));
+    if (ready(due)) playing.shown = due;
+    else holdUp(now);
+    show(playing.shown);
+    if (playing.shown >= last) playing = null;
+    else requestAnimationFrame(step);
+  }
+
+  // What is due is late: the next picture is waited for, and time goes on from there.
+  function holdUp(now) {
+    const next = playing.shown + 1;
+    load(next);
+    if (ready(next)) playing.shown = next;
+    Object.assign(playing, { frame: playing.shown, since: now });
   }
 
   return {
@@ -28,7 +30,8 @@ export function createPlayer({ fps, last, ready, load, show, active }) {
       playing = null;
     },
     start(frame) {
-      playing = { frame: frame >= last ? 0 : frame, since: performance.now() };
+      const first = frame >= last ? 0 : frame;
+      playing = { frame: first, since: performance.now(), shown: first };
       requestAnimationFrame(step);
     },
   };
