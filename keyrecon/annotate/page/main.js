@@ -191,8 +191,7 @@ addEventListener("hashchange", () => addressed() !== null && actions.open(addres
 addEventListener("pagehide", actions.dropDragged);
 
 await model.readState();
-model.listen();
-shell.refreshJobs();
+model.listen(shell.refreshJobs);
 lists.refresh();
 if (model.project.golf) {
   await model.readSwing();

@@ -48,7 +48,7 @@ class Jobs:
         self._lock = Lock()
         self._jobs: dict[int, Job] = {}
         self._process: Any = None
-        self._numbers = itertools.count(1)
+        self._numbers = itertools.count(time.time_ns() // 1_000_000)
 
     def listed(self) -> list[Job]:
         """All jobs since the start, the latest first."""

@@ -479,6 +479,28 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
     assert person.complaints == []
 
 
+def test_long_work_that_ended_with_its_server_is_told_and_can_be_started_again(context, folder):
+    with serving(folder, commands={"run": count_slowly}) as server:
+        person = Person(context, server.credentials.address)
+        person.open(40)
+        person.mark_joints(partial(place_of, 40))
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Make the motion")
+        person.press("Enter")
+        person.await_text("#job-text", "Counting")
+        server.stop()
+        person.await_text("#saving", "Not connected")
+        server.start()
+        person.await_text("#notice-text", "starting again goes on from there")
+        person.await_text("#motion-text", "Make the motion")
+        person.press("Enter")
+        person.await_text("#job-text", "Counting")
+        person.page.wait_for_selector("#notice", state="hidden")
+        person.page.wait_for_selector("#job:not([hidden])")
+        context.close()
+    assert person.complaints == []
+
+
 STRETCH = {
     "first": 20,
     "last": 31,

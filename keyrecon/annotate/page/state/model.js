@@ -186,17 +186,20 @@ export async function createModel() {
   model.undo = () => step("undo");
   model.redo = () => step("redo");
 
-  model.listen = () =>
+  model.disconnected = (fault) => outbox.disconnected(fault);
+  // `connected` is done each time that the server answers anew.
+  model.listen = (connected) =>
     api.listen({
       opened: () =>
         model
           .readState()
+          .then(connected)
           .then(() => outbox.reconnected())
-          .catch((fault) => outbox.disconnected(fault)),
+          .catch(model.disconnected),
       closed: () => outbox.disconnected(),
       news({ job, project, trouble, edits, ...counts }) {
         if (job) model.jobs.set(job.id, job);
-        if (project) model.readProject().catch((fault) => outbox.disconnected(fault));
+        if (project) model.readProject().catch(model.disconnected);
         if (trouble !== undefined) model.notify(trouble);
         const others = edits?.filter(({ id }) => !sent.has(id));
         if (others?.length)

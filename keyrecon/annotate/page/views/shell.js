@@ -172,6 +172,7 @@ export function createShell(model, go) {
 
 // Long work on the server: starting it, and what its end means for the page.
 function createJobs(model) {
+  const isOver = (job) => job !== undefined && job.state !== "running";
   const states = new Map(); // job -> last state that was acted on
   let listed = false; // whether it is known which jobs are older than the page
 
@@ -189,10 +190,17 @@ function createJobs(model) {
     }
   }
 
+  // What the server has at work. News of an end may be here before an older answer; what a server
+  // that was started anew does not know has broken off.
   async function refreshJobs() {
-    for (const job of await api.read("jobs")) {
-      model.jobs.set(job.id, job);
+    const jobs = await api.read("jobs");
+    for (const job of jobs) {
+      if (!isOver(model.jobs.get(job.id))) model.jobs.set(job.id, job);
       if (!listed) states.set(job.id, job.state);
+    }
+    for (const job of model.jobs.values()) {
+      if (!isOver(job) && !jobs.some(({ id }) => id === job.id))
+        model.jobs.set(job.id, { ...job, state: "cancelled" });
     }
     listed = true;
     model.redraw();
@@ -205,12 +213,13 @@ function createJobs(model) {
     if (job.state !== "done") return;
     const news = job.text?.split("\n") ?? [];
     if (job.text) model.notify(job.text, news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT);
-    model.readProject().then(() => {
+    const shown = model.readProject().then(() => {
       if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });
       if (job.kind === "golf") model.update({ view: "swing" });
       if (job.kind === "run") model.update({ view: "motion" });
     });
+    shown.catch(model.disconnected);
   }
 
   // Ends that happened before the page was opened are no news; what ends at once is never seen to run.
