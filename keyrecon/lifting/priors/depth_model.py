@@ -17,7 +17,7 @@ stands as bodies do, seen with thighs that are always too short, has other thigh
 little of it, a video more (`lifting/length_correction.py`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -123,17 +123,13 @@ def expected_depth(
     NaN for bones that the model does not know, for all of them where one of LSP14's is missing
     from the skeleton. A bone that is not observed (NaN) tells nothing about the others.
     """
-    expected = np.full(vectors.shape[:2], np.nan)
-    places = _places(skeleton)
-    if model is None or places is None:
-        return expected
-    flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
-    expected[:, places] = model.depth_shares(flat, fps) * lengths[places]
-    return expected
+    if model is None:
+        return np.full(vectors.shape[:2], np.nan)
+    return _expect(model.depth_shares, vectors, lengths, skeleton, fps) * lengths
 
 
 def length_errors(
-    model: DepthModel | None,
+    model: DepthModel,
     vectors: Float[np.ndarray, "T B 2"],
     lengths: Float[np.ndarray, "B"],
     skeleton: Skeleton,
@@ -144,14 +140,23 @@ def length_errors(
     NaN where a bone is not observed, and for bones that the model does not know, as in
     `expected_depth`.
     """
+    errors = _expect(model.length_errors, vectors, lengths, skeleton, fps)
+    return np.where(np.isfinite(vectors).all(axis=-1), errors, np.nan)
+
+
+def _expect(
+    rule: Callable[[Float[np.ndarray, "T 13 2"], float], Float[np.ndarray, "T 13"]],
+    vectors: Float[np.ndarray, "T B 2"],
+    lengths: Float[np.ndarray, "B"],
+    skeleton: Skeleton,
+    fps: float,
+) -> Float[np.ndarray, "T B"]:
+    """What a rule for LSP14's bones expects of a skeleton's; NaN for those it does not know."""
     expected = np.full(vectors.shape[:2], np.nan)
     places = _places(skeleton)
-    if model is None or places is None:
-        return expected
-    flat = vectors[:, places] / lengths[places, None]
-    known = np.isfinite(flat).all(axis=-1)
-    errors = model.length_errors(np.nan_to_num(flat), fps)
-    expected[:, places] = np.where(known, errors, np.nan)
+    if places is not None:
+        flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
+        expected[:, places] = rule(flat, fps)
     return expected
 
 
