@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.golf.observe.guided_club_detection import ExpectedClubs, detect_clubs, lay_on
+from keyrecon.golf.observe.guided_club_detection import ExpectedClubs, detect_clubs
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 
@@ -105,12 +105,6 @@ def test_a_club_that_rests_is_told_by_the_picture_alone(still_film):
     found = detect(still_film, NOWHERE, expected, np.ones(FRAMES, bool))
     assert (off(found, clubs(np.full(FRAMES, 75.0))) < 1.5).all()
     assert np.isnan(detect(still_film, NOWHERE, expected)).all()
-
-
-def test_a_club_laid_on_a_line_keeps_its_length_and_its_hands_along_it():
-    line, club = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[3.0, 4.0], [3.0, 24.0]])
-    np.testing.assert_allclose(lay_on(line, club), [[3.0, 0.0], [23.0, 0.0]])
-    np.testing.assert_allclose(lay_on(line, np.full((2, 2), np.nan)), line)
 
 
 def written(path, ends, ground):
