@@ -32,7 +32,7 @@ from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.foreground import Foreground, FrameForeground
 from keyrecon.golf.observe.joint_tracks import TrackedJoints, track_joints
 from keyrecon.golf.observe.point_matches import MatchOptions, match_points
-from keyrecon.golf.observe.swing_events import (
+from keyrecon.golf.observe.swing_timing import (
     TimingOptions,
     interpolate_times,
     refine_key_frames,

@@ -30,12 +30,8 @@ from keyrecon.golf.marks import hold_joints, hold_keys, hold_observations
 from keyrecon.golf.observation import ObservationOptions, ObservedSwing
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.motion_timing import TimeShift
-from keyrecon.golf.observe.swing_events import (
-    SwingEventOptions,
-    detect_swing_events,
-    interpolate_times,
-    order_keys,
-)
+from keyrecon.golf.observe.swing_events import SwingEventOptions, detect_swing_events
+from keyrecon.golf.observe.swing_timing import interpolate_times, order_keys
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.prior.skeleton import mark_neck, size_body
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingMarks, SwingState

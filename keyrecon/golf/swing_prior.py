@@ -19,7 +19,7 @@ from keyrecon.golf.fit.handedness import mirror_observations
 from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.observe.club import Club
-from keyrecon.golf.observe.swing_events import TimingOptions, find_key_frames, interpolate_times
+from keyrecon.golf.observe.swing_timing import TimingOptions, find_key_frames, interpolate_times
 from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import (
     Camera,

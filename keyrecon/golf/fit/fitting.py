@@ -48,7 +48,7 @@ from keyrecon.golf.fit.solver import (
     robust_weights,
     solve,
 )
-from keyrecon.golf.observe.swing_events import keep_order
+from keyrecon.golf.observe.swing_timing import keep_order
 from keyrecon.golf.prior.kinematics import place_body, pose_rates
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.records import Body, Observations, SwingFit, SwingState

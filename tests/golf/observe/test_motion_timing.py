@@ -10,7 +10,7 @@ from golf_truth import camera_before, observe
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.observe.motion_timing import measure_time_shift
-from keyrecon.golf.observe.swing_events import interpolate_times
+from keyrecon.golf.observe.swing_timing import interpolate_times
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body

@@ -1,68 +1,89 @@
+"""Hands that rest, swing and rest again before a still scene."""
+
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
+from golf_truth import camera_before, even_times, observe
 
-from keyrecon.errors import KeyreconError
-from keyrecon.golf.observe.club import Club
-from keyrecon.golf.observe.swing_events import find_key_frames, interpolate_times, keep_order
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.swing_events import detect_swing_events
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, SwingFit, SwingState
+from keyrecon.io.formats.model_file import read_motion_model
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
 
-HEIGHT, FPS = 200.0, 60.0
-TRUE = np.array([30, 78, 96, 130])
-
-
-def filmed(keys=TRUE, frames=160):
-    """A club that rests, goes up, turns round, comes down faster, and goes up to a finish."""
-    pace = np.array([1 / 48, 1 / 30, 1 / 25, 1 / 34])
-    passed = CubicHermiteSpline(keys, [0, 1, 2, 3], pace)(
-        np.clip(np.arange(frames), keys[0], keys[3])
-    )
-    up = 0.5 - 0.5 * np.cos(np.pi * passed)
-    turn = np.radians(90) + np.radians(np.interp(passed, [0, 1, 2, 3], [0, 190, 0, -220]))
-    hands = np.stack([300 - 60 * np.sin(np.pi * passed / 2), 300 - 80 * up], axis=1)
-    head = hands + 110 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    detected = np.ones(frames, bool)
-    return Club(np.stack([hands, head], axis=1), detected, detected)
+FRAMES, FPS, HEIGHT, STATURE = 110, 60.0, 300.0, 1.8
+LEAVES, TURNS, STOPS = 30.0, 62.0, 90.0
 
 
-def test_key_postures_are_found_within_two_frames():
-    keys = find_key_frames(filmed(), HEIGHT, FPS)
-    assert np.abs(keys[:3] - TRUE[:3]).max() <= 2
-    assert abs(keys[3] - TRUE[3]) <= 5
+def hands():
+    """Way of the hands in player heights: away, faster back and beyond, and at rest."""
+    time = np.arange(FRAMES)
+    away, back = (np.clip((time - a) / (b - a), 0, 1) for a, b in ((LEAVES, TURNS), (TURNS, STOPS)))
+    ease = [10 * s**3 - 15 * s**4 + 6 * s**5 for s in (away, back)]
+    return 0.4 * ease[0] - 0.6 * ease[1]
 
 
-def test_slow_motion_changes_no_key_posture():
-    slowly = find_key_frames(filmed(), HEIGHT, FPS / 1.5)
-    assert np.abs(slowly[:3] - TRUE[:3]).max() <= 3
+def rests():
+    """Last frame before and first one after the swing in which the hands hardly move."""
+    speed = np.abs(np.gradient(hands()))
+    slow = np.flatnonzero(speed < 0.05 * speed.max())
+    return slow[slow < 45][-1], slow[slow > 80][0]
 
 
-def test_a_rest_with_the_hands_up_is_no_address():
-    club = filmed(np.array([30, 78, 110, 144]), 180)
-    ends = club.ends.copy()
-    ends[60:78] = ends[78]
-    keys = find_key_frames(Club(ends, club.detected, club.tip), HEIGHT, FPS)
-    assert abs(keys[0] - 30) <= 4
+def filmed(folder, share):
+    """The hands, a patch of skin, of whose way the picture shows a share."""
+    rng = np.random.default_rng(0)
+    ground = rng.normal(100, 25, (300, 320, 3)).clip(0, 255).astype(np.uint8)
+    skin = cv2.GaussianBlur(rng.normal(170, 60, (40, 40, 3)), (0, 0), 2).clip(0, 255)
+    places = np.stack([160 + HEIGHT * share * hands(), np.full(FRAMES, 150.0)], axis=1)
+
+    def pictures():
+        for place in places:
+            shift = np.array([[1, 0, place[0] - 20], [0, 1, place[1] - 20]])
+            moved = cv2.warpAffine(skin, shift, (320, 300))
+            there = cv2.warpAffine(np.ones((40, 40, 1)), shift, (320, 300))[..., None]
+            yield (ground * (1 - there) + moved * there).astype(np.uint8)
+
+    write_video(folder / "hands.mp4", pictures(), FPS, 12)
+    return open_video(folder / "hands.mp4"), places
 
 
-def test_someone_who_stands_still_makes_no_swing():
-    club = filmed()
-    still = Club(club.ends[:1].repeat(100, axis=0), club.detected[:100], club.tip[:100])
-    with pytest.raises(KeyreconError, match="no swing in this video"):
-        find_key_frames(still, HEIGHT, FPS)
+def fitted_swing(places, off):
+    """A fitted swing whose hands are those of the film, in space as far as they go."""
+    model, body = read_motion_model(), size_body(STATURE)
+    rotation, position = camera_before(180.0)
+    state = SwingState(
+        np.zeros(1), even_times(FRAMES), np.tile(rotation, (FRAMES, 1, 1)),
+        np.tile(position, (FRAMES, 1)),
+    )  # fmt: skip
+    fit = SwingFit(model, body, state)
+    pose = fitted_pose(fit)
+    joints, club = find_joints(body, pose), find_club(body, pose)
+    observations = observe(joints, club, Camera(1000.0, np.array([160.0, 150.0])), 0.0)
+    swing = describe_fit(fit, observations, np.arange(FRAMES) / FPS)
+    club = np.zeros((FRAMES, 2, 3))
+    club[:, 0, 0] = STATURE * hands()
+    ends = np.repeat(places[:, None], 2, axis=1)
+    keys = np.array([LEAVES, TURNS, 76.0, STOPS]) + off
+    swing = replace(swing, club=club, club2d=ends, keys=keys)
+    return swing, replace(observations, height=HEIGHT)
 
 
-def test_after_the_finish_normalised_time_may_only_fall():
-    phase = keep_order(np.array([-0.1, 0.2, 0.1, 0.5, 1.2, 0.9, 0.95, 0.8]))
-    np.testing.assert_allclose(phase, [0, 0.2, 0.2, 0.5, 1, 0.9, 0.9, 0.8])
-
-
-def test_normalised_time_rises_through_the_key_postures_and_rests_outside():
-    times = np.array([0.0, 0.6, 0.75, 1.0])
-    phase = interpolate_times(TRUE.astype(float), times, 160)
-    np.testing.assert_allclose(phase[TRUE], times, atol=1e-9)
-    assert (np.diff(phase) >= 0).all()
-    assert phase[0] == 0 and phase[-1] == 1
-
-
-def test_key_postures_out_of_order_are_put_around_the_top():
-    times = interpolate_times(np.array([52.0, 50.0, 50.0, 49.0]), np.array([0, 0.4, 0.7, 1.0]), 90)
-    assert (np.diff(times) >= 0).all() and times[0] == 0 and times[-1] == 1
+@pytest.mark.parametrize("share", [1.0, 0.4])
+@pytest.mark.parametrize("off", [-4.0, 4.0])
+def test_hands_tell_when_a_swing_begins_turns_and_ends_however_much_of_their_way_is_seen(
+    tmp_path, share, off
+):
+    video, places = filmed(tmp_path, share)
+    grid = np.stack(np.meshgrid(np.arange(-15, 16, 6), np.arange(-15, 16, 6)), axis=2)
+    player = tuple(place + grid.reshape(-1, 2) for place in places)
+    swing, observations = fitted_swing(places, np.array([off, -off, 0, -off]))
+    keys = detect_swing_events(video, replace(observations, foreground=player), swing)
+    assert np.abs(keys[[0, 3]] - rests()).max() <= 1
+    assert abs(keys[1] - TURNS) <= FPS / 30, "the top is where the hands turn round"
+    assert keys[2] == swing.keys[2]
