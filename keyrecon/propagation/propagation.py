@@ -30,10 +30,16 @@ from keyrecon.propagation.appearance import (
     learn_appearance,
     regular_frames,
 )
-from keyrecon.propagation.body_frame import ground_path, stabilise_shots
+from keyrecon.propagation.body_frame import (
+    BodyFrame,
+    PlayerMarks,
+    ground_path,
+    stabilise_shots,
+)
 from keyrecon.propagation.bone_bounds import bound_bones
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
+    AnnotatedPoses,
     EdgeTemplates,
     learn_foot_offsets,
     make_edge_templates,
@@ -70,7 +76,6 @@ from keyrecon.records import (
     FlowTracks,
     JointTracks,
     Preparation,
-    Shots,
 )
 
 LIMB_HYPOTHESES = 3
@@ -107,24 +112,35 @@ class PropagateOptions:
 
 
 @dataclass(frozen=True, eq=False)
+class PlayerEvidence:
+    """What both halves of the body are propagated with."""
+
+    preparation: Preparation
+    flow: FlowTracks | None
+    body_frame: BodyFrame
+    marks: PlayerMarks
+    bounds: Float[np.ndarray, "J J"]
+    """Greatest distance of any two joints, as `bound_bones` has it, player heights."""
+    features: PlayerFeatures
+    """What the player looks like in every frame."""
+    silhouettes: Silhouettes
+    ground: Complex[np.ndarray, "T"] | None
+    """Way of the player over the ground, player heights; of legs, which stand on it."""
+
+
+@dataclass(frozen=True, eq=False)
 class HalfStart:
     """What is known of one half of the body before it is propagated."""
 
+    player: PlayerEvidence
     shift: Complex[np.ndarray, "T K"]
     """From an annotated pose to the same pose in another frame, by head or feet."""
     distance: Float[np.ndarray, "T K"]
     """Pose distance of every frame to the annotated ones, player heights."""
     fixed: Complex[np.ndarray, "T G"]
     """Joints that the other half has estimated."""
-    features: PlayerFeatures
-    """What the player looks like in every frame."""
-    shots: Shots
-    """Nothing is carried from one to the next but what is marked."""
     ways: MarkedWays
     """Where flow and straight lines lead from marks."""
-    silhouettes: Silhouettes
-    ground: Complex[np.ndarray, "T"] | None
-    """Way of the player over the ground, player heights; of legs, which stand on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,74 +193,94 @@ def _propagate_fused(
     progress: Progress,
 ) -> JointTracks:
     """Both halves of the body over the whole video."""
-    track, edges, fps = preparation.track, preparation.edges, preparation.video.fps
-    body_frame = stabilise_shots(track, preparation.camera, preparation.shots, fps)
-    index, silhouettes = index_elements(edges, body_frame), gather_silhouettes(edges, body_frame)
-    count, frames = len(edges), np.arange(len(edges))
-    ground = ground_path(body_frame, preparation.camera, preparation.shots)
-    features = describe_player(
-        preparation.video,
-        body_frame,
-        np.union1d(regular_frames(preparation.video), annotations.frames),
-    )
-    joints = np.full((count, annotations.joints.shape[1]), np.nan + 0j)
+    player = _gather_evidence(preparation, annotations, flow)
+    index = index_elements(preparation.edges, player.body_frame)
+    frames = np.arange(len(preparation.edges))
+    joints = np.full((len(frames), annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
     halves = split_body(annotations.skeleton)
-    marks = body_frame.of_marks(annotations)
-    bounds = bound_bones(marks)
     for half in progress(halves, "Propagating joints", len(halves)):
         fixed = joints[:, half.joints[half.fixed]]
-        poses = gather_poses(marks, bounds, half, fixed)
-        ways = find_ways(marks, flow, body_frame, half, fixed, preparation)
-        distance = distances_to(preparation.pose_distances, half.name, poses.frames)
-        templates = make_edge_templates(edges, body_frame, poses, options.elements)
-        if half.name == "lower":
-            tracked = body_frame.from_pixels(track.feet, frames[:, None])
-            templates = replace(
-                templates, feet=learn_foot_offsets(half, poses.frames, poses.joints, tracked)
-            )
-        anchor = track.head if half.name == "upper" else track.mid_feet
-        at = body_frame.from_pixels(anchor, frames)
-        shift = at[:, None] - at[poses.frames]
-        start = HalfStart(
-            shift,
-            distance,
-            fixed,
-            features,
-            preparation.shots,
-            ways,
-            silhouettes,
-            ground if half.name == "lower" else None,
-        )
-        result = propagate_half(templates, index, fps, start, options.similar, options.rounds)
+        poses = gather_poses(player.marks, player.bounds, half, fixed)
+        templates = _half_templates(player, poses, options.elements)
+        start = _start_half(player, poses, fixed)
+        result = propagate_half(templates, index, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
-    tracks = JointTracks(body_frame.to_pixels(joints, frames[:, None]), confidence, source)
-    return with_flow(tracks, flow, track.height, bounds)
+    places = player.body_frame.to_pixels(joints, frames[:, None])
+    tracks = JointTracks(places, confidence, source)
+    return with_flow(tracks, flow, preparation.track.height, player.bounds)
+
+
+def _gather_evidence(
+    preparation: Preparation, annotations: Annotations, flow: FlowTracks | None
+) -> PlayerEvidence:
+    video, camera, shots = preparation.video, preparation.camera, preparation.shots
+    body_frame = stabilise_shots(preparation.track, camera, shots, video.fps)
+    marks = body_frame.of_marks(annotations)
+    frames = np.union1d(regular_frames(video), annotations.frames)
+    return PlayerEvidence(
+        preparation,
+        flow,
+        body_frame,
+        marks,
+        bound_bones(marks),
+        describe_player(video, body_frame, frames),
+        gather_silhouettes(preparation.edges, body_frame),
+        ground_path(body_frame, camera, shots),
+    )
+
+
+def _half_templates(player: PlayerEvidence, poses: AnnotatedPoses, most: int) -> EdgeTemplates:
+    """Edge templates of one half of the body; of the lower one with where its feet are tracked."""
+    edges, body_frame = player.preparation.edges, player.body_frame
+    templates = make_edge_templates(edges, body_frame, poses, most)
+    if poses.half.name != "lower":
+        return templates
+    feet = player.preparation.track.feet
+    tracked = body_frame.from_pixels(feet, np.arange(len(feet))[:, None])
+    return replace(
+        templates, feet=learn_foot_offsets(poses.half, poses.frames, poses.joints, tracked)
+    )
+
+
+def _start_half(
+    player: PlayerEvidence, poses: AnnotatedPoses, fixed: Complex[np.ndarray, "T G"]
+) -> HalfStart:
+    preparation, half = player.preparation, poses.half
+    anchor = preparation.track.head if half.name == "upper" else preparation.track.mid_feet
+    at = player.body_frame.from_pixels(anchor, np.arange(len(anchor)))
+    return HalfStart(
+        player,
+        at[:, None] - at[poses.frames],
+        distances_to(preparation.pose_distances, half.name, poses.frames),
+        fixed,
+        find_ways(player.marks, player.flow, player.body_frame, half, fixed, preparation),
+    )
 
 
 def propagate_half(
     templates: EdgeTemplates,
     index: ElementIndex,
-    fps: float,
     start: HalfStart,
     similar: int,
     rounds: int,
 ) -> PropagatedHalf:
     """Joints of one half in all frames from `similar` templates each: hypotheses, choice, fit."""
-    half, poses = templates.half, templates.poses
+    half, poses, player = templates.half, templates.poses, start.player
+    shots, fps = player.preparation.shots, player.preparation.video.fps
     fitted = fit_similar(templates, index, start.distance, start.shift, similar)
     nearest = fitted.template[:, 0]
     with ThreadPoolExecutor(1) as beside:
-        tracked = beside.submit(track_from_keyframes, templates, index, nearest, start.shots, fps)
-        appearance = learn_appearance(start.features, poses, fitted.joints[:, 0])
+        tracked = beside.submit(track_from_keyframes, templates, index, nearest, shots, fps)
+        appearance = learn_appearance(player.features, poses, fitted.joints[:, 0])
         trunk, count = fitted.best_joints, LIMB_HYPOTHESES
         limbs = search_by_edges(templates, index, trunk, count)
         parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
-        searched = [search_by_silhouette(start.silhouettes, poses, trunk)]
+        searched = [search_by_silhouette(player.silhouettes, poses, trunk)]
         if half.middle:
             searched.append(search_by_looks(appearance, poses, trunk, count))
         parts += [fit_poses(templates, index, p, nearest) for p in searched if p.shape[1]]
@@ -254,18 +290,15 @@ def propagate_half(
         unlikeness=appearance.unlikeness(hypotheses.joints),
         bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
     )
-    limbs_chosen = choose_limbs(
-        templates, hypotheses, start.shots, fps, start.ways, start.silhouettes
-    )
+    limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     if half.name == "upper":
         gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    identity = identify_in_shots(
-        half, limbs_chosen.joints, gain, poses.frames, start.shots, fps, start.ground
-    )
+    ground = player.ground if half.name == "lower" else None
+    identity = identify_in_shots(half, limbs_chosen.joints, gain, poses.frames, shots, fps, ground)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
-    joints = smooth_trajectories(templates, index, chosen, start.shots, fps, rounds)
+    joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
 
