@@ -71,6 +71,8 @@ class _Shot:
 
     name: str
     """Appended to those of its stages; nothing for the only one."""
+    first: int
+    """Frame of the file that it begins with."""
     video: Video
     camera: CameraPath
     colors: Colors
@@ -95,42 +97,36 @@ def follow_player(
     """
     shots = Shots.between(camera.cuts, len(video))
     if not camera.cuts:
-        only = _Shot("", video, camera, colors, anchors, True)
+        only = _Shot("", 0, video, camera, colors, anchors, True)
         detected = keep(
             "find", find_player, video, colors, camera, anchors,
             options=options.find, progress=progress,
         )  # fmt: skip
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
+    sightings = _sight_each(each, options.find, keep, progress)
+    picked = np.array([shot.picked for shot in each])
+    shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
+    usable = np.flatnonzero(shots.usable).tolist()
+    found = [_found(sightings[number]) for number in usable]
+    followed = _follow_each([each[number] for number in usable], found, options, keep, progress)
+    return FollowedPlayer(shots, *followed)
+
+
+def _sight_each(
+    shots: Sequence[_Shot], options: FindOptions, keep: Keep, progress: Progress
+) -> list[Sighting]:
+    """What was found of the player in each shot."""
 
     def sight(shot: _Shot) -> Sighting:
         shown = hold_if_small(shot.video, HELD)
         return keep(
             f"find{shot.name}", sight_player, shown, shot.colors, shot.camera, shot.anchors,
-            options=options.find, progress=silent,
+            options=options, progress=silent,
         )  # fmt: skip
 
-    looked = work_on_each(keep, sight, each)
-    sightings = [*progress(looked, "Looking for the player in each shot", len(each))]
-    picked = np.array([shot.picked for shot in each])
-    shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
-    usable = np.flatnonzero(shots.usable).tolist()
-
-    def follow(number: int) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
-        return _follow(each[number], _found(sightings[number]), options, keep, silent)
-
-    tracks: list[Track] = []
-    edges: list[Edges] = []
-    verified: list[TrackVerification] = []
-    followed = work_on_each(keep, follow, usable)
-    for track, found, of_track in progress(
-        followed, "Following the player in each shot", len(usable)
-    ):
-        first = shots.first[usable[len(tracks)]]
-        tracks.append(track)
-        edges += found
-        verified.append(replace(of_track, frames=of_track.frames + first))
-    return FollowedPlayer(shots, join_frames(tracks), tuple(edges), join_frames(verified))
+    looked = work_on_each(keep, sight, shots)
+    return [*progress(looked, "Looking for the player in each shot", len(shots))]
 
 
 def _found(sighting: Sighting) -> Track:
@@ -152,12 +148,37 @@ def _shot(
     sized &= {pick.frame for pick in picks if pick.part == "foot"}
     return _Shot(
         f"@{part.start}",
+        part.start,
         video.part(part),
         part_of_path(camera, part),
         replace(colors, height=picked_height(picks)) if sized else colors,
         part_of_anchors(anchors, part),
         bool(picks),
     )
+
+
+def _follow_each(
+    shots: Sequence[_Shot],
+    detected: Sequence[Track],
+    options: FollowOptions,
+    keep: Keep,
+    progress: Progress,
+) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
+    """As `_follow` of several shots put end to end, the verification in frames of the file."""
+
+    def follow(number: int) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
+        return _follow(shots[number], detected[number], options, keep, silent)
+
+    tracks: list[Track] = []
+    edges: list[Edges] = []
+    verified: list[TrackVerification] = []
+    followed = work_on_each(keep, follow, range(len(shots)))
+    shown = progress(followed, "Following the player in each shot", len(shots))
+    for shot, (track, found, of_track) in zip(shots, shown, strict=True):
+        tracks.append(track)
+        edges += found
+        verified.append(replace(of_track, frames=of_track.frames + shot.first))
+    return join_frames(tracks), tuple(edges), join_frames(verified)
 
 
 def _follow(

@@ -140,7 +140,7 @@ def sort_shots(
     options: ShotOptions = ShotOptions(),
     dissolves: tuple[int, ...] = (),
 ) -> Shots:
-    """The shots with what each shows; `told` are those in which a person clicked or marked,
+    """The shots with what each shows; `picked` are those in which a person clicked or marked,
     `dissolves` the first frames of those that are none.
 
     Raises KeyreconError where a person's shot is asked for that is none, or where no shot is left.
