@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from keyrecon.golf.candidates import find_candidates, find_slowed_keys, place_in_film
 from keyrecon.golf.click_checks import check_hand, measure_hands
 from keyrecon.golf.clicks import ClickedPose
+from keyrecon.golf.fit.swing_search import SwingHypothesis
 from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.observe.motion_timing import TimeShift, measure_time_shift
@@ -51,23 +52,23 @@ def find_swing(
         hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
         check_hand(hands, clicked, "The clicks")
     candidates = keep("search", find_candidates, scene, pose, marks, model)
-    tried: list[_Tried] = []
-    for number, candidate in enumerate(candidates[: options.candidates], 1):
+
+    def attempt(candidate: SwingHypothesis, suffix: str) -> _Tried:
         observed = keep(
-            f"observe_{number}", observe_swing, video, scene, candidate, pose, marks, model,
+            f"observe{suffix}", observe_swing, video, scene, candidate, pose, marks, model,
             options=options.observation, progress=progress,
         )  # fmt: skip
-        tried.append(_try(observed, video, model, options, keep, progress, f"_{number}"))
+        return _try(observed, video, model, options, keep, progress, suffix)
+
+    tried: list[_Tried] = []
+    for number, candidate in enumerate(candidates[: options.candidates], 1):
+        first = attempt(candidate, f"_{number}")
+        tried.append(first)
         slowed = None
-        if observed.slow_motion == 1 and options.method == "swing":
-            slowed = find_slowed_keys(tried[-1].fitted.keys, observed.film, scene.film)
+        if first.observed.slow_motion == 1 and options.method == "swing":
+            slowed = find_slowed_keys(first.fitted.keys, first.observed.film, scene.film)
         if slowed is not None:
-            candidate = replace(candidate, keys=slowed)
-            observed = keep(
-                f"observe_{number}s", observe_swing, video, scene, candidate, pose, marks, model,
-                options=options.observation, progress=progress,
-            )  # fmt: skip
-            tried.append(_try(observed, video, model, options, keep, progress, f"_{number}s"))
+            tried.append(attempt(replace(candidate, keys=slowed), f"_{number}s"))
         if not tried[-1].doubts or options.method == "windows":
             break
     best = min(tried, key=lambda t: len(t.doubts))

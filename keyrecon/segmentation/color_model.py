@@ -105,13 +105,7 @@ def learn_colors(
                 counts[names.index(pick.part)] += _count(bins[grow_patch(lab, pick, height)])
         for row, margin in enumerate(SURROUNDINGS_MARGINS):
             around[row] += _count(bins[_outside(lab.shape[:2], here, margin * height)])
-    enough = around.sum(axis=(1, 2, 3)) >= MIN_SURROUNDINGS * height**2
-    if not enough.any():
-        raise KeyreconError(
-            "The player fills the picture in every picked frame, so nothing shows the "
-            "surroundings; pick also in a frame where the player is farther from its edges."
-        )
-    scene = _smooth(around[enough.argmax()])
+    scene = _smooth(_choose_surroundings(around, height))
     rest = [_smooth(c) for name, c in zip(names, counts, strict=True) if name != "head"]
     known = np.maximum(scene, np.max(rest, axis=0))
     circle = np.pi * (PATCH_RADIUS["foot"] * height) ** 2
@@ -123,6 +117,19 @@ def learn_colors(
         surroundings=(scene * options.surroundings).astype(np.float32),
         height=height,
     )
+
+
+def _choose_surroundings(
+    around: Float[np.ndarray, "m l a b"], height: float
+) -> Float[np.ndarray, "l a b"]:
+    """Counts of colours beyond the widest margin around the player that leaves enough of them."""
+    enough = around.sum(axis=(1, 2, 3)) >= MIN_SURROUNDINGS * height**2
+    if not enough.any():
+        raise KeyreconError(
+            "The player fills the picture in every picked frame, so nothing shows the "
+            "surroundings; pick also in a frame where the player is farther from its edges."
+        )
+    return around[enough.argmax()]
 
 
 def _at_and_above(pick: Pick, height: float) -> list[Pick]:
