@@ -204,6 +204,10 @@ class Background:
     """False where the scene was never observed."""
     from_reference: Float[np.ndarray, "3 3"]
     """Homography from pixels of the reference frame to those of the background."""
+    overlay: Bool[np.ndarray, "y x"]
+    """Where something is laid over the picture, a score or a logo; pixels of reduced pictures."""
+    shrink: float
+    """Pixels of these that one of the full picture has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +232,8 @@ class PoseDistances:
     the two were left out."""
     visibility_score: Float[np.ndarray, "T"]
     """0-1: how well a person could annotate each frame (tracked, not blurred)."""
+    seen: Float[np.ndarray, "2 T"]
+    """Share of its usual outline that each half of the body shows, upper and lower, 0-1."""
 
 
 @dataclass(frozen=True, eq=False)

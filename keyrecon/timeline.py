@@ -152,6 +152,7 @@ def spread_distances(
         ),
         consecutive_distance=np.where(both, steps[:, follows], usual).astype(steps.dtype),
         visibility_score=np.where(known, distances.visibility_score[before], 0.0),
+        seen=np.where(known, distances.seen[:, before], 0.0),
     )
 
 

@@ -77,11 +77,12 @@ def test_pose_distances_come_back_as_they_were():
     everyone = np.arange(count)
     distances = PoseDistances(
         upper, lower, everyone, everyone, np.zeros((2, count), np.float32),
-        rng.random((2, count - 1)).astype(np.float32), np.ones(count),
+        rng.random((2, count - 1)).astype(np.float32), np.ones(count), np.ones((2, count)),
     )  # fmt: skip
     spread = spread_distances(distances, USED, 60)
     assert len(spread.row) == 60
     assert (spread.visibility_score[20:30] == 0).all()
+    assert (spread.seen[:, 20:30] == 0).all()
     back = select_frames(spread, USED)
     np.testing.assert_array_equal(back.upper, upper)
     np.testing.assert_array_equal(back.frames, everyone)

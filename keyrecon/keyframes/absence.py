@@ -52,6 +52,7 @@ def select_frames(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> Pose
         exemplar_distance=exemplar_distance,
         consecutive_distance=np.where(follows, steps, steps.dtype.type(np.nan)),
         visibility_score=comparison.visibility_score[kept],
+        seen=comparison.seen[:, kept],
     )
 
 

@@ -114,6 +114,7 @@ def compare_frames(
         exemplar_distance=np.zeros((2, len(edges)), dtype=np.float32),
         consecutive_distance=np.stack([np.diag(upper, 1), np.diag(lower, 1)]),
         visibility_score=score_visibility(edges, track),
+        seen=measure_seen(edges),
     )
 
 
@@ -151,6 +152,7 @@ def _compare_exemplars(
         exemplar_distance=found.distance,
         consecutive_distance=_measure_steps(edges, track, options, progress, spread),
         visibility_score=score_visibility(edges, track),
+        seen=measure_seen(edges),
     )
 
 
@@ -184,6 +186,13 @@ def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray
     """
     count = np.array([len(e.points) for e in edges])
     return track.confidence * np.clip(count / max(1.0, np.median(count)), 0, 1)
+
+
+def measure_seen(edges: tuple[Edges, ...]) -> Float[np.ndarray, "2 T"]:
+    """Elements of each half of the body in each frame as a share of their median, at most 1."""
+    count = np.array([[getattr(e, half).sum() for e in edges] for half in HALVES])
+    usual = np.maximum(1.0, np.median(count, axis=1, keepdims=True))
+    return np.minimum(count / usual, 1.0)
 
 
 def measure_matrix(

@@ -24,6 +24,9 @@ STILL_SHARE = 0.1
 """Share of the frames in which the pose does not change: what distance they have is noise."""
 REACH_SECONDS = 0.2
 """T of Eq. 1 (`KeyframeOptions.reach`)."""
+WELL_SEEN = 0.5
+"""Share of its usual outline from which a half of the body is seen well enough to count whole:
+blur alone leaves more."""
 FIRST_BODIES_SHARE = 0.35
 """Share of time measured in pose change where whole bodies are asked for before the keyframes."""
 
@@ -35,11 +38,16 @@ def elapsed_time(
 
     A frame takes 1 - `share`, and `share` times how many times faster than on average its pose
     changes, so that all frames together take as long as they are many. `reach` is what frames a
-    gap may have that is bridged; change is measured over half of it.
+    gap may have that is bridged; change is measured over half of it. Where little of the half is
+    seen, behind a score or beyond the picture's edge, outlines differ by what is hidden, a mark is
+    mostly a guess, and time goes more slowly: half as fast where nothing is seen.
     """
     change = pose_change(comparison, half, max(1, reach // 4))
     mean = change.mean() if len(change) else 0.0
     weight = 1 - share + share * change / mean if mean > 0 else np.ones(len(change))
+    if share > 0 and comparison.seen[half].any():
+        weight *= (1 + np.minimum(comparison.seen[half] / WELL_SEEN, 1.0)) / 2
+        weight *= len(weight) / weight.sum()
     return np.rint(TIME_UNIT * np.concatenate([[0.0], np.cumsum(weight)])).astype(np.int64)
 
 

@@ -27,6 +27,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Track
 from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.static_overlay import find_overlay
 
 MAX_MOSAIC_SIZE = 4.0
 """Sides of the mosaic, pictures: a camera that turns far enough leaves any plane."""
@@ -111,6 +112,8 @@ def complete_background(first: Background, other: Background) -> Background:
         spread=np.where(first.known, first.spread, other.spread),
         known=first.known | other.known,
         from_reference=first.from_reference,
+        overlay=first.overlay,
+        shrink=first.shrink,
     )
 
 
@@ -145,16 +148,17 @@ def median_background(
     shift = np.array([[1.0, 0.0, -low[0]], [0.0, 1.0, -low[1]], [0.0, 0.0, 1.0]])
     size = (int(high[0] - low[0]), int(high[1] - low[1]))
     still = size == (columns, rows) and np.allclose(paths, np.eye(3), atol=1e-9)
+    overlay = find_overlay(lab, paths)
     layers = []
     for picture, clear, path in zip(lab, free, paths, strict=True):
-        alpha = np.where(clear, FREE, COVERED).astype(np.uint8)
+        alpha = np.where(clear & ~overlay, FREE, COVERED).astype(np.uint8)
         layer = np.dstack([picture, alpha])
         layers.append(layer if still else cv2.warpPerspective(layer, shift @ path, size))
     stack = np.stack(layers)
     color, spread, known = _median(stack, min_share)
     if inpaint:
         _inpaint_behind_player(stack, color, spread, known)
-    return Background(color, spread, known, shift @ small)
+    return Background(color, spread, known, shift @ small, overlay, shrink)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +200,8 @@ class ForegroundModel:
     ) -> Float[np.ndarray, "h w"]:
         """Probability that each pixel of a crop is not background; 0.5 where nobody knows.
 
+        0 where something is laid over the picture: whoever is behind it is not seen.
+
         `to_picture` maps pixels of the crop to those of the full picture of this frame.
         """
         to_scene = self.background.from_reference @ self.camera.to_reference[frame] @ to_picture
@@ -212,6 +218,10 @@ class ForegroundModel:
         square = light + a + b
         likely = square / (square + self._even_odds[spread])
         likely[spread == UNKNOWN] = 0.5
+        if self.background.overlay.any():
+            overlay = self.background.overlay.astype(np.uint8)
+            to_overlay = shrinking(self.background.shrink) @ to_picture
+            likely[_warp_to_crop(overlay, to_overlay, size) == 1] = 0.0
         return likely
 
 

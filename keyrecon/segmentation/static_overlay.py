@@ -1,8 +1,13 @@
-"""Letters and logos laid over the picture: they stand still while the scene moves.
+"""What is laid over the picture, scores and logos: it stands still while the scene moves.
 
-Edges that keep their place and direction in pictures from all over the video are laid over it, or
-they run along the way the camera pans, like a base line. Both mislead: a corner on such a line is
-tracked anywhere along it. A corner that once moved with the scene is neither.
+While the way of the camera is not known yet, edges that keep their place and direction in pictures
+from all over the video are laid over it, or they run along the way the camera pans, like a base
+line. Both mislead: a corner on such a line is tracked anywhere along it. A corner that once moved
+with the scene is neither.
+
+Where it is known, pictures of different directions are held against each other: what is laid over
+them agrees place by place, and not where the camera says that the scene went. A player who runs
+behind it is hidden there, and it is no part of them (`find_overlay`).
 """
 
 from dataclasses import dataclass
@@ -11,9 +16,26 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from keyrecon.numerics.geometry import warp_points
+
 MIN_PERSISTENCE = 0.85
 """An edge that keeps its place and direction to this degree all along is laid over the picture
 (or the camera is static)."""
+COMPARED_WIDTH = 480
+"""Pictures that are held against each other are no wider, px: letters can be read in them."""
+COMPARED_PAIRS = 16
+"""Pairs of pictures that are held against each other at most."""
+LEAST_SHIFT = 4.0
+"""The scene lies so far apart in both pictures everywhere, px: as broad as a letter's line."""
+SAME_COLOR, OTHER_COLOR = 20, 30
+"""Sums of differences in L, a and b up to which two colours are the same, from which they are not:
+compression and noise of broadcasts stay below the first."""
+LEAST_PAIRS = 0.4
+"""Share of the pairs, either way round, in which a place speaks for something laid over it. Either
+way round, as what it hides in one picture is missing from the other: its shadow would be taken for
+it as well."""
+GAP_SHARE, LEAST_SIDE = 0.03, 0.015
+"""Letters nearer than this belong together; what is smaller is noise. Shares of the width."""
 
 
 @dataclass(eq=False)
@@ -63,3 +85,99 @@ class StaticOverlay:
         if self.moved is not None:
             held &= self.moved <= 0
         return float(held[y, x].mean()) if len(x) else 0.0
+
+
+def find_overlay(
+    lab: list[UInt8[np.ndarray, "h w 3"]], to_reference: Float[np.ndarray, "n 3 3"]
+) -> Bool[np.ndarray, "h w"]:
+    """Where pictures of one shot have something laid over them; nowhere for a static camera.
+
+    `to_reference` tells where their pixels lie in the reference frame's, both as small as they are.
+    """
+    rows, columns = lab[0].shape[:2]
+    mask = np.zeros((rows, columns), np.uint8)
+    reduced = min(1.0, COMPARED_WIDTH / columns)
+    small = np.diag([reduced, reduced, 1.0])
+    paths = small @ to_reference @ np.linalg.inv(small)
+    size = (round(reduced * columns), round(reduced * rows))
+    pairs = _distant_pairs(paths, size)
+    if not len(pairs):
+        return mask > 0
+    seen = {n: cv2.resize(lab[n], size, interpolation=cv2.INTER_AREA) for n in np.unique(pairs)}
+    held = np.zeros((2, size[1], size[0]), int)
+    for pair in pairs:
+        for way, (one, other) in enumerate((pair, pair[::-1])):
+            moved = np.linalg.inv(paths[one]) @ paths[other]
+            held[way] += _stands_still(seen[one], seen[other], moved)
+    either, both = (
+        votes >= LEAST_PAIRS * len(pairs) for votes in (held.max(axis=0), held.min(axis=0))
+    )
+    panels = _fill(both)
+    usual = np.median([*seen.values()], axis=0)
+    return _enlarge(_fill(_with_margins(panels, either, usual)), (columns, rows))
+
+
+def _distant_pairs(
+    paths: Float[np.ndarray, "n 3 3"], size: tuple[int, int]
+) -> Int[np.ndarray, "m 2"]:
+    """Pictures in which no part of the scene is where it is in the other, spread over all such."""
+    width, height = size
+    corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], float)
+    places = np.stack([warp_points(path, corners) for path in paths])
+    shift = np.linalg.norm(places[:, None] - places[None], axis=-1).min(axis=-1)
+    pairs = np.argwhere(np.triu(shift > LEAST_SHIFT))
+    chosen = np.linspace(0, len(pairs) - 1, min(COMPARED_PAIRS, len(pairs))).round().astype(int)
+    return pairs[chosen]
+
+
+def _stands_still(
+    one: UInt8[np.ndarray, "h w 3"],
+    other: UInt8[np.ndarray, "h w 3"],
+    moved: Float[np.ndarray, "3 3"],
+) -> Bool[np.ndarray, "h w"]:
+    """Where one picture is as the other is in the same place, and not as its scene, moved here.
+
+    The scene may be off by a pixel.
+    """
+    size, around = (one.shape[1], one.shape[0]), np.ones((3, 3), np.uint8)
+    scene = cv2.warpPerspective(other, moved, size, borderMode=cv2.BORDER_REPLICATE)
+    low, high = cv2.erode(scene, around), cv2.dilate(scene, around)
+    away = cv2.max(cv2.subtract(low, one), cv2.subtract(one, high))
+    same = cv2.absdiff(one, other).sum(axis=-1, dtype=int) < SAME_COLOR
+    return np.logical_and(same, away.sum(axis=-1, dtype=int) > OTHER_COLOR)
+
+
+def _fill(still: Bool[np.ndarray, "y x"]) -> Bool[np.ndarray, "y x"]:
+    """The panels that letters and borders which stand still belong to."""
+    width = still.shape[1]
+    gap, least = max(3, round(GAP_SHARE * width)), LEAST_SIDE * width
+    near = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
+    mask = np.zeros(near.shape, np.uint8)
+    for contour in cv2.findContours(near, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]:
+        if min(cv2.boundingRect(contour)[2:]) >= least:
+            cv2.fillConvexPoly(mask, cv2.convexHull(contour), 1)
+    return mask > 0
+
+
+def _with_margins(
+    panels: Bool[np.ndarray, "y x"],
+    either: Bool[np.ndarray, "y x"],
+    usual: Float[np.ndarray, "y x 3"],
+) -> Bool[np.ndarray, "y x"]:
+    """Panels with what is beside them, speaks for an overlay one way round and has their colour.
+
+    Margins without letters and their shadows in the other picture do so alike.
+    """
+    number, parts = cv2.connectedComponents(panels.astype(np.uint8))
+    whole = panels.copy()
+    for part in range(1, number):
+        color = np.median(usual[parts == part], axis=0)
+        alike = np.abs(usual - color).sum(axis=-1) < SAME_COLOR
+        grown = cv2.connectedComponents(((alike & either) | (parts == part)).astype(np.uint8))[1]
+        whole |= grown == grown[parts == part].max()
+    return whole
+
+
+def _enlarge(mask: Bool[np.ndarray, "y x"], size: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
+    """A mask a pixel broader, for a picture of this size."""
+    return cv2.resize(cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)), size) > 0

@@ -1,5 +1,7 @@
 """Time measured in pose change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
@@ -40,6 +42,20 @@ def test_no_frame_takes_less_than_its_share_and_a_stroke_takes_longer(rare_strok
 def test_a_pose_that_does_not_change_takes_as_long_as_any_other():
     still = comparison_of(np.zeros((60, 2)))
     assert np.array_equal(elapsed_time(still, 0, 10, 0.5), TIME_UNIT * np.arange(61))
+
+
+def test_time_goes_more_slowly_where_the_body_is_hidden(rare_strokes):
+    seen = np.ones((2, 500))
+    seen[0, 100:200] = 0.0
+    seen[0, 300:400] = 0.6
+    hidden = replace(rare_strokes, seen=seen)
+    before, after = (np.diff(elapsed_time(c, 0, 10, 0.2)) for c in (rare_strokes, hidden))
+    assert after.sum() == pytest.approx(before.sum(), abs=1)
+    ratio = after / before
+    assert ratio[100:200].mean() == pytest.approx(ratio[:100].mean() / 2, rel=0.02)
+    assert ratio[300:400].mean() == pytest.approx(ratio[:100].mean(), rel=0.02)
+    paper = elapsed_time(hidden, 0, 10, 0.0)
+    assert np.array_equal(paper, TIME_UNIT * np.arange(501))
 
 
 def test_change_is_the_same_where_exemplars_stand_for_frames():

@@ -23,6 +23,7 @@ def comparison_of(upper, lower=None, visibility_score=None, row=None):
         exemplar_distance=np.zeros((2, len(row)), dtype=np.float32),
         consecutive_distance=np.stack(step),
         visibility_score=np.ones(len(row)) if visibility_score is None else visibility_score,
+        seen=np.ones((2, len(row))),
     )
 
 
