@@ -86,9 +86,10 @@ def table(
     )
 
 
-MOST_FRAMES = 60_000
-"""Of a video that a report holds one by one, 40 minutes of 25 frames per second: each takes 270
-bytes of numbers and 350 of the small video at its least, and a report shall stay below 50 MB."""
+MOST_FRAMES = 48_000
+"""Of a video that a report holds one by one, 32 minutes of 25 frames per second: each takes 270
+bytes of numbers and 350 of the small video at its least, script, charts and pictures of 195
+keyframes take 17 MB, and a report shall stay below 50 MB."""
 
 
 def data_block(name: str, data: str) -> str:

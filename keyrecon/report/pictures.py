@@ -27,7 +27,7 @@ from keyrecon.report.markup import thinning
 
 SIDE, LEAST_SIDE = 420, 120
 """Side of the square stills, and of the small video: of a video of hours it is smaller, px."""
-CLIP_BYTES = 16e6
+CLIP_BYTES = 12e6
 """What the small video may take, as long as its side is not the least."""
 FRAME_BYTES, SIDE_POWER = 1230.0, 1.2
 """What a frame of it takes at the whole side, bytes, and the power of the side that this grows

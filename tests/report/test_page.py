@@ -222,7 +222,7 @@ def test_of_hours_the_report_holds_every_few_frames():
     assert packed["every"] == 3 and packed["shape"] == [7, 3]
     np.testing.assert_allclose(held * packed["step"], values[::3], atol=packed["step"])
     assert thinning(MOST_FRAMES) == 1 and thinning(MOST_FRAMES + 1) == 2
-    assert thinning(50 * 3600) == 3
+    assert thinning(50 * 3600) == 4
 
 
 def test_its_small_video_lasts_as_long_with_fewer_pictures(material, tmp_path, monkeypatch):

@@ -66,8 +66,9 @@ def compare(points2d):
     everything = np.arange(len(flat))
     exemplar_distance = np.zeros((2, len(flat)))
     step = np.stack([distances[everything[:-1], everything[1:]]] * 2).astype(float)
+    all_seen = np.ones((2, len(flat)))
     return PoseDistances(
-        distances, distances, everything, everything, exemplar_distance, step, np.ones(len(flat))
+        distances, distances, everything, everything, exemplar_distance, step, all_seen[0], all_seen
     )
 
 
