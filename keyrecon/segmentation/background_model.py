@@ -102,7 +102,9 @@ def build_background(
     pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Modelling the background", len(frames))]
     free = [~_player_mask(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
-    return median_background(lab, free, camera.to_reference[frames], shrink, inpaint=True)
+    paths = camera.to_reference[frames]
+    overlay = find_overlay(lab, free, paths, shrink)
+    return median_background(lab, free, paths, shrink, inpaint=True, overlay=overlay)
 
 
 def complete_background(first: Background, other: Background) -> Background:
@@ -134,12 +136,14 @@ def median_background(
     shrink: float,
     inpaint: bool = False,
     min_share: float = 0.0,
+    overlay: Bool[np.ndarray, "h w"] | None = None,
 ) -> Background:
     """Median of Lab pictures where they are free of the player, in reference coordinates.
 
     `shrink` tells how many pixels of these pictures a pixel of the full picture has;
     `inpaint` fills in places that are never free from what recurs there; places that are free
-    in less than `min_share` of their pictures, or in fewer than three, count as unknown.
+    in less than `min_share` of their pictures, or in fewer than three, count as unknown. What is
+    laid over the pictures (`overlay`) is no part of the scene.
     """
     small = shrinking(shrink)
     rows, columns = lab[0].shape[:2]
@@ -148,7 +152,8 @@ def median_background(
     shift = np.array([[1.0, 0.0, -low[0]], [0.0, 1.0, -low[1]], [0.0, 0.0, 1.0]])
     size = (int(high[0] - low[0]), int(high[1] - low[1]))
     still = size == (columns, rows) and np.allclose(paths, np.eye(3), atol=1e-9)
-    overlay = find_overlay(lab, paths)
+    if overlay is None:
+        overlay = np.zeros((rows, columns), bool)
     layers = []
     for picture, clear, path in zip(lab, free, paths, strict=True):
         alpha = np.where(clear & ~overlay, FREE, COVERED).astype(np.uint8)

@@ -21,6 +21,7 @@ from keyrecon.segmentation.background_model import (
     sample_frames,
 )
 from keyrecon.segmentation.color_model import color_bins, to_lab
+from keyrecon.segmentation.static_overlay import find_overlay
 
 Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]
 """Gives the reduced pictures of the frames with the given numbers, in order."""
@@ -65,8 +66,10 @@ def model_scene_by_colour(
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
     free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
-    clear = median_background(lab, free, paths, shrink, min_share=MIN_CLEAR_SHARE)
-    plain = median_background(lab, [np.ones_like(f) for f in free], paths, shrink)
+    overlay = find_overlay(lab, free, paths, shrink)
+    clear = median_background(lab, free, paths, shrink, min_share=MIN_CLEAR_SHARE, overlay=overlay)
+    anywhere = [np.ones_like(f) for f in free]
+    plain = median_background(lab, anywhere, paths, shrink, overlay=overlay)
     return ForegroundModel(complete_background(clear, plain), camera)
 
 

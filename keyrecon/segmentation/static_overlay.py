@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from keyrecon.io.frame_reader import shrinking
 from keyrecon.numerics.geometry import warp_points
 
 MIN_PERSISTENCE = 0.85
@@ -25,17 +26,22 @@ COMPARED_WIDTH = 480
 """Pictures that are held against each other are no wider, px: letters can be read in them."""
 COMPARED_PAIRS = 16
 """Pairs of pictures that are held against each other at most."""
-LEAST_SHIFT = 4.0
-"""The scene lies so far apart in both pictures everywhere, px: as broad as a letter's line."""
+LEAST_SHIFT = 8.0
+"""The scene lies so far apart in both pictures everywhere, px: twice as broad as a letter's line,
+and farther than leaves are blown and the camera's way is wrong."""
 SAME_COLOR, OTHER_COLOR = 20, 30
 """Sums of differences in L, a and b up to which two colours are the same, from which they are not:
 compression and noise of broadcasts stay below the first."""
-LEAST_PAIRS = 0.4
+LEAST_SHARE = 0.4
 """Share of the pairs, either way round, in which a place speaks for something laid over it. Either
 way round, as what it hides in one picture is missing from the other: its shadow would be taken for
 it as well."""
+LEAST_PAIRS = 0.3
+"""Share of the pairs that show a place free of the player, at least: else nobody knows."""
 GAP_SHARE, LEAST_SIDE = 0.03, 0.015
 """Letters nearer than this belong together; what is smaller is noise. Shares of the width."""
+LEAST_FILLED = 0.7
+"""Share of its convex outline that letters and their gaps fill of a panel."""
 
 
 @dataclass(eq=False)
@@ -88,33 +94,38 @@ class StaticOverlay:
 
 
 def find_overlay(
-    lab: list[UInt8[np.ndarray, "h w 3"]], to_reference: Float[np.ndarray, "n 3 3"]
+    lab: list[UInt8[np.ndarray, "h w 3"]],
+    free: list[Bool[np.ndarray, "h w"]],
+    to_reference: Float[np.ndarray, "n 3 3"],
+    shrink: float,
 ) -> Bool[np.ndarray, "h w"]:
     """Where pictures of one shot have something laid over them; nowhere for a static camera.
 
-    `to_reference` tells where their pixels lie in the reference frame's, both as small as they are.
+    They are asked where they are `free` of the player: a camera that follows them has them in the
+    same place, too. `to_reference` leads from the pixels of the whole pictures to those of the
+    reference frame; these have `shrink` px for one of theirs.
     """
     rows, columns = lab[0].shape[:2]
-    mask = np.zeros((rows, columns), np.uint8)
     reduced = min(1.0, COMPARED_WIDTH / columns)
-    small = np.diag([reduced, reduced, 1.0])
-    paths = small @ to_reference @ np.linalg.inv(small)
     size = (round(reduced * columns), round(reduced * rows))
+    small = shrinking(reduced * shrink)
+    paths = small @ to_reference @ np.linalg.inv(small)
     pairs = _distant_pairs(paths, size)
     if not len(pairs):
-        return mask > 0
+        return np.zeros((rows, columns), bool)
     seen = {n: cv2.resize(lab[n], size, interpolation=cv2.INTER_AREA) for n in np.unique(pairs)}
-    held = np.zeros((2, size[1], size[0]), int)
+    clear = {n: cv2.resize(free[n].astype(np.uint8), size) > 0 for n in seen}
+    held, asked = np.zeros((2, size[1], size[0]), int), np.zeros((size[1], size[0]), int)
     for pair in pairs:
+        both_clear = clear[pair[0]] & clear[pair[1]]
+        asked += both_clear
         for way, (one, other) in enumerate((pair, pair[::-1])):
             moved = np.linalg.inv(paths[one]) @ paths[other]
-            held[way] += _stands_still(seen[one], seen[other], moved)
-    either, both = (
-        votes >= LEAST_PAIRS * len(pairs) for votes in (held.max(axis=0), held.min(axis=0))
-    )
-    panels = _fill(both)
+            held[way] += both_clear & _stands_still(seen[one], seen[other], moved)
+    share = np.where(asked >= LEAST_PAIRS * len(pairs), held / np.maximum(asked, 1), 0.0)
+    either, both = (shares >= LEAST_SHARE for shares in (share.max(axis=0), share.min(axis=0)))
     usual = np.median([*seen.values()], axis=0)
-    return _enlarge(_fill(_with_margins(panels, either, usual)), (columns, rows))
+    return _enlarge(_fill(_with_margins(_fill(both), either, usual)), (columns, rows))
 
 
 def _distant_pairs(
@@ -154,8 +165,11 @@ def _fill(still: Bool[np.ndarray, "y x"]) -> Bool[np.ndarray, "y x"]:
     near = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
     mask = np.zeros(near.shape, np.uint8)
     for contour in cv2.findContours(near, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]:
-        if min(cv2.boundingRect(contour)[2:]) >= least:
-            cv2.fillConvexPoly(mask, cv2.convexHull(contour), 1)
+        if min(cv2.boundingRect(contour)[2:]) < least:
+            continue
+        outline = cv2.convexHull(contour)
+        filled = cv2.contourArea(contour) >= LEAST_FILLED * cv2.contourArea(outline)
+        cv2.drawContours(mask, [outline if filled else contour], 0, 1, cv2.FILLED)
     return mask > 0
 
 

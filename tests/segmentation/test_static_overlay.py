@@ -41,28 +41,45 @@ def pan(shifts, panel=True):
     return pictures, np.linalg.inv(paths[0]) @ np.array(paths)
 
 
+def overlay_of(pictures, paths, free=None):
+    everywhere = [np.ones(SIZE, bool)] * len(pictures)
+    return find_overlay(pictures, everywhere if free is None else free, paths, 1.0)
+
+
 @pytest.mark.parametrize(
     "shifts", [range(0, 120, 8), [0] * 10 + [5, 12, 20, 28]], ids=["pan", "late"]
 )
 def test_a_panel_that_stays_while_the_camera_pans_is_found(shifts):
-    found = find_overlay(*pan(shifts))
+    found = overlay_of(*pan(shifts))
     assert (found & PANEL).sum() > 0.95 * PANEL.sum()
     assert (found & ~PANEL).sum() < 0.15 * PANEL.sum()
 
 
 def test_lines_along_the_way_of_the_camera_are_no_overlay():
-    assert not find_overlay(*pan(range(0, 120, 8), panel=False)).any()
+    assert not overlay_of(*pan(range(0, 120, 8), panel=False)).any()
 
 
 def test_a_static_camera_tells_nothing_of_overlays():
-    assert not find_overlay(*pan([0] * 12)).any()
+    assert not overlay_of(*pan([0] * 12)).any()
+
+
+def test_a_player_whom_the_camera_follows_is_no_overlay():
+    pictures, paths = pan(range(0, 120, 8), panel=False)
+    player = np.zeros(SIZE, bool)
+    player[60:160, 150:200] = True
+    for picture in pictures:
+        picture[player] = (90, 180, 160)
+        picture[70:150:6, 150:200] = (200, 100, 100)
+    assert overlay_of(pictures, paths).any()
+    assert not overlay_of(pictures, paths, [~player] * len(pictures)).any()
 
 
 def test_what_is_behind_a_panel_is_not_seen_and_what_is_beside_it_is():
     shifts = range(0, 120, 8)
     pictures, paths = pan(shifts)
     everywhere = [np.ones(SIZE, bool)] * len(pictures)
-    background = median_background(pictures, everywhere, paths, 1.0)
+    overlay = overlay_of(pictures, paths)
+    background = median_background(pictures, everywhere, paths, 1.0, overlay=overlay)
     model = ForegroundModel(background, CameraPath(paths, np.ones(len(paths))))
     picture = pictures[-1].copy()
     player = np.zeros(SIZE, bool)
