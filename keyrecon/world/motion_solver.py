@@ -47,6 +47,10 @@ class Figure:
         group = self.skeleton.length_group
         return np.column_stack([np.ones(len(group)), np.eye(group.max() + 1)[group]])
 
+    def grown(self, log_sizes: Float[np.ndarray, "P"]) -> "Figure":
+        """The figure of a body of these sizes."""
+        return replace(self, reach=self.reach * np.exp(self.growth @ log_sizes))
+
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
@@ -66,7 +70,7 @@ class WorldState:
 
     def reach(self, figure: Figure) -> Float[np.ndarray, "J B"]:
         """Lengths of the bones on the way to each joint, metres."""
-        return figure.reach * np.exp(figure.growth @ self.log_sizes)
+        return figure.grown(self.log_sizes).reach
 
     def points(self, figure: Figure) -> Float[np.ndarray, "T J 3"]:
         """Joints in the world, metres."""

@@ -39,6 +39,8 @@ DEPTH_ERROR |= {"elbow": 0.23, "wrist": 0.285}
 """Error of the depth of lifted bones by their outer joint, in shares of their lengths: standard
 deviations over eight rendered sequences. Those of the trunk's two bones are .13, but opposite to
 one another; with that, errors of the trunk's length became a lean (5.4 degrees for 4.5)."""
+OTHER_DEPTH_ERROR = 0.2
+"""The same of bones with other names, near the mean of all."""
 FLAT_ERROR = 0.07
 """The same across the line of sight: .03 (trunk) to .13 (forearms)."""
 MEMORY = 0.12
@@ -58,6 +60,8 @@ contact 7.0 cm off in place of 6.2, joints in the world 87 mm in place of 83; tw
 nothing more from above, where lifted lengths are furthest off. Where they are exact, the freedom
 costs pose from above: a trunk put upright wrongly passes for a shorter one (benchmarks/results.md).
 """
+OTHER_LENGTH_ERROR = 0.04
+"""The same of bones with other names, near the mean of all."""
 SLIPS = (1.0, 0.2, 0.03)
 """Metres per second that a foot may move while it stands, from round to round."""
 HEIGHT_ERROR = 0.012
@@ -97,6 +101,8 @@ BALANCE_MEMORY = 0.1
 """Seconds that it lasts."""
 STEPS = 8
 """Steps of the solver at most, for each of `SLIPS`."""
+HELD_SHARE = 1e-3
+"""Of these errors, where lengths are known from all windows: they may go nowhere."""
 WINDOW_FRAMES, OVERLAP_FRAMES = 1500, 100
 """Frames solved together, and shared by neighbours, whose joints are blended there."""
 
@@ -157,15 +163,20 @@ def refine_placed(
 
     `log_size` is where that logarithm starts.
     """
-    count, body = len(placed.seen), _lifted_body(placed)
-    points = np.zeros((count, len(placed.motion.skeleton.names), 3))
-    sizes = []
-    for frames, weight in _windows(count):
-        part_standing = Standing(standing.still[frames], standing.flat[frames])
-        part, size = _refine_window(placed.part(frames), body.part(frames), part_standing, log_size)
-        points[frames] += weight[:, None, None] * part
-        sizes.append(size)
-    return points, float(np.median(sizes))
+    body, windows = _lifted_body(placed), [*_windows(len(placed.seen))]
+    lifted, spread = body.figure.reach, _size_spread(placed.motion.skeleton)
+    sizes = SizePrior(np.append(log_size, np.zeros(len(spread) - 1)), spread)
+    refined = _refine_windows(placed, body, standing, sizes)
+    if len(windows) > 1:  # one player: what the windows tell of their lengths goes for all
+        usual = np.median([state.log_sizes for state in refined], axis=0)
+        body = replace(body, figure=body.figure.grown(usual))
+        held = SizePrior(np.zeros(len(spread)), HELD_SHARE * spread)
+        refined = _refine_windows(placed, body, standing, held)
+    points = np.zeros((len(placed.seen), len(placed.motion.skeleton.names), 3))
+    for (frames, weight), state in zip(windows, refined, strict=True):
+        points[frames] += weight[:, None, None] * state.points(body.part(frames).figure)
+    tall = np.median([state.reach(body.figure).max(axis=0).sum() for state in refined])
+    return points, float(np.log(tall / lifted.max(axis=0).sum()))
 
 
 def _windows(count: int) -> Iterator[tuple[slice, Float[np.ndarray, "n"]]]:
@@ -215,31 +226,53 @@ def _lifted_body(placed: Placed) -> _LiftedBody:
     return _LiftedBody(figure, _upright(unit_vectors(bones), figure), breadths)
 
 
+@dataclass(frozen=True, eq=False)
+class SizePrior:
+    """What is known of `WorldState.log_sizes`."""
+
+    start: Float[np.ndarray, "P"]
+    """Where the search for them starts."""
+    spread: Float[np.ndarray, "P"]
+    """Their standard deviations, about 0."""
+
+
+def _refine_windows(
+    placed: Placed, body: _LiftedBody, standing: Standing, sizes: SizePrior
+) -> list[WorldState]:
+    """What came out for each of the windows."""
+    return [
+        _refine_window(
+            placed.part(frames),
+            body.part(frames),
+            Standing(standing.still[frames], standing.flat[frames]),
+            sizes,
+        )
+        for frames, _ in _windows(len(placed.seen))
+    ]
+
+
 def _refine_window(
-    placed: Placed, body: _LiftedBody, standing: Standing, log_size: float
-) -> tuple[Float[np.ndarray, "T J 3"], float]:
+    placed: Placed, body: _LiftedBody, standing: Standing, sizes: SizePrior
+) -> WorldState:
     motion, skeleton, figure = placed.motion, placed.motion.skeleton, body.figure
     ankles = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
     hips = [skeleton.index(f"{side}_hip") for side in ("right", "left")]
     prior = _direction_prior(body.directions, motion)
-    spread = _size_spread(skeleton)
-    log_sizes = np.append(log_size, np.zeros(len(spread) - 1))
-    state = WorldState(np.zeros_like(placed.root), body.directions, log_sizes)
+    state = WorldState(np.zeros_like(placed.root), body.directions, sizes.start)
     state = replace(state, root=placed.root - state.points(figure)[:, hips].mean(axis=1))
     steady = _steady_terms(placed, body, standing)
     for slip in SLIPS:
         feet = state.points(figure)[:, ankles]
         recipe = [*steady, *_foot_terms(placed, standing, feet, slip)]
-        state = solve(state, figure, recipe, prior, spread, STEPS)
-    grown = state.reach(figure).max(axis=0).sum() / figure.reach.max(axis=0).sum()
-    return state.points(figure), float(np.log(grown))
+        state = solve(state, figure, recipe, prior, sizes.spread, STEPS)
+    return state
 
 
 def _size_spread(skeleton: Skeleton) -> Float[np.ndarray, "P"]:
     """Standard deviations of `WorldState.log_sizes`."""
     _, bones = np.unique(skeleton.length_group, return_index=True)
     ends = [skeleton.names[child] for child in skeleton.bones[bones, 1]]
-    return np.array([SIZE_ERROR, *_by_joint(LENGTH_ERROR, ends, 0.04)])
+    return np.array([SIZE_ERROR, *_by_joint(LENGTH_ERROR, ends, OTHER_LENGTH_ERROR)])
 
 
 def _by_joint(values: Mapping[str, float], names: Sequence[str], other: float) -> list[float]:
@@ -258,7 +291,7 @@ def _lasting(seconds: float, fps: float) -> float:
 
 def _direction_prior(before: Float[np.ndarray, "T B 3"], motion: Motion) -> DirectionPrior:
     ends = [motion.skeleton.names[child] for child in motion.skeleton.bones[:, 1]]
-    depths = _by_joint(DEPTH_ERROR, ends, 0.2)
+    depths = _by_joint(DEPTH_ERROR, ends, OTHER_DEPTH_ERROR)
     spread = np.array([[FLAT_ERROR, FLAT_ERROR, depth] for depth in depths])
     weight = 1 / (spread**2 * _lasting(MEMORY, motion.fps))
     return DirectionPrior(before, weight, MEMORY * motion.fps)

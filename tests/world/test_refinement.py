@@ -130,6 +130,9 @@ def test_windows_of_a_long_motion_fit_together(monkeypatch):
     assert off < 0.05  # two seconds tell the player's size less surely than four
     jumps = np.linalg.norm(np.diff(pieces.root, 2, axis=0), axis=1)
     assert jumps.max() < 0.01
+    ends = pieces.points[:, LSP14.bones]
+    lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    assert (lengths.max(axis=0) / lengths.min(axis=0)).max() < 1.01
 
 
 def test_a_player_of_another_size_than_said_is_as_large_as_the_court_says():
