@@ -95,6 +95,17 @@ def test_a_bone_that_is_never_observed_keeps_its_length(model, seen):
     np.testing.assert_allclose(seen_lengths(after)[wrists], seen_lengths(true)[wrists])
 
 
+def test_frames_in_which_a_joint_is_not_observed_say_nothing_of_the_other_bones(model, seen):
+    joints, true = seen
+    half = len(joints) // 2
+    hidden = joints.copy()
+    hidden[half:, [LSP14.index("right_knee"), LSP14.index("left_wrist")]] = np.nan
+    lengths = correct(true, hidden, model).lengths
+    seen_before = replace(true, scale=true.scale[: half - round(0.4 * FPS)])
+    only_before = correct(seen_before, joints[: half - round(0.4 * FPS)], model).lengths
+    np.testing.assert_allclose(lengths, only_before, rtol=0.01)
+
+
 def test_a_larger_picture_has_a_larger_scale_and_the_same_body(model, seen):
     joints, true = seen
     small = correct(true, joints, model)

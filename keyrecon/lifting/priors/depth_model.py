@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
@@ -32,13 +32,9 @@ DEPTH_MODEL_VERSION = 3
 OFFSETS = (-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4)
 """Moments that the rule is shown, seconds from the frame."""
 _BONES = len(LSP14.bones)
-_PAIRED, _LENGTH_OF = np.unique(
-    np.minimum(np.arange(_BONES), LSP14.bone_mirror), return_inverse=True
-)
-"""First bone of each length, and the length of each bone: left and right share one."""
-LENGTHS = len(_PAIRED)
-LENGTH_OF_BONE = tuple(_LENGTH_OF.tolist())
+LENGTH_OF_BONE = tuple(LSP14.length_group.tolist())
 """Which of the lengths each of LSP14's bones has."""
+LENGTHS = max(LENGTH_OF_BONE) + 1
 INPUTS, OUTPUTS = 3 * _BONES * len(OFFSETS), _BONES + LENGTHS
 LENGTH_UNIT = 0.2
 """Errors of lengths are learnt in this unit, which gives them about the spread of depths."""
@@ -81,7 +77,7 @@ class DepthModel:
         self, flat: Float[np.ndarray, "T 13 2"], fps: float
     ) -> Float[np.ndarray, "T 13"]:
         """Expected log of how much too long LSP14's bones look in each frame, as `depth_shares`."""
-        return LENGTH_UNIT * self._of_frames(flat, fps)[:, _BONES:][:, _LENGTH_OF]
+        return LENGTH_UNIT * self._of_frames(flat, fps)[:, _BONES:][:, LENGTH_OF_BONE]
 
     def forward(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n outputs"]:
         """Depth shares and errors of lengths from what the rule is shown, inputs of all moments."""
@@ -94,11 +90,15 @@ class DepthModel:
     def _of_frames(
         self, flat: Float[np.ndarray, "T 13 2"], fps: float
     ) -> Float[np.ndarray, "T outputs"]:
-        steps = np.round(np.array(OFFSETS) * fps).astype(int)
-        inputs = frame_inputs(flat)
-        parts = np.array_split(np.arange(len(flat)), max(len(flat) // _AT_ONCE, 1))
-        near = [np.clip(part[:, None] + steps, 0, max(len(flat) - 1, 0)) for part in parts]
-        return np.concatenate([self.forward(inputs[rows].reshape(-1, INPUTS)) for rows in near])
+        inputs, shown = frame_inputs(flat), frames_shown(len(flat), fps)
+        parts = np.array_split(shown, max(len(flat) // _AT_ONCE, 1))
+        return np.concatenate([self.forward(inputs[rows].reshape(-1, INPUTS)) for rows in parts])
+
+
+def frames_shown(count: int, fps: float) -> Int[np.ndarray, "T m"]:
+    """Which of `count` frames the rule is shown for each of them."""
+    steps = np.round(np.array(OFFSETS) * fps).astype(int)
+    return np.clip(np.arange(count)[:, None] + steps, 0, max(count - 1, 0))
 
 
 def frame_inputs(flat: Float[np.ndarray, "*n 13 2"]) -> Float[np.ndarray, "*n 39"]:
@@ -121,7 +121,8 @@ def expected_depth(
     """Depth that the model expects of bones in the frames of one shot, in the unit of `lengths`.
 
     NaN for bones that the model does not know, for all of them where one of LSP14's is missing
-    from the skeleton. A bone that is not observed (NaN) tells nothing about the others.
+    from the skeleton. A bone that is not observed (NaN) is shown as one that points at the camera:
+    signs of the others are told all the same, their depths less well.
     """
     if model is None:
         return np.full(vectors.shape[:2], np.nan)
@@ -137,11 +138,12 @@ def length_errors(
 ) -> Float[np.ndarray, "T B"]:
     """Log of how much too long bones look in the frames of one shot, as the model expects.
 
-    NaN where a bone is not observed, and for bones that the model does not know, as in
-    `expected_depth`.
+    NaN in frames where a bone is not observed at one of the moments shown, which would make the
+    others look too long, and for bones that the model does not know, as in `expected_depth`.
     """
     errors = _expect(model.length_errors, vectors, lengths, skeleton, fps)
-    return np.where(np.isfinite(vectors).all(axis=-1), errors, np.nan)
+    whole = np.isfinite(vectors[:, _places(skeleton) or []]).all(axis=(1, 2))
+    return np.where(whole[frames_shown(len(whole), fps)].all(axis=1)[:, None], errors, np.nan)
 
 
 def _expect(
