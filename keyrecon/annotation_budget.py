@@ -1,11 +1,18 @@
 """How many frames a person marks: what is usual, and what was asked for."""
 
+from keyrecon.errors import KeyreconError
 from keyrecon.records import Keyframes
 
 LONG_SHARE, LONG_SECONDS = 0.015, 30.0
 """Share of frames that the paper marks (ECCV 2004, Section 4), in videos of half a minute."""
 SHORT_SHARE = 0.06
 """Share of frames that are marked at most, unless more is asked for."""
+
+
+def check_budget(share: float) -> None:
+    """Raise KeyreconError for what is no share of the frames."""
+    if not 0 < share <= 1:
+        raise KeyreconError(f"--budget is a share of the frames, 0.015 for 1.5 %, not {share:g}.")
 
 
 def usual_budget(n_frames: int, fps: float) -> float:

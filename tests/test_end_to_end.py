@@ -168,6 +168,12 @@ def test_keyframes_without_marks_are_named(clip, solved):
         (clip / "aside.json").rename(workspace.annotations_file)
 
 
+@pytest.mark.parametrize("budget", ["1.5", "-0.1", "nan"])
+def test_a_budget_in_per_cent_is_told_what_a_budget_is(clip, capsys, budget):
+    assert keyrecon("keyframes", clip / "project", "--budget", budget) == 1
+    assert "--budget is a share of the frames, 0.015 for 1.5 %" in capsys.readouterr().err
+
+
 def test_a_budget_that_cannot_be_met_says_what_would_do(clip, capsys):
     assert keyrecon("keyframes", clip / "project", "--budget", "0.001") == 1
     assert "--budget" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import UInt8
 
-from keyrecon.annotation_budget import annotation_cost
+from keyrecon.annotation_budget import annotation_cost, check_budget
 from keyrecon.app.preparing import describe_shots, prepare_project, with_chosen_shots
 from keyrecon.app.project import load_annotations
 from keyrecon.errors import counted, quoted
@@ -35,7 +35,12 @@ class KeyframeSettings:
     reach: int | None = None
 
     def over(self, options: KeyframeOptions) -> KeyframeOptions:
-        """Options with those that are given here in their place."""
+        """Options with those that are given here in their place.
+
+        Raises KeyreconError for a budget that is no share.
+        """
+        if self.budget is not None:
+            check_budget(self.budget)
         return replace(
             options,
             budget=options.budget if self.budget is None else self.budget,

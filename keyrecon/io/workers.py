@@ -131,6 +131,11 @@ def _cluster(address: str) -> Iterator[Workers]:
         raise KeyreconError(
             "--workers with an address needs Dask: pip install 'keyrecon[cluster]'."
         ) from fault
+    if ":" not in address.split("//")[-1]:
+        raise KeyreconError(
+            f"--workers {address} has no port; give the address that `dask scheduler` prints, such "
+            "as tcp://head:8786."
+        )
     for name in logging.root.manager.loggerDict:
         if name.startswith("distributed"):  # what matters is told in one line
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -31,7 +31,7 @@ from typing import Annotated, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.annotation_budget import least_labels, usual_budget
+from keyrecon.annotation_budget import check_budget, least_labels, usual_budget
 from keyrecon.errors import KeyreconError
 from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
@@ -172,8 +172,7 @@ def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
     if options.reach < 0:
         raise KeyreconError(f"--reach is a number of frames, not {options.reach}.")
     budget = usual_budget(n_frames, fps) if options.budget is None else options.budget
-    if not 0 < budget <= 1:
-        raise KeyreconError(f"--budget is a share of the frames, 0.015 for 1.5 %, not {budget:g}.")
+    check_budget(budget)
     labels = int(2 * budget * n_frames + 1e-9)
     if labels < 2 and None in (options.beta_upper, options.beta_lower):
         raise KeyreconError(

@@ -80,7 +80,8 @@ def test_a_process_that_is_lost_ends_in_one_line_and_what_was_made_stays(tmp_pat
     [
         ("0", "from 1 on, or an address"),
         ("tcp://127.0.0.1:9", "No Dask scheduler answers at tcp://127.0.0.1:9"),
-        ("head", "No Dask scheduler answers at head"),
+        ("head", "--workers head has no port"),
+        ("tcp://head", "--workers tcp://head has no port"),
         ("ftp://head:1", "No Dask scheduler answers at ftp://head:1"),
     ],
 )

@@ -190,16 +190,17 @@ function createJobs(model) {
     }
   }
 
-  // What the server has at work. News of an end may be here before an older answer; what a server
-  // that was started anew does not know has broken off.
+  // What the server has at work. News of a beginning or an end may be here before an older answer;
+  // what was known before, and not to a server that was started anew, has broken off.
   async function refreshJobs() {
-    const jobs = await api.read("jobs");
+    const before = [...model.jobs.values()],
+      jobs = await api.read("jobs");
     for (const job of jobs) {
       if (!isOver(model.jobs.get(job.id))) model.jobs.set(job.id, job);
       if (!listed) states.set(job.id, job.state);
     }
-    for (const job of model.jobs.values()) {
-      if (!isOver(job) && !jobs.some(({ id }) => id === job.id))
+    for (const job of before) {
+      if (!isOver(model.jobs.get(job.id)) && !jobs.some(({ id }) => id === job.id))
         model.jobs.set(job.id, { ...job, state: "cancelled" });
     }
     listed = true;
