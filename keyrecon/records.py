@@ -132,6 +132,8 @@ class TrackVerification:
     """Whether the lower edge of the picture cuts the player off."""
     distractor: Float[np.ndarray, "n 2"]
     """Head of another figure that looks like the player, px; NaN where there is none."""
+    hidden: Bool[np.ndarray, "n"]
+    """Whether something laid over the picture, such as a score, hides a part of the player."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Bool, Int
 
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.coco import coco_text, read_coco
@@ -40,8 +41,9 @@ AS_SURE = 0.01
 click in eleven on a real rally: .77 with it, .99 without."""
 
 
-CUT_OFF = 0.1
-"""Share of the frames from which feet that the picture cuts off are told of."""
+CUT_OFF, HIDDEN = 0.1, 0.05
+"""Shares of the frames from which feet that the picture cuts off are told of, and a player who is
+hidden."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,7 @@ class ProjectPreparation:
         made, lines = self.preparation, []
         if made.verification is not None:
             lines += describe_truncation(made.verification)
+            lines += describe_hiding(made.verification)
             lines += describe_identity(
                 made.track,
                 made.camera,
@@ -126,15 +129,33 @@ def describe_truncation(verification: TrackVerification) -> list[str]:
     share = float(verification.truncated.mean())
     if share < CUT_OFF:
         return []
-    cut, frames = verification.truncated, verification.frames
-    turns = np.flatnonzero(np.diff(cut, prepend=False, append=False)).reshape(-1, 2)
-    first, end = max(turns.tolist(), key=lambda run: run[1] - run[0])
+    first, last = _longest(verification.frames, verification.truncated)
     return [
         f"The lower edge of the picture cuts the player's feet off in about {share:.0%} of the "
-        f"frames (longest: {frames[first]}-{frames[end - 1]}): what was taken for feet there is "
+        f"frames (longest: {first}-{last}): what was taken for feet there is "
         "none, and legs come out wrong. Film with the feet in the picture, or use a part of the "
         "video that shows them."
     ]
+
+
+def describe_hiding(verification: TrackVerification) -> list[str]:
+    """A line where something laid over the picture hides the player."""
+    share = float(verification.hidden.mean())
+    if share < HIDDEN:
+        return []
+    first, last = _longest(verification.frames, verification.hidden)
+    return [
+        f"Something laid over the picture, such as a score, hides a part of the player in about "
+        f"{share:.0%} of the frames (longest: {first}-{last}): joints behind it are guessed from "
+        "the marks before and after. Mark them in some of these frames as hidden ones."
+    ]
+
+
+def _longest(frames: Int[np.ndarray, "n"], flags: Bool[np.ndarray, "n"]) -> tuple[int, int]:
+    """First and last frame of the longest run of flags."""
+    turns = np.flatnonzero(np.diff(flags, prepend=False, append=False)).reshape(-1, 2)
+    first, end = max(turns.tolist(), key=lambda run: run[1] - run[0])
+    return int(frames[first]), int(frames[end - 1])
 
 
 def describe_identity(

@@ -101,8 +101,8 @@ def find_overlay(
 ) -> Bool[np.ndarray, "h w"]:
     """Where pictures of one shot have something laid over them; nowhere for a static camera.
 
-    They are asked where they are `free` of the player: a camera that follows them has them in the
-    same place, too. `to_reference` leads from the pixels of the whole pictures to those of the
+    They are asked where one of two is `free` of the player: a camera that follows them has them in
+    the same place, too, in both. `to_reference` leads from the pixels of the whole pictures to those of the
     reference frame; these have `shrink` px for one of theirs.
     """
     rows, columns = lab[0].shape[:2]
@@ -117,11 +117,11 @@ def find_overlay(
     clear = {n: cv2.resize(free[n].astype(np.uint8), size) > 0 for n in seen}
     held, asked = np.zeros((2, size[1], size[0]), int), np.zeros((size[1], size[0]), int)
     for pair in pairs:
-        both_clear = clear[pair[0]] & clear[pair[1]]
-        asked += both_clear
+        told = clear[pair[0]] | clear[pair[1]]
+        asked += told
         for way, (one, other) in enumerate((pair, pair[::-1])):
             moved = np.linalg.inv(paths[one]) @ paths[other]
-            held[way] += both_clear & _stands_still(seen[one], seen[other], moved)
+            held[way] += told & _stands_still(seen[one], seen[other], moved)
     share = np.where(asked >= LEAST_PAIRS * len(pairs), held / np.maximum(asked, 1), 0.0)
     either, both = (shares >= LEAST_SHARE for shares in (share.max(axis=0), share.min(axis=0)))
     usual = np.median([*seen.values()], axis=0)
@@ -148,10 +148,10 @@ def _stands_still(
 ) -> Bool[np.ndarray, "h w"]:
     """Where one picture is as the other is in the same place, and not as its scene, moved here.
 
-    The scene may be off by a pixel.
+    The scene may be off by a pixel. What the other does not show of it says nothing.
     """
     size, around = (one.shape[1], one.shape[0]), np.ones((3, 3), np.uint8)
-    scene = cv2.warpPerspective(other, moved, size, borderMode=cv2.BORDER_REPLICATE)
+    scene = cv2.warpPerspective(other, moved, size, one.copy(), borderMode=cv2.BORDER_TRANSPARENT)
     low, high = cv2.erode(scene, around), cv2.dilate(scene, around)
     away = cv2.max(cv2.subtract(low, one), cv2.subtract(one, high))
     same = cv2.absdiff(one, other).sum(axis=-1, dtype=int) < SAME_COLOR

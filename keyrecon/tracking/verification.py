@@ -1,4 +1,4 @@
-"""Hold the track against the video: whether the feet are in the picture, and who else is there.
+"""Hold the track against the video: whether all of the player is seen, and who else is there.
 
 A path through candidates goes on wherever there are any, and is as sure of a knee at the lower edge
 as of a shoe, and of another player in the same clothes as of the one meant. Both show elsewhere.
@@ -55,6 +55,9 @@ MEETS = 1.0
 """Nearer than this the track may change over, player heights."""
 MAX_STEP_SECONDS, MAX_STEP = 0.12, 0.9
 """Nobody's head moves farther in that time, player heights: 13 m/s."""
+HIDDEN_SHARE, WAY_POINTS = 0.15, 13
+"""Share of the way from head to feet, of so many points, from which something hides the player: a
+trunk is a third of it."""
 STRIPES = 8
 """Of which colours are compared, from head to feet."""
 
@@ -76,7 +79,22 @@ def verify_track(
         rows = slice(len(truncated), len(truncated) + len(views))
         distractors.append(_find_distractors(views, track.confidence[frames[rows]]))
         truncated += [view.is_truncated() for view in views]
-    return TrackVerification(frames, np.array(truncated), _lasting(np.concatenate(distractors)))
+    hidden = hidden_shares(track, background)[frames] > HIDDEN_SHARE
+    passing = _lasting(np.concatenate(distractors))
+    return TrackVerification(frames, np.array(truncated), passing, hidden)
+
+
+def hidden_shares(track: Track, background: Background) -> Float[np.ndarray, "T"]:
+    """Share of the ways from head to feet that lies behind something laid over the picture."""
+    rows, columns = background.overlay.shape
+    along = np.linspace(0, 1, WAY_POINTS)[:, None]
+    ways = track.head[:, None, None] + along * (track.feet - track.head[:, None])[:, :, None]
+    x, y = np.moveaxis(
+        np.rint(warp_points(shrinking(background.shrink), ways.reshape(-1, 2))), 1, 0
+    )
+    inside = (x >= 0) & (y >= 0) & (x < columns) & (y < rows)
+    place = y.clip(0, rows - 1).astype(int), x.clip(0, columns - 1).astype(int)
+    return (inside & background.overlay[place]).reshape(len(track.head), -1).mean(axis=1)
 
 
 @dataclass(frozen=True, eq=False)

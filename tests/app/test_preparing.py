@@ -3,7 +3,12 @@
 import numpy as np
 
 from keyrecon.app.annotator import _contradictions
-from keyrecon.app.preparing import describe_identity, describe_shots, describe_truncation
+from keyrecon.app.preparing import (
+    describe_hiding,
+    describe_identity,
+    describe_shots,
+    describe_truncation,
+)
 from keyrecon.records import PLAYER, CameraPath, Shots, Track, TrackVerification
 
 
@@ -22,11 +27,12 @@ def test_a_video_of_one_shot_tells_nothing():
 FRAMES = np.arange(0, 200, 4)
 
 
-def verified(truncated=(), meeting=()):
+def verified(truncated=(), meeting=(), hidden=()):
     """What is seen of a player who stands at (100, 50), in frames of ranges."""
     cut = np.isin(FRAMES, truncated)
     near = np.isin(FRAMES, meeting)[:, None]
-    return TrackVerification(FRAMES, cut, np.where(near, (140.0, 50.0), np.nan))
+    distractor = np.where(near, (140.0, 50.0), np.nan)
+    return TrackVerification(FRAMES, cut, distractor, np.isin(FRAMES, hidden))
 
 
 def identity(meeting=(), known=(), jump=None):
@@ -44,6 +50,13 @@ def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
     (line,) = describe_truncation(verified(truncated=range(40, 101)))
     assert "in about 32% of the frames (longest: 40-100)" in line
     assert describe_truncation(verified(truncated=range(8))) == []
+
+
+def test_what_is_laid_over_the_player_is_told_and_shown_on_the_page():
+    (line,) = describe_hiding(verified(hidden=[4, *range(100, 133)]))
+    assert "in about 20% of the frames (longest: 100-132)" in line
+    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert describe_hiding(verified(hidden=range(8))) == []
 
 
 def test_who_looks_like_the_player_is_told_until_the_player_is_marked_on_both_sides():

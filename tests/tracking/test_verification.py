@@ -8,12 +8,12 @@ from drawn_player import HEIGHT, SIZE, corners, draw_player, heads, picks, scene
 
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
-from keyrecon.records import CameraPath, Shots, Track
+from keyrecon.records import Background, CameraPath, Shots, Track
 from keyrecon.segmentation.background_model import build_background
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking import verification as verification_module
 from keyrecon.tracking.scale import player_boxes
-from keyrecon.tracking.verification import find_jumps, find_meetings, verify_track
+from keyrecon.tracking.verification import find_jumps, find_meetings, hidden_shares, verify_track
 
 COUNT = 60
 HEAD = heads(COUNT) - corners(COUNT, False)
@@ -132,3 +132,14 @@ def test_a_long_shot_is_looked_at_part_by_part(verified, monkeypatch):
     closest = np.linalg.norm(HEAD - OTHER, axis=1).argmin()
     meetings = find_meetings(verification, track, 30.0)
     assert any(first - 10 <= closest <= last + 10 for first, last in meetings)
+
+
+def test_a_player_behind_a_panel_is_hidden_and_one_beside_it_is_not():
+    head = np.array([[50.0, 20.0], [150.0, 20.0]])
+    overlay = np.zeros((60, 120), bool)
+    overlay[20:30, 60:90] = True  # of pictures half as large
+    plain = np.zeros((10, 10, 3), np.uint8)
+    background = Background(plain, np.zeros((10, 10)), plain[..., 0] == 0, np.eye(3), overlay, 0.5)
+    shares = hidden_shares(track_along(head, rows=400), background)
+    assert shares[0] == 0
+    assert shares[1] == pytest.approx(20 / HEIGHT, abs=0.1)
