@@ -102,8 +102,8 @@ def find_overlay(
     """Where pictures of one shot have something laid over them; nowhere for a static camera.
 
     They are asked where one of two is `free` of the player: a camera that follows them has them in
-    the same place, too, in both. `to_reference` leads from the pixels of the whole pictures to those of the
-    reference frame; these have `shrink` px for one of theirs.
+    the same place, too, in both. `to_reference` leads from the pixels of the whole pictures to
+    those of the reference frame; these have `shrink` px for one of theirs.
     """
     rows, columns = lab[0].shape[:2]
     reduced = min(1.0, COMPARED_WIDTH / columns)
