@@ -126,36 +126,34 @@ def _listed(numbers: set[str]) -> str:
 
 def describe_truncation(verification: TrackVerification) -> list[str]:
     """A line where the lower edge of the picture cuts the feet off."""
-    share = float(verification.truncated.mean())
-    if share < CUT_OFF:
-        return []
-    first, last = _longest(verification.frames, verification.truncated)
-    return [
-        f"The lower edge of the picture cuts the player's feet off in about {share:.0%} of the "
-        f"frames (longest: {first}-{last}): what was taken for feet there is "
-        "none, and legs come out wrong. Film with the feet in the picture, or use a part of the "
-        "video that shows them."
-    ]
+    often = _how_often(verification.frames, verification.truncated, CUT_OFF)
+    line = (
+        f"The lower edge of the picture cuts the player's feet off {often}: what was taken for "
+        "feet there is none, and legs come out wrong. Film with the feet in the picture, or use a "
+        "part of the video that shows them."
+    )
+    return [line] if often else []
 
 
 def describe_hiding(verification: TrackVerification) -> list[str]:
     """A line where something laid over the picture hides the player."""
-    share = float(verification.hidden.mean())
-    if share < HIDDEN:
-        return []
-    first, last = _longest(verification.frames, verification.hidden)
-    return [
-        f"Something laid over the picture, such as a score, hides a part of the player in about "
-        f"{share:.0%} of the frames (longest: {first}-{last}): joints behind it are guessed from "
-        "the marks before and after. Mark them in some of these frames as hidden ones."
-    ]
+    often = _how_often(verification.frames, verification.hidden, HIDDEN)
+    line = (
+        "Something laid over the picture, such as a score, hides a part of the player "
+        f"{often}: joints behind it are guessed from the marks before and after. Mark them in "
+        "some of these frames as hidden ones."
+    )
+    return [line] if often else []
 
 
-def _longest(frames: Int[np.ndarray, "n"], flags: Bool[np.ndarray, "n"]) -> tuple[int, int]:
-    """First and last frame of the longest run of flags."""
+def _how_often(frames: Int[np.ndarray, "n"], flags: Bool[np.ndarray, "n"], least: float) -> str:
+    """In how many of the frames, and in which longest; nothing below the least share."""
+    share = float(flags.mean())
+    if share < least:
+        return ""
     turns = np.flatnonzero(np.diff(flags, prepend=False, append=False)).reshape(-1, 2)
     first, end = max(turns.tolist(), key=lambda run: run[1] - run[0])
-    return int(frames[first]), int(frames[end - 1])
+    return f"in about {share:.0%} of the frames (longest: {frames[first]}-{frames[end - 1]})"
 
 
 def describe_identity(

@@ -461,15 +461,21 @@ def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, fol
     assert person.complaints == []
 
 
+def start_counting(context, server):
+    """Somebody who has marked a frame and has the motion made, which takes its time."""
+    person = Person(context, server.credentials.address)
+    person.open(40)
+    person.mark_joints(partial(place_of, 40))
+    person.press("Alt+3")
+    person.await_text("#motion-text", "Make the motion")
+    person.press("Enter")
+    person.await_text("#job-text", "Counting")
+    return person
+
+
 def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
     with serving(folder, commands={"run": count_slowly}) as server:
-        person = Person(context, server.credentials.address)
-        person.open(40)
-        person.mark_joints(partial(place_of, 40))
-        person.press("Alt+3")
-        person.await_text("#motion-text", "Make the motion")
-        person.press("Enter")
-        person.await_text("#job-text", "Counting")
+        person = start_counting(context, server)
         job = person.page.locator("#job").bounding_box()
         assert job["y"] + job["height"] <= person.page.locator("header").bounding_box()["height"]
         person.page.click("#job-cancel")
@@ -481,13 +487,7 @@ def test_long_work_shows_how_far_it_is_and_can_be_cancelled(context, folder):
 
 def test_long_work_that_ended_with_its_server_is_told_and_can_be_started_again(context, folder):
     with serving(folder, commands={"run": count_slowly}) as server:
-        person = Person(context, server.credentials.address)
-        person.open(40)
-        person.mark_joints(partial(place_of, 40))
-        person.press("Alt+3")
-        person.await_text("#motion-text", "Make the motion")
-        person.press("Enter")
-        person.await_text("#job-text", "Counting")
+        person = start_counting(context, server)
         server.stop()
         person.await_text("#saving", "Not connected")
         server.start()
