@@ -171,7 +171,7 @@ export function createShell(model, go) {
 }
 
 // Long work on the server: starting it, and what its end means for the page.
-function createJobs(model) {
+export function createJobs(model) {
   const isOver = (job) => job !== undefined && job.state !== "running";
   const states = new Map(); // job -> last state that was acted on
   let listed = false; // whether it is known which jobs are older than the page
