@@ -149,7 +149,7 @@ def held_out(truth: Annotations, marks: Annotations) -> np.ndarray:
 def real_draws(name: str, draws: int, work: Path) -> Iterator[Known]:
     """A clip as benchmarks/draws.py has it marked, as it is and in a mirror."""
     for mirrored in (False, True):
-        prepared = prepare_clip(name, mirrored, COST, work)
+        prepared = prepare_clip(real.load_clip(name, mirrored), COST, work)
         clip, options, keep = prepared.clip, prepared.options, prepared.store.keep
         for seed in range(draws):
             made, marks = mark_draw(prepared, seed)

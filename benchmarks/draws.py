@@ -78,9 +78,8 @@ class Prepared:
     options: Options
 
 
-def prepare_clip(name: str, mirrored: bool, cost: float, work: Path) -> Prepared:
+def prepare_clip(clip: real.Clip, cost: float, work: Path) -> Prepared:
     """Everything up to the choice, as real.py has it."""
-    clip = real.load_clip(name, mirrored)
     store = StageStore(work / clip.name / "cache")
     options = replace(Options(), keyframes=replace(Options().keyframes, budget=cost))
     first = real.choose_bodies(clip, 1)
@@ -186,7 +185,8 @@ def main() -> None:
     every: list[list[Draw]] = []
     with patch.object(stages, "KEPT_RESULTS", words.draws + stages.KEPT_RESULTS):
         for name in words.only:
-            prepared = prepare_clip(name, words.mirrored, words.cost, words.work)
+            clip = real.load_clip(name, words.mirrored)
+            prepared = prepare_clip(clip, words.cost, words.work)
             draws = [draw_once(prepared, seed, words.lift) for seed in range(words.draws)]
             if not every:
                 print(f"{'clip':<34}" + "".join(f"{f:>8}{'worst':>7}" for f in draws[0].figures))

@@ -22,13 +22,26 @@ the joints near the marked ones, or top or hit more than FARTHEST_KEY frames off
 import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+from changed_clips import (
+    ROWS,
+    Change,
+    Picture,
+    change_clip,
+    crowd,
+    dark,
+    half,
+    move_points,
+    rate,
+    same_place,
+    shake,
+)
 from golf_real import COLUMNS, Swing, click, describe, load_swing, measure, write_sheet
-from real import DEVELOP, TRUTH, mirror_clip
+from real import DEVELOP, TRUTH, Clip, mirror_clip
 
 from keyrecon.app.golf import GolfFit, fit_video
 from keyrecon.body import LSP14
@@ -37,97 +50,18 @@ from keyrecon.golf.clicks import GolfClicks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.stages import StageStore
-from keyrecon.io.video import open_video
-from keyrecon.io.video_writer import write_video
 
 LEAST_PCK, FARTHEST_KEY = 0.85, 3.0
 """Of a right fit: share of the joints near the marked ones, and frames of top and hit. Of joints on
 the marked figure, which `body` counts, the fits of the clips as they are have no more than .81 to
 .91."""
-ROWS = 720.0
-"""Rows of the picture for which lengths are told."""
-Picture = np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
-    """How a variant differs from its clip."""
-
-    picture: Callable[[int, Picture], Picture]
-    warp: Callable[[int], np.ndarray]
-    """(2, 3): where pixels of a frame go."""
-    step: int = 1
-    """Every how manieth frame is shown."""
-    crf: int = 20
-
-
-def same_place(_: int) -> np.ndarray:
-    """No pixel moves."""
-    return np.eye(2, 3)
-
-
-def shake(swing: Swing) -> Change:
-    """A camera that drifts and is held by hand."""
-    video, random = swing.clip.video, np.random.default_rng(1)
-    seconds = np.arange(len(video)) / video.fps
-    path = np.zeros((len(video), 2))
-    for hertz in (0.4, 0.9, 1.7, 3.1):
-        for axis in (0, 1):
-            path[:, axis] += np.sin(2 * np.pi * (hertz * seconds + random.random())) / hertz**0.5
-    path *= 13 * video.height / ROWS / np.abs(path).max()
-    path[:, 0] += 0.04 * video.width * np.linspace(-0.5, 0.5, len(video))
-    turn = np.radians(0.4) * np.sin(2 * np.pi * 0.7 * seconds)
-
-    def warp(t: int) -> np.ndarray:
-        c, s = np.cos(turn[t]), np.sin(turn[t])
-        middle = np.array([video.width, video.height]) / 2
-        rotation = np.array([[c, -s], [s, c]])
-        return np.column_stack([rotation, middle - rotation @ middle + path[t]])
-
-    def picture(t: int, shown: Picture) -> Picture:
-        size = video.width, video.height
-        return cv2.warpAffine(shown, warp(t), size, borderMode=cv2.BORDER_REPLICATE)
-
-    return Change(picture, warp)
-
-
-def crowd(swing: Swing) -> Change:
-    """People who sway close beside the player."""
-    video, random = swing.clip.video, np.random.default_rng(2)
-    marked = swing.clip.truth.joints.reshape(-1, 2)
-    low, high = np.nanmin(marked, axis=0), np.nanmax(marked, axis=0)
-    tall = high[1] - low[1]
-    people = []
-    for side, edge in ((-1, low[0]), (1, high[0])):
-        for away in (0.22, 0.5, 0.8):
-            people.append(
-                (edge + side * away * tall, random.random(), random.integers(30, 226, (3, 3)))
-            )
-
-    def picture(t: int, shown: Picture) -> Picture:
-        out, second = shown.copy(), t / video.fps
-        for x, phase, colours in people:
-            sway = 0.03 * tall * np.sin(2 * np.pi * (0.5 * second + phase))
-            at = np.array([x + sway, high[1] - 0.02 * tall])
-            parts = (
-                ((0, -0.24), (0.07, 0.24)),
-                ((0, -0.62), (0.1, 0.18)),
-                ((0, -0.88), (0.05, 0.07)),
-            )
-            for (middle, axes), colour in zip(parts, colours.tolist(), strict=True):
-                centre = np.rint(at + tall * np.array(middle)).astype(int)
-                size = np.rint(tall * np.array(axes)).astype(int)
-                cv2.ellipse(out, centre.tolist(), size.tolist(), 0, 0, 360, colour, -1, cv2.LINE_AA)
-        return out
-
-    return Change(picture, same_place)
-
-
-def double(swing: Swing) -> Change:
+def double(clip: Clip) -> Change:
     """A second golfer swings beside the player: he himself, mirrored, three quarters as tall."""
-    marked = swing.clip.truth.joints.reshape(-1, 2)
+    marked = clip.truth.joints.reshape(-1, 2)
     low, high = np.nanmin(marked, axis=0), np.nanmax(marked, axis=0)
-    tall, width = high[1] - low[1], swing.clip.video.width
+    tall, width = high[1] - low[1], clip.video.width
     middle = float((low[0] + high[0]) / 2)
     side = 1 if width - 1 - high[0] > low[0] else -1
 
@@ -147,35 +81,7 @@ def double(swing: Swing) -> Change:
     return Change(picture, same_place)
 
 
-def half(swing: Swing) -> Change:
-    """Half the size, compressed hard."""
-    size = tuple(n // 4 * 2 for n in (swing.clip.video.width, swing.clip.video.height))
-
-    def picture(_: int, shown: Picture) -> Picture:
-        return cv2.resize(shown, size, interpolation=cv2.INTER_AREA)
-
-    scale = size[0] / swing.clip.video.width
-    reduced = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2]])
-    return Change(picture, lambda _: reduced, crf=32)
-
-
-def rate(_: Swing) -> Change:
-    """Every other frame."""
-    return Change(lambda _, shown: shown, same_place, step=2)
-
-
-def dark(_: Swing) -> Change:
-    """A third of the light, and noise."""
-    random = np.random.default_rng(3)
-
-    def picture(_: int, shown: Picture) -> Picture:
-        noise = random.normal(0, 6, shown.shape[:2])[..., None]
-        return np.clip(shown / 3 + noise, 0, 255).astype(np.uint8)
-
-    return Change(picture, same_place)
-
-
-CHANGES: dict[str, Callable[[Swing], Change]] = {
+CHANGES: dict[str, Callable[[Clip], Change]] = {
     "shake": shake, "crowd": crowd, "double": double, "half": half, "rate": rate, "dark": dark,
 }  # fmt: skip
 VARIANTS = ("plain", *CHANGES, "clicks", "clicks2", "mirror")
@@ -183,31 +89,12 @@ VARIANTS = ("plain", *CHANGES, "clicks", "clicks2", "mirror")
 
 def change_swing(swing: Swing, change: Change, path: Path) -> Swing:
     """A clip with its truth as a variant shows it; the file is written once."""
-    clip, step = swing.clip, change.step
-    if not path.is_file():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        shown = (change.picture(t, p) for t, p in enumerate(clip.video.frames()) if t % step == 0)
-        write_video(path, shown, clip.video.fps / step, crf=change.crf)
-
-    def moved(frame: int, points: np.ndarray) -> np.ndarray:
-        warp = change.warp(frame)
-        return points @ warp[:, :2].T + warp[:, 2]
-
-    truth, video = clip.truth, open_video(path)
-    rows = np.flatnonzero(truth.frames % step == 0)
-    joints = np.stack([moved(int(truth.frames[k]), truth.joints[k]) for k in rows])
-    marks = replace(
-        truth, frames=truth.frames[rows] // step, joints=joints, visible=truth.visible[rows],
-        nearer=truth.nearer[rows], absent=(),
-    )  # fmt: skip
-    clubs = {t // step: moved(t, ends) for t, ends in swing.clubs.items() if t % step == 0}
+    step = change.step
+    clubs = {
+        t // step: move_points(change, t, ends) for t, ends in swing.clubs.items() if t % step == 0
+    }
     events = {k: None if t is None else t / step for k, t in swing.events.items()}
-    scale = float(np.linalg.norm(change.warp(0)[:, 0]))
-    clip = replace(
-        clip, video=video, truth=marks, seen=clip.seen[rows], action=clip.action[rows],
-        torso=scale * clip.torso,
-    )  # fmt: skip
-    return Swing(clip, events, clubs, swing.left_handed)
+    return Swing(change_clip(swing.clip, change, path), events, clubs, swing.left_handed)
 
 
 def mirror_swing(swing: Swing) -> Swing:
@@ -243,7 +130,7 @@ def show_variant(name: str, variant: str, work: Path) -> tuple[Swing, GolfClicks
     swing = load_swing(name)
     if variant in CHANGES:
         file = work / "videos" / f"{name}-{variant}.mp4"
-        swing = change_swing(swing, CHANGES[variant](swing), file)
+        swing = change_swing(swing, CHANGES[variant](swing.clip), file)
     elif variant == "mirror":
         swing = mirror_swing(swing)
     if variant.startswith("clicks"):

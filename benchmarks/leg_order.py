@@ -76,7 +76,7 @@ def main() -> None:
     words = parser.parse_args()
     with patch.object(stages, "KEPT_RESULTS", words.draws + stages.KEPT_RESULTS):
         for name, order in json.loads(ORDER.read_text())["clips"].items():
-            prepared = prepare_clip(name, words.mirrored, words.cost, words.work)
+            prepared = prepare_clip(real.load_clip(name, words.mirrored), words.cost, words.work)
             told = sum(last - first + 1 for first, last, _ in order)
             for seed in range(words.draws):
                 made, marks = mark_draw(prepared, seed)
