@@ -18,6 +18,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.following import FollowOptions, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
+from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, call_stage, spread_of, work_on_each
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
@@ -121,6 +122,7 @@ def prepare(
     camera = keep(
         "camera", estimate_camera_motion, video, options=options.camera, progress=progress
     )
+    video = with_exposure(video, camera.exposure)
     clicks, anchors = tuple(picks), TrackAnchors.none()
     if marks is not None:
         clicks += picks_from_bodies(marks, (video.width, video.height))

@@ -42,6 +42,9 @@ class CameraPath:
     """Frames with which another shot begins; the path means nothing across them."""
     dissolves: tuple[int, ...] = ()
     """Those of them with which one shot dissolves into the next."""
+    exposure: Float[np.ndarray, "T"] | None = None
+    """Brightness of the frames as factors on what is usual in their shot; None where the light
+    hardly changes."""
 
 
 PLAYER = "the player"
@@ -298,6 +301,7 @@ class Preparation:
     """Everything known before a person annotates keyframes."""
 
     video: Video
+    """Read as if all frames had been exposed alike."""
     camera: CameraPath
     colors: Colors
     track: Track

@@ -55,7 +55,8 @@ def join_frames(records: Sequence[PerFrame]) -> PerFrame:
 
 def part_of_path(camera: CameraPath, frames: slice | Int[np.ndarray, "n"]) -> CameraPath:
     """How the camera moves in some frames of one shot or of several."""
-    return CameraPath(camera.to_reference[frames], camera.confidence[frames])
+    exposure = None if camera.exposure is None else camera.exposure[frames]
+    return CameraPath(camera.to_reference[frames], camera.confidence[frames], exposure=exposure)
 
 
 def part_of_marks(marks: Annotations, frames: Int[np.ndarray, "n"]) -> Annotations:

@@ -41,7 +41,7 @@ from keyrecon.io.formats.golf_marks import read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
-from keyrecon.io.held_video import hold_frames, mirror_video
+from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.provenance import golf_evidence, note_fitted
 from keyrecon.io.video import Video, has_fingerprint, open_video
@@ -179,6 +179,7 @@ def fit_video(
         seen, pose = mirror_video(video), mirror_clicks(pose)
         own_marks = mirror_marks(marks, video.width)
     camera = keep("camera", estimate_camera_motion, seen, progress=progress)
+    seen = with_exposure(seen, camera.exposure)
     swing = find_swing(seen, camera, pose, model, options, keep, progress, own_marks)
     if clicks.left_handed:
         swing = keep("mirrored", mirror_found, swing, video.width)

@@ -14,6 +14,7 @@ from keyrecon.errors import counted, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.frame_reader import side_by_side
+from keyrecon.io.held_video import with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
@@ -159,7 +160,7 @@ def write_keyframe_pictures(
     """
     make_folder(workspace.pictures)
     frames = preparation.keyframes.frames
-    pictures = preparation.video.part(frames).frames()
+    pictures = with_exposure(preparation.video, None).part(frames).frames()
     shown = progress(pictures, "Writing keyframe pictures", len(frames))
 
     def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:

@@ -11,6 +11,7 @@ from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.formats.shot_choices import ShotChoices
+from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.library import reconstruct
@@ -55,7 +56,7 @@ def run(
     placed = write_placed_motion(workspace, motion)
     doubts, shots = automatic.contradictions(), describe_shots(preparation.shots)
     material = ReportMaterial(
-        video=preparation.video,
+        video=with_exposure(preparation.video, None),
         track=preparation.track,
         pose_distances=preparation.pose_distances,
         keyframes=preparation.keyframes,

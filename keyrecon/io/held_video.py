@@ -16,7 +16,7 @@ from threading import Lock
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from keyrecon.io.video import Video
 
@@ -56,7 +56,10 @@ class HeldVideo(Video):
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
         """That of the source, not held."""
-        return replace(self.source, turns=self.turns, mirrored=self.mirrored).part(frames)
+        shown = replace(
+            self.source, turns=self.turns, mirrored=self.mirrored, exposure=self.exposure
+        )
+        return shown.part(frames)
 
     @cached_property
     def _held(self) -> "_HeldFrames":
@@ -81,6 +84,20 @@ def hold_if_small(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> Video
 def mirror_video(video: Video) -> Video:
     """The same video with left and right exchanged; what one has decoded the other has too."""
     other = replace(video, mirrored=not video.mirrored, turns=-video.turns % 4)
+    return _with_decoded(other, video)
+
+
+def with_exposure(video: Video, exposure: Float[np.ndarray, "T"] | None) -> Video:
+    """The same video, its frames read as if all had been exposed alike; None: as filmed.
+
+    What one has decoded the other has too.
+    """
+    if exposure is video.exposure:
+        return video
+    return _with_decoded(replace(video, exposure=exposure), video)
+
+
+def _with_decoded(other: Video, video: Video) -> Video:
     if isinstance(video, HeldVideo):
         vars(other)["_held"] = video._held
     return other

@@ -51,7 +51,7 @@ class JoinedVideo(Video):
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
         """A video of some frames; its times stay those of the whole."""
-        return replace(self, stamps=self.stamps[frames], time=self.time[frames])
+        return replace(self, **self._of_frames(frames))
 
     def _decoded(self, start: int, stop: int | None) -> "Iterator[av.VideoFrame]":
         stop = len(self) if stop is None else min(stop, len(self))
@@ -60,7 +60,7 @@ class JoinedVideo(Video):
             number = int(np.searchsorted(self.begins, self.stamps[first], side="right")) - 1
             file = self.files[number]
             stamps = self.stamps[first:last] - self.begins[number] + file.stamps[0]
-            piece = replace(file, stamps=stamps, time=self.time[first:last])
+            piece = replace(file, stamps=stamps, time=self.time[first:last], exposure=None)
             yield from piece._decoded(0, None)
 
 

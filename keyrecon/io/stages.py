@@ -251,6 +251,8 @@ class StageStore:
         elif isinstance(value, Video):
             digest.update(value.fingerprint.encode() + value.stamps.tobytes())
             digest.update(value.time.tobytes() + bytes((value.turns, value.mirrored)))
+            if value.exposure is not None:
+                digest.update(value.exposure.tobytes())
         elif isinstance(value, np.ndarray):
             digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
         elif is_dataclass(value):

@@ -143,7 +143,7 @@ def steady_video(
     inherited = {field.name: getattr(video, field.name) for field in fields(Video)}
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else video.fps
     inherited |= {"width": size[0], "height": size[1], "stamps": video.stamps[numbers]}
-    inherited |= {"time": time, "fps": fps}
+    inherited |= {"time": time, "fps": fps, "exposure": None}  # which the source evens
     return SteadyVideo(**inherited, source=source, numbers=numbers, warps=warps)
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError, counted
+from keyrecon.io.evening import black_of, even_exposure
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
@@ -70,6 +71,9 @@ class Video:
     """Quarter turns counter-clockwise that stand the stored picture upright."""
     mirrored: bool
     """Whether left and right of the stored picture are exchanged before it is turned."""
+    exposure: Float[np.ndarray, "T"] | None
+    """Brightness of the frames as factors on what is usual; they are read as if all were alike.
+    None reads them as they were filmed."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -88,7 +92,12 @@ class Video:
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
         """A video of some frames; its times stay those of the whole."""
         inherited = {field.name: getattr(self, field.name) for field in fields(Video)}
-        return Video(**(inherited | {"stamps": self.stamps[frames], "time": self.time[frames]}))
+        return Video(**(inherited | self._of_frames(frames)))
+
+    def _of_frames(self, frames: slice | Int[np.ndarray, "n"]) -> dict[str, Any]:
+        """What is known of each frame, of some of them."""
+        exposure = None if self.exposure is None else self.exposure[frames]
+        return {"stamps": self.stamps[frames], "time": self.time[frames], "exposure": exposure}
 
     @property
     def variable_rate(self) -> bool:
@@ -105,14 +114,14 @@ class Video:
         self, start: int = 0, stop: int | None = None, width: int | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         """Frames start..stop-1 in order, one in memory at a time; reduced to `width` if given."""
-        for frame in self._decoded(start, stop):
-            yield self._picture(frame, width)
+        for number, frame in enumerate(self._decoded(start, stop), start):
+            yield even_exposure(self._picture(frame, width), self._exposure(number))
 
     def chosen_frames(self, numbers: Container[int], last: int) -> Iterator[np.ndarray]:
         """The frames with these numbers up to `last`; the others are decoded but not converted."""
         for number, frame in enumerate(self._decoded(0, last + 1)):
             if number in numbers:
-                yield self._picture(frame, None)
+                yield even_exposure(self._picture(frame, None), self._exposure(number))
 
     def grey_frames(
         self, wanted: Container[int] | None = None
@@ -131,7 +140,17 @@ class Video:
                 grey = pixels.reshape(plane.height, plane.line_size)[:, : plane.width]
             else:
                 grey = frame.to_ndarray(format="gray")
-            yield self._upright(grey)
+            evened = even_exposure(grey, self._exposure(number), black_of(frame))
+            yield self._upright(evened)
+
+    @cached_property
+    def black(self) -> int:
+        """How black is stored in the brightness that `grey_frames` gives."""
+        return black_of(next(self._decoded(0, 1)))
+
+    def _exposure(self, number: int) -> float:
+        """Brightness of a frame as a factor on what is usual."""
+        return 1.0 if self.exposure is None else float(self.exposure[number])
 
     def _decoded(self, start: int, stop: int | None) -> Iterator[av.VideoFrame]:
         """Frames start..stop-1 as they are stored, not turned."""
@@ -270,7 +289,7 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
     if not MIN_FPS <= fps <= MAX_FPS or not time[-1] < len(time) / MIN_FPS:
         raise ValueError(f"{len(time)} frames in {time[-1]:g} s")
-    return Video(path, width, height, stamps, time, fps, turns, mirrored)
+    return Video(path, width, height, stamps, time, fps, turns, mirrored, None)
 
 
 def _distinct(stamps: Int[np.ndarray, "N"]) -> Int[np.ndarray, "T"]:

@@ -1,64 +1,42 @@
 """How the camera moves: a homography from every frame to the reference frame.
 
 A camera that turns and zooms without travelling maps the background between any two frames by a
-homography (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., 8.4). Corners spread evenly
-over a key picture are tracked into each frame by pyramidal Lucas-Kanade (Bouguet 2000) and a
-model is fitted by RANSAC, so that whatever moves on its own, the player first of all, is outvoted.
-A similarity is fitted first; a full homography replaces it only where it explains the corners
-clearly better, since its extra freedom otherwise drifts where there are no corners. The RANSAC of
-the homography is locally optimised (Chum, Matas and Kittler, DAGM 2003): a sample of four corners
-carries their noise, and the best of many is refitted to all that agree with it.
+homography (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., 8.4).
 
 Frames are registered to key pictures, not to their predecessors: a new key picture is taken only
 when the view has left all earlier ones, so errors add up per view, not per frame, and a camera that
 comes back finds its old key picture. While the camera rests, only a few frames are registered.
-Letters and logos laid over the picture are left out (`static_overlay.py`).
+Letters and logos laid over the picture are left out (`static_overlay.py`), and where the light
+changes (`exposure.py`), which Lucas-Kanade takes to stay, frames are registered again as if it had
+not.
 
 If no corner moves noticeably over the whole sequence, the camera is static and the path is
 exactly the identity.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
-import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float
 
 from keyrecon.io.frame_reader import read_grey, shrinking, side_by_side
+from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import CameraPath, Shots
 from keyrecon.segmentation.static_overlay import StaticOverlay
+from keyrecon.tracking.exposure import ExposureMeter
+from keyrecon.tracking.key_pictures import Grey, KeyPicture, Match, find_corners, match_key
 from keyrecon.tracking.shots import CutDetector
 
-Grey = UInt8[np.ndarray, "h w"]
 Matrix = Float[np.ndarray, "3 3"]
 
-MAX_CORNERS = 240
-"""Corners tracked from a key picture."""
-INLIER_DISTANCE = 1.0
-"""How far a corner may lie from where the camera's motion puts it, reduced px."""
-AGREEING_DISTANCE = 0.35
-"""How far a corner may lie from the homography that it is fitted to, reduced px: a few times what
-Lucas-Kanade errs by. Beyond it are letters laid over the picture and limbs that move slowly.
-
-Mean error of the path over 28 s of each of seven rendered videos of turning cameras, px: plain
-RANSAC with 1 px .12 to 1.54; locally optimised with 1 px .10 to 1.43, with .35 .11 to .88, which is
-.57 of the plain one's in the median, .96 at worst. On 12 s of them .18 and .25 gave what .35 did
-within .06; .5 and .7 lay between in three of four.
-"""
-MIN_INLIERS = 12
-"""Fewer agreeing corners say nothing about the camera."""
-MAX_RESIDUAL_RATIO = 0.8
-"""A homography must bring the median residual below this share of a similarity's."""
 MAX_OVERLAY_SHARE = 0.05
 """Share of the corners that may lie on overlays: so few are outvoted with the player."""
-MIN_SCENE_MOTION = 3.0
-"""A corner that the model moves by so much shows whether it belongs to the scene, reduced px."""
 FRAMES_AT_REST = 4
 """Frames that share one registration while the camera rests: only the last is registered."""
 MAX_REST_MOTION = 0.25
@@ -68,6 +46,9 @@ KEY_HYSTERESIS = 0.08
 MOST_HELD = 2**26
 """Bytes of reduced pictures that are kept in case they are needed a second time: 20 s at 25 frames
 per second, or all of a shot."""
+MOST_REPEATS = 3
+"""How often frames are registered again where the light changes: it is measured along the path, and
+the path found in evened light."""
 MIN_CONFIDENCE = 0.35
 """Share of agreeing corners below which a key picture has nothing to say."""
 
@@ -86,28 +67,6 @@ class CameraMotionOptions:
     """
 
 
-@dataclass(frozen=True, eq=False)
-class _KeyPicture:
-    """A picture that others are registered to."""
-
-    picture: Grey
-    corners: Float[np.ndarray, "n 2"]
-    to_start: Float[np.ndarray, "3 3"]
-
-
-@dataclass(frozen=True, eq=False)
-class _Match:
-    """How a key picture is registered to a frame."""
-
-    model: Float[np.ndarray, "3 3"]
-    confidence: float
-    """Share of agreeing corners."""
-    moved: Float[np.ndarray, "m 2"]
-    """Corners of the key picture that the model moves noticeably."""
-    moves_along: Bool[np.ndarray, "m"]
-    """Whether they were tracked to where it puts them."""
-
-
 @dataclass(eq=False)
 class _FeatureTracker:
     """Registers one frame after the other."""
@@ -115,7 +74,8 @@ class _FeatureTracker:
     options: CameraMotionOptions
     overlaid: Bool[np.ndarray, "h w"] | None = None
     overlay: StaticOverlay = field(default_factory=StaticOverlay)
-    keys: list[_KeyPicture] = field(default_factory=list)
+    light: ExposureMeter = field(default_factory=ExposureMeter)
+    keys: list[KeyPicture] = field(default_factory=list)
     current: int = 0
 
     def register(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float]:
@@ -125,7 +85,7 @@ class _FeatureTracker:
             return np.eye(3), 1.0
         self.current = self._nearest(guess, grey.shape)
         key = self.keys[self.current]
-        match = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
+        match = match_key(key, grey, np.linalg.inv(guess) @ key.to_start)
         if match is None:
             # The view was cut or blurred: start a view of its own where we believe to be.
             self.keys.append(self._key(grey, guess))
@@ -139,20 +99,20 @@ class _FeatureTracker:
     def register_at_rest(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
         """The same for a frame a little later; None if the camera has moved since."""
         key = self.keys[self.current]
-        match = _match(key, grey, np.linalg.inv(guess) @ key.to_start)
+        match = match_key(key, grey, np.linalg.inv(guess) @ key.to_start)
         if match is None or self._leaves(match, grey):
             return None
         to_start = _to_start(key, match)
         step = _displacement(np.linalg.inv(guess) @ to_start, grey.shape)
         return None if step * grey.shape[1] > MAX_REST_MOTION else (to_start, match.confidence)
 
-    def _leaves(self, match: _Match, grey: Grey) -> bool:
+    def _leaves(self, match: Match, grey: Grey) -> bool:
         """Whether this frame shares too little with its key picture."""
         far = _displacement(match.model, grey.shape) > self.options.leave
         return far or match.confidence < MIN_CONFIDENCE
 
-    def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> _KeyPicture:
-        return _KeyPicture(grey, _corners(grey, self.overlaid), to_start)
+    def _key(self, grey: Grey, to_start: Float[np.ndarray, "3 3"]) -> KeyPicture:
+        return KeyPicture(grey, find_corners(grey, self.overlaid), to_start)
 
     def _nearest(self, to_start: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> int:
         """The key picture whose view is nearest; the current one unless another is clearly so."""
@@ -163,7 +123,7 @@ class _FeatureTracker:
         return self.current if keep else best
 
 
-def _to_start(key: _KeyPicture, match: _Match) -> Float[np.ndarray, "3 3"]:
+def _to_start(key: KeyPicture, match: Match) -> Float[np.ndarray, "3 3"]:
     """Homography to frame 0 by way of a key picture."""
     to_start = key.to_start @ np.linalg.inv(match.model)
     return to_start / to_start[2, 2]
@@ -191,7 +151,20 @@ def estimate_camera_motion(
         np.concatenate([path.confidence for path in paths]),
         cuts,
         tuple(detector.dissolves),
+        _join_exposures(paths),
     )
+
+
+def _join_exposures(paths: Sequence[CameraPath]) -> Float[np.ndarray, "T"] | None:
+    """Of one shot after the other."""
+    if all(path.exposure is None for path in paths):
+        return None
+    even = [np.ones(len(path.confidence)) for path in paths]
+    known = [
+        one if path.exposure is None else path.exposure
+        for path, one in zip(paths, even, strict=True)
+    ]
+    return np.concatenate(known)
 
 
 def estimate_shot_motion(
@@ -207,26 +180,43 @@ def estimate_shot_motion(
     width = min(options.width, video.width)
     shape = (round(video.height * width / video.width), width)
 
-    def pictures() -> Iterator[Grey]:
-        return progress(read_grey(video, width), "Estimating the camera's motion", len(video))
+    def pictures(shown: Video) -> Iterator[Grey]:
+        return progress(read_grey(shown, width), "Estimating the camera's motion", len(shown))
 
-    tracker = _FeatureTracker(options)
-    watched = pictures() if detector is None else _first_shot(pictures(), detector)
+    tracker = _FeatureTracker(options, light=ExposureMeter(video.black))
+    watched = pictures(video) if detector is None else _first_shot(pictures(video), detector)
     held: list[Grey] | None = [] if len(video) * shape[0] * shape[1] <= MOST_HELD else None
     path, confidence = _register_all(_holding(watched, held), tracker, max(1, len(video) // 64))
+    exposure = tracker.light.exposure()
     if _is_static(path, shape, options):
-        return CameraPath(np.tile(np.eye(3), (len(path), 1, 1)), confidence)
+        return _still(confidence, exposure)
     if detector is not None and detector.cuts:
         return CameraPath(path, confidence)
-    if tracker.overlay.share(np.concatenate([k.corners for k in tracker.keys])) > MAX_OVERLAY_SHARE:
-        tracker = _FeatureTracker(options, tracker.overlay.mask())
-        path, confidence = _register_all(pictures() if held is None else held, tracker)
-        if _is_static(path, shape, options):
-            return CameraPath(np.tile(np.eye(3), (len(video), 1, 1)), confidence)
+    corners = np.concatenate([key.corners for key in tracker.keys])
+    hidden = tracker.overlay.share(corners) > MAX_OVERLAY_SHARE
+    overlaid = tracker.overlay.mask() if hidden else None
+    for _ in range(MOST_REPEATS if hidden or exposure is not None else 0):
+        tracker = _FeatureTracker(options, overlaid, light=ExposureMeter(video.black))
+        evened = None if exposure is None else pictures(with_exposure(video, exposure))
+        path, confidence = _register_all(evened or held or pictures(video), tracker)
+        if exposure is None:
+            break
+        exposure = exposure * tracker.light.factors()
+        if tracker.light.exposure() is None:
+            break
+    if _is_static(path, shape, options):
+        return _still(confidence, exposure)
     to_reference = np.linalg.inv(path[len(path) // 2]) @ path
     small = shrinking(width / video.width)
     full = np.linalg.inv(small) @ to_reference @ small
-    return CameraPath(full / full[:, 2:, 2:], confidence)
+    return CameraPath(full / full[:, 2:, 2:], confidence, exposure=exposure)
+
+
+def _still(
+    confidence: Float[np.ndarray, "T"], exposure: Float[np.ndarray, "T"] | None
+) -> CameraPath:
+    """The path of a camera that does not move."""
+    return CameraPath(np.tile(np.eye(3), (len(confidence), 1, 1)), confidence, exposure=exposure)
 
 
 def _first_shot(pictures: Iterable[Grey], detector: CutDetector) -> Iterator[Grey]:
@@ -256,9 +246,17 @@ def _register_all(
         waiting.append(grey)
         if len(waiting) == FRAMES_AT_REST or len(path) < FRAMES_AT_REST:
             path += _register(tracker, waiting, [pose for pose, _ in path[-2:]])
+            _meter(tracker, waiting, path)
             waiting = []
     path += _register(tracker, waiting, [pose for pose, _ in path[-2:]])
+    _meter(tracker, waiting, path)
     return np.array([pose for pose, _ in path]), np.array([confidence for _, confidence in path])
+
+
+def _meter(tracker: _FeatureTracker, waiting: list[Grey], path: list[tuple[Matrix, float]]) -> None:
+    """Measure the light of the frames at the end of the path."""
+    for grey, (pose, _) in zip(waiting, path[len(path) - len(waiting) :], strict=True):
+        tracker.light.add(grey, pose)
 
 
 def _register(
@@ -282,76 +280,6 @@ def _register(
         registered.append(tracker.register(grey, guess))
         guess = registered[-1][0]
     return registered
-
-
-def _corners(grey: Grey, overlaid: Bool[np.ndarray, "h w"] | None) -> Float[np.ndarray, "n 2"]:
-    """Corners spread over the picture: the best of each cell of a grid, weak ones left out."""
-    mask = None if overlaid is None else (~overlaid).astype(np.uint8)
-    response = cv2.cornerMinEigenVal(grey, 5)
-    if mask is not None:
-        response = response * mask
-    cell = max(6, round(np.sqrt(grey.size / MAX_CORNERS)))
-    rows, columns = grey.shape[0] // cell, grey.shape[1] // cell
-    blocks = response[: rows * cell, : columns * cell]
-    blocks = blocks.reshape(rows, cell, columns, cell).swapaxes(1, 2).reshape(rows, columns, -1)
-    best = blocks.argmax(axis=2)
-    y = np.arange(rows)[:, None] * cell + best // cell
-    x = np.arange(columns) * cell + best % cell
-    good = blocks.max(axis=2) > max(1e-6, 0.002 * float(response.max()))
-    return np.stack([x[good], y[good]], axis=1).astype(np.float32)
-
-
-def _match(key: _KeyPicture, grey: Grey, guess: Float[np.ndarray, "3 3"]) -> _Match | None:
-    """Homography from a key picture to this one; None where too few corners agree."""
-    if len(key.corners) < MIN_INLIERS:
-        return None
-    start = warp_points(guess, key.corners.astype(float)).astype(np.float32)
-    size = np.array(grey.shape[::-1])
-    inside = ((start > 4) & (start < size - 5)).all(axis=1)
-    if inside.sum() < MIN_INLIERS:
-        return None
-    source = np.ascontiguousarray(key.corners[inside])
-    tracked, status, _ = cv2.calcOpticalFlowPyrLK(
-        key.picture, grey, source, start[inside].copy(), winSize=(15, 15), maxLevel=3,
-        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.02),
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-    )  # fmt: skip
-    good = status.ravel() > 0
-    source, tracked = source[good], tracked[good]
-    model = _fit(source, tracked)
-    if model is None:
-        return None
-    put = warp_points(model, source)
-    agrees = np.linalg.norm(put - tracked, axis=1) < 1.5 * INLIER_DISTANCE
-    if agrees.sum() < MIN_INLIERS:
-        return None
-    moved = np.linalg.norm(put - source, axis=1) > MIN_SCENE_MOTION
-    return _Match(model, float(agrees.sum()) / int(inside.sum()), source[moved], agrees[moved])
-
-
-def _fit(
-    source: Float[np.ndarray, "n 2"], target: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "3 3"] | None:
-    """A similarity, or a homography where that is clearly better."""
-    if len(source) < MIN_INLIERS:
-        return None
-    similar, _ = cv2.estimateAffinePartial2D(
-        source, target, method=cv2.RANSAC, ransacReprojThreshold=2 * INLIER_DISTANCE, maxIters=500
-    )
-    if similar is None:
-        return None
-    model = np.vstack([similar, [0, 0, 1]])
-    # Four parameters more need many corners to be known well.
-    if len(source) < 5 * MIN_INLIERS:
-        return model
-    full, _ = cv2.findHomography(source, target, cv2.USAC_FAST, AGREEING_DISTANCE, maxIters=500)
-    if full is None:
-        return model
-    error, other = (
-        np.median(np.minimum(np.linalg.norm(warp_points(m, source) - target, axis=1), 3))
-        for m in (model, full)
-    )
-    return full if other < MAX_RESIDUAL_RATIO * error else model
 
 
 def _displacement(homography: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> float:

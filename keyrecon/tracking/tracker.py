@@ -26,6 +26,7 @@ from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
+from keyrecon.timeline import part_of_path
 from keyrecon.tracking.anchors import marked_places
 from keyrecon.tracking.correlation_filters import (
     Examples,
@@ -48,7 +49,7 @@ from keyrecon.tracking.radial_symmetry import find_peaks
 from keyrecon.tracking.scale import player_boxes, standing_height, zoom
 from keyrecon.tracking.visibility import is_visible
 
-Record = TypeVar("Record", Crops, CameraPath, Track)
+Record = TypeVar("Record", Crops, Track)
 
 TRAINING_RATE = 16.0
 """Frames per second that are linked to train the second filters on. Halved: at most 0.4 points, 1.1
@@ -187,7 +188,7 @@ class _CroppedFrames:
             self.cropping.every(step),
             self.player,
             _thinned(self.rough, step),
-            _thinned(self.camera, step),
+            part_of_path(self.camera, slice(None, None, step)),
             self.magnification[::step],
             self.marked_head[::step],
             self.marked_feet[::step],

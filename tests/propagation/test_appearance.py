@@ -28,7 +28,7 @@ class Drawn(Video):
     def __init__(self, drawn):
         stamps = np.arange(len(drawn))
         high, wide = drawn[0].shape[:2]
-        super().__init__(Path("none.mp4"), wide, high, stamps, stamps / 25, 25.0, 0, False)
+        super().__init__(Path("none.mp4"), wide, high, stamps, stamps / 25, 25.0, 0, False, None)
         object.__setattr__(self, "drawn", drawn)
 
     def chosen_frames(self, numbers, last):

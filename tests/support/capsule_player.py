@@ -170,4 +170,4 @@ class Pictures(Video):
 def pictures(count, fps=50.0):
     """A video of `count` pictures that never change."""
     stamps = np.arange(count)
-    return Pictures(Path("none.mp4"), 1280, 720, stamps, stamps / fps, fps, 0, False)
+    return Pictures(Path("none.mp4"), 1280, 720, stamps, stamps / fps, fps, 0, False, None)

@@ -47,7 +47,7 @@ def surer_by_flow(
         return suggestion
     first, last = min(frame, int(near.frames.min())), max(frame, int(near.frames.max()))
     window = slice(first, last + 1)
-    part = replace(video, stamps=video.stamps[window], time=video.time[window])
+    part = video.part(window)
     moved = replace(near, frames=near.frames - first, absent=())
     flow = track_marked_joints(part, moved, FlowOptions(longest=2 * REACH))
     surer = _surer(flow.confidence[frame - first], suggestion)

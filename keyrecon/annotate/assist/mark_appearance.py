@@ -12,7 +12,7 @@ likeness  how points along both arms and both legs look like their own side, and
 Hidden joints look like what hides them, and have no excess.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Float32, Int
@@ -67,7 +67,7 @@ def describe_frames(
     if not len(lacking):
         return described or PlayerFeatures(lacking, np.zeros((0, 1, 1, 1), np.uint8))
     video = preparation.video
-    part = replace(video, stamps=video.stamps[lacking], time=video.time[lacking])
+    part = video.part(lacking)
     own = BodyFrame(body_frame.origin[lacking], body_frame.height[lacking])
     cells = describe_player(part, own, np.arange(len(lacking))).cells
     if described is None:

@@ -22,7 +22,7 @@ from keyrecon.records import Annotations, JointTracks
 FRAMES, FPS = 50, 30.0
 HEIGHTS = np.full(FRAMES, 380.0)
 VIDEO = Video(
-    Path("swing.mp4"), 1280, 720, np.arange(FRAMES), np.arange(FRAMES) / FPS, FPS, 0, False
+    Path("swing.mp4"), 1280, 720, np.arange(FRAMES), np.arange(FRAMES) / FPS, FPS, 0, False, None
 )
 
 

@@ -1,0 +1,33 @@
+"""Frames as if all of them had been exposed alike."""
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+if TYPE_CHECKING:
+    import av
+
+FULL_RANGE = 2
+"""FFmpeg's number of colours whose black is stored as 0 (AVCOL_RANGE_JPEG)."""
+LIMITED_BLACK = 16
+"""How black is stored in all other brightness of 8 bit (ITU-R BT.601)."""
+
+
+def even_exposure(
+    picture: UInt8[np.ndarray, "h w *c"], exposure: float, black: int = 0
+) -> UInt8[np.ndarray, "h w *c"]:
+    """A picture as it would be with an exposure of 1; `black` is how black is stored."""
+    if exposure == 1.0:
+        return picture
+    stored = np.arange(256.0)
+    table = np.clip(np.rint(black + (stored - black) / exposure), 0, 255).astype(np.uint8)
+    evened: UInt8[np.ndarray, "h w *c"] = cv2.LUT(np.ascontiguousarray(picture), table)
+    return evened
+
+
+def black_of(frame: "av.VideoFrame") -> int:
+    """How black is stored in a frame's brightness."""
+    full = frame.format.name.startswith(("yuvj", "gray")) or frame.color_range == FULL_RANGE
+    return 0 if full else LIMITED_BLACK

@@ -1,0 +1,95 @@
+"""Light that changes, over scenes whose light is known, and videos read as if it had not."""
+
+import cv2
+import numpy as np
+import pytest
+
+from keyrecon.io.evening import even_exposure
+from keyrecon.io.frame_reader import read_grey, read_small
+from keyrecon.io.held_video import hold_frames, with_exposure
+from keyrecon.io.stages import StageStore
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.tracking.camera_motion import estimate_camera_motion
+
+SIZE, FRAMES = (320, 180), 48
+EACH = np.arange(FRAMES)
+FLICKER = 1 + 0.1 * np.sin(2.1 * EACH)
+CLOUD = 2.0 ** (EACH / FRAMES - 0.6)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    rng = np.random.default_rng(4)
+    noise = cv2.GaussianBlur(rng.integers(0, 255, (400, 900, 3)).astype(np.float32), (0, 0), 3)
+    return cv2.normalize(noise, None, 40, 150, cv2.NORM_MINMAX).astype(np.uint8)
+
+
+def film(scene, light, path, speed=0.0):
+    """A camera that turns, and somebody dark who walks through the picture."""
+
+    def picture(t):
+        left = round(speed * t)
+        shown = scene[100 : 100 + SIZE[1], 100 + left : 100 + left + SIZE[0]].copy()
+        cv2.rectangle(shown, (4 * t, 60), (4 * t + 50, 170), (30, 60, 40), -1)
+        return np.clip(np.rint(shown * light[t]), 0, 255).astype(np.uint8)
+
+    write_video(path, (picture(t) for t in EACH), 25.0, crf=8)
+    return open_video(path)
+
+
+@pytest.mark.parametrize("light", [FLICKER, CLOUD, FLICKER * CLOUD])
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+def test_changes_of_the_light_are_measured_to_two_percent(scene, light, speed, tmp_path):
+    video = film(scene, light, tmp_path / "lit.mp4", speed)
+    found = estimate_camera_motion(video).exposure
+    factor = found / light
+    assert np.abs(factor / np.median(factor) - 1).max() < 0.02
+
+
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+def test_who_walks_by_and_a_camera_that_turns_are_no_change_of_the_light(scene, speed, tmp_path):
+    video = film(scene, np.ones(FRAMES), tmp_path / "even.mp4", speed)
+    assert estimate_camera_motion(video).exposure is None
+
+
+def test_a_camera_is_followed_through_changes_of_the_light(scene, tmp_path):
+    video = film(scene, FLICKER * CLOUD, tmp_path / "lit.mp4", 4.0)
+    path = estimate_camera_motion(video).to_reference
+    assert np.abs(np.diff(path[:, 0, 2]) - 4).max() < 0.3
+
+
+def test_frames_are_read_as_if_the_light_had_stayed(scene, tmp_path):
+    lit = film(scene, CLOUD, tmp_path / "lit.mp4")
+    even = film(scene, np.ones(FRAMES), tmp_path / "even.mp4")
+    video = with_exposure(lit, CLOUD)
+    readers = {
+        "small": lambda one: read_small(one, 160),
+        "grey": lambda one: read_grey(one, 160),
+        "some": lambda one: read_small(one, 320, {3, 40}),
+        "one": lambda one: [one.frame(40)],
+        "part": lambda one: one.part(slice(30, 44)).frames(),
+    }
+    for name, read in readers.items():
+        wanted = np.stack([*read(even)]).astype(float)
+        for source in (video, hold_frames(video)):
+            shown = np.stack([*read(source)])
+            assert np.abs(shown - wanted).mean() < 2.5, name
+        assert np.abs(np.stack([*read(lit)]) - wanted).mean() > 8, name
+        filmed = np.stack([*read(with_exposure(video, None))])
+        assert (filmed == np.stack([*read(lit)])).all(), name
+
+
+def test_stages_know_a_video_by_its_exposure(scene, tmp_path):
+    video = film(scene, CLOUD, tmp_path / "lit.mp4")
+    key = StageStore(tmp_path)._key
+    assert key(video) == key(with_exposure(video, None))
+    assert (
+        len({key(video), key(with_exposure(video, CLOUD)), key(with_exposure(video, FLICKER))}) == 3
+    )
+
+
+def test_black_stays_black():
+    stored = np.array([[16, 66, 116]], np.uint8)
+    assert even_exposure(stored, 0.5, black=16).tolist() == [[16, 116, 216]]
+    assert even_exposure(stored, 2.0).tolist() == [[8, 33, 58]]
