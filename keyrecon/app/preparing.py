@@ -44,6 +44,8 @@ click in eleven on a real rally: .77 with it, .99 without."""
 CUT_OFF, HIDDEN = 0.1, 0.05
 """Shares of the frames from which feet that the picture cuts off are told of, and a player who is
 hidden."""
+LIGHT_CHANGE = 1.25
+"""Brightest by darkest frame from which a change of the light is told of: one that is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,7 @@ class ProjectPreparation:
         """A line for every click or mark that does not fit the rest."""
         track = self.preparation.track
         made, lines = self.preparation, []
+        lines += describe_light(made.camera)
         if made.verification is not None:
             lines += describe_truncation(made.verification)
             lines += describe_hiding(made.verification)
@@ -122,6 +125,28 @@ def with_chosen_shots(options: Options, choices: ShotChoices) -> Options:
 
 def _listed(numbers: set[str]) -> str:
     return ",".join(sorted(numbers, key=lambda word: (len(word), word)))
+
+
+def describe_light(camera: CameraPath) -> list[str]:
+    """A line where the light changes within a shot so that it is seen."""
+    if camera.exposure is None:
+        return []
+    begins = [0, *camera.cuts, len(camera.exposure)]
+    changes = [
+        (camera.exposure[first:end].max() / camera.exposure[first:end].min(), first, end)
+        for first, end in pairwise(begins)
+    ]
+    change, first, end = max(changes)
+    if change < LIGHT_CHANGE:
+        return []
+    darkest, brightest = (
+        first + int(find(camera.exposure[first:end])) for find in (np.argmin, np.argmax)
+    )
+    return [
+        f"The light changes: frame {brightest} is {change:.1f} times as bright as frame "
+        f"{darkest}. Frames are compared as if it had not; if the overlay shows that the player "
+        "was lost there, mark a frame of each light."
+    ]
 
 
 def describe_truncation(verification: TrackVerification) -> list[str]:

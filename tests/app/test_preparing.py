@@ -1,11 +1,14 @@
 """What the automatic part tells of the shots of a video and of the track."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from keyrecon.app.annotator import _contradictions
 from keyrecon.app.preparing import (
     describe_hiding,
     describe_identity,
+    describe_light,
     describe_shots,
     describe_truncation,
 )
@@ -50,6 +53,16 @@ def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
     (line,) = describe_truncation(verified(truncated=range(40, 101)))
     assert "in about 32% of the frames (longest: 40-100)" in line
     assert describe_truncation(verified(truncated=range(8))) == []
+
+
+def test_a_change_of_the_light_within_a_shot_is_told():
+    light = np.r_[np.linspace(0.8, 1.6, 50), np.full(150, 0.5)]
+    path = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200), (50,), exposure=light)
+    (line,) = describe_light(path)
+    assert "frame 49 is 2.0 times as bright as frame 0" in line
+    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert describe_light(replace(path, exposure=np.r_[light[:50] * 0 + 1.3, light[50:]])) == []
+    assert describe_light(replace(path, exposure=None)) == []
 
 
 def test_what_is_laid_over_the_player_is_told_and_shown_on_the_page():
