@@ -12,13 +12,20 @@ accelerations that no player has. From there `refinement` changes root and pose 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.linalg import spsolve
 
 from keyrecon.records import Motion
 from keyrecon.world.records import WorldCamera, WorldMotion
-from keyrecon.world.refinement import HEEL_UP, Placed, Standing, refine_placed, without_moments
+from keyrecon.world.refinement import (
+    HEEL_UP,
+    Placed,
+    Shots,
+    Standing,
+    refine_placed,
+    without_moments,
+)
 from keyrecon.world.sight import sight_axes, sight_lines
 
 ANKLE_SHARE = 0.0486
@@ -43,6 +50,8 @@ HIGHEST_HEEL = 0.12
 highest fiftieth of such feet have theirs .09 to .12 m up; higher ones are at the top of a jump."""
 SPELL = 0.08
 """Seconds that a foot stands at least."""
+LEAST_SEEN = 3
+"""Frames of a shot with a court and a motion, below which it has no place."""
 REACH = 0.04
 """Seconds to both sides over which a foot's speed is taken."""
 PIXELS = 2.0
@@ -73,10 +82,13 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     skeleton = motion.skeleton
     ankles = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
     hips = [skeleton.index(f"{side}_hip") for side in ("right", "left")]
-    seen = camera.found & np.isfinite(motion.points2d).all(axis=(1, 2))
-    seen &= np.isfinite(motion.points3d).all(axis=(1, 2))
-    if seen.sum() < 3:
+    seen = camera.found & np.isfinite(motion.points2d).all(axis=(1, 2)) & motion.known
+    shots = tuple(shot for shot in motion.stretches if seen[shot].sum() >= LEAST_SEEN)
+    if not shots:
         return None
+    inside = np.zeros(len(seen), dtype=bool)
+    inside[np.concatenate([np.r_[shot] for shot in shots])] = True
+    seen &= inside
     at_root = motion.points2d[:, hips].mean(axis=1)
     pose = _turned_pose(motion, camera, at_root, hips)
     feet = motion.points2d[:, ankles]
@@ -84,17 +96,20 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     for _ in range(2):  # the ankle's height hangs on the player's size
         height = ratio * pose[:, ankles, 2]
         ground = _on_ground(camera, feet, ANKLE_SHARE * ratio * stature_in_units(motion))
-        speed = _speed_across(motion, camera, ground)
-        still = _slow_and_low(speed, height, HELD_SPEED, motion.fps) & seen[:, None]
+        speed = _speed_across(motion, camera, ground, shots)
+        still = _slow_and_low(speed, height, HELD_SPEED) & seen[:, None]
+        still = _without_moments(still, motion.fps, shots)
         if not still.any():
             return None
         ratio = _size(motion, camera, ground, still)
-    contact = _slow_and_low(speed, height, CONTACT_SPEED, motion.fps) & seen[:, None]
+    slow = _slow_and_low(speed, height, CONTACT_SPEED) & seen[:, None]
+    slow = _without_moments(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)
-    root = _solve(motion, camera, evidence, _spells(still))
-    placed = Placed(motion, camera, seen, root, ratio, ratio * stature_in_units(motion), ankle)
-    return _refined(_filled(placed), still, contact)
+    root = _solve(motion, camera, evidence, _spells(still, shots), shots)
+    stature = ratio * stature_in_units(motion)
+    placed = Placed(motion, camera, seen, root, ratio, stature, ankle, shots)
+    return _refined(_filled(placed), still, slow)
 
 
 def _refined(
@@ -106,9 +121,9 @@ def _refined(
     points, log_size = refine_placed(placed, Standing(still, still))
     height = points[:, ankles, 2]
     rise = height - np.percentile(height[still], STANDING_SHARE)
-    shortest = max(2, round(SPELL * placed.motion.fps))
-    flat = without_moments(still & (rise < HEEL_UP), shortest)
-    contact = without_moments((still | slow) & (rise < HIGHEST_HEEL), shortest)
+    fps, shots = placed.motion.fps, placed.shots
+    flat = _without_moments(still & (rise < HEEL_UP), fps, shots)
+    contact = _without_moments((still | slow) & (rise < HIGHEST_HEEL), fps, shots)
     points, log_size = refine_placed(placed, Standing(still, flat), log_size)
     points[~seen] = np.nan
     ratio = placed.scale * float(np.exp(log_size))
@@ -117,12 +132,21 @@ def _refined(
 
 
 def _filled(placed: Placed) -> Placed:
-    """Frames that are not known have the camera and the pose of the nearest one that is."""
-    known = np.flatnonzero(placed.seen)
-    frames = np.arange(len(placed.seen))
+    """Frames that are not known have the camera and the pose of the nearest one that is.
+
+    In a shot it is the nearest one of the shot.
+    """
+    nearest = _nearest(np.flatnonzero(placed.seen), np.arange(len(placed.seen)))
+    for shot in placed.shots:
+        known = np.flatnonzero(placed.seen[shot]) + shot.start
+        nearest[shot] = _nearest(known, np.r_[shot])
+    return replace(placed.part(nearest), seen=placed.seen, root=placed.root, shots=placed.shots)
+
+
+def _nearest(known: Int[np.ndarray, "k"], frames: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
+    """The nearest of the known frames, ascending, to each."""
     at = np.clip(np.searchsorted(known, frames), 1, len(known) - 1)
-    nearest = np.where(frames - known[at - 1] <= known[at] - frames, known[at - 1], known[at])
-    return replace(placed.part(nearest), seen=placed.seen, root=placed.root)
+    return np.where(frames - known[at - 1] <= known[at] - frames, known[at - 1], known[at])
 
 
 def stature_in_units(motion: Motion) -> float:
@@ -130,9 +154,8 @@ def stature_in_units(motion: Motion) -> float:
     if motion.units != "m":
         return 1.0
     bones = motion.skeleton.bones
-    lengths = np.median(
-        np.linalg.norm(motion.points3d[:, bones[:, 1]] - motion.points3d[:, bones[:, 0]], axis=2), 0
-    )
+    points = motion.points3d[motion.known]
+    lengths = np.median(np.linalg.norm(points[:, bones[:, 1]] - points[:, bones[:, 0]], axis=2), 0)
     shares = np.array([motion.skeleton.proportions[child] for child in bones[:, 1]])
     return float(lengths.sum() / shares.sum())
 
@@ -160,12 +183,14 @@ def _on_ground(
 
 
 def _speed_across(
-    motion: Motion, camera: WorldCamera, ground: Float[np.ndarray, "T 2 3"]
+    motion: Motion, camera: WorldCamera, ground: Float[np.ndarray, "T 2 3"], shots: Shots
 ) -> Float[np.ndarray, "T 2"]:
     """Speeds of the feet across the line of sight, as if they were on the ground, m/s."""
-    count = len(ground)
     reach = max(1, round(REACH * motion.fps))
-    before, after = (np.clip(np.arange(count) + k, 0, count - 1) for k in (-reach, reach))
+    before, after = np.arange(len(ground)), np.arange(len(ground))
+    for shot in shots:
+        before[shot] = np.maximum(before[shot] - reach, shot.start)
+        after[shot] = np.minimum(after[shot] + reach, shot.stop - 1)
     sight = ground - camera.centre[:, None]
     sight = sight / np.linalg.norm(sight, axis=2, keepdims=True)
     way = ground[after] - ground[before]
@@ -175,12 +200,21 @@ def _speed_across(
 
 
 def _slow_and_low(
-    speed: Float[np.ndarray, "T 2"], height: Float[np.ndarray, "T 2"], limit: float, fps: float
+    speed: Float[np.ndarray, "T 2"], height: Float[np.ndarray, "T 2"], limit: float
 ) -> Bool[np.ndarray, "T 2"]:
     """Feet that hardly move against the ground, and are the lower ones of the pose."""
-    low = height - height.min(axis=1, keepdims=True) < LOWER_BY
     with np.errstate(invalid="ignore"):
-        return without_moments((speed < limit) & low, max(2, round(SPELL * fps)))
+        return (speed < limit) & (height - height.min(axis=1, keepdims=True) < LOWER_BY)
+
+
+def _without_moments(
+    standing: Bool[np.ndarray, "T 2"], fps: float, shots: Shots
+) -> Bool[np.ndarray, "T 2"]:
+    """Without spells that are too short to stand, shot by shot."""
+    kept = np.zeros_like(standing)
+    for shot in shots:
+        kept[shot] = without_moments(standing[shot], max(2, round(SPELL * fps)))
+    return kept
 
 
 def _size(
@@ -195,12 +229,17 @@ def _size(
     return float(np.nanmedian((depth / by_size[:, None])[contact]))
 
 
-def _spells(contact: Bool[np.ndarray, "T 2"]) -> _Stances:
-    """Number every spell of standing."""
+def _spells(contact: Bool[np.ndarray, "T 2"], shots: Shots) -> _Stances:
+    """Number every spell of standing; none goes on from one shot to the next."""
     frames, feet, spells, count = [], [], [], 0
+    shot_of = np.zeros(len(contact), dtype=int)
+    shot_of[[shot.start for shot in shots]] = 1
+    shot_of = np.cumsum(shot_of)
     for foot in range(2):
         standing = np.flatnonzero(contact[:, foot])
-        number = np.cumsum(np.diff(standing, prepend=-9) > 1) - 1 + count
+        begins = np.diff(standing, prepend=-9) > 1
+        begins |= np.diff(shot_of[standing], prepend=0) > 0
+        number = np.cumsum(begins) - 1 + count
         frames.append(standing)
         feet.append(np.full(len(standing), foot))
         spells.append(number)
@@ -224,12 +263,12 @@ class _Evidence:
 
 
 def _solve(
-    motion: Motion, camera: WorldCamera, evidence: _Evidence, stances: _Stances
+    motion: Motion, camera: WorldCamera, evidence: _Evidence, stances: _Stances, shots: Shots
 ) -> Float[np.ndarray, "T 3"]:
     """The root in all frames, and with it the places on which feet stand."""
     count = len(motion.time)
     size = 3 * count + 2 * stances.count
-    steady = [*_sight_rows(motion, camera, evidence, size), _calm_rows(motion, size)]
+    steady = [*_sight_rows(motion, camera, evidence, size), _calm_rows(motion.fps, size, shots)]
     weight = np.ones(len(stances.frame))
     solution = np.zeros(size)
     for _ in range(ROUNDS):
@@ -286,10 +325,10 @@ def _sight_rows(motion: Motion, camera: WorldCamera, evidence: _Evidence, size: 
     return made
 
 
-def _calm_rows(motion: Motion, size: int) -> Rows:
+def _calm_rows(fps: float, size: int, shots: Shots) -> Rows:
     """Accelerations are about zero."""
-    middle = np.arange(1, len(motion.time) - 1)
-    pace = motion.fps**2 / ACCELERATION
+    middle = np.concatenate([np.arange(shot.start + 1, shot.stop - 1) for shot in shots])
+    pace = fps**2 / ACCELERATION
     columns = (3 * middle[:, None] + np.arange(3)).ravel()
     ones = np.full(len(columns), pace)
     parts = [(columns - 3, ones), (columns, -2 * ones), (columns + 3, ones)]

@@ -101,6 +101,9 @@ OF_FRAMES = (
 """What a `Motion` has of every frame."""
 
 
+Shots = tuple[slice, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Standing:
     """What feet, the right and the left, do; frames without a court have neither."""
@@ -127,16 +130,20 @@ class Placed:
     """Metres."""
     ankle: float
     """Height of the ankles of standing feet, metres."""
+    shots: Shots
+    """Frames that follow one another; those outside have no place."""
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> "Placed":
-        """Some of its frames."""
+        """Some of its frames, as one shot."""
         motion = replace(
             self.motion,
             **{name: getattr(self.motion, name)[frames] for name in OF_FRAMES},
             expected_error=None,
+            cuts=None,
         )
         return replace(
             self,
+            shots=(slice(0, len(motion.time)),),
             motion=motion,
             camera=self.camera.part(frames),
             seen=self.seen[frames],
@@ -151,7 +158,7 @@ def refine_placed(
 
     `log_size` is where that logarithm starts.
     """
-    body, windows = _lifted_body(placed), [*_windows(len(placed.seen))]
+    body, windows = _lifted_body(placed), [*_windows(placed.shots)]
     lifted, spread = body.figure.reach, _size_spread(placed.motion.skeleton)
     sizes = SizePrior(np.append(log_size, np.zeros(len(spread) - 1)), spread)
     refined = _refine_windows(placed, body, standing, sizes)
@@ -167,16 +174,21 @@ def refine_placed(
     return points, float(np.log(tall / lifted.max(axis=0).sum()))
 
 
-def _windows(count: int) -> Iterator[tuple[slice, Float[np.ndarray, "n"]]]:
-    """Overlapping windows, with weights that add up to 1."""
-    first = 0
+def _windows(shots: Shots) -> Iterator[tuple[slice, Float[np.ndarray, "n"]]]:
+    """Overlapping windows of each shot, with weights that add up to 1."""
+    for shot in shots:
+        yield from _windows_of_shot(shot.start, shot.stop)
+
+
+def _windows_of_shot(start: int, count: int) -> Iterator[tuple[slice, Float[np.ndarray, "n"]]]:
+    first = start
     while True:
         last = count
         if count - first > WINDOW_FRAMES + OVERLAP_FRAMES:
             last = first + WINDOW_FRAMES
         weight = np.ones(last - first)
         ramp = (np.arange(OVERLAP_FRAMES) + 0.5) / OVERLAP_FRAMES
-        if first > 0:
+        if first > start:
             weight[:OVERLAP_FRAMES] = ramp
         if last < count:
             weight[-OVERLAP_FRAMES:] = 1 - ramp
@@ -235,7 +247,7 @@ def _refine_windows(
             Standing(standing.still[frames], standing.flat[frames]),
             sizes,
         )
-        for frames, _ in _windows(len(placed.seen))
+        for frames, _ in _windows(placed.shots)
     ]
 
 

@@ -88,3 +88,27 @@ def test_a_motion_on_the_court_is_the_same_without_it(walked, tmp_path):
         assert placed["points3d_world"].shape == motion.points3d.shape
         assert placed["contact"].shape == (len(motion.time), 2)
     assert read_motion(tmp_path / "court.npz").units == "m"
+
+
+def test_nothing_goes_on_from_one_shot_to_the_next():
+    """Who stands in one place, and after a cut in another, is in both and ran nowhere."""
+    standing = np.repeat(walk()[0][:1], 60, axis=0)
+    for step in ((1.0, 0.0), (0.0, 1.0), (0.0, 6.0)):
+        points = np.concatenate([standing, standing + np.array([*step, 0.0])])
+        motion = replace(lifted(points, PINHOLE), cuts=np.array([60]))
+        world = place_motion(motion, court_camera(PINHOLE, len(points)))
+        hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+        assert np.linalg.norm(world.root - hips, axis=1).max() < 0.12, step
+        assert abs(world.height_ratio - 1) < 0.03, step
+
+
+def test_a_shot_without_a_motion_is_left_out(walked):
+    points, _, motion, whole = walked
+    gap = np.zeros(len(points), dtype=bool)
+    gap[60:80] = True
+    pose, places = motion.points3d.copy(), motion.points2d.copy()
+    pose[gap], places[gap] = np.nan, np.nan
+    cut = replace(motion, points3d=pose, points2d=places, cuts=np.array([60, 80]))
+    world = place_motion(cut, court_camera(PINHOLE, len(points)))
+    assert np.isnan(world.points[gap]).all()
+    assert np.median(np.linalg.norm(world.points - whole.points, axis=2)[~gap]) < 0.05
