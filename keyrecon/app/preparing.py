@@ -64,7 +64,7 @@ class ProjectPreparation:
         """A line for every click or mark that does not fit the rest."""
         track = self.preparation.track
         made, lines = self.preparation, []
-        lines += describe_light(made.camera)
+        lines += describe_light(made.camera, made.shots)
         if made.verification is not None:
             lines += describe_truncation(made.verification)
             lines += describe_hiding(made.verification)
@@ -127,21 +127,17 @@ def _listed(numbers: set[str]) -> str:
     return ",".join(sorted(numbers, key=lambda word: (len(word), word)))
 
 
-def describe_light(camera: CameraPath) -> list[str]:
-    """A line where the light changes within a shot so that it is seen."""
-    if camera.exposure is None:
+def describe_light(camera: CameraPath, shots: Shots) -> list[str]:
+    """A line where the light changes within a usable shot so that it is seen."""
+    used = np.flatnonzero(shots.usable)
+    if camera.exposure is None or not len(used):
         return []
-    begins = [0, *camera.cuts, len(camera.exposure)]
-    changes = [
-        (camera.exposure[first:end].max() / camera.exposure[first:end].min(), first, end)
-        for first, end in pairwise(begins)
-    ]
-    change, first, end = max(changes)
+    parts = [(shots.parts[number], camera.exposure[shots.parts[number]]) for number in used]
+    part, light = max(parts, key=lambda one: one[1].max() / one[1].min())
+    change = light.max() / light.min()
     if change < LIGHT_CHANGE:
         return []
-    darkest, brightest = (
-        first + int(find(camera.exposure[first:end])) for find in (np.argmin, np.argmax)
-    )
+    darkest, brightest = part.start + int(light.argmin()), part.start + int(light.argmax())
     return [
         f"The light changes: frame {brightest} is {change:.1f} times as bright as frame "
         f"{darkest}. Frames are compared as if it had not; if the overlay shows that the player "

@@ -9,6 +9,8 @@ from jaxtyping import UInt8
 if TYPE_CHECKING:
     import av
 
+LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12")
+"""Pixel formats whose first plane is the brightness, a byte each."""
 FULL_RANGE = 2
 """FFmpeg's number of colours whose black is stored as 0 (AVCOL_RANGE_JPEG)."""
 LIMITED_BLACK = 16
@@ -28,6 +30,10 @@ def even_exposure(
 
 
 def black_of(frame: "av.VideoFrame") -> int:
-    """How black is stored in a frame's brightness."""
-    full = frame.format.name.startswith(("yuvj", "gray")) or frame.color_range == FULL_RANGE
-    return 0 if full else LIMITED_BLACK
+    """How black is stored in a frame's brightness, where that is read as `Video.grey_frames` does.
+
+    Formats that must be converted come out in full range.
+    """
+    as_stored = frame.format.name in LUMA_FIRST
+    full = frame.format.name.startswith("yuvj") or frame.color_range == FULL_RANGE
+    return LIMITED_BLACK if as_stored and not full else 0

@@ -35,10 +35,11 @@ class SteadyVideo(Video):
 
     @cached_property
     def fingerprint(self) -> str:
-        """Tells this video from others: its file, its frames and its warps."""
+        """Tells this video from others: its file, its frames, its warps, what evens its light."""
         digest = hashlib.sha256(self.source.fingerprint.encode() + self.numbers.tobytes())
-        if self.warps is not None:
-            digest.update(self.warps.tobytes())
+        for more in (self.warps, self.source.exposure):
+            if more is not None:
+                digest.update(more.tobytes())
         return digest.hexdigest()[:32]
 
     def frames(

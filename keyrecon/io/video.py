@@ -22,14 +22,12 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError, counted
-from keyrecon.io.evening import black_of, even_exposure
+from keyrecon.io.evening import LUMA_FIRST, black_of, even_exposure
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
     import av
 
-LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12")
-"""Pixel formats whose first plane is the brightness, a byte each."""
 VARIABLE_RATE = 0.25
 """Frame spacing that differs by more than this share from its median counts as variable."""
 
@@ -126,9 +124,10 @@ class Video:
     def grey_frames(
         self, wanted: Container[int] | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w"]]:
-        """The brightness of all frames, or of the wanted ones, in the range that the file stores.
+        """The brightness of all frames, or of the wanted ones, in order.
 
-        They come in order.
+        They are in the range that the file stores, or in full range where its format has to be
+        converted: `black` tells.
         """
         grey: UInt8[np.ndarray, "h w"]
         for number, frame in enumerate(self._decoded(0, None)):

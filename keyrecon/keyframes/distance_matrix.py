@@ -259,7 +259,7 @@ def _accumulate(
             matched[:, frames.start : frames.stop] = new @ near
 
     blocks = range(0, elements.n_frames, FRAMES_PER_BLOCK)
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         for _ in progress(pool.map(measure, blocks), "Comparing frames", len(blocks)):
             pass
     count = np.bincount(elements.frame, minlength=elements.n_frames).astype(np.float32)

@@ -77,6 +77,8 @@ class _FeatureTracker:
     light: ExposureMeter = field(default_factory=ExposureMeter)
     keys: list[KeyPicture] = field(default_factory=list)
     current: int = 0
+    lost: bool = False
+    """Whether the newest key picture was begun where nothing agreed, and nothing has since."""
 
     def register(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float]:
         """Homography to frame 0, and its confidence; `guess` is the last frame's."""
@@ -87,14 +89,28 @@ class _FeatureTracker:
         key = self.keys[self.current]
         match = match_key(key, grey, np.linalg.inv(guess) @ key.to_start)
         if match is None:
-            # The view was cut or blurred: start a view of its own where we believe to be.
-            self.keys.append(self._key(grey, guess))
+            self._begin_lost(grey, guess)
             return guess, 0.0
         self.overlay.count(grey.shape, match.moved, match.moves_along)
         to_start = _to_start(key, match)
-        if self._leaves(match, grey):
+        if match.confidence < MIN_CONFIDENCE:
+            self._begin_lost(grey, to_start)
+        elif self._leaves(match, grey):
             self.keys.append(self._key(grey, to_start))
+            self.lost = False
+        elif self.current == len(self.keys) - 1:
+            self.lost = False
         return to_start, match.confidence
+
+    def _begin_lost(self, grey: Grey, to_start: Matrix) -> None:
+        """Begin a view where we believe to be: what was seen was cut, blurred, or shows nothing.
+
+        Where that goes on there is one such view, not one for each frame.
+        """
+        if self.lost:
+            self.keys.pop()
+        self.keys.append(self._key(grey, to_start))
+        self.lost = True
 
     def register_at_rest(self, grey: Grey, guess: Matrix) -> tuple[Matrix, float] | None:
         """The same for a frame a little later; None if the camera has moved since."""
@@ -137,11 +153,12 @@ def estimate_camera_motion(
     Exactly the identity where the camera is static. Where the video cuts to another shot is told
     beside it (`CameraPath.cuts`).
     """
-    detector = CutDetector()
+    detector = CutDetector.at_rate(video.fps)
     path = estimate_shot_motion(video, options, progress, detector)
     cuts = tuple(sorted({*detector.cuts, *video.joints}))
-    if not cuts:
-        return path
+    if not cuts:  # what looked like a cut may have been the end
+        whole = len(path.confidence) == len(video)
+        return path if whole else estimate_shot_motion(video, options, progress)
     shots = Shots.between(cuts, len(video))
     parts = [video.part(part) for part in shots.parts]
     moved = side_by_side(lambda part: estimate_shot_motion(part, options), parts)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.io.frame_reader import shrinking
 
@@ -30,14 +30,21 @@ changes."""
 AGREEMENT = 0.1
 """How far the factor of a block may be from that of most, relative, to be of the same light."""
 LEAST_AGREEING = 0.4
-"""Share of the blocks that must agree for a frame to tell its exposure."""
+"""Share of the blocks that can tell its exposure that must agree in a frame."""
+LEAST_USABLE = 0.02
+"""Share of all blocks that must agree: fewer may be the player's, whose own brightness changes."""
 LEAST_SHARED = 0.6
-"""Share of the blocks below which a frame shares too little with the key picture."""
+"""Share of the key picture's usable blocks below which a frame shares too little with it."""
 MOST = 4.0
 """Factor beyond which a picture fades to black or white, which no exposure mends."""
 DARK, USUAL_LIGHT = 50.0, 100.0
 """Above black: a shot is dark of which three quarters stay below the first, and is read as if they
 stayed below the second. Of eighteen real clips the darkest has 67, the others 97 to 215."""
+BAR = 1.0
+"""Above black: blocks up to this are bars beside the picture, which say nothing of its light."""
+WHITE, BRIGHT_BLOCKS = 180.0, 99.8
+"""Above black: a dark shot is brightened no further than that this percentile of a frame's blocks
+comes to the first, so that a lit player before a dark wall stays below white."""
 IN_PLACE = 0.02
 """A key picture that the camera's motion changes by less, reduced px, is not moved."""
 
@@ -66,6 +73,8 @@ class ExposureMeter:
     """Logarithm for each frame, beside the first one's."""
     light: list[float] = field(default_factory=list)
     """Brightness that a quarter of the blocks of each frame exceed."""
+    brightest: list[float] = field(default_factory=list)
+    """Brightness that hardly any block of each frame exceeds."""
     key: _KeyPicture | None = None
 
     def add(self, grey: UInt8[np.ndarray, "h w"], to_start: Matrix) -> None:
@@ -79,29 +88,43 @@ class ExposureMeter:
         if self.key is None:
             self.key = _KeyPicture(blocks, place, 0.0)
         moved = _in_place(self.key.blocks, np.linalg.inv(place) @ self.key.place)
-        usable = (np.minimum(moved, blocks) > DARKEST) & (np.maximum(moved, blocks) < BRIGHTEST)
+        usable = _can_tell(moved) & _can_tell(blocks)
         factor = np.log(blocks[usable] / moved[usable])
         middle = float(np.median(factor)) if len(factor) else 0.0
         agreeing = factor[np.abs(factor - middle) < AGREEMENT]
         known = self.brightness[-1] if self.brightness else 0.0
-        if len(agreeing) > LEAST_AGREEING * blocks.size:
+        if len(agreeing) > max(LEAST_AGREEING * len(factor), LEAST_USABLE * blocks.size):
             known = self.key.brightness + float(agreeing.mean())
-        if usable.sum() < LEAST_SHARED * blocks.size:
+        if usable.sum() <= LEAST_SHARED * _can_tell(self.key.blocks).sum():
             self.key = _KeyPicture(blocks, place, known)
         self.brightness.append(known)
-        self.light.append(float(np.percentile(blocks, 75)))
+        shown = blocks[blocks > BAR] if (blocks > BAR).any() else blocks
+        self.light.append(float(np.percentile(shown, 75)))
+        self.brightest.append(float(np.percentile(blocks, BRIGHT_BLOCKS)))
 
     def factors(self) -> Float[np.ndarray, "T"]:
         """Brightness of each frame, as factors on what is usual."""
         brightness = np.array(self.brightness) - np.median(self.brightness)
         factors: Float[np.ndarray, "T"] = np.exp(np.clip(brightness, -np.log(MOST), np.log(MOST)))
+        return factors * self._darkness()
+
+    def _darkness(self) -> float:
+        """The light of a dark shot as a factor on what is usual; 1 where there is enough."""
         light = float(np.median(self.light))
-        return factors * max(light, 1.0) / USUAL_LIGHT if light < DARK else factors
+        if light >= DARK:
+            return 1.0
+        dark = max(light / USUAL_LIGHT, max(self.brightest) / WHITE, 1 / MOST)
+        return min(1.0, dark)
 
     def exposure(self) -> Float[np.ndarray, "T"] | None:
         """The same; None where there is enough light, and it hardly changes."""
         factors = self.factors()
         return factors if np.abs(np.log(factors)).max() > np.log1p(EVEN) else None
+
+
+def _can_tell(blocks: Blocks) -> Bool[np.ndarray, "h w"]:
+    """Blocks that are neither nearly black nor nearly white."""
+    return (blocks > DARKEST) & (blocks < BRIGHTEST)
 
 
 def _in_place(blocks: Blocks, to_frame: Matrix) -> Blocks:

@@ -33,6 +33,9 @@ from keyrecon.records import Annotations, FlowTracks
 WHOLE_BODY = 0.8
 """Share of the joints that are marked where a whole body is."""
 
+LEAST_HEIGHT = 12.0
+"""px that marks must span from top to bottom: half of a body 24 px high, the smallest taken."""
+
 
 @dataclass(frozen=True)
 class FlowOptions:
@@ -76,7 +79,14 @@ def track_marked_joints(
     options: FlowOptions = FlowOptions(),
     progress: Progress = silent,
 ) -> FlowTracks:
-    """Joints between marks, and how sure they are; NaN and 0 where flow says nothing."""
+    """Joints between marks, and how sure they are; NaN and 0 where flow says nothing.
+
+    It says nothing where so little is marked that the player's size is not known.
+    """
+    if _marked_height(marks) < LEAST_HEIGHT:
+        shape = (len(video), len(marks.skeleton.names))
+        unknown = np.full((*shape, 2), np.nan)
+        return FlowTracks(unknown, np.zeros(shape), np.zeros(shape, dtype=bool))
     follower = _Follower.start(video, marks, options)
     pictures = progress(read_grey(video, follower.width), "Following marks", len(video))
     for t, picture in enumerate(pictures):

@@ -30,10 +30,10 @@ SAME_SCENE = 0.6
 """Correlation above which two pictures show one scene: midway between neighbours and strangers."""
 PLAIN = 1.0
 """Contrast of a thumbnail below which it shows nothing, such as black, grey values."""
-FLASH_FRAMES = 3
-"""What is over within so many frames, a flash or a torn picture, is no cut."""
-BLENDS = 8, 16, 32, 64
-"""Frames that a dissolve may take at most, tried in turn."""
+FLASH_FRAMES, FLASH_SECONDS = 3, 0.05
+"""What is over within so many frames or seconds, a flash or a torn picture, is no cut."""
+SHORTEST_BLEND, LONGEST_BLEND = 8, 2.7
+"""Frames that a dissolve takes, the doubles of which are tried in turn, and seconds at most."""
 STRANGERS = 0.4
 """Correlation, place by place, up to which the pictures before and after may be of two scenes."""
 BLENDED = 0.88
@@ -50,10 +50,20 @@ MARGIN = 0.25
 themselves already, by up to a third."""
 
 
+def blend_lengths(fps: float) -> tuple[int, ...]:
+    """Frames that a dissolve may take, to be tried in turn."""
+    doubled = max(0, int(np.log2(LONGEST_BLEND * fps / SHORTEST_BLEND)))
+    return tuple(SHORTEST_BLEND << k for k in range(doubled + 1))
+
+
 @dataclass(eq=False)
 class CutDetector:
     """Takes the frames of a video one by one."""
 
+    blends: tuple[int, ...]
+    """Frames that a dissolve may take, tried in turn."""
+    flash: int
+    """What is over within so many frames is no cut."""
     cuts: list[int] = field(default_factory=list)
     """First frames of new shots."""
     dissolves: list[int] = field(default_factory=list)
@@ -62,11 +72,16 @@ class CutDetector:
     """Of the shot that goes on."""
     _since: list[Thumbnail] = field(default_factory=list)
     """Frames since the picture changed, not yet known to be a shot."""
-    _recent: deque[Thumbnail] = field(default_factory=lambda: deque(maxlen=BLENDS[-1] + 1))
+    _recent: deque[Thumbnail] = field(default_factory=deque)
     """The last frames of the shot that goes on."""
     _blend: "_Blend | None" = None
     """The dissolve that is going on."""
     _count: int = 0
+
+    @classmethod
+    def at_rate(cls, fps: float) -> "CutDetector":
+        """One for so many frames per second of real time."""
+        return cls(blend_lengths(fps), max(FLASH_FRAMES, round(FLASH_SECONDS * fps)))
 
     def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:
         """Pass the frames on, and look at each."""
@@ -81,22 +96,24 @@ class CutDetector:
         """The next frame."""
         picture = thumbnail(grey)
         self._recent.append(picture)
+        if len(self._recent) > self.blends[-1] + 1:
+            self._recent.popleft()
         self._look_for_blend()
         if self._last is None or correlation(self._last, picture) >= SAME_SCENE:
             self._last, self._since = picture, []
         else:
             self._since.append(picture)
-            if len(self._since) > FLASH_FRAMES:
+            if len(self._since) > self.flash:
                 self._end_blend()
-                if not self.cuts or self._count - FLASH_FRAMES > self.cuts[-1]:
-                    self.cuts.append(self._count - FLASH_FRAMES)
+                if not self.cuts or self._count - self.flash > self.cuts[-1]:
+                    self.cuts.append(self._count - self.flash)
                 self._last, self._since = picture, []
                 self._recent.clear()
         self._count += 1
 
     def _look_for_blend(self) -> None:
         """Whether a dissolve of some length ends with this frame, or the last one was the end."""
-        now = find_blend(self._recent)
+        now = find_blend(self._recent, self.blends)
         if now is not None:
             length, weight = now
             blend = _Blend(self._count - length + 1, self._count, abs(weight - 0.5))
@@ -132,10 +149,10 @@ class _Blend:
     """How far the weights of both scenes are from equal in its middle."""
 
 
-def find_blend(recent: Sequence[Thumbnail]) -> tuple[int, float] | None:
+def find_blend(recent: Sequence[Thumbnail], lengths: Sequence[int]) -> tuple[int, float] | None:
     """Length of a dissolve that ends with the last picture, and the weight of the scene before in
     its middle; None where there is no dissolve."""
-    for length in BLENDS:
+    for length in lengths:
         if length >= len(recent):
             return None
         before, middle, after = recent[-1 - length], recent[-1 - length // 2], recent[-1]

@@ -55,14 +55,15 @@ def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
     assert describe_truncation(verified(truncated=range(8))) == []
 
 
-def test_a_change_of_the_light_within_a_shot_is_told():
-    light = np.r_[np.linspace(0.8, 1.6, 50), np.full(150, 0.5)]
-    path = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200), (50,), exposure=light)
-    (line,) = describe_light(path)
+def test_a_change_of_the_light_within_a_usable_shot_is_told():
+    light = np.r_[np.linspace(0.8, 1.6, 50), np.full(100, 0.5), np.linspace(0.2, 3, 50)]
+    path = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200), (50, 150), exposure=light)
+    shots = Shots((0, 50, 150), 200, (PLAYER, PLAYER, "black"))
+    (line,) = describe_light(path, shots)
     assert "frame 49 is 2.0 times as bright as frame 0" in line
     assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
-    assert describe_light(replace(path, exposure=np.r_[light[:50] * 0 + 1.3, light[50:]])) == []
-    assert describe_light(replace(path, exposure=None)) == []
+    assert describe_light(path, replace(shots, shows=("black", PLAYER, "black"))) == []
+    assert describe_light(replace(path, exposure=None), shots) == []
 
 
 def test_what_is_laid_over_the_player_is_told_and_shown_on_the_page():

@@ -5,10 +5,11 @@ import pytest
 from numbered_pictures import read_number
 from numbered_videos import turn
 
+from keyrecon.annotate.assist.preview import cut_strip
 from keyrecon.errors import KeyreconError
 from keyrecon.io.joined_video import join_videos
 from keyrecon.io.video import open_video
-from keyrecon.tracking.camera_motion import estimate_camera_motion
+from keyrecon.tracking.camera_motion import estimate_camera_motion, estimate_shot_motion
 
 EVEN = list(range(0, 240, 12))
 """20 frames at 50 per second."""
@@ -72,3 +73,9 @@ def test_files_that_do_not_fit_are_refused(write_numbered, tmp_path):
         turn(first.path, tmp_path / "t.mp4", degrees)
         with pytest.raises(KeyreconError, match=word):
             join_videos([first, open_video(tmp_path / "t.mp4")])
+
+
+def test_the_camera_of_some_of_its_pictures_can_be_estimated(joined):
+    strip = cut_strip(joined, (2,))
+    assert strip.black == 0
+    assert len(estimate_shot_motion(strip).confidence) == len(strip)

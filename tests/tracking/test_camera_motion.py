@@ -57,3 +57,15 @@ def test_corners_on_lines_along_the_pan_are_no_overlay_if_they_move_with_the_sce
     for row in range(120, 270, 50):
         cv2.line(lined, (0, row), (899, row), 255, 3)
     assert follow_pan(lined)[1] < 0.05
+
+
+@pytest.mark.parametrize("deviation", [0, 40])
+def test_what_shows_nothing_has_one_key_picture_however_long_it_lasts(scene, deviation):
+    rng = np.random.default_rng(0)
+    empty = [
+        np.clip(rng.normal(128, deviation, SIZE[::-1]), 0, 255).astype(np.uint8) for _ in range(40)
+    ]
+    tracker = _FeatureTracker(CameraMotionOptions())
+    _, confidence = _register_all([view(scene, 0), *empty], tracker)
+    assert len(tracker.keys) <= 3
+    assert confidence[5:].max() < 0.35

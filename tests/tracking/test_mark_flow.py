@@ -66,3 +66,11 @@ def test_marks_too_far_apart_say_nothing_of_the_middle(video):
     flow = track_marked_joints(video, marked(0, 17), FlowOptions(player=143.0, longest=0.2))
     assert np.isnan(flow.joints[8]).all()
     assert (flow.confidence[8] == 0).all()
+
+
+def test_one_joint_marked_says_nothing_of_the_player_and_is_not_followed(video):
+    marks = marked(9)
+    marks.joints[:, 1:] = np.nan
+    flow = track_marked_joints(video, marks)
+    assert np.isnan(flow.joints).all()
+    assert (flow.confidence == 0).all()

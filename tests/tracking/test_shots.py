@@ -6,6 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.tracking.shots import FLASH_FRAMES, CutDetector
 
 SIZE = 320, 180
@@ -24,8 +27,8 @@ def view(place, shift=0.0, zoom=1.0):
     return cv2.warpAffine(place, matrix, SIZE, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
 
 
-def cuts_of(pictures):
-    detector = CutDetector()
+def cuts_of(pictures, fps=25.0):
+    detector = CutDetector.at_rate(fps)
     assert list(detector.watch(pictures)) == pictures
     return detector.cuts
 
@@ -65,19 +68,45 @@ def test_black_between_two_views_of_one_place_is_a_shot_of_its_own():
     assert cuts_of(pictures + [view(scene(0))] * 10) == [10, 18]
 
 
-@pytest.mark.parametrize("length", [12, 30, 50])
-def test_a_dissolve_between_moving_shots_is_taken_out_of_both(length):
-    before = [view(scene(0), shift) for shift in np.linspace(0, 60, 80 + length)]
-    after = [view(scene(1), shift) for shift in np.linspace(30, 0, 80 + length)]
-    share = np.clip((np.arange(160 + length) - 79) / (length + 1), 0, 1)
-    pictures = [
-        cv2.addWeighted(before[min(t, 79 + length)], 1 - w, after[max(0, t - 80)], w, 0)
+def dissolve(length, before, after, fps=25.0):
+    """One moving shot that dissolves into another; the first pans by 12 px a second."""
+    one = [view(scene(0), 12 / fps * t) for t in range(before + length)]
+    other = [view(scene(1), 30 - 6 / fps * t) for t in range(after + length)]
+    share = np.clip((np.arange(before + length + after) - before + 1) / (length + 1), 0, 1)
+    return [
+        cv2.addWeighted(one[min(t, before + length - 1)], 1 - w, other[max(0, t - before)], w, 0)
         for t, w in enumerate(share)
     ]
-    detector = CutDetector()
-    list(detector.watch(pictures))
+
+
+@pytest.mark.parametrize(
+    ("length", "fps"), [(12, 25.0), (30, 25.0), (50, 25.0), (100, 60.0), (300, 240.0)]
+)
+def test_a_dissolve_between_moving_shots_is_taken_out_of_both(length, fps):
+    detector, around = CutDetector.at_rate(fps), max(80, length)
+    list(detector.watch(dissolve(length, around, around, fps)))
     first, end = detector.cuts
     assert detector.dissolves == [first]
-    assert first <= 80 + length // 3
-    assert end >= 80 + length - length // 3
+    assert first <= around + length // 3
+    assert end >= around + length - length // 3
     assert end - first <= 2 * length + 8
+
+
+def test_somebody_before_the_lens_for_a_moment_is_no_cut_however_many_frames_that_is():
+    pictures = [view(scene(0))] * 100
+    pictures[40:50] = [view(scene(1))] * 10
+    assert cuts_of(pictures, fps=240.0) == []
+    assert cuts_of(pictures, fps=25.0) == [40, 50]
+
+
+@pytest.mark.parametrize(("before", "length", "after"), [(2, 5, 3), (3, 6, 2), (1, 8, 2)])
+def test_a_dissolve_that_is_all_of_a_video_leaves_no_frame_without_a_camera(
+    before, length, after, tmp_path
+):
+    write_video(
+        tmp_path / "short.mp4",
+        (np.repeat(one[..., None], 3, axis=2) for one in dissolve(length, before, after)),
+        25.0,
+    )
+    video = open_video(tmp_path / "short.mp4")
+    assert len(estimate_camera_motion(video).to_reference) == len(video)

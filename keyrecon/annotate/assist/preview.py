@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.evening import even_exposure
 from keyrecon.io.frame_reader import reduce_picture
 from keyrecon.io.video import Video
 from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
@@ -42,22 +43,28 @@ class Strip(Video):
         self, start: int = 0, stop: int | None = None, width: int | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         """Pictures start..stop-1."""
-        for picture in self.pictures[start:stop]:
-            yield picture if width is None else reduce_picture(picture, width)
+        for place, picture in enumerate(self.pictures[start:stop], start):
+            shown = even_exposure(picture, self._exposure(place))
+            yield shown if width is None else reduce_picture(shown, width)
 
     def chosen_frames(self, numbers: Container[int], last: int) -> Iterator[np.ndarray]:
         """The pictures with these places up to `last`."""
         for place, picture in enumerate(self.pictures[: last + 1]):
             if place in numbers:
-                yield picture
+                yield even_exposure(picture, self._exposure(place))
 
     def grey_frames(
         self, wanted: Container[int] | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w"]]:
-        """The brightness of all pictures, or of those with the wanted places."""
-        for place, picture in enumerate(self.pictures):
+        """The brightness of all pictures, or of those with the wanted places, in full range."""
+        for place, picture in enumerate(self.frames()):
             if wanted is None or place in wanted:
                 yield cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+
+    @property
+    def black(self) -> int:
+        """That of RGB."""
+        return 0
 
 
 def cut_strip(video: Video, frames: tuple[int, ...]) -> Strip:
@@ -72,6 +79,7 @@ def cut_strip(video: Video, frames: tuple[int, ...]) -> Strip:
     time = video.time[numbers]
     rate = 1 / float(np.median(np.diff(time))) if len(time) > 1 else video.fps
     part = {"stamps": video.stamps[numbers], "time": time - time[0], "fps": rate}
+    part["exposure"] = None  # the pictures are evened as the video was
     return Strip(**{**whole, **part}, numbers=tuple(numbers.tolist()), pictures=pictures)
 
 
