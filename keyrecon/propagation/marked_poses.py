@@ -36,9 +36,10 @@ def gather_poses(
     poses[:, half.fixed], known[:, half.fixed] = fixed[frames], True
     # from the joints that are there outwards, back for parents that are not, and out from these
     for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
-        bone = np.nanmedian(poses[:, child] - poses[:, parent]) if rows.size else np.nan
-        missing = np.isnan(poses[:, child])
-        poses[missing, child] = poses[missing, parent] + bone
+        bone, missing = poses[:, child] - poses[:, parent], np.isnan(poses[:, child])
+        if np.isfinite(bone).any():
+            usual = np.nanmedian(bone.real) + 1j * np.nanmedian(bone.imag)
+            poses[missing, child] = poses[missing, parent] + usual
     if not np.isfinite(poses).all() or not rows.size:
         raise KeyreconError(
             f"Too few joints of the {half.name} body are marked to propagate them to other "
