@@ -47,7 +47,7 @@ ERROR_TABLES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
         (1.27, 1.27, 1.27, 1.05, 0.95, 0.92, 0.92),
     ),
     "speed": (
-        (0.0, 0.001, 0.003, 0.008, 0.02, 0.04),
+        (0.0, 0.03, 0.09, 0.24, 0.6, 1.2),
         (0.63, 0.72, 0.93, 1.04, 1.20, 1.87),
     ),
 }
@@ -121,20 +121,21 @@ def measure_correction(motion: Motion) -> Float[np.ndarray, "T J"]:
 
 def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
     """What tells of each joint's error: `correction` and `part_correction` in player heights,
-    `part_confidence`, and `speed` in player heights per frame."""
+    `part_confidence`, and `speed` in player heights per second."""
     correction, confidence = measure_correction(motion), motion.confidence
     part_correction, part_confidence = np.zeros_like(correction), np.zeros_like(correction)
     for members in body_parts(motion.skeleton).values():
         part_correction[:, members] = correction[:, members].mean(axis=1, keepdims=True)
         part_confidence[:, members] = confidence[:, members].mean(axis=1, keepdims=True)
-    step = np.zeros_like(motion.points2d)
-    if len(step) > 1:
-        step = np.gradient(motion.points2d, axis=0)
+    velocity = np.zeros_like(motion.points2d)
+    for part in motion.stretches:
+        if part.stop - part.start > 1:
+            velocity[part] = np.gradient(motion.points2d[part], motion.time[part], axis=0)
     return {
         "correction": correction,
         "part_correction": part_correction,
         "part_confidence": part_confidence,
-        "speed": np.linalg.norm(step, axis=2) / player_height(motion)[:, None],
+        "speed": np.linalg.norm(velocity, axis=2) / player_height(motion)[:, None],
     }
 
 

@@ -168,3 +168,23 @@ def test_a_track_that_is_a_guess_for_long_asks_for_the_body_in_its_middle():
     (stretch,) = unsure_track(track, reach=10)
     assert (stretch.first, stretch.last, stretch.frame, stretch.half) == (20, 40, 30, "both")
     assert "px" not in stretch.text
+
+
+def swinging(fps):
+    """Four seconds of a body that swings to and fro once a second."""
+    count = round(4 * fps)
+    still = make_motion()
+    values = {
+        name: np.repeat(getattr(still, name)[:1], count, axis=0)
+        for name in ("points3d", "points2d", "points2d_propagated", "confidence", "source", "scale")
+    }
+    time = np.arange(count) / fps
+    way = 0.3 * PIXELS * np.sin(2 * np.pi * time)[:, None, None]
+    values["points2d"] = values["points2d"] + way
+    values["points2d_propagated"] = values["points2d_propagated"] + way
+    return replace(still, **values, fps=fps, time=time, expected_error=None)
+
+
+def test_the_same_motion_is_as_sure_at_any_frame_rate():
+    expected = [expected_error(swinging(fps)).mean() for fps in (25.0, 50.0, 200.0)]
+    assert expected == pytest.approx([expected[0]] * 3, rel=0.03)

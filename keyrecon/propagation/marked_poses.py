@@ -37,8 +37,9 @@ def gather_poses(
     # from the joints that are there outwards, back for parents that are not, and out from these
     for parent, child in [*half.bones, *half.bones[::-1, ::-1], *half.bones]:
         bone, missing = poses[:, child] - poses[:, parent], np.isnan(poses[:, child])
-        if np.isfinite(bone).any():
-            usual = np.nanmedian(bone.real) + 1j * np.nanmedian(bone.imag)
+        bone = bone[np.isfinite(bone)]
+        if bone.size:
+            usual = np.median(bone.real) + 1j * np.median(bone.imag)
             poses[missing, child] = poses[missing, parent] + usual
     if not np.isfinite(poses).all() or not rows.size:
         raise KeyreconError(
