@@ -13,12 +13,14 @@ is nor where the ground lies, so three things are estimated, and every file or t
   follows the player, because a step away from a camera that looks down shows as a rise.
 - Over what. The middle of the hips is over the origin in the first frame.
 
-Where a camera that is known has told where the player stands (`points3d_world` of motion.npz),
-nothing is estimated here: the origin is at the middle of the net of a court, elsewhere under the
-player's first stance, x to the right.
+Where a camera that is known has told where the player stands in every frame (`points3d_world` of
+motion.npz), nothing is estimated here: the origin is at the middle of the net of a court, elsewhere
+under the player's first stance, x to the right. Where it has not in some frames, all frames are
+estimated, since both in one file would be two origins, and the file says so.
 
-Every shot of a video stands by itself. Where shots do not show the player there is no figure:
-markers are missing there, and formats that hold a figure in every frame have it stand still.
+Where the floor is estimated every shot of a video stands by itself. Where shots do not show the
+player there is no figure: markers are missing there, and formats that hold a figure in every frame
+have it stand still.
 """
 
 from dataclasses import dataclass, replace
@@ -127,11 +129,19 @@ def stand_on_floor(motion: Motion, even_times: bool = True, world: World = None)
     """The motion with Y up, feet on the floor, and the first frame over the origin.
 
     With `even_times`, frames that are unevenly spaced are replaced by as many at even times.
-    Joints in the `world` are taken as they are if all of them are known. Raises KeyreconError
-    where joints are missing.
+    Joints in the `world` are taken as they are if all frames of the motion have a place there.
+    Raises KeyreconError where joints are missing.
     """
-    parts = motion.stretches
-    if len(parts) > 1 or not motion.known.all():
+    parts, known = motion.stretches, motion.known
+    lost = 0 if world is None else int(np.isnan(world.points[known]).any(axis=(1, 2)).sum())
+    if world is not None and lost:
+        standing = stand_on_floor(motion, even_times)
+        instead = (
+            f"; not on the {world.origin}, since the place there is unknown in {lost} of "
+            f"{known.sum()} frames (the others can be exported by themselves)"
+        )
+        return replace(standing, placing=standing.placing + instead)
+    if len(parts) > 1 or not known.all():
         return _stand_in_shots(motion, parts, even_times, world)
     return _stand(motion, even_times, world)
 
@@ -164,16 +174,15 @@ def _stand_in_shots(
             even[inside] = _resample(points[part], uneven[part], time[inside], motion.skeleton)
         points = even
     longest = max(range(len(parts)), key=lambda k: parts[k].stop - parts[k].start)
-    units = {standing.units for standing in placed}
-    if len(units) > 1:
-        return _stand_in_shots(motion, parts, even_times, None)
+    alone = world is not None or len(parts) == 1
+    apart = "" if alone else f"; each of {len(parts)} shots by itself"
     gaps = f", {(~motion.known).sum()} of them without a figure" if not motion.known.all() else ""
     return replace(
         placed[longest],
         points=points,
         time=time,
         fps=fps,
-        placing=f"{placed[longest].placing}; each of {len(parts)} shots by itself",
+        placing=placed[longest].placing + apart,
         timing=describe_times(motion, even_times) + gaps,
     )
 
@@ -197,7 +206,7 @@ def _stand(motion: Motion, even_times: bool, world: World) -> StandingMotion:
     _check_whole(motion)
     units, size, lean = motion.units, stature(motion), camera_pitch(motion)
     placing = _describe_placing(lean)
-    if world is not None and np.isfinite(world.points).all():
+    if world is not None:
         points = world.points[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
         units, size = "m", stature(replace(motion, points3d=points))
         placing = IN_WORLD[world.origin]

@@ -8,7 +8,14 @@ from scipy.spatial.transform import Rotation
 from small_motion import FPS, make_motion
 
 from keyrecon.body import ANKLE_HEIGHT, LSP14, Skeleton
-from keyrecon.io.formats.conventions import camera_pitch, stand_on_floor, stature, y_up
+from keyrecon.io.formats.conventions import (
+    WorldJoints,
+    camera_pitch,
+    stand_on_floor,
+    stature,
+    y_up,
+)
+from keyrecon.world.records import COURT
 
 ANKLES = [LSP14.index("right_ankle"), LSP14.index("left_ankle")]
 HIPS = [LSP14.index("right_hip"), LSP14.index("left_hip")]
@@ -125,3 +132,44 @@ def test_a_skeleton_without_ankles_stands_on_its_lowest_joint():
 
 def test_stature_is_told_by_the_bones():
     assert stature(make_motion()) == pytest.approx(1.8)
+
+
+def in_two_shots(motion, cut=30):
+    """The same motion, which another shot begins in."""
+    return replace(motion, cuts=np.array([cut]))
+
+
+def on_the_court(motion):
+    """The same joints 20 m from the net: x right, y away from the camera, z up."""
+    x, y, z = motion.points3d.transpose(2, 0, 1)
+    return WorldJoints(np.stack([x + 3, z - 20, 1.2 - y], axis=2), COURT)
+
+
+def test_two_shots_on_the_court_stand_where_the_court_is():
+    motion = in_two_shots(make_motion())
+    world = on_the_court(motion)
+    standing = stand_on_floor(motion, world=world)
+    assert np.allclose(standing.points, world.points[..., [0, 2, 1]] * [1, 1, -1])
+    assert "on the court" in standing.placing and "by itself" not in standing.placing
+
+
+@pytest.mark.parametrize("shots", [1, 2])
+def test_all_frames_have_one_origin_where_one_of_them_has_no_place_on_the_court(shots):
+    motion = make_motion()
+    motion = motion if shots == 1 else in_two_shots(motion)
+    world = on_the_court(motion)
+    world.points[7] = np.nan  # the camera was lost for a frame
+    standing = stand_on_floor(motion, world=world)
+    assert np.array_equal(standing.points, stand_on_floor(motion).points)
+    assert standing.placing.startswith("feet on the floor at 0")
+    assert "not on the court, since the place there is unknown in 1 of 60" in standing.placing
+
+
+def test_frames_without_a_figure_need_no_place_on_the_court():
+    motion = make_motion()
+    points = motion.points3d.copy()
+    points[20:25] = np.nan
+    motion = replace(motion, points3d=points)
+    standing = stand_on_floor(motion, world=on_the_court(motion))
+    assert standing.placing.startswith("on the court")
+    assert np.array_equal(standing.known, motion.known)
