@@ -11,7 +11,7 @@ gives millimetres.
 - PA-MPJPE: the same after the best similarity of every frame, without mirroring (protocol 2,
   "reconstruction error").
 - Acceleration error: distance between second differences, per frame squared, with the root at
-  the origin (Kanazawa et al., HMMR, CVPR 2019).
+  the origin (Kanazawa et al., HMMR, CVPR 2019). Of several shots within each of them.
 - PCK: share of joints in the picture closer to the truth than 0.2 of the torso, the distance
   from right hip to left shoulder in that frame (Sapp and Taskar, MODEC, CVPR 2013).
 """
@@ -109,13 +109,19 @@ def align_similarity(points: Points, truth: Points) -> Points:
     return scale[:, None, None] * moved + their_mean
 
 
-def acceleration_error(points: Points, truth: Points, root: Sequence[int]) -> float:
-    """Mean distance of second differences, root-aligned, unit per frame squared."""
-    if len(points) < 3:
-        return float("nan")
-    known = np.diff(_centred(truth, root), n=2, axis=0)
-    ours = np.diff(_centred(points, root), n=2, axis=0)
-    return _mean(np.linalg.norm(ours - known, axis=2), known)
+def acceleration_error(
+    points: Points, truth: Points, root: Sequence[int], parts: Sequence[slice] = (slice(None),)
+) -> float:
+    """Mean distance of second differences, root-aligned, unit per frame squared.
+
+    Differences are taken within each of `parts`, frames that follow one another. NaN where none
+    has three.
+    """
+    theirs, ours = (
+        np.concatenate([np.diff(_centred(joints[part], root), n=2, axis=0) for part in parts])
+        for joints in (truth, points)
+    )
+    return _mean(np.linalg.norm(ours - theirs, axis=2), theirs)
 
 
 def pck(points: Pixels, truth: Pixels, torso: tuple[int, int], threshold: float = 0.2) -> float:
@@ -153,13 +159,14 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
             f"{len(truth['points3d'])}; evaluate against the truth of the same video and trim."
         )
     root = [names.index("right_hip"), names.index("left_hip")]
-    used = slice(None) if motion.cuts is None else motion.known
-    points, known = motion.points3d[used][:, ours], truth["points3d"][used][:, theirs]
+    every, true = 1000 * motion.points3d[:, ours], 1000 * truth["points3d"][:, theirs]
     scaled = motion.units != "m"
     if scaled:
-        scale = _best_scale(_centred(points, root), _centred(known, root), axes=(0, 1, 2))
-        points = points * scale
-    points, known = 1000 * points, 1000 * known
+        every = every * _best_scale(_centred(every, root), _centred(true, root), axes=(0, 1, 2))
+    one_shot = motion.cuts is None
+    used = slice(None) if one_shot else motion.known
+    parts = [slice(None)] if one_shot else motion.stretches
+    points, known = every[used], true[used]
     pixels, known_pixels = motion.points2d[used][:, ours], truth["points2d"][used][:, theirs]
     torso = (names.index("right_hip"), names.index("left_shoulder"))
     errors = joint_errors(points, known, root)
@@ -168,7 +175,7 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
         mpjpe=mpjpe(points, known, root),
         n_mpjpe=n_mpjpe(points, known, root),
         pa_mpjpe=pa_mpjpe(points, known),
-        acceleration=acceleration_error(points, known, root),
+        acceleration=acceleration_error(every, true, root, parts),
         pck=pck(pixels, known_pixels, torso),
         median_px=median_distance(pixels, known_pixels),
         limb_variation=float(variation.mean()),

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -115,6 +117,21 @@ def test_a_joint_that_jitters_by_1_every_other_frame_accelerates_by_4(figure):
     shaken = figure.copy()
     shaken[:, 7, 0] += np.where(np.arange(len(figure)) % 2, 1, -1)
     assert metrics.acceleration_error(shaken, figure, ROOT) == pytest.approx(4 / 14)
+
+
+def test_an_error_that_is_constant_within_every_shot_is_no_acceleration_error(figure):
+    wrong = figure.copy()
+    wrong[12:, LSP14.index("left_wrist")] += 0.1  # the second shot has its own
+    motion = replace(motion_from(wrong), cuts=np.array([12]))
+    assert metrics.evaluate_motion(motion, truth_from(figure)).acceleration == pytest.approx(0)
+    wrong[10:12] = np.nan  # nobody is seen at the end of the first
+    motion = replace(motion, points3d=wrong, cuts=np.array([10, 12]))
+    assert metrics.evaluate_motion(motion, truth_from(figure)).acceleration == pytest.approx(0)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_two_frames_tell_nothing_of_acceleration(figure, frames):
+    assert np.isnan(metrics.acceleration_error(figure[:frames], figure[:frames], ROOT))
 
 
 def test_joints_count_as_correct_within_a_fifth_of_the_torso():
