@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from keyrecon.errors import KeyreconError
 from keyrecon.reading import check_numbers, read_arrays, reading
@@ -68,14 +68,14 @@ def joint_errors(points: Points, truth: Points, root: Sequence[int]) -> Float[np
 
 def mpjpe(points: Points, truth: Points, root: Sequence[int]) -> float:
     """Mean per-joint position error, root-aligned, in the unit of the points."""
-    return _mean(joint_errors(points, truth, root), truth, root)
+    return _mean(joint_errors(points, truth, root), _known(truth, root))
 
 
 def n_mpjpe(points: Points, truth: Points, root: Sequence[int]) -> float:
     """Mean per-joint position error after the best scale of every frame, root-aligned."""
     ours, theirs = _centred(points, root), _centred(truth, root)
     scale = _best_scale(ours, theirs, axes=(1, 2))
-    return _mean(np.linalg.norm(scale * ours - theirs, axis=2), truth, root)
+    return _mean(np.linalg.norm(scale * ours - theirs, axis=2), _known(truth, root))
 
 
 def pa_mpjpe(points: Points, truth: Points) -> float:
@@ -121,7 +121,7 @@ def acceleration_error(
         np.concatenate([np.diff(_centred(joints[part], root), n=2, axis=0) for part in parts])
         for joints in (truth, points)
     )
-    return _mean(np.linalg.norm(ours - theirs, axis=2), theirs)
+    return _mean(np.linalg.norm(ours - theirs, axis=2), _known(theirs))
 
 
 def pck(points: Pixels, truth: Pixels, torso: tuple[int, int], threshold: float = 0.2) -> float:
@@ -169,7 +169,7 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
     points, known = every[used], true[used]
     pixels, known_pixels = motion.points2d[used][:, ours], truth["points2d"][used][:, theirs]
     torso = (names.index("right_hip"), names.index("left_shoulder"))
-    errors = joint_errors(points, known, root)
+    errors, told = joint_errors(points, known, root), _known(known, root)
     variation = limb_variation(motion.points3d[used], motion.skeleton.bones)
     return Scores(
         mpjpe=mpjpe(points, known, root),
@@ -180,7 +180,7 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
         median_px=median_distance(pixels, known_pixels),
         limb_variation=float(variation.mean()),
         limb_variation_max=float(variation.max()),
-        by_joint={name: _mean(errors[:, [j]], known[:, [j]]) for j, name in enumerate(names)},
+        by_joint={name: _mean(errors[:, j], told[:, j]) for j, name in enumerate(names)},
         frames=len(points),
         scaled=scaled,
     )
@@ -241,8 +241,12 @@ def _best_scale(ours: Points, theirs: Points, axes: tuple[int, ...]) -> Float[np
     return (ours * theirs).sum(axis=axes, keepdims=True) / np.where(size > 0, size, 1)
 
 
-def _mean(errors: Float[np.ndarray, "T J"], truth: Points, root: Sequence[int] = ()) -> float:
-    """Mean where the truth, and its root, are known; NaN where the estimate has gaps there."""
+def _known(truth: Points, root: Sequence[int] = ()) -> Bool[np.ndarray, "T J"]:
+    """Joints that the truth, and its root, are known of."""
     known = np.isfinite(truth).all(axis=2)
-    known &= np.isfinite(truth[:, list(root)]).all(axis=(1, 2))[:, None]
+    return known & np.isfinite(truth[:, list(root)]).all(axis=(1, 2))[:, None]
+
+
+def _mean(errors: Float[np.ndarray, "*n"], known: Bool[np.ndarray, "*n"]) -> float:
+    """Mean where the truth is known; NaN where the estimate has gaps there."""
     return float(errors[known].mean()) if known.any() else float("nan")

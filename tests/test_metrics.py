@@ -183,6 +183,16 @@ def test_errors_of_a_motion_are_in_millimetres(figure):
     assert scores.by_joint["left_wrist"] == pytest.approx(14)
 
 
+def test_where_the_true_hip_is_unknown_no_joint_has_an_error_and_all_others_keep_theirs(figure):
+    moved, true = figure.copy(), figure.copy()
+    moved[:, LSP14.index("left_wrist"), 1] += 0.014
+    true[3, LSP14.index("right_hip")] = np.nan
+    scores = metrics.evaluate_motion(motion_from(moved), truth_from(true))
+    assert scores.mpjpe == pytest.approx(1)
+    assert scores.by_joint["left_wrist"] == pytest.approx(14)
+    assert scores.by_joint["neck"] == pytest.approx(0, abs=1e-9)
+
+
 def test_a_truth_of_another_length_is_refused(figure):
     with pytest.raises(KeyreconError, match="30 frames and the truth 20"):
         metrics.evaluate_motion(motion_from(figure), truth_from(figure[:20]))
