@@ -130,16 +130,16 @@ def correction(motion: Motion, track: Track) -> Float[np.ndarray, "J"]:
 
 
 def joint_acceleration(
-    points2d: Float[np.ndarray, "T J 2"], track: Track, fps: float
+    points2d: Float[np.ndarray, "T J 2"], motion: Motion, track: Track
 ) -> Float[np.ndarray, "J"]:
     """Mean acceleration of each joint across the picture, player heights / s^2: noise shows here.
 
-    NaN for a joint never seen in three frames running.
+    `points2d` are joints of the motion. NaN for a joint never seen in three frames running.
     """
-    placed = points2d / np.median(track.height)
-    size = np.linalg.norm(np.diff(placed, 2, axis=0), axis=-1) * fps**2
+    placed = _in_heights(points2d, motion, track)
+    size = np.linalg.norm(np.concatenate([np.diff(part, 2, axis=0) for part in placed]), axis=-1)
     known = np.isfinite(size)
-    total = np.where(known, size, 0).sum(axis=0)
+    total = np.where(known, size, 0).sum(axis=0) * motion.fps**2
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
@@ -150,9 +150,17 @@ def foot_speed(motion: Motion, track: Track) -> Float[np.ndarray, "steps"]:
     should then be near 0, and what is left is slip.
     """
     feet = _leaves(motion.skeleton, motion.skeleton.is_lower)
-    steps = [np.diff(motion.points2d[part][:, feet], axis=0) for part in motion.stretches]
-    slower = np.linalg.norm(np.concatenate(steps), axis=-1).min(axis=1)
-    return slower * motion.fps / float(np.median(track.height))
+    placed = _in_heights(motion.points2d[:, feet], motion, track)
+    steps = np.concatenate([np.diff(part, axis=0) for part in placed])
+    return np.linalg.norm(steps, axis=-1).min(axis=1) * motion.fps
+
+
+def _in_heights(
+    points2d: Float[np.ndarray, "T J 2"], motion: Motion, track: Track
+) -> list[Float[np.ndarray, "_ J 2"]]:
+    """Joints of every stretch in its own usual player height: shots show the player at sizes of
+    their own."""
+    return [points2d[part] / np.median(track.height[part]) for part in motion.stretches]
 
 
 def truth_error_2d(

@@ -82,10 +82,10 @@ def _joint_table(material: ReportMaterial) -> str:
         ("moved", correction(motion, track), ".1%"),
         (
             "acceleration before",
-            joint_acceleration(motion.points2d_propagated, track, motion.fps),
+            joint_acceleration(motion.points2d_propagated, motion, track),
             ".1f",
         ),
-        ("acceleration after", joint_acceleration(motion.points2d, track, motion.fps), ".1f"),
+        ("acceleration after", joint_acceleration(motion.points2d, motion, track), ".1f"),
     ]
     if material.true_joints is not None:
         error = truth_error_2d(motion, material.true_joints.points2d, track)

@@ -302,12 +302,6 @@ def test_a_planted_foot_has_no_speed(material):
     assert summary.foot_speed(standing, material.track).max() == 0
 
 
-def test_steady_motion_has_no_acceleration(material):
-    points = np.arange(40.0)[:, None, None] * np.ones((14, 2))
-    found = summary.joint_acceleration(points, material.track, 25.0)
-    np.testing.assert_allclose(found, 0, atol=1e-9)
-
-
 def test_truth_in_another_order_and_unit_is_brought_to_the_motion(material):
     other = {
         "points3d": 1000 * material.truth["points3d"][:, ::-1],
