@@ -163,22 +163,28 @@ def uncertain_stretches(
 ) -> list[UncertainStretch]:
     """The worst stretches of a motion, in the order of time.
 
-    None is longer than what the marks of one frame help (`TAUGHT_SECONDS` to either side). Those
-    whose best frame is among `marked` were helped already since the motion was made. Nothing for
-    a motion without expected errors.
+    None is longer than what the marks of one frame help (`TAUGHT_SECONDS` to either side), and
+    none goes on over frames without a motion or into another shot. Those whose best frame is among
+    `marked` were helped already since the motion was made. Nothing for a motion without expected
+    errors.
     """
     if motion.expected_error is None:
         return []
     done = np.setdiff1d(np.array([] if marked is None else marked, int), motion.keyframes)
     doubt = _doubt_by_part(motion)
-    least = LEAST_SECONDS * motion.fps
-    stretches, open_runs = [], _runs(_is_uncertain(doubt), round(MERGED_SECONDS * motion.fps))
+    least, gap = LEAST_SECONDS * motion.fps, round(MERGED_SECONDS * motion.fps)
+    uncertain, stretches = _is_uncertain(doubt), []
+    open_runs = [
+        (shot, shot.start + first, shot.start + last)
+        for shot in motion.stretches
+        for first, last in _runs(uncertain[shot], gap)
+    ]
     while open_runs:
-        first, last = open_runs.pop()
+        shot, first, last = open_runs.pop()
         if last - first + 1 < least:
             continue
-        stretch, weight = _worst_stretch(motion, doubt, first, last)
-        open_runs += [(first, stretch.first - 1), (stretch.last + 1, last)]
+        stretch, weight = _worst_stretch(motion, doubt, shot, first, last)
+        open_runs += [(shot, first, stretch.first - 1), (shot, stretch.last + 1, last)]
         if stretch.frame not in done:
             stretches.append((weight, stretch))
     worst = sorted(stretches, key=lambda row: -row[0])[:count]
@@ -226,14 +232,15 @@ def _is_uncertain(doubt: Mapping[str, Float[np.ndarray, "T"]]) -> Bool[np.ndarra
 
 
 def _worst_stretch(
-    motion: Motion, doubt: Mapping[str, Float[np.ndarray, "T"]], first: int, last: int
+    motion: Motion, doubt: Mapping[str, Float[np.ndarray, "T"]], shot: slice, first: int, last: int
 ) -> tuple[UncertainStretch, float]:
-    """The part of an uncertain run that marks of one frame would help most, and by how much."""
+    """The part of an uncertain run of a shot that marks of one frame would help most, and by how
+    much."""
     reach = round(TAUGHT_SECONDS * motion.fps)
     run = slice(first, last + 1)
     bad = _bad_parts(doubt, run)
-    taught = _taught(np.sum([doubt[name] for name in bad], axis=0), reach)
-    frame = first + int(taught[run].argmax())
+    taught = _taught(np.sum([doubt[name][shot] for name in bad], axis=0), reach)
+    frame = first + int(taught[first - shot.start : last + 1 - shot.start].argmax())
     first, last = max(first, frame - reach), min(last, frame + reach)
     inside = slice(first, last + 1)
     bad = _bad_parts(doubt, inside)
@@ -241,7 +248,7 @@ def _worst_stretch(
     members = np.concatenate([parts[name] for name in bad])
     lower = motion.skeleton.is_lower[members]
     half = "both" if lower.any() and not lower.all() else "lower" if lower.all() else "upper"
-    height = np.nan_to_num(player_height(motion)[inside])
+    height = player_height(motion)[inside]
     error = float(np.mean([doubt[name][inside] * height for name in bad]))
     total = float(np.sum([doubt[name][inside] for name in bad]))
     return UncertainStretch(first, last, " and ".join(bad), error, frame, half), total

@@ -113,6 +113,28 @@ def test_no_line_covers_more_than_one_mark_can_help():
     assert len(told) >= 0.8 * 90
 
 
+def test_no_stretch_reaches_over_frames_without_a_motion_or_into_another_shot():
+    motion = with_lost_arms(30, 60)
+    points, errors = motion.points3d.copy(), motion.expected_error.copy()
+    scale = motion.scale.copy()
+    points[43:47], errors[43:47], scale[43:47] = np.nan, np.nan, np.nan  # under MERGED_SECONDS
+    gone = replace(motion, points3d=points, expected_error=errors, scale=scale, cuts=np.array([52]))
+    stretches = uncertain_stretches(gone, count=9)
+    told = [(stretch.first, stretch.last) for stretch in stretches]
+    assert told == [(30, 42), (47, 51), (52, 60)]
+    assert all(s.first <= s.frame <= s.last for s in stretches)
+    assert np.isclose([s.error for s in stretches], stretches[0].error, rtol=0.1).all()
+
+
+def test_whatever_the_next_shot_begins_with_the_same_frame_of_this_one_is_asked_for():
+    motion = replace(with_lost_arms(30, 39), cuts=np.array([40]))
+    (asked,) = uncertain_stretches(motion)
+    errors = motion.expected_error.copy()
+    errors[40:61, ARMS] = uncertainty.MAX_ERROR * PIXELS
+    followed = replace(motion, expected_error=errors)
+    assert uncertain_stretches(followed, count=9)[0].frame == asked.frame
+
+
 def test_the_share_of_uncertain_frames_is_that_of_the_frames_with_lost_parts():
     assert uncertain_share(make_motion()) == 0
     assert uncertain_share(with_lost_arms(41, 60)) == pytest.approx(0.2)
