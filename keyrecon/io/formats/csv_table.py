@@ -35,12 +35,14 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = N
     columns.append("source")
     head.append(",".join(["frame", "time", *(f"{n}_{c}" for n in names for c in columns)]))
     numbers = np.concatenate(known, axis=2)
+    nowhere = np.isnan(motion.points3d).any(axis=2) & (motion.confidence == 0)
+    sources = np.where(nowhere, "", np.array(SOURCES)[motion.source])
     rows = []
-    for frame, (values, source) in enumerate(zip(numbers, motion.source, strict=True)):
+    for frame, (values, source) in enumerate(zip(numbers, sources, strict=True)):
         cells = [str(first_frame + frame), f"{motion.time[frame]:.6f}"]
         for joint, origin in zip(values, source, strict=True):
             cells += ["" if np.isnan(v) else f"{v:.6g}" for v in joint]
-            cells.append("" if np.isnan(joint).any() and not joint[-1] else SOURCES[origin])
+            cells.append(origin)
         rows.append(",".join(cells))
     write_durably(path, "\n".join(head + rows) + "\n")
     return f"camera axes{WITH_WORLD if world is not None else ''}; {describe_times(motion)}"
