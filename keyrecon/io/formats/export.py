@@ -57,8 +57,9 @@ def export_motion(
 
     `size` is the picture's, px; `first_frame` is the video's frame that the motion begins with;
     `further` is what motion.npz holds besides (`read_further_arrays`): .npz keeps all of it, the
-    others its joints in the world. Raises KeyreconError for a suffix that is not known, an
-    optional library that is not installed, or a motion that the format cannot hold.
+    others its joints in the world, and .json, whose joints are pixels, nothing of it. Raises
+    KeyreconError for a suffix that is not known, an optional library that is not installed, or a
+    motion that the format cannot hold.
     """
     check_suffix(path)
     suffix = path.suffix.lower()
@@ -73,7 +74,7 @@ def export_motion(
     if suffix == ".csv":
         return write_csv(path, motion, first_frame, world)
     if suffix == ".nc":
-        return write_netcdf(path, motion)
+        return write_netcdf(path, motion, world)
     if suffix == ".npz":
         write_motion(path, motion, more=further)
         return f"camera axes{WITH_WORLD if world is not None else ''}; {describe_times(motion)}"

@@ -45,3 +45,27 @@ def test_joints_have_a_source_in_the_table_where_there_is_a_motion(
     for name in motion.skeleton.names:
         told = np.array([row[f"{name}_source"] != "" for row in rows])
         np.testing.assert_array_equal(told, motion.known)
+
+
+def test_netcdf_holds_the_joints_in_the_world_beside_those_of_the_camera(tmp_path, motion, world):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    told = export_motion(tmp_path / "a.nc", motion, further=world)
+    assert "and the world's besides" in told
+    with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:
+        placed = data["position_world"]
+        assert placed.dims == data["position"].dims == ("time", "space", "keypoint", "individual")
+        neck = placed.sel(keypoint="neck", individual="athlete")
+        index = motion.skeleton.index("neck")
+        np.testing.assert_array_equal(neck, world["points3d_world"][:, index])
+        np.testing.assert_array_equal(data["position"][..., 0], motion.points3d.transpose(0, 2, 1))
+        assert placed.attrs["units"] == "m"
+        assert placed.attrs["axes"].startswith("origin on the ground at the middle of the net")
+
+
+def test_netcdf_of_a_motion_without_a_world_has_none(tmp_path, motion):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    assert "world" not in export_motion(tmp_path / "a.nc", motion)
+    with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:
+        assert "position_world" not in data
