@@ -15,7 +15,13 @@ from keyrecon.report.court_drawing import metre_grid
 from keyrecon.report.markup import ReportMaterial, note, pack, section, text, thinning
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, tennis_court
 from keyrecon.world.records import COURT, WorldCamera, WorldMotion
-from keyrecon.world.run_measures import ON_BASELINE, ZONES, RunMeasures, measure_run
+from keyrecon.world.run_measures import (
+    ON_BASELINE,
+    ZONES,
+    RunMeasures,
+    frame_seconds,
+    measure_run,
+)
 
 BESIDE, BEYOND_NET = 3.7, 1.0
 """Metres shown beside the court and behind it, and beyond the net."""
@@ -200,6 +206,6 @@ def _heat(
     edges = [
         np.arange(low, high + CELL, CELL) for low, high in zip(frame[:2], frame[2:], strict=True)
     ]
-    seconds = np.gradient(motion.time)[known]
+    seconds = frame_seconds(motion)[known]
     counted, _, _ = np.histogram2d(places[:, 1], places[:, 0], edges[::-1], weights=seconds)
     return gaussian_filter(counted / CELL**2, SPREAD / CELL)

@@ -1,7 +1,8 @@
 """What a coach asks of a player's way over the court: how far, how fast, and where.
 
-Velocity is that of the root, averaged over `STEADY` seconds: swaying is not running. How far the
-numbers are off is told by rendered sequences whose truth is known (`python benchmarks/way.py`), not
+Velocity is that of the root, averaged over `STEADY` seconds: swaying is not running. It is that
+within a shot: where the next one shows the player, he did not run there. How far the numbers are
+off is told by rendered sequences whose truth is known (`python benchmarks/way.py`), not
 by the fit: a root that drifts by 10 cm fits as well.
 """
 
@@ -70,8 +71,8 @@ def measure_run(world: WorldMotion, motion: Motion) -> RunMeasures | None:
     known = np.isfinite(speed)
     if known.sum() < 2:
         return None
-    acceleration = np.linalg.norm(np.gradient(velocity, motion.time, axis=0), axis=1)
-    duration = np.gradient(motion.time)
+    acceleration = np.linalg.norm(_rate(velocity, motion), axis=1)
+    duration = frame_seconds(motion)
     beyond = np.abs(world.root[:, 1]) - HALF_LENGTH
     with np.errstate(invalid="ignore"):
         zones = (beyond > ON_BASELINE, np.abs(beyond) <= ON_BASELINE, beyond < -ON_BASELINE)
@@ -92,11 +93,31 @@ def measure_run(world: WorldMotion, motion: Motion) -> RunMeasures | None:
 
 def run_velocity(world: WorldMotion, motion: Motion) -> Float[np.ndarray, "T 2"]:
     """Velocity of the root over the ground, averaged over `STEADY` seconds; NaN where unknown."""
-    velocity = np.gradient(world.root[:, :2], motion.time, axis=0)
-    known = np.isfinite(velocity).all(axis=1)
-    spread = STEADY * motion.fps
-    share = gaussian_filter1d(known.astype(float), spread, mode="constant")
-    filled = np.where(known[:, None], velocity, 0.0)
-    mean = gaussian_filter1d(filled, spread, axis=0, mode="constant")
-    mean /= np.maximum(share, 1e-9)[:, None]
-    return np.where(known[:, None], mean, np.nan)
+    velocity, spread = _rate(world.root[:, :2], motion), STEADY * motion.fps
+    mean = np.full_like(velocity, np.nan)
+    for part in motion.stretches:
+        known = np.isfinite(velocity[part]).all(axis=1)
+        share = gaussian_filter1d(known.astype(float), spread, mode="constant")
+        filled = np.where(known[:, None], velocity[part], 0.0)
+        total = gaussian_filter1d(filled, spread, axis=0, mode="constant")
+        averaged = total / np.maximum(share, 1e-9)[:, None]
+        mean[part] = np.where(known[:, None], averaged, np.nan)
+    return mean
+
+
+def frame_seconds(motion: Motion) -> Float[np.ndarray, "T"]:
+    """Seconds that each frame stands for within its stretch; 0 where there is no motion."""
+    seconds = np.zeros(len(motion.time))
+    for part in motion.stretches:
+        alone = part.stop - part.start == 1
+        seconds[part] = 1 / motion.fps if alone else np.gradient(motion.time[part])
+    return seconds
+
+
+def _rate(values: Float[np.ndarray, "T 2"], motion: Motion) -> Float[np.ndarray, "T 2"]:
+    """Change per second within each stretch; NaN in those of one frame."""
+    rate = np.full_like(values, np.nan)
+    for part in motion.stretches:
+        if part.stop - part.start > 1:
+            rate[part] = np.gradient(values[part], motion.time[part], axis=0)
+    return rate

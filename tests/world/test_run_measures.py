@@ -54,3 +54,43 @@ def test_frames_without_a_place_count_for_nothing():
     assert np.isnan(way.speed[100:200]).all()
     root[:] = np.nan
     assert measure_run(*along(root)) is None
+
+
+def cut_between(root, cut):
+    """A way of which another shot begins with frame `cut`."""
+    world, motion = along(root)
+    return world, replace(motion, cuts=np.array([cut]))
+
+
+def test_who_stands_in_two_shots_at_two_places_has_not_run():
+    root = straight(0.0)
+    root[200:, :2] += [3.0, 9.0]
+    way = measure_run(*cut_between(root, 200))
+    assert way.length.value < 0.2
+    assert way.top_speed.value == pytest.approx(0, abs=1e-9)
+    assert way.top_acceleration.value == pytest.approx(0, abs=1e-9)
+    assert np.isfinite(way.speed).all() and way.known_seconds == pytest.approx(FRAMES / FPS)
+
+
+def test_each_of_two_shots_keeps_the_speed_of_its_own_way():
+    root = straight(1.5)
+    root[200:] = straight(3.0)[:200]
+    speed = measure_run(*cut_between(root, 200)).speed
+    assert speed[:200] == pytest.approx(1.5)
+    assert speed[200:] == pytest.approx(3.0)
+
+
+def test_a_shot_of_one_frame_tells_no_speed():
+    world, motion = along(straight(1.5))
+    way = measure_run(world, replace(motion, cuts=np.array([200, 201])))
+    assert np.isnan(way.speed[200]) and np.isfinite(np.delete(way.speed, 200)).all()
+    assert way.length.value == pytest.approx(12.0, rel=0.01)
+
+
+def test_time_between_shots_is_spent_nowhere():
+    """Black that is stored as one long frame belongs to nobody's way."""
+    world, motion = along(straight(1.5))
+    later = motion.time + np.where(np.arange(FRAMES) < 200, 0, 60.0)
+    way = measure_run(world, replace(motion, time=later, cuts=np.array([200])))
+    assert way.known_seconds == pytest.approx(FRAMES / FPS)
+    assert way.length.value == pytest.approx(12.0)
