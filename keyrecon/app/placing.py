@@ -75,7 +75,7 @@ def write_placed_motion(
         return PlacedMotion(court=(world, camera))
     picture = workspace.folder / "way.jpg"
     title = f"{way.length.value:.1f} m run, top speed {way.top_speed.value:.1f} m/s"
-    write_court_picture(picture, draw_way(world.root, way.speed, title, where))
+    write_court_picture(picture, draw_way(world, motion, way.speed, title, where))
     height = f" The player is {world.height_ratio:.2f} m tall by the {where}."
     line = f"On the {where}: {title}; {picture} shows the way."
     return PlacedMotion((line + (height if motion.units != "m" else ""),), (world, camera))

@@ -75,17 +75,18 @@ def metre_grid(places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "L 2 3"]:
 
 
 def draw_way(
-    root: Float[np.ndarray, "T 3"],
+    world: WorldMotion,
+    motion: Motion,
     speed: Float[np.ndarray, "T"],
     title: str,
     origin: Origin = COURT,
 ) -> UInt8[np.ndarray, "h w 3"]:
     """The court from above, to scale, with the way of the root coloured by its speed.
 
-    The near half is below, as the camera sees it; frames without a place are left out. Without a
-    court there are squares of a metre.
+    The near half is below, as the camera sees it; frames without a place are left out, and no line
+    leads from one shot to the next. Without a court there are squares of a metre.
     """
-    on_court = origin == COURT
+    on_court, root = origin == COURT, world.root
     lines = tennis_court().ends if on_court else metre_grid(root[:, :2])
     half = np.array([HALF_DOUBLES, HALF_LENGTH])
     low, high = (-half - BESIDE, half + BESIDE)
@@ -111,9 +112,11 @@ def draw_way(
     colors = cv2.applyColorMap(share[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1]
     shown = np.isfinite(root).all(axis=1)
     places = pixel(np.nan_to_num(root[:, :2]))
-    for t in np.flatnonzero(shown[1:] & shown[:-1]):
-        a, b, color = places[t].tolist(), places[t + 1].tolist(), colors[t].tolist()
-        cv2.line(picture, a, b, color, 3, cv2.LINE_AA, SUBPIXEL)
+    for part in motion.stretches:
+        for t in range(part.start, part.stop - 1):
+            if shown[t] and shown[t + 1]:
+                a, b, color = places[t].tolist(), places[t + 1].tolist(), colors[t].tolist()
+                cv2.line(picture, a, b, color, 3, cv2.LINE_AA, SUBPIXEL)
     font = cv2.FONT_HERSHEY_SIMPLEX
     cv2.putText(picture, title, (16, 34), font, 0.75, (255, 255, 255), 2, cv2.LINE_AA)
     words = f"from dark (0) to yellow ({top:.1f} m/s)"
@@ -136,12 +139,14 @@ def draw_ground(
     if frame >= len(camera.found) or not camera.found[frame]:
         return drawn
     thick = max(1, round(picture.shape[1] / 640))
-    way = world.root[: frame + 1] * [1, 1, 0]
-    recent = motion.time[: frame + 1] > motion.time[frame] - RECENT
+    ground, recent = world.root * [1, 1, 0], motion.time > motion.time[frame] - RECENT
+    so_far = [slice(part.start, min(part.stop, frame + 1)) for part in motion.stretches]
     faint = drawn.copy()
-    _draw_line(faint, camera.project(frame, way), WAY, thick)
+    for part in so_far:
+        _draw_line(faint, camera.project(frame, ground[part]), WAY, thick)
     cv2.addWeighted(faint, FAINT, drawn, 1 - FAINT, 0, dst=drawn)
-    _draw_line(drawn, camera.project(frame, way[recent]), WAY, thick)
+    for part in so_far:
+        _draw_line(drawn, camera.project(frame, ground[part][recent[part]]), WAY, thick)
     turn = np.linspace(0, 2 * np.pi, 25)
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(25)]) * STANCE
     for foot, (side, color) in enumerate((("right", RIGHT), ("left", LEFT))):
