@@ -1,7 +1,8 @@
 """The instants that a reader looks for: where a hand is fastest, as in strokes, throws and swings.
 
 A hand's speed is taken relative to the middle of the body, so that running does not count. Peaks
-are told apart by their height over what is around them, not by a speed that would fit one sport.
+are told apart by their height over what is around them in their shot, not by a speed that would fit
+one sport.
 """
 
 from dataclasses import dataclass
@@ -45,15 +46,19 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
 
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
-    peaks, properties = find_peaks(
-        np.pad(fastest, 1),
-        height=LEAST_SPEED * stature(motion),
-        distance=max(1, round(APART_SECONDS * motion.fps)),
-        prominence=STANDS_OUT * float(fastest.max()),
-    )
-    chosen = sorted(peaks[np.argsort(-properties["peak_heights"])[:MOST]] - 1)
+    peaks: list[tuple[float, int]] = []
+    for part in motion.stretches:
+        places, properties = find_peaks(
+            np.pad(fastest[part], 1),
+            height=LEAST_SPEED * stature(motion),
+            distance=max(1, round(APART_SECONDS * motion.fps)),
+            prominence=STANDS_OUT * float(fastest.max()),
+        )
+        frames = part.start + places - 1
+        peaks += zip(properties["peak_heights"].tolist(), frames.tolist(), strict=True)
+    chosen = sorted(frame for _, frame in sorted(peaks, reverse=True)[:MOST])
     return [
-        KeyInstant(int(t), hands[int(np.nanargmax(speeds[:, t]))].replace("_wrist", ""), float(v))
+        KeyInstant(t, hands[int(np.nanargmax(speeds[:, t]))].replace("_wrist", ""), float(v))
         for t in chosen
         for v in [np.nanmax(speeds[:, t])]
     ]

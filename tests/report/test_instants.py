@@ -30,6 +30,13 @@ def test_strokes_are_found_where_the_hand_is_fastest():
     assert all(instant.speed == pytest.approx(6, rel=0.1) for instant in found)
 
 
+def test_strokes_on_both_sides_of_a_cut_are_two():
+    motion = swinging([185, 215])  # in one shot nearer than a backswing and its hit
+    assert len(key_instants(motion)) == 1
+    found = key_instants(replace(motion, cuts=np.array([200])))
+    assert [instant.frame for instant in found] == pytest.approx([185, 215], abs=1)
+
+
 def test_a_runner_whose_hands_are_still_has_none():
     motion = make_motion(200, wildness=0.0)
     run = np.arange(200)[:, None, None] / FPS * np.array([7.0, 0, 0])
