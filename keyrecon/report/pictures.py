@@ -21,7 +21,7 @@ from keyrecon.io.frame_reader import read_small, reduce_picture, side_by_side
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Annotations, Motion, Track
+from keyrecon.records import Annotations, Motion, Shots, Track
 from keyrecon.report.drawing import draw_pose
 from keyrecon.report.markup import thinning
 
@@ -93,13 +93,17 @@ class Pictures:
     """The small video, one frame per frame of the motion."""
 
 
-def follow_player(track: Track, fps: float) -> Windows:
-    """A window around the player for every frame that moves as calmly as the player allows."""
-    sigma = max(1.0, CALM * fps)
+def follow_player(track: Track, motion: Motion) -> Windows:
+    """A window around the player for every frame that moves as calmly as the player allows, and
+    jumps where another shot begins."""
+    sigma = max(1.0, CALM * motion.fps)
     middle = track.box.reshape(-1, 2, 2).mean(axis=1)
     middle = np.where(np.isfinite(middle), middle, (track.head + track.mid_feet) / 2)
-    center = gaussian_filter1d(_bridge(middle), sigma, axis=0, mode="nearest")
-    size = gaussian_filter1d(_bridge(track.height[:, None])[:, 0], 2 * sigma, mode="nearest")
+    center, size = _bridge(middle), _bridge(track.height[:, None])[:, 0]
+    cuts = () if motion.cuts is None else tuple(motion.cuts.tolist())
+    for part in Shots.between(cuts, len(size)).parts:
+        center[part] = gaussian_filter1d(center[part], sigma, axis=0, mode="nearest")
+        size[part] = gaussian_filter1d(size[part], 2 * sigma, mode="nearest")
     return Windows(center, ROOM * size)
 
 
@@ -113,7 +117,7 @@ def cut_pictures(
     instants: Sequence[int] = (),
 ) -> Pictures:
     """Read the video once and cut everything that the report shows of it."""
-    windows = follow_player(track, motion.fps)
+    windows = follow_player(track, motion)
     count = len(motion.points2d)
     shown_motion = motion.known
     known = np.flatnonzero(shown_motion)
