@@ -17,18 +17,19 @@ from jaxtyping import Bool
 
 from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion, take_rows
 from keyrecon.io.video import Video
-from keyrecon.records import Annotations
+from keyrecon.records import Annotations, Shots
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
 
 REACH = 1.0
 """Seconds within which marks are followed: what is read of the video for one suggestion."""
 
 
-def nearest_marks(annotations: Annotations, frame: int, fps: float) -> Annotations:
+def nearest_marks(annotations: Annotations, frame: int, fps: float, shots: Shots) -> Annotations:
     """The marks that flow would follow to a frame: of each joint the last before it and the first
-    after it."""
-    away = annotations.frames - frame
+    after it in its shot."""
+    away, number = annotations.frames - frame, shots.number
     marked = np.isfinite(annotations.joints[:, :, 0])
+    marked &= (number[annotations.frames] == number[frame])[:, None]
     chosen = np.zeros(len(away), dtype=bool)
     for side in (away < 0, away > 0):
         near = marked & (side & (np.abs(away) <= REACH * fps))[:, None]

@@ -142,7 +142,7 @@ class ProjectCache:
         if not len(sources.frames):
             return None
         marks, video = _marks_of(annotations, frame), preparation.video
-        near = nearest_marks(annotations, frame, video.fps)
+        near = nearest_marks(annotations, frame, video.fps, preparation.shots)
         key = _digest(sources.frames, sources.joints, marks, near.frames, near.joints)
         kept = self._suggestions.get(frame)
         if kept is None or kept[0] != key:

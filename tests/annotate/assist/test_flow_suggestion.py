@@ -9,10 +9,11 @@ from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
-from keyrecon.records import Annotations
+from keyrecon.records import Annotations, Shots
 
 FPS, COUNT, STEP = 25.0, 40, (2.0, 1.0)
 SIZE = (240, 320)
+ONE_SHOT = Shots.between((), COUNT)
 START = np.column_stack([60 + 8 * (np.arange(14) % 5), 30 + 10.0 * np.arange(14)])
 
 
@@ -58,7 +59,7 @@ def test_flow_brings_a_doubtful_suggestion_to_where_the_joints_are(video):
 def test_what_is_surer_than_flow_stays_and_so_does_all_without_near_marks(video):
     sure, far = suggested(1.0), suggested(0.2)
     assert (surer_by_flow(sure, video, marks(5, 20), 12).joints == sure.joints).all()
-    near = nearest_marks(marks(0, 39), 12, FPS / 4)
+    near = nearest_marks(marks(0, 39), 12, FPS / 4, ONE_SHOT)
     assert len(near.frames) == 0
     assert surer_by_flow(far, video, near, 12) is far
 
@@ -72,4 +73,11 @@ def test_a_frame_in_the_middle_of_being_marked_is_not_followed(video):
 def test_of_each_joint_the_marks_before_and_after_are_taken():
     given = marks(2, 6, 10, 12, 18, 30)
     given.joints[2, 5] = np.nan  # of this joint frame 6 is the last before
-    assert nearest_marks(given, 12, FPS).frames.tolist() == [6, 10, 18]
+    assert nearest_marks(given, 12, FPS, ONE_SHOT).frames.tolist() == [6, 10, 18]
+
+
+def test_nothing_is_followed_from_one_shot_into_another():
+    given, shots = marks(2, 6, 10, 12, 18, 30), Shots.between((8, 15), COUNT)
+    assert nearest_marks(given, 9, FPS, shots).frames.tolist() == [10]
+    assert nearest_marks(given, 12, FPS, shots).frames.tolist() == [10]
+    assert nearest_marks(given, 20, FPS, shots).frames.tolist() == [18, 30]
