@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.records import HalfName, Motion, Track
+from keyrecon.records import HalfName, Motion, Shots, Track
 
 MEAN_ERROR = 0.0205
 """Player heights. Fitted, as the tables, to 2613 joints of nine clips. With every clip predicted
@@ -261,10 +261,15 @@ def _bad_parts(doubt: Mapping[str, Float[np.ndarray, "T"]], inside: slice) -> li
     return bad or [max(means, key=lambda name: means[name])]
 
 
-def unsure_track(track: Track, reach: int, count: int = 3) -> list[UncertainStretch]:
-    """The longest stretches in which the track is a guess, before there is a motion."""
+def unsure_track(track: Track, shots: Shots, reach: int, count: int = 3) -> list[UncertainStretch]:
+    """The longest stretches of shots in which the track is a guess, before there is a motion."""
     guessed = (track.confidence < MIN_CONFIDENCE) & track.known
-    runs = [r for r in _runs(guessed, 0) if r[1] - r[0] >= reach]
+    runs = [
+        (shot.start + first, shot.start + last)
+        for shot in shots.parts
+        for first, last in _runs(guessed[shot], 0)
+        if last - first >= reach
+    ]
     longest = sorted(runs, key=lambda run: run[0] - run[1])[:count]
     return [
         UncertainStretch(first, last, "the player's place", np.nan, (first + last) // 2, "both")

@@ -7,7 +7,7 @@ import pytest
 
 from keyrecon import uncertainty
 from keyrecon.body import LSP14
-from keyrecon.records import Motion, Track
+from keyrecon.records import Motion, Shots, Track
 from keyrecon.uncertainty import (
     describe_uncertainty,
     expected_error,
@@ -187,9 +187,11 @@ def test_a_track_that_is_a_guess_for_long_asks_for_the_body_in_its_middle():
         box=np.zeros((FRAMES, 4)),
         height=np.full(FRAMES, PIXELS),
     )
-    (stretch,) = unsure_track(track, reach=10)
+    (stretch,) = unsure_track(track, Shots.between((), FRAMES), reach=10)
     assert (stretch.first, stretch.last, stretch.frame, stretch.half) == (20, 40, 30, "both")
     assert "px" not in stretch.text
+    (stretch,) = unsure_track(track, Shots.between((28,), FRAMES), reach=10)
+    assert (stretch.first, stretch.last, stretch.frame) == (28, 40, 34)
 
 
 def swinging(fps):

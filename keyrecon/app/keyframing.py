@@ -85,6 +85,7 @@ def describe_keyframes(
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     keyframes, frames = preparation.keyframes, len(preparation.video)
+    unsure = unsure_track(preparation.track, preparation.shots, keyframes.reach)
     folder, used = quoted(workspace.folder), preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
     halves = [
@@ -99,7 +100,7 @@ def describe_keyframes(
             *describe_shots(preparation.shots),
             *contradictions,
             *_describe_absence(preparation),
-            *(stretch.text for stretch in unsure_track(preparation.track, keyframes.reach)),
+            *(stretch.text for stretch in unsure),
             *halves,
             *_describe_gains(keyframes),
             f"Annotation cost {annotation_cost(keyframes, frames):.2%}: {len(keyframes.frames)} "

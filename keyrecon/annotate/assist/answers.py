@@ -290,7 +290,8 @@ def describe_stretches(cache: ProjectCache, annotations: Annotations) -> list[Js
     if motion is not None:
         stretches = uncertain_stretches(motion, np.union1d(upper, lower))
     elif preparation is not None:
-        stretches = unsure_track(preparation.track, preparation.keyframes.reach)
+        reach = preparation.keyframes.reach
+        stretches = unsure_track(preparation.track, preparation.shots, reach)
     else:
         return []
     return [
