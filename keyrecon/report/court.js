@@ -1,7 +1,7 @@
 // The court, or the ground in squares of a metre, from above with the player's way, at the frame of the page's cursor. Metres on the court:
 // x along the net to the right, y up the court, the camera's end below.
 import { cssColor } from "./colors.js";
-import { byId, data, count, seconds, frame, show, followers, restyled } from "./cursor.js";
+import { byId, data, count, cuts, seconds, frame, show, followers, restyled } from "./cursor.js";
 import { unpack } from "./packed.js";
 import { prepareCanvas } from "./figure3d.js";
 
@@ -59,7 +59,7 @@ function createMap(canvas, court) {
     pen.lineWidth = 3;
     pen.lineCap = "round";
     for (let t = 1; t < count; t++) {
-      if (!known(t) || !known(t - 1)) continue;
+      if (!known(t) || !known(t - 1) || cuts.has(t)) continue;
       pen.strokeStyle = rampColor(KINDS[kind].share(t));
       pen.beginPath();
       pen.moveTo(...at(root[2 * t - 2], root[2 * t - 1]));

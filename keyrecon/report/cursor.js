@@ -8,6 +8,7 @@ export const restyled = []; // called when the colour scheme changes
 
 const late = unpack(data.late).values; // seconds after those of an even frame rate
 export const count = late.length;
+export const cuts = new Set(data.cuts); // frames with which another shot begins
 export const seconds = (number) => number / data.fps + late[number];
 
 const slider = byId("frame"),

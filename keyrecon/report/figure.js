@@ -1,8 +1,9 @@
 // The motion as a figure in space, at the frame of the page's cursor.
 import { cssColor } from "./colors.js";
-import { byId, data, count, frame, followers, restyled } from "./cursor.js";
+import { byId, data, count, cuts, frame, followers, restyled } from "./cursor.js";
 import { unpack } from "./packed.js";
 import { createFigure3d } from "./figure3d.js";
+import { groundLevel } from "./ground_level.js";
 
 const SIDES = ["left", "right", "trunk"];
 const STYLE = {
@@ -27,20 +28,16 @@ function pose({ values }) {
   return Array.from({ length: joints }, (_, j) => values.slice(start + j * 3, start + j * 3 + 3));
 }
 
-// Height of the lower foot over the frames around, so that the ground does not follow each step.
+// Height of the ground in every frame.
 function smoothGround() {
   const lowest = new Float32Array(count);
   for (let t = 0; t < count; t++) {
     let low = -Infinity;
-    for (let j = 0; j < joints; j++)
-      low = Math.max(low, points3d.values[(t * joints + j) * 3 + 1] || 0);
+    for (let j = 0; j < joints; j++) low = Math.max(low, points3d.values[(t * joints + j) * 3 + 1]);
     lowest[t] = low;
   }
   const radius = Math.max(1, Math.round(data.fps / 4));
-  return lowest.map((_, t) => {
-    const around = lowest.subarray(Math.max(0, t - radius), t + radius + 1);
-    return around.reduce((sum, value) => sum + value, 0) / around.length;
-  });
+  return lowest.map((_, t) => groundLevel(lowest, t, radius, cuts) || 0);
 }
 const ground = smoothGround();
 
@@ -78,7 +75,7 @@ function wayOnGround() {
     at = (t) => inFigure([places.root[2 * t], places.root[2 * t + 1]]),
     pieces = [];
   for (let t = Math.max(1, frame() - reach); t <= Math.min(count - 1, frame() + reach); t++)
-    pieces.push({ from: at(t - 1), to: at(t), color: cssColor("accent"), width: 2 });
+    if (!cuts.has(t)) pieces.push({ from: at(t - 1), to: at(t), color: cssColor("accent"), width: 2 });
   return pieces.filter(({ from, to }) => Number.isFinite(from[0] + to[0]));
 }
 

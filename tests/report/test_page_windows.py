@@ -1,5 +1,8 @@
 """report.html in windows of several widths."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from page_driver import BROWSER
 from report_material import make_material, on_court, on_ground
@@ -9,6 +12,21 @@ from keyrecon.report.page import write_report
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE REPORT IS NOT OPENED: there is no browser at {BROWSER}"
 )
+MIDDLE_OF_MAP = """
+() => {
+  const { frame: [left, near, right, far] } = JSON.parse(
+    document.getElementById("motion-data").textContent,
+  ).court;
+  const canvas = document.getElementById("court-map"), sharp = canvas.width / canvas.clientWidth;
+  const scale = Math.min(
+    (canvas.clientWidth - 100) / (right - left), (canvas.clientHeight - 16) / (far - near),
+  );
+  const [x, y] = [8 + (0 - left) * scale, 8 + (far + 14) * scale];
+  const area = [sharp * x - 3, sharp * y - 3, 6, 6].map(Math.round);
+  return [...canvas.getContext("2d").getImageData(...area).data];
+}
+"""
+"""Pixels of the map about the place 14 m from the net and in the middle of its width."""
 TOPS = """
 [...document.querySelectorAll(".still")].map((still) => [
   Math.round(still.getBoundingClientRect().top),
@@ -78,3 +96,28 @@ def test_the_way_lies_on_the_ground_where_there_is_no_court(chromium, tmp_path):
     assert page.locator("[data-eye=umpire]").count() == 0
     page.close()
     assert faults == []
+
+
+def jumping(material, cuts):
+    """The walk on the court, which goes on 4 m further to the right from frame 20 on."""
+    world, camera = on_court(material).court
+    root = world.root.copy()
+    root[:, 0] = np.where(np.arange(len(root)) < 20, -2.0, 2.0)
+    moved = replace(world, root=root)
+    return replace(material, court=(moved, camera), motion=replace(material.motion, cuts=cuts))
+
+
+def test_no_way_leads_from_one_shot_to_the_next(chromium, tmp_path):
+    material = make_material(tmp_path)
+    seen = {}
+    for name, cuts in (("one", None), ("two", np.array([20]))):
+        write_report(tmp_path / f"{name}.html", jumping(material, cuts))
+        page = chromium.new_page(viewport={"width": 1366, "height": 900})
+        page.goto((tmp_path / f"{name}.html").as_uri())
+        page.wait_for_selector(".js-plotly-plot .main-svg")
+        page.locator("#court-map").scroll_into_view_if_needed()
+        page.wait_for_timeout(100)
+        seen[name] = np.array(page.evaluate(MIDDLE_OF_MAP)).reshape(-1, 4)
+        page.close()
+    assert np.ptp(seen["two"], axis=0).max() == 0  # the surroundings alone
+    assert (seen["one"] != seen["two"]).any()

@@ -21,6 +21,7 @@ def motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
     return {
         "from": first,
         "to": last,
+        "cuts": [] if motion.cuts is None else motion.cuts.tolist(),
         "units": motion.units,
         "stature": _stature(motion),
         "points2d": np.round(motion.points2d[chosen], 1).tolist(),

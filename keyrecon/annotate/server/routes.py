@@ -30,7 +30,9 @@ from keyrecon.errors import KeyreconError
 
 PACKAGE = Path(__file__).parents[2]
 PAGE = PACKAGE / "annotate" / "page"
-SHARED = (PACKAGE / "report" / "colors.js", PACKAGE / "report" / "figure3d.js")
+SHARED = tuple(
+    PACKAGE / "report" / name for name in ("colors.js", "figure3d.js", "ground_level.js")
+)
 """Scripts that the page shares with the report."""
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 

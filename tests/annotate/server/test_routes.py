@@ -3,6 +3,7 @@
 import asyncio
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 from annotator import CREDENTIALS, HEADERS, ask, call, run_apart
@@ -173,6 +174,13 @@ def test_the_motion_is_read_in_stretches_once_it_is_made(opened, folder):
     assert (answer["from"], answer["to"], len(answer["points3d"])) == (45, 50, 5)
     assert np.abs(np.array(answer["points2d"]) - motion.points2d[45:]).max() <= 0.05
     assert ask(session, "GET", "/api/motion?from=x").status == 400
+    assert answer["cuts"] == []
+
+
+def test_the_page_is_told_where_the_motion_goes_on_in_another_shot(opened, folder):
+    session = opened()
+    write_motion(folder / "motion.npz", replace(make_motion(frames=50), cuts=np.array([20])))
+    assert ask(session, "GET", "/api/motion?from=30&to=40").json()["cuts"] == [20]
 
 
 def test_every_open_page_hears_the_news():

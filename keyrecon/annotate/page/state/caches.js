@@ -1,4 +1,5 @@
 // What is fetched from the server ahead of being drawn: frames as pictures, and the motion.
+import { groundLevel } from "../../../report/ground_level.js";
 import * as api from "./api.js";
 
 const CACHE_BYTES = 260e6; // of decoded pictures
@@ -127,13 +128,11 @@ export function createMotionCache(project, arrived) {
       const number = Math.floor(frame / CHUNK),
         chunk = chunks.get(number);
       if (!chunk) return null;
-      const radius = Math.max(1, Math.round(project.fps / 4)),
-        at = frame - number * CHUNK,
-        around = chunk.points3d.slice(Math.max(0, at - radius), at + radius + 1);
-      const lows = around.map((row) => Math.max(...row.map((point) => point?.[1] ?? -Infinity)));
-      const known = lows.filter(Number.isFinite);
-      if (!known.length) return null;
-      const level = known.reduce((sum, low) => sum + low, 0) / known.length;
+      const lowest = chunk.points3d.map((row) => Math.max(...row.map((point) => point?.[1] ?? NaN))),
+        radius = Math.max(1, Math.round(project.fps / 4)),
+        cuts = new Set(chunk.cuts.map((cut) => cut - number * CHUNK)),
+        level = groundLevel(lowest, frame - number * CHUNK, radius, cuts);
+      if (Number.isNaN(level)) return null;
       return { level, unit: chunk.stature, units: chunk.units };
     },
     // {joint: px}: how far off each joint probably is; null while it is not known.
