@@ -98,12 +98,12 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
         ground = _on_ground(camera, feet, ANKLE_SHARE * ratio * stature_in_units(motion))
         speed = _speed_across(motion, camera, ground, shots)
         still = _slow_and_low(speed, height, HELD_SPEED) & seen[:, None]
-        still = _without_moments(still, motion.fps, shots)
+        still = _long_enough(still, motion.fps, shots)
         if not still.any():
             return None
         ratio = _size(motion, camera, ground, still)
     slow = _slow_and_low(speed, height, CONTACT_SPEED) & seen[:, None]
-    slow = _without_moments(slow, motion.fps, shots)
+    slow = _long_enough(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)
     root = _solve(motion, camera, evidence, _spells(still, shots), shots)
@@ -122,8 +122,8 @@ def _refined(
     height = points[:, ankles, 2]
     rise = height - np.percentile(height[still], STANDING_SHARE)
     fps, shots = placed.motion.fps, placed.shots
-    flat = _without_moments(still & (rise < HEEL_UP), fps, shots)
-    contact = _without_moments((still | slow) & (rise < HIGHEST_HEEL), fps, shots)
+    flat = _long_enough(still & (rise < HEEL_UP), fps, shots)
+    contact = _long_enough((still | slow) & (rise < HIGHEST_HEEL), fps, shots)
     points, log_size = refine_placed(placed, Standing(still, flat), log_size)
     points[~seen] = np.nan
     ratio = placed.scale * float(np.exp(log_size))
@@ -207,7 +207,7 @@ def _slow_and_low(
         return (speed < limit) & (height - height.min(axis=1, keepdims=True) < LOWER_BY)
 
 
-def _without_moments(
+def _long_enough(
     standing: Bool[np.ndarray, "T 2"], fps: float, shots: Shots
 ) -> Bool[np.ndarray, "T 2"]:
     """Without spells that are too short to stand, shot by shot."""
