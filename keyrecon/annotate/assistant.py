@@ -58,8 +58,8 @@ class Assistant:
     """Squares of a metre over a frame of pictures of a size."""
     ground_mark: Callable[..., Json] | None = None
     """Keeps a mark of a kind in a frame by both ends, and its length or None."""
-    ground_removal: Callable[[str], Json] | None = None
-    """Takes one away by its name."""
+    ground_removal: Callable[..., Json] | None = None
+    """Takes one away, told in the same way."""
     field_of_view: Callable[[float | None], Json] | None = None
     """Keeps the angle across the picture, or none."""
     backprojection: Callable[[tuple[Pick, ...], int, str], Any] | None = None

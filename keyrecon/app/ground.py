@@ -1,12 +1,15 @@
 """`keyrecon ground`: the camera over level ground, where there is no court."""
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from keyrecon.app.placing import MAX_TILT_ERROR, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
+from keyrecon.io.formats.ground_marks import merge_marks
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.lens_metadata import lens_focal
 from keyrecon.io.video import Video
@@ -27,7 +30,7 @@ from keyrecon.world.ground_marks import (
     check_field_of_view,
     check_mark,
     mark_names,
-    without_marks,
+    named_marks,
 )
 from keyrecon.world.records import COURT, KINDS, GroundMark, GroundMarks, Kind
 
@@ -71,8 +74,11 @@ def find_ground(
     vertical-2, fov, all. Marks that contradict the rest are not kept.
     """
     video = workspace.video()
-    kept = without_marks(workspace.ground_marks(), forget)
-    together = _with_marks(kept, told, video)
+    before = workspace.ground_marks()
+    dropped = named_marks(before, forget)
+    kept = merge_marks(before, GroundMarks(), dropped)
+    _check_told(told, video)
+    together = merge_marks(kept, told)
     _keep_court(workspace)
     motion = _motion_of(workspace, video)
     known = _known_focal(video, together.field_of_view)
@@ -84,8 +90,10 @@ def find_ground(
         found = calibrate_ground(motion, path, (video.width, video.height), together.marks, known)
     except ContradictoryMarks as fault:
         raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, told)}") from fault
-    workspace.keep_ground_marks(together)
+    workspace.change_ground_marks(told, dropped)
     write_camera(workspace.camera_file, found.camera)
+    if workspace.ground_marks() != together:
+        _date_after(workspace.ground_marks_file, workspace.camera_file)
     picture = workspace.folder / "ground.jpg"
     drawn = draw_grid(video.frame(found.reference), found.camera, found.reference, _height(found))
     write_court_picture(picture, drawn)
@@ -104,16 +112,18 @@ def find_ground(
     )
 
 
-def _with_marks(kept: GroundMarks, told: GroundMarks, video: Video) -> GroundMarks:
-    """Marks of former calls and of this one, which must lie in the video."""
+def _date_after(file: Path, other: Path) -> None:
+    """Let marks that were changed while a camera was made count as newer than it."""
+    time = other.stat().st_mtime_ns + 1_000_000
+    os.utime(file, ns=(time, time))
+
+
+def _check_told(told: GroundMarks, video: Video) -> None:
+    """Raise KeyreconError for marks outside the video, and a field of view that no camera has."""
     for mark in told.marks:
         check_mark(mark, len(video), (video.width, video.height))
     if told.field_of_view is not None:
         check_field_of_view(told.field_of_view)
-    return GroundMarks(
-        tuple(dict.fromkeys((*kept.marks, *told.marks))),
-        kept.field_of_view if told.field_of_view is None else told.field_of_view,
-    )
 
 
 def _motion_of(workspace: Workspace, video: Video) -> Motion:

@@ -31,7 +31,11 @@ from keyrecon.io.formats.court_points import (
     read_court_points,
     write_court_points,
 )
-from keyrecon.io.formats.ground_marks import read_ground_marks, write_ground_marks
+from keyrecon.io.formats.ground_marks import (
+    merge_marks,
+    read_ground_marks,
+    write_ground_marks,
+)
 from keyrecon.io.formats.picks import read_picks, write_picks
 from keyrecon.io.formats.shot_choices import (
     ShotChoices,
@@ -318,11 +322,14 @@ class Workspace:
         file = self.ground_marks_file
         return read_ground_marks(file) if file.is_file() else GroundMarks()
 
-    def keep_ground_marks(self, told: GroundMarks) -> None:
-        """Keep what a person told of the ground."""
+    def change_ground_marks(
+        self, added: GroundMarks = GroundMarks(), dropped: GroundMarks = GroundMarks()
+    ) -> None:
+        """Keep what a person told of the ground, and drop what was taken back."""
         with self.exclusive():
-            if told != self.ground_marks():
-                write_ground_marks(self.ground_marks_file, told)
+            old = self.ground_marks()
+            if (new := merge_marks(old, added, dropped)) != old:
+                write_ground_marks(self.ground_marks_file, new)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:

@@ -55,14 +55,17 @@ def mark_names(marks: Sequence[GroundMark]) -> list[str]:
     return names
 
 
-def without_marks(told: GroundMarks, forget: Sequence[str]) -> GroundMarks:
-    """Marks but for those that are named."""
-    names = mark_names(told.marks)
-    known = [*names, *([FOV] if told.field_of_view is not None else [])]
-    if unknown := sorted(set(forget) - {*known, "all"}):
-        there = f"it has {', '.join(known)}" if known else "it has none"
-        raise KeyreconError(f"The project has no mark {unknown[0]} to forget; {there}.")
-    if "all" in forget:
-        return GroundMarks()
-    left = tuple(m for name, m in zip(names, told.marks, strict=True) if name not in forget)
-    return GroundMarks(left, None if FOV in forget else told.field_of_view)
+def named_marks(told: GroundMarks, names: Sequence[str]) -> GroundMarks:
+    """The marks that are named; "all" names every one.
+
+    Raises KeyreconError for a name that none has.
+    """
+    there = mark_names(told.marks)
+    known = [*there, *([FOV] if told.field_of_view is not None else [])]
+    if unknown := sorted(set(names) - {*known, "all"}):
+        has = f"it has {', '.join(known)}" if known else "it has none"
+        raise KeyreconError(f"The project has no mark {unknown[0]} to forget; {has}.")
+    if "all" in names:
+        return told
+    marks = tuple(m for name, m in zip(there, told.marks, strict=True) if name in names)
+    return GroundMarks(marks, told.field_of_view if FOV in names else None)

@@ -5,6 +5,7 @@ import pytest
 from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
 
+from keyrecon.annotate.assist.ground_views import describe_ground
 from keyrecon.app import ground
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.app.placing import write_placed_motion
@@ -15,6 +16,7 @@ from keyrecon.io.formats.motion_file import read_further_arrays, read_on_court, 
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
+from keyrecon.world.ground_calibration import calibrate_ground
 from keyrecon.world.records import GROUND, GroundMark, GroundMarks
 
 
@@ -98,6 +100,26 @@ def test_marks_are_kept_named_and_forgotten(stood):
     assert "Kept marks" not in told(stood, forget=["all"])
 
 
+def test_what_a_person_changes_meanwhile_stays_changed(stood, monkeypatch):
+    told(stood, posts(), forget=["all"])
+    meanwhile = GroundMark("vertical", 0, (640.0, 100.0), (640.0, 600.0))
+
+    def calibrate(*evidence):
+        removed = GroundMarks(posts()[:1])
+        Workspace(stood).change_ground_marks(GroundMarks((meanwhile,)), removed)
+        return calibrate_ground(*evidence)
+
+    monkeypatch.setattr(ground, "calibrate_ground", calibrate)
+    told(stood, fov=60.0)
+    workspace = Workspace(stood)
+    assert workspace.ground_marks() == GroundMarks((posts()[1], meanwhile), 60.0)
+    assert describe_ground(workspace)["changed"]
+    monkeypatch.undo()
+    told(stood)
+    assert not describe_ground(workspace)["changed"]
+    told(stood, forget=["all"])
+
+
 def test_marks_that_contradict_one_another_are_named_and_not_kept(stood):
     told(stood, forget=["all"] if Workspace(stood).ground_marks().marks else ())
     third = GroundMark("vertical", 0, (640.0, 100.0), (640.0, 600.0))
@@ -109,7 +131,7 @@ def test_marks_that_contradict_one_another_are_named_and_not_kept(stood):
         told(stood, [leaning])
     workspace = Workspace(stood)
     assert len(workspace.ground_marks().marks) == 2
-    workspace.keep_ground_marks(GroundMarks((third, posts()[0], leaning)))  # as the page does
+    workspace.change_ground_marks(GroundMarks((leaning,)))  # as the page does
     with pytest.raises(KeyreconError, match=r"in frame 0 \(vertical-3\)"):
         told(stood)
     told(stood, forget=["all"])

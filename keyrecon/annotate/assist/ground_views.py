@@ -12,13 +12,7 @@ from keyrecon.annotate.assist.court_views import drawn_lines
 from keyrecon.io.formats.camera_file import read_camera
 from keyrecon.io.workspace import Workspace
 from keyrecon.report.court_drawing import metre_grid
-from keyrecon.world.ground_marks import (
-    FOV,
-    check_field_of_view,
-    check_mark,
-    mark_names,
-    without_marks,
-)
+from keyrecon.world.ground_marks import check_field_of_view, check_mark, mark_names
 from keyrecon.world.records import COURT, GroundMark, GroundMarks, Kind, WorldCamera
 
 Json = dict[str, Any]
@@ -60,27 +54,31 @@ def keep_ground_mark(
     mark = GroundMark(kind, frame, *ends, metres)
     video = workspace.video()
     check_mark(mark, len(video), (video.width, video.height))
-    told = workspace.ground_marks()
-    workspace.keep_ground_marks(
-        GroundMarks(tuple(dict.fromkeys((*told.marks, mark))), told.field_of_view)
-    )
+    workspace.change_ground_marks(GroundMarks((mark,)))
     return describe_ground(workspace)
 
 
-def drop_ground_mark(workspace: Workspace, name: str) -> Json:
-    """Take a mark away by its name."""
-    workspace.keep_ground_marks(without_marks(workspace.ground_marks(), [name]))
+def drop_ground_mark(
+    workspace: Workspace,
+    kind: Kind,
+    frame: int,
+    ends: tuple[Place, Place],
+    metres: float | None,
+) -> Json:
+    """Take a mark away; one that is gone already stays gone."""
+    mark = GroundMark(kind, frame, *ends, metres)
+    workspace.change_ground_marks(dropped=GroundMarks((mark,)))
     return describe_ground(workspace)
 
 
 def keep_field_of_view(workspace: Workspace, degrees: float | None) -> Json:
     """Keep the field of view, or none."""
-    told = workspace.ground_marks()
     if degrees is not None:
         check_field_of_view(degrees)
-        workspace.keep_ground_marks(GroundMarks(told.marks, degrees))
-    elif told.field_of_view is not None:
-        workspace.keep_ground_marks(without_marks(told, [FOV]))
+        workspace.change_ground_marks(GroundMarks((), degrees))
+    else:
+        known = workspace.ground_marks().field_of_view
+        workspace.change_ground_marks(dropped=GroundMarks((), known))
     return describe_ground(workspace)
 
 

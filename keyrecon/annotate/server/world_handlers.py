@@ -27,10 +27,10 @@ class GroundMarkRequest(Struct, forbid_unknown_fields=True):
 
 
 class GroundRequest(Struct, forbid_unknown_fields=True):
-    """A mark to keep, or the name of one to take away, or else the field of view."""
+    """A mark to keep, or one to take away, or else the field of view."""
 
     mark: GroundMarkRequest | None = None
-    remove: Name | None = None
+    removed: GroundMarkRequest | None = None
     field_of_view: float | None = None
 
 
@@ -70,10 +70,9 @@ def ground_view(session: Session, request: ApiRequest) -> Json:
 def change_ground(session: Session, request: ApiRequest) -> Json:
     """Keep or drop a mark on the ground, or the field of view."""
     body, assistant = request.body, session.assistant
-    if body.mark is not None:
-        mark, keep = body.mark, assistant.ground_mark
-        check_frame(mark.frame, session.limits)
-        return keep(mark.kind, mark.frame, mark.ends, mark.metres) if keep else {}
-    if body.remove is not None:
-        return assistant.ground_removal(body.remove) if assistant.ground_removal else {}
-    return assistant.field_of_view(body.field_of_view) if assistant.field_of_view else {}
+    change = assistant.ground_mark if body.mark is not None else assistant.ground_removal
+    mark = body.mark or body.removed
+    if mark is None:
+        return assistant.field_of_view(body.field_of_view) if assistant.field_of_view else {}
+    check_frame(mark.frame, session.limits)
+    return change(mark.kind, mark.frame, mark.ends, mark.metres) if change else {}

@@ -45,3 +45,14 @@ def write_ground_marks(path: Path, told: GroundMarks) -> None:
     body = ",\n  ".join(json.dumps(row) for row in rows)
     angle = json.dumps(told.field_of_view)
     write_durably(path, f'{{"field_of_view": {angle}, "marks": [\n  {body}\n]}}\n')
+
+
+def merge_marks(
+    old: GroundMarks, added: GroundMarks, dropped: GroundMarks = GroundMarks()
+) -> GroundMarks:
+    """Old marks without those that are dropped, and new ones; a new field of view replaces it."""
+    left = [mark for mark in old.marks if mark not in dropped.marks]
+    angle = None if old.field_of_view == dropped.field_of_view else old.field_of_view
+    if added.field_of_view is not None:
+        angle = added.field_of_view
+    return GroundMarks(tuple(dict.fromkeys((*left, *added.marks))), angle)

@@ -11,6 +11,7 @@ from keyrecon.app.project import start
 from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
+from keyrecon.world.records import GroundMarks
 
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
@@ -68,3 +69,18 @@ def test_upright_things_are_marked_and_squares_lie_on_the_ground(folder, chromiu
         assert [mark.kind for mark in told.marks] == ["vertical", "vertical", "horizon"]
         for mark, post in zip(told.marks, posts(), strict=False):
             assert np.abs(np.subtract(mark.start, post.start)).max() < 2.5
+
+
+def test_two_clicks_on_a_removal_take_one_mark_away(folder, chromium):
+    marks = (*posts(), HORIZON)
+    Workspace(folder).change_ground_marks(GroundMarks(marks))
+    with serving(folder, make_assistant(Workspace(folder))) as server:
+        context = chromium.new_context(viewport={"width": 1440, "height": 900})
+        person = Person(context, server.credentials.address)
+        person.press("Alt+6")
+        person.page.dblclick("[aria-label='Remove vertical-1']", delay=60)
+        person.page.wait_for_selector("[aria-label='Remove vertical-2']", state="detached")
+        person.page.wait_for_timeout(300)
+        context.close()
+        assert person.complaints == []
+        assert Workspace(folder).ground_marks().marks == marks[1:]

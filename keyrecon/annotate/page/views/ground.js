@@ -110,7 +110,7 @@ export function createGround(model, { frames, shell }) {
   field.addEventListener("change", () => {
     const degrees = numberIn(field);
     if (Number.isNaN(degrees)) model.notify("The field of view is a number of degrees.");
-    else change(degrees === null ? { remove: "fov" } : { field_of_view: degrees });
+    else change({ field_of_view: degrees });
   });
 
   function primary() {
@@ -167,12 +167,17 @@ export function createGround(model, { frames, shell }) {
     viewer.cursor("crosshair");
   }
 
-  function markRow({ name, frame, metres: length }) {
-    const known = length === null ? "" : `, ${length} m`,
+  const remove = ({ kind, frame, ends, metres: length }) =>
+    change({ removed: { kind, frame, ends, metres: length } });
+
+  function markRow(mark) {
+    const { name, frame, metres: length } = mark,
+      known = length === null ? "" : `, ${length} m`,
       go = make("button", { className: "plain" }, `${name}, frame ${frame}${known}`),
       removal = make("button", { className: "plain", "aria-label": `Remove ${name}` }, "✕");
     go.addEventListener("click", () => show(frame));
-    removal.addEventListener("click", () => change({ remove: name }));
+    // The second click of a double one would meet the row that has moved up.
+    removal.addEventListener("click", ({ detail }) => detail < 2 && remove(mark));
     return make("div", {}, go, removal);
   }
 
@@ -208,7 +213,7 @@ export function createGround(model, { frames, shell }) {
 
   const commands = {
     primary: () => !byId("ground-primary").hidden && primary(),
-    clear: () => here().length && change({ remove: here().at(-1).name }),
+    clear: () => here().length && remove(here().at(-1)),
     kind: ({ index }) => choose(Object.keys(KINDS)[index]),
     back: () => choose(selection.kind),
     step: ({ index, shift }) =>
