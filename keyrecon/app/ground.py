@@ -53,7 +53,7 @@ def ground_mark(kind: Kind, text: str) -> GroundMark:
     try:
         frame, start, end, *length = (part.strip() for part in text.split(":"))
         (x0, y0), (x1, y1) = ((float(v) for v in place.split(",")) for place in (start, end))
-        metres = float(*length) if length else None
+        (metres,) = map(float, length) if length else (None,)
         mark = GroundMark(kind, int(frame), (x0, y0), (x1, y1), metres)
     except ValueError as fault:
         raise KeyreconError(f"--{kind} needs {form}, such as {example}; got '{text}'.") from fault

@@ -195,6 +195,7 @@ def test_marks_are_typed():
         "vertical", 3, (1.0, 2.0), (1.5, 90.0)
     )
     assert ground_mark("length", "0:1,2:3,4:2.5").metres == 2.5
-    for kind, text in (("vertical", "3:1,2"), ("length", "0:1,2:3,4"), ("horizon", "0:1,2:3,4:5")):
+    wrong = (("vertical", "3:1,2"), ("length", "0:1,2:3,4"), ("horizon", "0:1,2:3,4:5"))
+    for kind, text in (*wrong, ("vertical", "0:1,2:3,4:2.44:3")):
         with pytest.raises(KeyreconError, match=f"--{kind} needs FRAME:X,Y:X,Y"):
             ground_mark(kind, text)
