@@ -35,7 +35,7 @@ from keyrecon.golf.records import (
     SwingMarks,
 )
 from keyrecon.golf.swing_fit import GolfOptions
-from keyrecon.io.durable import make_folder, write_durably
+from keyrecon.io.durable import make_folder, put_aside, write_durably
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.golf_marks import read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
@@ -252,7 +252,7 @@ def keep_clicks(workspace: Workspace, content: bytes) -> None:
     file = workspace.golf_clicks_file
     with workspace.exclusive():
         if file.is_file() and file.read_bytes() != content:
-            workspace.put_aside(file)
+            put_aside(file)
         write_durably(file, content)
 
 

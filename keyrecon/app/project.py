@@ -13,7 +13,7 @@ from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, counted, quoted
-from keyrecon.io.durable import write_durably
+from keyrecon.io.durable import put_aside, write_durably
 from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
@@ -144,7 +144,7 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
         if comparison.conflicts and not replacing:
             raise _conflict_error(name_conflicts(comparison))
         if comparison.conflicts:
-            workspace.put_aside(workspace.annotations_file)
+            put_aside(workspace.annotations_file)
         apply_in_place(cells, comparison.changes(replace=True))
         merged = annotations_from_cells(cells, skeleton)
         write_coco(workspace.annotations_file, merged, size)

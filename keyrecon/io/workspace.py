@@ -361,11 +361,6 @@ class Workspace:
             or (file.exists() and any(kept.samefile(file) for kept in self.kept_files()))
         )
 
-    def put_aside(self, file: Path) -> None:
-        """Keep a copy of a file that a person made, before it changes."""
-        number = len(list(self.folder.glob(f"{file.stem}.old-*{file.suffix}"))) + 1
-        write_durably(file.with_name(f"{file.stem}.old-{number}{file.suffix}"), file.read_bytes())
-
     def options(self, given: Record, defaults: Record, section: str | None = None) -> Record:
         """Options that this project has set, and on top of them what `given` sets otherwise.
 

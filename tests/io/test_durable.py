@@ -7,7 +7,7 @@ import pytest
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io import durable
-from keyrecon.io.durable import hold_lock, write_durably
+from keyrecon.io.durable import hold_lock, put_aside, write_durably
 
 
 def test_text_and_bytes_are_written_as_they_are(tmp_path):
@@ -43,6 +43,21 @@ def test_a_failed_write_leaves_the_old_content_and_nothing_else(tmp_path, monkey
         write_durably(tmp_path / "a.txt", "new")
     assert (tmp_path / "a.txt").read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_copies_put_aside_never_take_one_anothers_place(tmp_path):
+    def keep(content):
+        (tmp_path / "marks.json").write_text(content)
+        put_aside(tmp_path / "marks.json")
+
+    keep("first")
+    keep("second")
+    (tmp_path / "marks.old-1.json").unlink()
+    (tmp_path / "marks.old-mine.json").write_text("by hand")
+    keep("third")
+    keep("fourth")
+    kept = [(tmp_path / f"marks.old-{name}.json").read_text() for name in (2, 3, 4, "mine")]
+    assert kept == ["second", "third", "fourth", "by hand"]
 
 
 def test_where_no_lock_can_be_written_the_folder_is_named(tmp_path):

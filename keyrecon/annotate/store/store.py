@@ -31,7 +31,7 @@ from keyrecon.annotate.store.file_sync import FileSync, annotations_form, picks_
 from keyrecon.annotate.store.golf_files import clicks_form, marks_form
 from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
 from keyrecon.errors import KeyreconError
-from keyrecon.io.durable import hold_lock
+from keyrecon.io.durable import hold_lock, put_aside
 from keyrecon.io.workspace import Workspace
 from keyrecon.reading import reading
 from keyrecon.records import Annotations
@@ -213,7 +213,7 @@ class Store:
             role: Role = "fixed" if first else "edit"
             self._commit([Draft(f"file-{uuid.uuid4().hex}", "file", changes, role)])
         if changes and first and file.form.may_hold_more and not file.is_written():
-            self._workspace.put_aside(file.form.path)
+            put_aside(file.form.path)
         file.accept(self.state.cells)
 
     def _commit(
