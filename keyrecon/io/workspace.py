@@ -165,8 +165,9 @@ class Workspace:
 
     @property
     def is_golf(self) -> bool:
-        """Whether the project is one of a golf swing: begun as one, or with clicks for a fit."""
-        return self.project.get("kind") == GOLF or self.golf_clicks_file.is_file()
+        """Whether the project is one of a golf swing: begun or become one, or with its clicks."""
+        kind = read_project(self.project_file).get("kind")
+        return kind == GOLF or self.golf_clicks_file.is_file()
 
     def become_golf(self) -> None:
         """Make the project one of a golf swing, besides what it is."""

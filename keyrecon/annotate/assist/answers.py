@@ -70,7 +70,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
         ground_mark=partial(keep_ground_mark, workspace),
         ground_removal=partial(drop_ground_mark, workspace),
         field_of_view=partial(keep_field_of_view, workspace),
-        swing=partial(_describe_swing, workspace) if workspace.is_golf else None,
+        swing=partial(_describe_swing, workspace),
     )
 
 

@@ -209,9 +209,9 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
 
 
 def swing(session: Session, request: ApiRequest) -> Json:
-    """A golf swing: whether the clicks can be, and the last fit."""
+    """A golf swing: whether the clicks can be, and the last fit; nothing of another project."""
     describe, cells = session.assistant.swing, session.store.state.cells
-    if describe is None:
+    if describe is None or not session.workspace.is_golf:
         return {}
     values = (by_frame(cells, kind) for kind in ("golf", "click", "key"))
     description = describe(session.limits.size, *values)

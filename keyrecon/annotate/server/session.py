@@ -146,8 +146,9 @@ class ProjectWatch:
             self._session.events.publish({"project": True})
 
     def _file_stamps(self) -> list[int]:
-        """When keyframes and motion were made."""
-        files = (self._session.workspace.keyframes_file, self._session.workspace.motion_file)
+        """When the project's kind was told, and keyframes and motion were made."""
+        workspace = self._session.workspace
+        files = (workspace.project_file, workspace.keyframes_file, workspace.motion_file)
         return [_stamp(file) for file in files]
 
 

@@ -27,7 +27,7 @@ from keyrecon.annotate.store.cells import (
     resolve_changes,
 )
 from keyrecon.annotate.store.edits import AnyEdit, Limits, changes_of
-from keyrecon.annotate.store.file_sync import FileSync, annotations_form, picks_form
+from keyrecon.annotate.store.file_sync import FileForm, FileSync, annotations_form, picks_form
 from keyrecon.annotate.store.golf_files import clicks_form, marks_form
 from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
 from keyrecon.errors import KeyreconError
@@ -109,13 +109,26 @@ class Store:
                 self.state = advance(JournalState(), self._journal.entries())
                 check_cells(self.state.cells)
                 check_fit(self.state.cells, limits.skeleton, limits.n_frames)
-                forms = [annotations_form(workspace, limits), picks_form(workspace)]
-                if workspace.is_golf:
-                    forms += [clicks_form(workspace, limits), marks_form(workspace, limits)]
-                notes = [self._journal.note(form.path.name) for form in forms]
-                self._files = [FileSync(f, note) for f, note in zip(forms, notes, strict=True)]
+                self._files: list[FileSync] = []
+                self._show(annotations_form(workspace, limits), picks_form(workspace))
+                self._show_swing()
             self.refresh()
             self._held = held.pop_all()
+
+    def _show(self, *forms: FileForm) -> None:
+        """Have files show the state from now on."""
+        shown = {file.name for file in self._files}
+        self._files += [
+            FileSync(form, self._journal.note(form.path.name))
+            for form in forms
+            if form.path.name not in shown
+        ]
+
+    def _show_swing(self) -> None:
+        """The files of a golf swing, from the moment on at which the project is one."""
+        if self._workspace.is_golf:
+            forms = (form(self._workspace, self._limits) for form in (clicks_form, marks_form))
+            self._show(*forms)
 
     def annotations(self) -> Annotations:
         """The marks as the rest of keyrecon reads them."""
@@ -195,6 +208,7 @@ class Store:
         with self._lock, self._workspace.exclusive():
             before = self.state.revision
             try:
+                self._show_swing()
                 for file in self._files:
                     self._take_in(file)
                 entries = self._commit(draft(self.state), notes)

@@ -9,6 +9,7 @@ from keyrecon.annotate.store.journal import NotSaved
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks
 from keyrecon.io.formats.clicks import read_some_clicks, write_clicks
+from keyrecon.io.workspace import Workspace
 
 JOINTS = {
     "head_top": (60.0, 4.0), "root": (60.0, 30.0), "right_knee": (55.0, 45.0),
@@ -125,6 +126,28 @@ def test_a_project_of_another_kind_gets_no_golf_files(open_store, bare):
     (bare / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
     submit(open_store(), mark(9, "neck", [4, 5, 2]))
     assert not (bare / "golf_marks.json").exists()
+
+
+def test_a_project_that_becomes_a_swing_while_it_is_open_gets_its_files(open_store, bare):
+    (bare / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
+    store = open_store()
+    submit(store, mark(9, "neck", [4, 5, 2]))
+    Workspace(bare).become_golf()
+    click_all(store)
+    submit(store, shaft(9, [40, 21, 70, 5]))
+    assert read_some_clicks(bare / "golf_clicks.json").joints == JOINTS
+    marks = json.loads((bare / "golf_marks.json").read_text())
+    shown = {"frame": 9, "joints": {"neck": [4, 5]}, "shaft": [[40, 21], [70, 5]]}
+    assert marks["frames"] == [shown]
+    assert open_store().state.cells == store.state.cells
+
+
+def test_clicks_that_a_fit_brings_into_an_open_project_come_in(open_store, bare):
+    (bare / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
+    store = open_store()
+    write_clicks(bare / "golf_clicks.json", GolfClicks(3, (128, 64), JOINTS))
+    submit(store, golf("frame", 5, was=3))
+    assert read_some_clicks(bare / "golf_clicks.json") == GolfClicks(5, (128, 64), JOINTS)
 
 
 def test_a_whole_address_is_one_edit_that_is_taken_back_as_one(open_store, bare):
