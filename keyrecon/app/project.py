@@ -9,6 +9,8 @@ from keyrecon.annotate.store.cells import (
     apply_in_place,
     cells_from_annotations,
 )
+from keyrecon.annotate.store.edits import Limits
+from keyrecon.annotate.store.golf_files import marks_form
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
@@ -132,22 +134,29 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
 
 
 def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:
-    """Add marks from a file to the project's annotations."""
+    """Add marks from a file to the project's annotations, and to what a golf fit must hold."""
     video, skeleton = workspace.video(), workspace.skeleton
     size = (video.width, video.height)
     imported = read_annotations(file, skeleton, len(video), size)
+    swing = marks_form(workspace, Limits(skeleton, len(video), size))
     with workspace.exclusive():
+        files = [f for f in (workspace.annotations_file, swing.path) if f.is_file()]
         cells: Cells = {}
-        if workspace.annotations_file.is_file():
+        if workspace.annotations_file in files:
             cells = cells_from_annotations(load_annotations(workspace, video))
+        if swing.path in files:
+            cells |= swing.read(cells)
         comparison = compare_marks(cells, cells_from_annotations(imported))
         if comparison.conflicts and not replacing:
             raise _conflict_error(name_conflicts(comparison))
         if comparison.conflicts:
-            put_aside(workspace.annotations_file)
+            for changed in files:
+                put_aside(changed)
         apply_in_place(cells, comparison.changes(replace=True))
         merged = annotations_from_cells(cells, skeleton)
         write_coco(workspace.annotations_file, merged, size)
+        if swing.path in files:
+            write_durably(swing.path, swing.write(cells))
     warnings = [*joints_outside(merged, size), *implausible_bones(merged)]
     return "\n".join(
         [

@@ -1,0 +1,56 @@
+"""Marks of a file in a golf project: what a fit then holds."""
+
+import numpy as np
+import pytest
+
+from keyrecon.app.golf import kept_marks
+from keyrecon.app.project import import_annotations, load_annotations, start
+from keyrecon.body import LSP14
+from keyrecon.errors import KeyreconError
+from keyrecon.golf.records import SwingMarks
+from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.formats.golf_marks import write_golf_marks
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.records import Annotations
+
+SIZE = 128, 96
+WRIST, HIP = LSP14.index("left_wrist"), LSP14.index("left_hip")
+
+
+def joints_at(**places):
+    joints = np.full((1, len(LSP14.names), 2), np.nan)
+    for name, place in places.items():
+        joints[0, LSP14.index(name)] = place
+    return joints
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    """A swing with a wrist, a club and the top marked, and another wrist and a hip in a file."""
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * 12, 25.0)
+    start(tmp_path / "v.mp4", tmp_path / "p", golf=True)
+    marks = SwingMarks(
+        np.array([5]), joints_at(left_wrist=(60, 40)), np.full((1, 2, 2), 30.0),
+        np.array([np.nan, 5.5, np.nan, np.nan]),
+    )  # fmt: skip
+    write_golf_marks(tmp_path / "p" / "golf_marks.json", marks, SIZE)
+    joints, bones = joints_at(left_wrist=(70, 50), left_hip=(64, 60)), len(LSP14.bones)
+    seen, nearer = np.isfinite(joints[..., 0]), np.zeros((1, bones), np.int64)
+    file = Annotations(LSP14, np.array([5]), joints, seen, nearer)
+    write_coco(tmp_path / "marks.json", file, SIZE)
+    return Workspace(tmp_path / "p")
+
+
+def test_a_mark_that_a_file_replaces_is_the_one_that_a_fit_holds(workspace):
+    file = workspace.folder.parent / "marks.json"
+    with pytest.raises(KeyreconError, match=r"1 mark differs .*frame 5 left_wrist"):
+        import_annotations(workspace, file, replacing=False)
+    import_annotations(workspace, file, replacing=True)
+    held = kept_marks(workspace, workspace.video())
+    assert held.joints[0, WRIST].tolist() == [70, 50]
+    assert held.joints[0, HIP].tolist() == [64, 60]
+    assert np.isfinite(held.shafts).all() and held.keys[1] == 5.5
+    there = load_annotations(workspace, workspace.video())
+    assert there.joints[0, WRIST].tolist() == [70, 50]
+    assert "[60" in (workspace.folder / "golf_marks.old-1.json").read_text()
