@@ -63,11 +63,22 @@ test("while the server is gone edits are kept and tried again", async () => {
   trial.outbox.add(edit("b"));
   await rest();
   assert.deepEqual(trial.statuses.at(-1), ["unsaved", 2, "disk full"]);
-  assert.equal(await trial.outbox.drained(), false);
+  await assert.rejects(trial.outbox.inTurn(async () => "done"), Gone);
   gone = false;
   await trial.retry();
   assert.deepEqual(trial.outbox.waiting(), []);
   assert.deepEqual(trial.sent, [["a"], ["a", "b"]]);
+});
+
+test("what waits for its turn comes after earlier edits and before later ones", async () => {
+  const trial = createTrial(() => ({}));
+  trial.outbox.add(edit("a"));
+  trial.outbox.add(edit("b"));
+  const answer = trial.outbox.inTurn(async () => trial.sent.flat());
+  trial.outbox.add(edit("c"));
+  assert.deepEqual(await answer, ["a", "b"]);
+  await rest();
+  assert.deepEqual(trial.sent.flat(), ["a", "b", "c"]);
 });
 
 test("edits kept by a page that was closed are sent by the next one, oldest first", async () => {

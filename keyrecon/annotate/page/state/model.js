@@ -165,23 +165,31 @@ export async function createModel() {
 
   function takeBack(edit) {
     const back = inverse(edit);
-    takenBack.add(edit.id).add(back.id);
+    takenBack.add(back.id);
     model.edit(back);
     return edit;
   }
 
   // Undo belongs to the server, so that it survives a restart; while it is gone, edits that wait for it
-  // are taken back here.
+  // are taken back here. What is undone is the last edit at this moment: later ones are sent after it.
   async function step(direction) {
-    if (direction === "undo" && !(await outbox.drained())) {
-      const last = outbox.waiting().findLast(({ id }) => !takenBack.has(id));
-      if (last) return takeBack(last);
-    }
     const id = newId();
     sent.add(id);
-    const { changes, ...counts } = await api.send(direction, { id });
-    merge(counts, changes);
-    return changes.length ? editFromChange(changes[0]) : null;
+    const last =
+      direction === "undo" ? outbox.waiting().findLast((edit) => !takenBack.has(edit.id)) : null;
+    if (last) {
+      takenBack.add(last.id);
+      model.state = apply(model.state, inverse(last)); // edits made meanwhile are made without it
+      model.redraw();
+    }
+    try {
+      const { changes, ...counts } = await outbox.inTurn(() => api.send(direction, { id }));
+      merge(counts, changes);
+      return changes.length ? editFromChange(changes[0]) : null;
+    } catch (fault) {
+      if (!last || !(fault instanceof api.Gone)) throw fault;
+      return takeBack(last);
+    }
   }
   model.undo = () => step("undo");
   model.redo = () => step("redo");

@@ -32,7 +32,7 @@ export function pendingEdits(storage, project) {
 // "saving" | "unsaved", how many wait, and why), `delivered` (the answer and the edits that were sent),
 // `rejected` (an edit that the server will never take, and why).
 export function createOutbox({ send, pending, status, delivered, rejected, wait = setTimeout }) {
-  const drains = [];
+  const turns = []; // what waits for edits made before it: {ahead: how many, work, giveUp}
   let waiting = pending.all(),
     sending = false,
     failures = 0,
@@ -44,20 +44,33 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
   function report() {
     if (failures || (offline && !waiting.length)) status("unsaved", waiting.length, why);
     else status(waiting.length ? "saving" : "saved", waiting.length);
-    if (!waiting.length || failures || offline)
-      drains.splice(0).forEach((done) => done(!waiting.length));
+    if (failures || offline) turns.splice(0).forEach(({ giveUp }) => giveUp(new Gone(why)));
   }
 
   function forget(edits) {
     const ids = new Set(edits.map((edit) => edit.id));
     waiting = waiting.filter((edit) => !ids.has(edit.id));
+    for (const turn of turns) turn.ahead -= edits.length;
     pending.drop(ids);
   }
 
   async function flush() {
-    if (sending || !waiting.length) return;
+    if (sending) return;
+    if (turns[0]?.ahead === 0) await takeTurn();
+    else if (waiting.length) await sendBatch();
+    else return;
+    if (!failures) flush();
+  }
+
+  async function takeTurn() {
     sending = true;
-    const batch = waiting.slice(0, batchSize);
+    await turns.shift().work();
+    sending = false;
+  }
+
+  async function sendBatch() {
+    sending = true;
+    const batch = waiting.slice(0, Math.min(batchSize, turns[0]?.ahead ?? batchSize));
     try {
       const answer = await send(batch);
       failures = 0;
@@ -72,7 +85,6 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
       sending = false;
       report();
     }
-    if (!failures) flush();
   }
 
   function retry(fault) {
@@ -112,11 +124,14 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
       flush();
     },
     waiting: () => waiting,
-    // True once nothing waits any more, false when that may take long.
-    drained() {
-      const drained = new Promise((done) => drains.push(done));
-      report();
-      return drained;
+    // The answer of `work`, which is done once the edits made so far are on the disk and before any later
+    // one is sent; Gone where that may take long.
+    inTurn(work) {
+      return new Promise((done, giveUp) => {
+        turns.push({ ahead: waiting.length, work: () => work().then(done, giveUp), giveUp });
+        if (!failures) flush();
+        report();
+      });
     },
   };
 }

@@ -1,0 +1,84 @@
+// What the page knows while the server is slow, refuses, or another page was faster.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { placeJoint } from "../../../keyrecon/annotate/page/state/edits.js";
+import { createModel } from "../../../keyrecon/annotate/page/state/model.js";
+
+const PROJECT = { id: "p", joints: ["neck", "left_knee"], mirror: [], keyframes: [], has: {} };
+const rest = () => new Promise((done) => setTimeout(done, 5));
+
+// A page whose server answers edits as `answer(edits)` does, once `arrive()` is called.
+async function createTrial(answer) {
+  const trial = { received: [], waiting: [] };
+  const arrived = () => new Promise((done) => trial.waiting.push(done));
+  trial.arrive = async () => {
+    trial.waiting.splice(0).forEach((done) => done());
+    await rest();
+  };
+  const answers = {
+    "/api/project": () => PROJECT,
+    "/api/state": () => ({ revision: 0 }),
+    async "/api/edits"({ edits }) {
+      await arrived();
+      trial.received.push(...edits.map(({ joint }) => joint));
+      return { revision: 1, results: edits.map(answer) };
+    },
+    async "/api/undo"() {
+      await arrived();
+      const name = trial.received.at(-1);
+      trial.received.push("undo");
+      const change = { kind: "mark", frame: 3, joint: name, from: [1, 1, 2], to: null };
+      return { revision: 2, undo: 0, redo: 1, changes: [change] };
+    },
+  };
+  globalThis.localStorage = Object.create({
+    setItem: () => {},
+    getItem: () => null,
+    removeItem: () => {},
+  });
+  globalThis.requestAnimationFrame = (draw) => setTimeout(draw);
+  globalThis.fetch = async (path, { body } = {}) => {
+    const content = await answers[path](body && JSON.parse(body));
+    return { ok: true, status: 200, json: async () => structuredClone(content) };
+  };
+  return Object.assign(trial, { model: await createModel() });
+}
+
+const place = (model, joint, x) => model.edit(placeJoint(model.state, 3, joint, [x, 1, 2]));
+
+test("an edit made after an undo on a slow disk is not the one that is taken back", async () => {
+  const { model, arrive, received } = await createTrial(() => ({ ok: true }));
+  place(model, "neck", 1);
+  const undone = model.undo();
+  assert.deepEqual(model.marks(3), {});
+  place(model, "left_knee", 2);
+  for (let n = 0; n < 3; n++) await arrive();
+  assert.equal((await undone).joint, "neck");
+  assert.deepEqual(received, ["neck", "undo", "left_knee"]);
+  assert.deepEqual(model.marks(3), { left_knee: [2, 1, 2] });
+});
+
+test("a joint placed anew after an undo is placed where nothing is", async () => {
+  const sent = [];
+  const { model, arrive } = await createTrial((edit) => {
+    sent.push(edit);
+    return { ok: true };
+  });
+  place(model, "neck", 1);
+  model.undo();
+  place(model, "neck", 7);
+  for (let n = 0; n < 3; n++) await arrive();
+  assert.deepEqual(sent.at(-1).from, null);
+  assert.deepEqual(model.marks(3), { neck: [7, 1, 2] });
+});
+
+test("two undos on a slow disk take the last two edits back", async () => {
+  const { model, arrive, received } = await createTrial(() => ({ ok: true }));
+  place(model, "neck", 1);
+  place(model, "left_knee", 2);
+  model.undo();
+  model.undo();
+  assert.deepEqual(model.marks(3), {});
+  for (let n = 0; n < 4; n++) await arrive();
+  assert.deepEqual(received.slice(0, 4), ["neck", "left_knee", "undo", "undo"]);
+});
