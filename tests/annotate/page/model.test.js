@@ -82,3 +82,23 @@ test("two undos on a slow disk take the last two edits back", async () => {
   for (let n = 0; n < 4; n++) await arrive();
   assert.deepEqual(received.slice(0, 4), ["neck", "left_knee", "undo", "undo"]);
 });
+
+test("all edits for which another page was faster are offered, and what was refused is told", async () => {
+  const answers = {
+    neck: { ok: false, status: 409, current: {} },
+    left_knee: { ok: false, status: 400, error: "Frame 3 is outside." },
+  };
+  const { model, arrive, received } = await createTrial(({ joint }) => answers[joint]);
+  place(model, "neck", 1);
+  place(model, "neck", 2);
+  place(model, "left_knee", 3);
+  await arrive();
+  await arrive();
+  assert.match(model.notice.text, /Frame 3 is outside.*changed the same 2 places/);
+  answers.neck = { ok: true };
+  received.length = 0;
+  model.notice.offer.act();
+  for (let n = 0; n < 3; n++) await arrive();
+  assert.deepEqual(received, ["neck", "neck"]);
+  assert.deepEqual(model.marks(3), { neck: [2, 1, 2] });
+});

@@ -211,3 +211,15 @@ export function rebased(state, edit) {
       };
   }
 }
+
+// What a person is told of edits that the server did not take, {edit, error}, and those of them that can be
+// made anew because another page was faster; `earlier` are some that are still offered.
+export function describeRefused(failed, earlier = []) {
+  const wrong = new Set(failed.map(({ error }) => error).filter(Boolean)),
+    overruled = [...earlier, ...failed.filter(({ error }) => !error).map(({ edit }) => edit)],
+    parts = [...wrong].map((error) => `Not taken: ${error}`);
+  if (overruled.length === 1) parts.push("Another page changed the same place; its version was kept.");
+  if (overruled.length > 1)
+    parts.push(`Another page changed the same ${overruled.length} places; its versions were kept.`);
+  return { text: parts.join(" "), overruled };
+}

@@ -4,6 +4,7 @@ import * as api from "./api.js";
 import {
   apply,
   cellsOf,
+  describeRefused,
   editFromChange,
   emptyState,
   inverse,
@@ -74,10 +75,7 @@ export async function createModel() {
       model.redraw();
     },
     delivered,
-    rejected(edit, message) {
-      model.notify(`One edit was refused: ${message}`);
-      model.readState();
-    },
+    rejected: (edit, error) => yieldTo([{ edit, error }]),
   });
 
   model.readState = async () => {
@@ -125,16 +123,11 @@ export async function createModel() {
   }
 
   // Somebody else was faster, or the server does not take it: its version stays, ours is one click away.
-  async function yieldTo(failed) {
-    await model.readState();
-    const { edit, error } = failed.at(-1);
-    if (error) model.notify(`Not taken: ${error}`);
-    else {
-      model.notify("Another page changed the same place; its version was kept.", {
-        text: "Use mine",
-        act: () => model.edit(rebased(model.state, edit)),
-      });
-    }
+  function yieldTo(failed) {
+    const { text, overruled } = describeRefused(failed, model.notice?.offer?.overruled);
+    const act = () => overruled.forEach((edit) => model.edit(rebased(model.state, edit)));
+    model.notify(text, overruled.length ? { text: "Use mine", overruled, act } : null);
+    model.readState().catch(model.disconnected);
   }
 
   // Work begins with what is on the disk; a server that is gone says so itself.
