@@ -13,7 +13,7 @@ import { byId } from "./views/dom.js";
 import { createExports } from "./views/exports.js";
 import { createFiles } from "./views/files.js";
 import { createJoints } from "./views/joints.js";
-import { belongsTo, interpret, keyframeCommands } from "./views/keyboard.js";
+import { belongsTo, goesOn, interpret, keyframeCommands } from "./views/keyboard.js";
 import { SMALL_WIDTH, createKeyframePicture } from "./views/keyframe.js";
 import { createLists } from "./views/lists.js";
 import { createMotion } from "./views/motion.js";
@@ -156,6 +156,7 @@ document.addEventListener("keydown", (event) => {
   const key = interpret(event, ui.view);
   if (!key || belongsTo(event.target, event.key)) return;
   event.preventDefault();
+  if (event.repeat && !goesOn(key)) return;
   if (event.target.matches("input[type=text]")) event.target.blur(); // takes what was typed
   execute(commands[ui.view][key.action] ?? commands.any[key.action], key);
 });

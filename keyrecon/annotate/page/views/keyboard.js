@@ -136,6 +136,11 @@ function named(event) {
   return [...parts, letter].join("+");
 }
 
+const REPEATED = new Set(["undo", "redo", "keyframe", "joint", "scrub", "step", "nudge", "zoomBy"]);
+
+// Whether an action goes on while its key is held down; all others are done once.
+export const goesOn = ({ action }) => REPEATED.has(action);
+
 // {action, key, index, shift} of a key on a page, or null; the index is that of the key in its row.
 export function interpret(event, page) {
   const name = named(event);
