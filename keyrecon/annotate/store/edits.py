@@ -15,6 +15,8 @@ from keyrecon.errors import KeyreconError
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Frame = Annotated[int, Meta(ge=0, le=100_000_000)]
+Instant = int | float
+"""A frame, or between two as files have key postures."""
 Place = tuple[float, float, Literal[0, 1, 2]]
 Click = tuple[float, float, Literal[1, 2]]
 Shaft = tuple[float, float, float, float]
@@ -106,8 +108,8 @@ class KeyPostureEdit(Edit, frozen=True, tag="key"):
     """The frame of one of a swing's key postures."""
 
     name: Literal["start", "top", "hit", "finish"]
-    to: Frame | None
-    was: Frame | None = field(name="from")
+    to: Instant | None
+    was: Instant | None = field(name="from")
 
 
 class GolfEdit(Edit, frozen=True, tag="golf"):
@@ -262,7 +264,7 @@ def _check_golf(kind: str, name: str | int, value: Value, limits: Limits) -> Non
                 _check_place(end, limits.size, margin=1.0)
 
 
-def check_frame(frame: int, limits: Limits) -> None:
+def check_frame(frame: int | float, limits: Limits) -> None:
     """Raise KeyreconError for a frame that the video does not have."""
     if not 0 <= frame < limits.n_frames:
         raise KeyreconError(

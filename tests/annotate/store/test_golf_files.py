@@ -101,6 +101,16 @@ def test_marks_that_another_program_writes_come_in(open_store, bare):
     assert len(store.state.cells) == 5
 
 
+def test_a_key_posture_between_two_frames_is_moved_cleared_and_put_back(open_store, bare):
+    file = bare / "golf_marks.json"
+    file.write_text('{"keyrecon_golf_marks": 1, "size": [128, 64], "keys": {"top": 8.5}}')
+    store = open_store()
+    for was, to in ((8.5, 9), (9, 8.5), (8.5, None)):
+        assert submit(store, key_posture("top", to, was=was))[0]["ok"]
+        assert json.loads(file.read_text())["keys"] == ({"top": to} if to else {})
+    assert submit(store, key_posture("top", -0.5))[0]["status"] == 400
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
