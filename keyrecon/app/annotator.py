@@ -33,7 +33,6 @@ from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
-from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames
@@ -185,8 +184,7 @@ def _find_ground(folder: Path, _: dict[str, Any], progress: Progress) -> str:
 
 def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     """A golf fit; what the page shows in no other place is returned."""
-    model = read_motion_model(BUILT_IN_SWING_PRIOR)
-    summary = golf.fit_project(Workspace(folder), model, progress=progress)
+    summary = golf.fit_project(Workspace(folder), progress=progress)
     return "\n".join(line for line in summary.splitlines() if line.startswith("Note: "))
 
 

@@ -11,8 +11,9 @@ so that an interrupted fit goes on where it stopped, and one that is repeated is
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -43,6 +44,7 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
+from keyrecon.io.project_videos import relative_path
 from keyrecon.io.provenance import golf_evidence, note_fitted
 from keyrecon.io.video import Video, has_fingerprint, open_video
 from keyrecon.io.workspace import GOLF, Workspace
@@ -73,47 +75,89 @@ class GolfFit:
     """What was found of the film."""
 
 
+BUILT_IN = Path("built-in")
+"""How the prior is named that comes with keyrecon."""
+
+
+@dataclass(frozen=True)
+class GolfSettings:
+    """What is told of a fit; None leaves it as the project has it, or as it usually is."""
+
+    method: Literal["swing", "windows"] | None = None
+    """How the model is fitted."""
+    components: int | None = None
+    """Components of the prior used at most."""
+    prior: Path | None = None
+    """A swing prior of `keyrecon golf train`, or BUILT_IN."""
+
+    def over(self, options: GolfOptions, folder: Path) -> GolfOptions:
+        """The options of the project in a folder with what is told."""
+        components = options.fit.components if self.components is None else self.components
+        prior = options.prior if self.prior is None else relative_path(self.prior, folder)
+        return replace(
+            options,
+            method=options.method if self.method is None else self.method,
+            fit=replace(options.fit, components=components),
+            prior="" if self.prior == BUILT_IN else prior,
+        )
+
+
 def fit_file(
     video_file: Path,
     clicks_file: Path | None,
     folder: Path,
-    prior: Path = BUILT_IN_SWING_PRIOR,
-    slow_motion: float = 1.0,
+    slow_motion: float | None = None,
     force: bool = False,
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
+    told: GolfSettings = GolfSettings(),
 ) -> str:
     """Fit a swing in a project folder; returns what to print. `force` makes every stage again.
 
-    Without a file of clicks those are taken that the project has.
+    Without a file of clicks those are taken that the project has. What is `told` goes before
+    `options`, and these before what the project remembers.
     """
-    model = read_motion_model(prior)
-    video = open_video(video_file, slow_motion=slow_motion)
+    model = read_prior(told.over(options, folder), folder)
+    factor = 1.0 if slow_motion is None else slow_motion
+    video = open_video(video_file, slow_motion=factor)
     if clicks_file is not None:
-        check_evidence(read_clicks(clicks_file), video, model, slow_motion, str(clicks_file))
+        check_evidence(read_clicks(clicks_file), video, model, factor, str(clicks_file))
     else:
-        check_length(video, slow_motion)
-    check_options(options)
+        check_length(video, factor)
+    check_options(told.over(options, folder))
     workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
-    return fit_project(workspace, model, options, progress)
+    return fit_project(workspace, options, progress, told)
+
+
+def read_prior(options: GolfOptions, folder: Path) -> MotionModel:
+    """The prior of the project in a folder; KeyreconError tells how to name another."""
+    file = folder / options.prior if options.prior else BUILT_IN_SWING_PRIOR
+    if not file.is_file():
+        raise KeyreconError(
+            f"There is no swing prior at {file}; name the one to fit with: keyrecon golf fit VIDEO "
+            f"--out {quoted(folder)} --prior FILE ({BUILT_IN} for the one that keyrecon has)."
+        )
+    return read_motion_model(file)
 
 
 def fit_project(
     workspace: Workspace,
-    model: MotionModel,
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
+    told: GolfSettings = GolfSettings(),
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
     video, folder, evidence = workspace.video(), workspace.folder, golf_evidence(workspace)
     clicks = kept_clicks(workspace)
+    options = told.over(workspace.options(options, GolfOptions(), GOLF), folder)
+    model = read_prior(options, folder)
     slow_motion = workspace.project["video"].get("slow_motion", 1.0)
     check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
-    options = workspace.options(options, GolfOptions(), GOLF)
     video = hold_frames(video)
     marks = kept_marks(workspace, video)
-    fit = fit_video(video, clicks, model, options, workspace.stages.keep, progress, marks)
+    fitting = replace(options, prior="")  # stages know the prior by its content
+    fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     workspace.remember(options, GolfOptions(), GOLF)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
@@ -201,7 +245,7 @@ def open_golf_project(
     folder: Path,
     video: Video,
     clicks_file: Path | None,
-    slow_motion: float = 1.0,
+    slow_motion: float | None = None,
     force: bool = False,
 ) -> Workspace:
     """The project of a video in a folder, made if need be, with a copy of the clicks.
@@ -226,7 +270,7 @@ def open_golf_project(
     return Workspace(folder, force)
 
 
-def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) -> None:
+def _require_same_video(workspace: Workspace, video: Video, slow_motion: float | None) -> None:
     """Raises KeyreconError where a project is not one of this video with the usual joints."""
     folder, kept = workspace.folder, workspace.project["video"]
     if not has_fingerprint(video.path, kept["fingerprint"]):
@@ -240,7 +284,7 @@ def _require_same_video(workspace: Workspace, video: Video, slow_motion: float) 
             "another folder with --out."
         )
     earlier = kept.get("slow_motion", 1.0)
-    if slow_motion not in (1.0, earlier):
+    if slow_motion not in (None, earlier):
         raise KeyreconError(
             f"{folder} was made with --slowmo {earlier:g}; name another folder with --out for "
             f"--slowmo {slow_motion:g}."

@@ -13,12 +13,17 @@ from keyrecon.app import golf as golf_job
 from keyrecon.app import golf_comparing
 from keyrecon.app import golf_training as mocap_swings
 from keyrecon.app.console import show
-from keyrecon.commands.arguments import Files, MaybeFile, Project, Switch, VideoFile
-from keyrecon.golf.fit.fitting import FitOptions
+from keyrecon.commands.arguments import (
+    Files,
+    MaybeFile,
+    MaybeNumber,
+    MaybeWhole,
+    Project,
+    Switch,
+    VideoFile,
+)
 from keyrecon.golf.prior.training import TrainOptions
 from keyrecon.golf.prior.variation import VariationOptions
-from keyrecon.golf.swing_fit import GolfOptions
-from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR
 
 
 def train(
@@ -47,12 +52,12 @@ def fit(
     video: VideoFile,
     clicks: MaybeFile = None,
     out: Annotated[Path, arg(metavar="FOLDER")] = Path("swing"),
-    prior: Annotated[
-        Path, arg(metavar="FILE", help_behavior_hint="(default: built-in)")
-    ] = BUILT_IN_SWING_PRIOR,
-    slowmo: float = 1.0,
-    method: Literal["swing", "windows"] = "swing",
-    components: int = FitOptions().components,
+    prior: MaybeFile = None,
+    slowmo: MaybeNumber = None,
+    method: Annotated[
+        Literal["swing", "windows"] | None, arg(metavar="{swing,windows}", help_behavior_hint="")
+    ] = None,
+    components: MaybeWhole = None,
     force: Switch = False,
 ) -> None:
     """Fit the swing prior to a video of one swing, filmed from one place.
@@ -62,8 +67,9 @@ def fit(
     `keyrecon golf compare A B` sets two swings side by side.
 
     Without CLICKS those count that were made on the page, `keyrecon annotate OUT`: there a fit is
-    also looked at, put right and made again. CLICKS is a small JSON file: six joints of the player
-    in one frame, best at the address.
+    also looked at, put right and made again. The project keeps prior, method and components, which
+    count until others are told. CLICKS is a small JSON file: six joints of the player in one frame,
+    best at the address.
 
         {"keyrecon_golf_clicks": 1, "frame": 0, "size": [1280, 720],
          "stature": 1.80, "left_handed": false,
@@ -78,14 +84,14 @@ def fit(
         video: A whole swing, from the address to the finish.
         clicks: JSON file with a few joints clicked in one frame; without it those of the project.
         out: Project folder; made if need be.
-        prior: A swing prior of `keyrecon golf train`.
-        slowmo: How many times slower than life the video plays (240 fps shown at 30: 8).
-        method: 'swing' fits all frames at once, 'windows' slides over three as the paper does.
-        components: Components of the prior used at most; fewer keep nearer to its mean swing.
+        prior: A swing prior of `keyrecon golf train`, or the one that is built-in (default).
+        slowmo: How many times slower than life the video plays (240 fps at 30: 8).
+        method: 'swing' (default) fits all frames at once, 'windows' slides over three as the paper.
+        components: Components of the prior used at most (default: 40); fewer keep nearer its mean.
         force: Make every stage again.
     """
-    options = GolfOptions(method, fit=FitOptions(components))
-    print(golf_job.fit_file(video, clicks, out, prior, slowmo, force, options, show))
+    told = golf_job.GolfSettings(method, components, prior)
+    print(golf_job.fit_file(video, clicks, out, slowmo, force, progress=show, told=told))
 
 
 def compare(

@@ -47,6 +47,8 @@ class GolfOptions:
 
     method: Literal["swing", "windows"] = "swing"
     """'swing' fits all frames at once; 'windows' slides over three frames as in the paper."""
+    prior: str = ""
+    """File of the swing prior, as seen from the project's folder; without one the built-in."""
     observation: ObservationOptions = field(default_factory=ObservationOptions)
     """What is observed in the video."""
     fit: FitOptions = field(default_factory=FitOptions)
