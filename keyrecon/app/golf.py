@@ -306,10 +306,17 @@ def write_results(
     """Overlay, report and table, and last the motion, whose presence tells that all are written."""
     folder = workspace.folder
     reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
-    swing = record_swing(fit.fitted, fit.observations, reasons)
+    swing = record_swing(fit.fitted, fit.observations, reasons, fit.notes)
     write_golf_overlay(folder / OVERLAY_FILE, video, fit.fitted, fit.observations.camera, progress)
     write_golf_report(
-        workspace.report_file, fit.fitted, fit.observations, model, video, reasons, progress
+        workspace.report_file,
+        fit.fitted,
+        fit.observations,
+        model,
+        video,
+        reasons,
+        progress,
+        fit.notes,
     )
     write_golf_table(folder / TABLE_FILE, swing)
     write_swing(workspace.motion_file, swing)

@@ -282,3 +282,5 @@ class RecordedSwing:
     left_handed: bool
     doubts: tuple[str, ...] = ()
     """What speaks against the fit; its numbers are no measurements where anything does."""
+    notes: tuple[str, ...] = ()
+    """What a reader of its numbers should know of the film."""

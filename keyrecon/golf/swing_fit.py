@@ -184,12 +184,16 @@ def swing_found(
     video: Video,
     model: MotionModel,
 ) -> FoundSwing:
-    """A fitted film as a swing in every frame of the file, with the file's `marks` held."""
+    """A fitted film as a swing in every frame of the file, with the file's `marks` held.
+
+    Its times are seconds of the world, also where nobody told of the slow motion.
+    """
     film = observed.film
     doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
     notes = tuple(_describe_film(observed, len(video)))
     if not film.is_whole(video):
-        fitted = swing_in_file(fitted, observations, film, video.time, model)
+        time = video.time / observed.slow_motion
+        fitted = swing_in_file(fitted, observations, film, time, model)
         observations = replace(observations_in_file(observations, film), marks=marks)
     fitted = hold_joints(fitted, marks, observations.camera.focal)
     fitted = replace(fitted, keys=hold_keys(fitted.keys, marks))
@@ -203,8 +207,8 @@ def _describe_film(observed: ObservedSwing, frames: int) -> list[str]:
         notes.append(f"{film.repeated:.0%} of the frames repeat the one before")
     if observed.slow_motion > 1:
         notes.append(
-            f"the film seems slowed down {observed.slow_motion:.1f} times; give --slowmo if you "
-            "know better, since times and tempo in seconds depend on it"
+            f"the film seems slowed down {observed.slow_motion:.1f} times, and seconds are told "
+            "as they were without that; give --slowmo if you know better"
         )
     if film.shot != (0, frames - 1):
         notes.append(f"only frames {film.shot[0]} to {film.shot[1]} show the shot that was clicked")

@@ -113,7 +113,10 @@ AT = {
 
 
 def record_swing(
-    fitted: FittedSwing, observations: Observations, doubts: tuple[str, ...] = ()
+    fitted: FittedSwing,
+    observations: Observations,
+    doubts: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
 ) -> RecordedSwing:
     """What is kept of a fitted swing."""
     up = fitted.state.rotation[..., 1] * ([-1, 1, 1] if observations.left_handed else [1, 1, 1])
@@ -126,6 +129,7 @@ def record_swing(
         vertical=unit_vectors(up.mean(axis=0), 1e-9),
         left_handed=observations.left_handed,
         doubts=doubts,
+        notes=notes,
     )
 
 

@@ -82,9 +82,10 @@ def write_golf_report(
     video: Video,
     reasons: tuple[str, ...] = (),
     progress: Progress = silent,
+    notes: tuple[str, ...] = (),
 ) -> None:
     """Write the report of a swing to one HTML file; `reasons` are what speaks against the fit."""
-    swing = record_swing(fitted, observations, reasons)
+    swing = record_swing(fitted, observations, reasons, notes)
     measures = measure_swing(swing)
     body = "".join((
         _headline(swing, measures, video),
@@ -121,7 +122,8 @@ def _headline(swing: RecordedSwing, measures: SwingMeasures, video: Video) -> st
     return (
         f'<header><p class="kicker">keyrecon swing report</p><h1>{text(video.path.name)}</h1>'
         f'<p class="lead">{video.width} &times; {video.height} px, {len(video)} frames, '
-        f"{video.fps:.4g} per second, {hand}</p></header>"
+        f"{video.fps:.4g} per second, {hand}</p>"
+        f"{''.join(note(f'{text(t[0].upper() + t[1:])}.') for t in swing.notes)}</header>"
         f"{warning(swing.doubts)}{'' if swing.doubts else cards(measures)}"
     )
 

@@ -78,7 +78,7 @@ def find_window(video: Video, swing: RecordedSwing) -> SwingWindow:
 
 
 def cut_clip(video: Video, swing: RecordedSwing, progress: Progress = silent) -> SwingClip:
-    """The small video of a swing."""
+    """The small video of a swing, at the pace of its motion."""
     window = find_window(video, swing)
     width, height = window.right - window.left, window.bottom - window.top
     scale = min(1.0, CLIP_HEIGHT / height, CLIP_WIDTH / width)
@@ -89,7 +89,7 @@ def cut_clip(video: Video, swing: RecordedSwing, progress: Progress = silent) ->
     )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
-        write_video(path, pictures, video.fps, CLIP_QUALITY, SEEK_EVERY)
+        write_video(path, pictures, swing.motion.fps, CLIP_QUALITY, SEEK_EVERY)
         uri = video_uri(path.read_bytes())
     corner = np.array([window.left, window.top], float)
     return SwingClip(video.path.name, uri, size, corner, size[0] / width)

@@ -20,10 +20,13 @@ HEAD = ("measure", "posture", "frame", "time", "value", "doubt", "unit")
 
 
 def write_golf_table(path: Path, swing: RecordedSwing) -> None:
-    """Write all numbers; of a doubtful fit the lines on top say what speaks against it."""
+    """Write all numbers; the lines on top say what is told of the film, and what speaks against a
+    doubtful fit."""
     measures = measure_swing(swing)
     text = io.StringIO()
     text.write("# keyrecon golf swing; doubt is one standard deviation\n")
+    for told in swing.notes:
+        text.write(f"# {told}\n")
     for doubt in swing.doubts:
         text.write(f"# DOUBTFUL, these are no measurements: {doubt}\n")
     writer = csv.writer(text, lineterminator="\n")

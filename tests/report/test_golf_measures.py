@@ -1,5 +1,6 @@
 """What is measured of a body that turns, bends and moves by known amounts, and how surely."""
 
+import base64
 import csv
 from dataclasses import replace
 
@@ -15,9 +16,12 @@ from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import Camera, FittedSwing, RootPose, SwingState
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.formats.swing_file import read_swing, write_swing
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
 from keyrecon.records import Motion
 from keyrecon.report.golf_charts import align_frames
 from keyrecon.report.golf_measures import KEY_ERRORS, measure_swing, record_swing
+from keyrecon.report.golf_player import cut_clip
 from keyrecon.report.golf_table import write_golf_table
 
 FRAMES = 31
@@ -166,11 +170,12 @@ def test_frames_without_a_club_lower_the_share_found():
 
 
 def test_a_swing_survives_its_file(tmp_path):
-    swing = record_swing(still(), seen(left_handed=True), ("the top lies at the film's end",))
+    doubts, notes = ("the top lies at the film's end",), ("the film seems slowed down",)
+    swing = record_swing(still(), seen(left_handed=True), doubts, notes)
     write_swing(tmp_path / "motion.npz", swing)
     again = read_swing(tmp_path / "motion.npz")
     assert again.left_handed
-    assert again.doubts == swing.doubts
+    assert (again.doubts, again.notes) == (doubts, notes)
     for name in ("club", "club2d", "club_seen", "keys", "vertical"):
         np.testing.assert_array_equal(getattr(again, name), getattr(swing, name))
     assert read_motion(tmp_path / "motion.npz").fps == 30.0
@@ -183,9 +188,11 @@ def test_a_motion_that_is_no_swing_is_refused(tmp_path):
 
 
 def test_the_table_tells_every_number_with_its_doubt(tmp_path):
-    swing = record_swing(still(), seen(), ("the club was not seen",))
+    notes = ("the film seems slowed down 4.0 times",)
+    swing = record_swing(still(), seen(), ("the club was not seen",), notes)
     write_golf_table(tmp_path / "golf.csv", swing)
     lines = (tmp_path / "golf.csv").read_text().splitlines()
+    assert "# the film seems slowed down 4.0 times" in lines
     assert "# DOUBTFUL, these are no measurements: the club was not seen" in lines
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     tempo = next(row for row in rows if row["measure"] == "tempo")
@@ -194,6 +201,17 @@ def test_the_table_tells_every_number_with_its_doubt(tmp_path):
     frames = [row for row in rows if row["measure"] == "hip_turn" and not row["posture"]]
     assert len(frames) == FRAMES
     assert {"hands_x", "club_head_y", "spine_ahead", "head_lift"} <= {r["measure"] for r in rows}
+
+
+def test_the_clip_of_a_swing_goes_at_the_pace_of_its_motion(tmp_path):
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * FRAMES, 30.0)
+    fitted = still()
+    faster = replace(fitted.motion, fps=120.0, time=fitted.motion.time / 4)
+    swing = record_swing(replace(fitted, motion=faster), seen())
+    clip = cut_clip(open_video(tmp_path / "v.mp4"), swing)
+    content = base64.b64decode(clip.uri.partition("base64,")[2])
+    (tmp_path / "clip.mp4").write_bytes(content)
+    assert open_video(tmp_path / "clip.mp4").fps == pytest.approx(120.0, rel=0.01)
 
 
 def test_the_second_swing_is_shown_in_the_posture_of_the_first():

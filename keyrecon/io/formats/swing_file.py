@@ -4,7 +4,7 @@
     club_seen (T)                    where the club was detected; elsewhere it is the model's
     key_postures (4), key_posture_names     frames, not rounded: address, top, hit, finish
     vertical (3), left_handed        up in camera axes; which hand
-    doubts                           what speaks against the fit, one text each
+    doubts, notes                    what speaks against the fit, and is told of the film
 
 Any reader of motions reads it too.
 """
@@ -35,6 +35,7 @@ def write_swing(path: Path, swing: RecordedSwing) -> None:
             "vertical": swing.vertical,
             "left_handed": np.array(swing.left_handed),
             "doubts": np.array(swing.doubts, dtype=np.str_),
+            "notes": np.array(swing.notes, dtype=np.str_),
         },
     )
 
@@ -57,4 +58,5 @@ def read_swing(path: Path) -> RecordedSwing:
             vertical=data["vertical"].astype(float).reshape(3),
             left_handed=bool(data["left_handed"]),
             doubts=tuple(str(doubt) for doubt in data["doubts"]),
+            notes=tuple(str(note) for note in data.get("notes", ())),
         )

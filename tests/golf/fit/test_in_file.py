@@ -1,15 +1,21 @@
 """A swing that was fitted to a film, before the camera as it moved."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from keyrecon.golf.fit.in_file import swing_in_file
 from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observation import ObservedSwing
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, SwingFit, SwingState
+from keyrecon.golf.records import NO_MARKS, Camera, SwingFit, SwingState
+from keyrecon.golf.swing_fit import swing_found
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
 from keyrecon.numerics.geometry import warp_points
 from tests.support.golf_truth import camera_before, even_times, observe
 
@@ -33,6 +39,33 @@ def fitted():
     pose = fitted_pose(fit)
     observations = observe(find_joints(body, pose), find_club(body, pose), CAMERA, 0.0)
     return describe_fit(fit, observations, TIME), observations, model
+
+
+def film_as_it_is(time):
+    """A film of all frames of a file, whose camera stood still."""
+    place, whole = np.arange(FRAMES, dtype=float), (0, FRAMES - 1)
+    warps = np.tile(np.eye(3), (FRAMES, 1, 1))
+    return Film(
+        np.arange(FRAMES), time, place, warps, (720, 500), np.zeros(2), True, whole, 0.0, whole
+    )
+
+
+@pytest.mark.parametrize("still", [True, False])
+def test_times_are_those_of_the_world_in_slow_motion_that_nobody_told_of(fitted, still, tmp_path):
+    swing, observations, model = fitted
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * FRAMES, 30.0)
+    video = open_video(tmp_path / "v.mp4")
+    film = film_as_it_is(TIME / 4)
+    if not still:
+        film = replace(film, still=False, corner=CORNER)
+    motion = replace(swing.motion, time=TIME / 4, fps=120.0)
+    found = swing_found(
+        replace(swing, motion=motion), observations, (), ObservedSwing(film, 4.0, observations),
+        NO_MARKS, video, model,
+    )  # fmt: skip
+    assert found.fitted.motion.time == pytest.approx(video.time / 4, abs=1e-6)
+    assert found.fitted.motion.fps == pytest.approx(120.0)
+    assert "slowed down 4.0 times" in found.notes[0]
 
 
 def film_seen_by(back):
