@@ -10,7 +10,6 @@ from keyrecon.annotate.store.cells import (
     cells_from_annotations,
 )
 from keyrecon.annotate.store.edits import Limits
-from keyrecon.annotate.store.golf_files import marks_form
 from keyrecon.annotate.store.importing import compare_marks, name_conflicts
 from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
@@ -135,6 +134,8 @@ def add_picks(workspace: Workspace, picks: Sequence[Pick]) -> str:
 
 def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str:
     """Add marks from a file to the project's annotations, and to what a golf fit must hold."""
+    from keyrecon.annotate.store.golf_files import marks_form  # loads what golf needs
+
     video, skeleton = workspace.video(), workspace.skeleton
     size = (video.width, video.height)
     imported = read_annotations(file, skeleton, len(video), size)
