@@ -58,6 +58,7 @@ from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 CLICKS_FILE = "golf_clicks.json"
 OVERLAY_FILE, TABLE_FILE = "overlay.mp4", "golf.csv"
+KEYS = ("start", "top", "hit", "finish")
 SHORTEST_SWING = 0.7
 """Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take
 0.93 (21 + 7 frames at 30 a second: 0.7 + 0.23; Novosel & Garrity, Tour Tempo, 2004)."""
@@ -73,6 +74,8 @@ class GolfFit:
     """What speaks against it."""
     notes: tuple[str, ...] = ()
     """What was found of the film."""
+    shown: tuple[bool, bool, bool, bool] = (True, True, True, True)
+    """Which key postures it shows."""
 
 
 BUILT_IN = Path("built-in")
@@ -165,7 +168,7 @@ def fit_project(
     spent = time.perf_counter() - began
     return "\n".join(
         [
-            describe_tempo(record_swing(fit.fitted, fit.observations)),
+            describe_tempo(record_swing(fit.fitted, fit.observations, shown=fit.shown)),
             *(f"Note: {note}." for note in fit.notes),
             *describe_doubts(fit.doubts, folder),
             f"{folder}/motion.npz, golf.csv, overlay.mp4, report.html: {len(video)} frames, "
@@ -227,7 +230,7 @@ def fit_video(
     swing = find_swing(seen, camera, pose, model, options, keep, progress, own_marks)
     if clicks.left_handed:
         swing = keep("mirrored", mirror_found, swing, video.width)
-    return GolfFit(swing.fitted, swing.observations, swing.doubts, swing.notes)
+    return GolfFit(swing.fitted, swing.observations, swing.doubts, swing.notes, swing.shown)
 
 
 def check_length(video: Video, slow_motion: float) -> None:
@@ -306,17 +309,10 @@ def write_results(
     """Overlay, report and table, and last the motion, whose presence tells that all are written."""
     folder = workspace.folder
     reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
-    swing = record_swing(fit.fitted, fit.observations, reasons, fit.notes)
+    swing = record_swing(fit.fitted, fit.observations, reasons, fit.notes, fit.shown)
     write_golf_overlay(folder / OVERLAY_FILE, video, fit.fitted, fit.observations.camera, progress)
     write_golf_report(
-        workspace.report_file,
-        fit.fitted,
-        fit.observations,
-        model,
-        video,
-        reasons,
-        progress,
-        fit.notes,
+        workspace.report_file, swing, fit.fitted, fit.observations, model, video, progress
     )
     write_golf_table(folder / TABLE_FILE, swing)
     write_swing(workspace.motion_file, swing)
@@ -336,14 +332,17 @@ def describe_tempo(swing: RecordedSwing) -> str:
     start, top, hit, finish = swing.keys
     measures = measure_swing(swing)
     up, down, tempo = (measures.key(name) for name in ("upswing", "downswing", "tempo"))
-    events = (
-        f"tempo {tempo.value:.1f} : 1 (give or take {tempo.doubt:.1f})"
-        if np.isfinite(tempo.value)
-        else "no tempo"
-    )
+    pace = [f"{m.value:.2f} s {way}" for m, way in ((up, "up"), (down, "down"))]
+    pace.append(f"tempo {tempo.value:.1f} : 1 (give or take {tempo.doubt:.1f})")
+    known = [
+        text if np.isfinite(m.value) else f"no {m.name}"
+        for m, text in zip((up, down, tempo), pace, strict=True)
+    ]
+    missing = [name for name, shown in zip(KEYS, swing.shown, strict=True) if not shown]
+    not_shown = f" ({' and '.join(missing)} not shown)" if missing else ""
     return (
-        f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}; "
-        f"{up.value:.2f} s up, {down.value:.2f} s down, {events}."
+        f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}"
+        f"{not_shown}; {', '.join(known)}."
     )
 
 

@@ -42,9 +42,8 @@ def mirror_found(swing: FoundSwing, width: int) -> FoundSwing:
     observations = mirror_observations(swing.observations, width)
     observations = replace(observations, left_handed=not swing.observations.left_handed)
     fitted = _mirror_fitted(swing.fitted, width)
-    return FoundSwing(
-        fitted, observations, tuple(_mirror_doubt(d) for d in swing.doubts), swing.notes
-    )
+    doubts = tuple(_mirror_doubt(d) for d in swing.doubts)
+    return FoundSwing(fitted, observations, doubts, swing.notes, swing.shown)
 
 
 def _mirror_fitted(fitted: FittedSwing, width: int) -> FittedSwing:

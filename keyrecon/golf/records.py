@@ -284,3 +284,5 @@ class RecordedSwing:
     """What speaks against the fit; its numbers are no measurements where anything does."""
     notes: tuple[str, ...] = ()
     """What a reader of its numbers should know of the film."""
+    shown: tuple[bool, bool, bool, bool] = (True, True, True, True)
+    """Which key postures the film shows; where one is not, its frame only bounds it."""

@@ -32,7 +32,7 @@ from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, 
 from keyrecon.golf.observe.motion_timing import TimeShift
 from keyrecon.golf.observe.swing_events import SwingEventOptions, detect_swing_events
 from keyrecon.golf.observe.swing_timing import interpolate_times, order_keys
-from keyrecon.golf.plausibility import SwingDoubt
+from keyrecon.golf.plausibility import SwingDoubt, shown_keys
 from keyrecon.golf.prior.skeleton import mark_neck, size_body
 from keyrecon.golf.records import FittedSwing, MotionModel, Observations, SwingMarks, SwingState
 from keyrecon.io.video import Video
@@ -172,7 +172,9 @@ class FoundSwing:
     doubts: tuple[SwingDoubt, ...]
     """What speaks against it."""
     notes: tuple[str, ...]
-    """What was found of the film: slow motion, repeated frames, cuts."""
+    """What was found of the film: slow motion, repeated frames, cuts, what it does not show."""
+    shown: tuple[bool, bool, bool, bool]
+    """Which key postures the film shows, or a person marked."""
 
 
 def swing_found(
@@ -190,14 +192,33 @@ def swing_found(
     """
     film = observed.film
     doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
-    notes = tuple(_describe_film(observed, len(video)))
+    marked = np.isfinite(marks.keys).tolist()
+    seen = shown_keys(fitted.keys, len(film.numbers))
+    start, top, hit, finish = (one or other for one, other in zip(seen, marked, strict=True))
+    notes = (*_describe_film(observed, len(video)), *_describe_missing(start, finish))
     if not film.is_whole(video):
         time = video.time / observed.slow_motion
         fitted = swing_in_file(fitted, observations, film, time, model)
         observations = replace(observations_in_file(observations, film), marks=marks)
     fitted = hold_joints(fitted, marks, observations.camera.focal)
     fitted = replace(fitted, keys=hold_keys(fitted.keys, marks))
-    return FoundSwing(fitted, observations, doubts, notes)
+    return FoundSwing(fitted, observations, doubts, notes, (start, top, hit, finish))
+
+
+def _describe_missing(start: bool, finish: bool) -> list[str]:
+    """What the film does not show of a swing, and what cannot be told then, in words."""
+    notes = []
+    if not start:
+        notes.append(
+            "the start is not shown, since the film begins within the upswing: there is no tempo, "
+            "and nothing that is counted from the address"
+        )
+    if not finish:
+        notes.append(
+            "the finish is not shown, since the film ends in the follow-through: there are no "
+            "numbers of it"
+        )
+    return notes
 
 
 def _describe_film(observed: ObservedSwing, frames: int) -> list[str]:

@@ -117,6 +117,7 @@ def record_swing(
     observations: Observations,
     doubts: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
+    shown: tuple[bool, bool, bool, bool] = (True, True, True, True),
 ) -> RecordedSwing:
     """What is kept of a fitted swing."""
     up = fitted.state.rotation[..., 1] * ([-1, 1, 1] if observations.left_handed else [1, 1, 1])
@@ -130,11 +131,12 @@ def record_swing(
         left_handed=observations.left_handed,
         doubts=doubts,
         notes=notes,
+        shown=shown,
     )
 
 
 def measure_swing(swing: RecordedSwing) -> SwingMeasures:
-    """The numbers of a swing."""
+    """The numbers of a swing; NaN where they hang on a key posture that its film does not show."""
     curves = measure_curves(swing)
     keys = _measure_tempo(swing)
     for curve in curves:
@@ -162,6 +164,8 @@ def measure_curves(swing: RecordedSwing) -> tuple[Curve, ...]:
         "head_sway": centimetres * moved["head"] @ across,
         "head_lift": centimetres * moved["head"] @ up,
     }
+    if not swing.shown[0]:
+        values = {n: v if n in ABSOLUTE else np.full_like(v, np.nan) for n, v in values.items()}
     return tuple(
         Curve(name, *LABELS[name], of_name, _spread_errors(swing, MEASURE_ERRORS[name]))
         for name, of_name in values.items()
@@ -183,6 +187,8 @@ LABELS = {
     "head_lift": ("Head lift", "cm"),
 }  # fmt: skip
 """In words, and units."""
+ABSOLUTE = ("spine_ahead", "spine_aside")
+"""What is not counted from the address."""
 STATURE_OF_UNITS = 1.75
 """Metres of a body height, where a motion has no metres."""
 
@@ -196,7 +202,8 @@ def _measure_tempo(swing: RecordedSwing) -> list[KeyMeasure]:
     """Times of upswing and downswing, and their ratio."""
     time = swing.motion.time
     start, top, hit = np.interp(swing.keys[:3], np.arange(len(time)), time)
-    errors = key_time_errors(swing)
+    start = start if swing.shown[0] else np.nan
+    errors = np.where(swing.shown, key_time_errors(swing), np.nan)
     up, down = top - start, hit - top
     if down > 0:
         slopes = np.array([-1 / down, 1 / down + up / down**2, -up / down**2])
@@ -215,7 +222,7 @@ def _measure_key(swing: RecordedSwing, curve: Curve, posture: int) -> KeyMeasure
     """A curve's value at a key posture."""
     frames, time = np.arange(len(curve.values)), swing.motion.time
     moment = float(np.interp(swing.keys[posture], frames, time))
-    value = float(np.interp(moment, time, curve.values))
+    value = float(np.interp(moment, time, curve.values)) if swing.shown[posture] else np.nan
     around = moment + np.array([-RATE_WINDOW, RATE_WINDOW])
     around = np.clip(around, time[0], time[-1])
     before, after = np.interp(around, time, curve.values)
@@ -223,6 +230,7 @@ def _measure_key(swing: RecordedSwing, curve: Curve, posture: int) -> KeyMeasure
     doubt = float(
         np.hypot(MEASURE_ERRORS[curve.name][posture], rate * key_time_errors(swing)[posture])
     )
+    doubt = doubt if np.isfinite(value) else np.nan
     return KeyMeasure(
         curve.name, curve.label, KEY_NAMES[posture], float(swing.keys[posture]), value, doubt,
         curve.unit,

@@ -19,7 +19,7 @@ from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
 from keyrecon.report.charts import stack_charts, style_chart
 from keyrecon.report.golf_charts import curve_charts, follow_chart, plain_chart
-from keyrecon.report.golf_measures import KEY_NAMES, SwingMeasures, measure_swing, record_swing
+from keyrecon.report.golf_measures import KEY_NAMES, SwingMeasures, measure_swing
 from keyrecon.report.golf_pictures import key_pictures, overlay_strip, path_picture
 from keyrecon.report.golf_player import cut_clip, player
 from keyrecon.report.golf_tables import DOUBT_NOTE, cards, measure_table, warning
@@ -76,23 +76,21 @@ def style_bars(fitted: FittedSwing) -> go.Figure:
 
 def write_golf_report(
     path: Path,
+    swing: RecordedSwing,
     fitted: FittedSwing,
     observations: Observations,
     model: MotionModel,
     video: Video,
-    reasons: tuple[str, ...] = (),
     progress: Progress = silent,
-    notes: tuple[str, ...] = (),
 ) -> None:
-    """Write the report of a swing to one HTML file; `reasons` are what speaks against the fit."""
-    swing = record_swing(fitted, observations, reasons, notes)
+    """Write the report of a swing to one HTML file; a doubtful one has no numbers."""
     measures = measure_swing(swing)
     body = "".join((
         _headline(swing, measures, video),
         section("swing", "The swing", player([swing], [cut_clip(video, swing, progress)])),
-        "" if reasons else _numbers(measures),
-        _key_postures(fitted, observations, video),
-        "" if reasons else _curves(swing, measures),
+        "" if swing.doubts else _numbers(measures),
+        _key_postures(swing, fitted, observations, video),
+        "" if swing.doubts else _curves(swing, measures),
         _paths(fitted, observations, video),
         _strip(fitted, observations, video),
         _making(fitted, observations, model, measures),
@@ -135,13 +133,19 @@ def _numbers(measures: SwingMeasures) -> str:
     return section("numbers", "Numbers", about, both)
 
 
-def _key_postures(fitted: FittedSwing, observations: Observations, video: Video) -> str:
+def _key_postures(
+    swing: RecordedSwing, fitted: FittedSwing, observations: Observations, video: Video
+) -> str:
+    names = [
+        name if shown else f"{name} not shown"
+        for name, shown in zip(KEY_NAMES, swing.shown, strict=True)
+    ]
     stills = "".join(
         f'<div class="still">{_image(uri, f"{name}, frame {frame}")}'
         f"<span>{name} <small>frame {frame}</small></span>"
         f"{_image(above, f'{name} from above')}</div>"
         for name, (frame, uri, above) in zip(
-            KEY_NAMES, key_pictures(video, fitted, observations), strict=True
+            names, key_pictures(video, fitted, observations), strict=True
         )
     )
     about = note("The fitted body on the picture, and from above with the camera below.")

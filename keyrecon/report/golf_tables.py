@@ -34,7 +34,7 @@ def cards(measures: SwingMeasures) -> str:
     """The numbers that a coach asks first."""
     up, down, tempo = (measures.key(name) for name in ("upswing", "downswing", "tempo"))
     rows = [
-        ("Tempo", tempo, f"{up.value:.2f} s up, {down.value:.2f} s down"),
+        ("Tempo", tempo, f"{_plain(up)} s up, {_plain(down)} s down"),
         ("Shoulder turn", measures.key("shoulder_turn", "Top"), "at the top"),
         ("Hip turn", measures.key("hip_turn", "Top"), "at the top"),
         ("X-factor", measures.key("x_factor", "Top"), "at the top"),

@@ -10,7 +10,7 @@ from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.observe.motion_timing import TimeShift
-from keyrecon.golf.plausibility import find_doubts
+from keyrecon.golf.plausibility import find_doubts, shown_keys
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
@@ -149,3 +149,17 @@ def test_clicks_that_the_fit_is_not_near_are_told(played):
     assert find_doubts(fitted, clicked) == []
     aside = replace(observations, initial=InitialJoints(0, names, places + np.array([60.0, 0.0])))
     assert "clicked joints are 20% of the body height away" in texts(fitted, aside)
+
+
+@pytest.mark.parametrize(
+    ("keys", "frames", "shown"),
+    [
+        ((19.0, 36.8, 44.2, 57.0), 80, (True, True)),
+        ((0.0, 17.0, 25.7, 40.0), 45, (False, True)),  # begins within the upswing
+        ((3.5, 25.5, 34.9, 36.0), 41, (True, False)),  # ends right after the hit
+        ((3.5, 26.0, 34.8, 41.0), 46, (True, False)),  # ends in the follow-through
+        ((19.0, 36.8, 44.2, 78.5), 80, (True, False)),
+    ],
+)
+def test_a_film_that_begins_late_or_ends_early_does_not_show_the_whole_swing(keys, frames, shown):
+    assert shown_keys(np.array(keys), frames) == (shown[0], True, True, shown[1])

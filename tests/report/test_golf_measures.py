@@ -203,6 +203,24 @@ def test_the_table_tells_every_number_with_its_doubt(tmp_path):
     assert {"hands_x", "club_head_y", "spine_ahead", "head_lift"} <= {r["measure"] for r in rows}
 
 
+def test_what_the_film_does_not_show_has_no_numbers(tmp_path):
+    late = measure_swing(record_swing(still(), seen(), shown=(False, True, True, True)))
+    assert {key.name for key in late.keys if np.isfinite(key.value)} == {
+        "downswing", "spine_ahead", "spine_aside",
+    }  # fmt: skip
+    assert np.isnan(late.key("spine_ahead", "Address").value)
+    assert np.isfinite(late.key("spine_ahead", "Top").value)
+    assert np.isnan(late.curve("hip_turn").values).all()
+    swing = record_swing(still(), seen(), shown=(True, True, True, False))
+    early = measure_swing(swing)
+    unknown = [key for key in early.keys if not np.isfinite(key.value)]
+    assert {key.posture for key in unknown} == {"Finish"}
+    assert len(unknown) == sum(key.posture == "Finish" for key in early.keys)
+    assert all(np.isnan(key.doubt) for key in unknown)
+    write_swing(tmp_path / "motion.npz", swing)
+    assert read_swing(tmp_path / "motion.npz").shown == swing.shown
+
+
 def test_the_clip_of_a_swing_goes_at_the_pace_of_its_motion(tmp_path):
     write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * FRAMES, 30.0)
     fitted = still()

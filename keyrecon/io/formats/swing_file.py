@@ -3,6 +3,7 @@
     club3d (T,2,3), club2d (T,2,2)   grip and head, metres in camera axes and px
     club_seen (T)                    where the club was detected; elsewhere it is the model's
     key_postures (4), key_posture_names     frames, not rounded: address, top, hit, finish
+    key_postures_shown (4)           which of them the film shows
     vertical (3), left_handed        up in camera axes; which hand
     doubts, notes                    what speaks against the fit, and is told of the film
 
@@ -32,6 +33,7 @@ def write_swing(path: Path, swing: RecordedSwing) -> None:
             "club_seen": swing.club_seen,
             "key_postures": swing.keys,
             "key_posture_names": np.array(KEY_POSTURE_NAMES),
+            "key_postures_shown": np.array(swing.shown),
             "vertical": swing.vertical,
             "left_handed": np.array(swing.left_handed),
             "doubts": np.array(swing.doubts, dtype=np.str_),
@@ -59,4 +61,10 @@ def read_swing(path: Path) -> RecordedSwing:
             left_handed=bool(data["left_handed"]),
             doubts=tuple(str(doubt) for doubt in data["doubts"]),
             notes=tuple(str(note) for note in data.get("notes", ())),
+            shown=_shown(data.get("key_postures_shown", np.ones(4, bool))),
         )
+
+
+def _shown(stored: np.ndarray) -> tuple[bool, bool, bool, bool]:
+    address, top, hit, finish = (bool(one) for one in stored)
+    return address, top, hit, finish

@@ -68,6 +68,27 @@ def test_times_are_those_of_the_world_in_slow_motion_that_nobody_told_of(fitted,
     assert "slowed down 4.0 times" in found.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("marked", "shown"), [(np.nan, (False, True, True, False)), (0.0, (True, True, True, False))]
+)
+def test_a_posture_at_the_films_end_is_not_shown_unless_a_person_marked_it(
+    fitted, marked, shown, tmp_path
+):
+    swing, observations, model = fitted
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * FRAMES, 30.0)
+    film = film_as_it_is(TIME)
+    swing = replace(swing, keys=np.array([0.0, 5.0, 7.0, FRAMES - 1.0]))
+    marks = replace(NO_MARKS, keys=np.array([marked, np.nan, np.nan, np.nan]))
+    found = swing_found(
+        swing, observations, (), ObservedSwing(film, 1.0, observations), marks,
+        open_video(tmp_path / "v.mp4"), model,
+    )  # fmt: skip
+    assert found.shown == shown
+    told = "; ".join(found.notes)
+    assert "the finish is not shown" in told
+    assert ("the start is not shown" in told) == (not shown[0])
+
+
 def film_seen_by(back):
     """A film whose frames were warped from a file by the inverses of `back`."""
     place = np.arange(FRAMES, dtype=float)
