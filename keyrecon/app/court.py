@@ -1,6 +1,6 @@
 """`keyrecon court`: the camera of every frame from the tennis court in the picture."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,14 +39,16 @@ def calibrate(
     options: CalibrationOptions,
     progress: Progress,
     forget: Sequence[str] = (),
+    told: Collection[str] = (),
 ) -> str:
     """Find the court, write camera.npz and court.jpg; returns the text to show.
 
+    Options `told` by name count also where they are as usual.
     The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
     clicks are taken out first. New clicks that contradict the rest are not kept.
     """
     video = workspace.video()
-    options = workspace.options(options, CalibrationOptions(), COURT)
+    options = workspace.options(options, CalibrationOptions(), COURT, told)
     dropped = _forgotten(workspace.court_clicks(), forget)
     kept = [click for click in workspace.court_clicks() if click not in dropped]
     for click in clicks:

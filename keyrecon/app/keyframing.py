@@ -1,7 +1,7 @@
 """What `keyrecon keyframes` does to a project folder, and what it tells of the keyframes."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,14 +56,16 @@ def find_keyframes(
     chosen: KeyframeSettings,
     progress: Progress,
     printed: bool = False,
+    told: Collection[str] = (),
 ) -> str:
     """Run the automatic part; write keyframes.json and a picture of each keyframe.
 
+    Options `told` by dotted names count also where they are as usual.
     `printed` takes the forms that the paper prints. The project remembers its options without
     them, so that a run by the same forms finds the same stages, and one by ours is not bound.
     """
     choices = workspace.shot_choices()
-    options = with_chosen_shots(workspace.options(options, Options()), choices)
+    options = with_chosen_shots(workspace.options(options, Options(), told=told), choices)
     options = replace(options, keyframes=chosen.over(options.keyframes))
     check_options(options)
     forms = as_printed(options) if printed else options

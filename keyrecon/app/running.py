@@ -1,7 +1,7 @@
 """`keyrecon run`: from marks to motion and report, in a project folder."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,11 +23,19 @@ from keyrecon.report.page import write_report
 from keyrecon.uncertainty import describe_uncertainty
 
 
-def settings(workspace: Workspace, given: Options, height: float | None = None) -> Options:
-    """The project's options and what is told now, with the height in metres."""
+def settings(
+    workspace: Workspace,
+    given: Options,
+    height: float | None = None,
+    told: Collection[str] = (),
+) -> Options:
+    """The project's options and what is told now, with the height in metres.
+
+    Options `told` by dotted names count also where they are as usual.
+    """
     if height is not None and not 0.5 < height < 2.6:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
-    options = workspace.options(given, Options())
+    options = workspace.options(given, Options(), told=told)
     return options if height is None else with_height(options, height)
 
 

@@ -1,5 +1,7 @@
-"""How arguments that several commands share are shown in the help."""
+"""Arguments that several commands share: how the help shows them, and which were typed."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,3 +17,13 @@ MaybeNumber = Annotated[float | None, arg(metavar="FLOAT", help_behavior_hint=""
 MaybeFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 """Left out unless they are typed; what counts then stands in the help."""
 MaybeWorkers = Annotated[str | None, arg(metavar="N|ADDRESS", help_behavior_hint="")]
+
+
+def typed_options(words: Sequence[str]) -> frozenset[str]:
+    """Names of the options among words that were typed, with dots, as option records have them.
+
+    What is typed counts also where a project remembers another value and this is the usual one.
+    """
+    flags = (word[2:].partition("=")[0] for word in words if word.startswith("--"))
+    names = {flag.replace("-", "_") for flag in flags}
+    return frozenset(names | {re.sub(r"(^|\.)no_", r"\1", name) for name in names})

@@ -1,12 +1,13 @@
 """The command that calibrates the camera on a tennis court."""
 
+import sys
 from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from keyrecon.app.console import show
 from keyrecon.app.court import calibrate, court_click
-from keyrecon.commands.arguments import Project, Switch
+from keyrecon.commands.arguments import Project, Switch, typed_options
 from keyrecon.io.workspace import Workspace
 from keyrecon.world.calibration import CalibrationOptions
 
@@ -33,4 +34,5 @@ def court(
         force: Look for the court again.
     """
     clicks = [court_click(text) for text in point]
-    print(calibrate(Workspace(project, force), clicks, options, show, forget))
+    told = typed_options(sys.argv)
+    print(calibrate(Workspace(project, force), clicks, options, show, forget, told))

@@ -1,12 +1,20 @@
 """The commands that take the options of every stage."""
 
+import sys
 from typing import Annotated, Literal
 
 from tyro.conf import arg
 
 from keyrecon.app import keyframing, running
 from keyrecon.app.console import show
-from keyrecon.commands.arguments import MaybeNumber, MaybeWhole, MaybeWorkers, Project, Switch
+from keyrecon.commands.arguments import (
+    MaybeNumber,
+    MaybeWhole,
+    MaybeWorkers,
+    Project,
+    Switch,
+    typed_options,
+)
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
@@ -45,7 +53,8 @@ def keyframes(
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
     with open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
-        print(keyframing.find_keyframes(workspace, options, chosen, show, method == "paper"))
+        printed, told = method == "paper", typed_options(sys.argv)
+        print(keyframing.find_keyframes(workspace, options, chosen, show, printed, told))
 
 
 def run(
@@ -76,5 +85,5 @@ def run(
     """
     with open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
-        chosen = running.settings(workspace, options, height)
+        chosen = running.settings(workspace, options, height, typed_options(sys.argv))
         print(running.run(workspace, chosen, show, partial, printed=method == "paper"))

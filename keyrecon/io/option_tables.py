@@ -6,6 +6,7 @@ value where a number belongs is named in one line with what is allowed.
 """
 
 import types
+from collections.abc import Collection
 from dataclasses import Field, fields, replace
 from typing import (
     Annotated,
@@ -59,15 +60,18 @@ NUMBERS = {int: "a whole number", float: "a number", bool: "true or false", str:
 
 
 def changed_options(
-    options: OptionRecord, defaults: OptionRecord, prefix: str = ""
+    options: OptionRecord,
+    defaults: OptionRecord,
+    prefix: str = "",
+    told: Collection[str] = (),
 ) -> dict[str, Any]:
-    """Dotted names and values of the options that differ from the defaults."""
+    """Dotted names and values of the options that differ from the defaults, or were `told`."""
     changed: dict[str, Any] = {}
     for field in fields(options):
         value, default = getattr(options, field.name), getattr(defaults, field.name)
         if isinstance(value, OptionRecord):
-            changed |= changed_options(value, default, f"{prefix}{field.name}.")
-        elif value != default and value is not None:
+            changed |= changed_options(value, default, f"{prefix}{field.name}.", told)
+        elif value is not None and (value != default or prefix + field.name in told):
             changed[prefix + field.name] = value
     return changed
 
@@ -93,6 +97,15 @@ def flat_options(tables: object, prefix: str = "") -> dict[str, Any]:
         inside = isinstance(value, dict)
         flat |= flat_options(value, f"{prefix}{name}.") if inside else {prefix + name: value}
     return flat
+
+
+def table_of(tables: object, section: str | None, sections: Collection[str]) -> object:
+    """The options of a section, or of none of the `sections`; what is no table stays as it is."""
+    if not isinstance(tables, dict):
+        return tables
+    if section is not None:
+        return tables.get(section, {})
+    return {name: value for name, value in tables.items() if name not in sections}
 
 
 def former_names(name: str) -> list[str]:

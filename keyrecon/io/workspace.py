@@ -18,10 +18,9 @@
 What a person made is written durably and never replaced by something that does not parse.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
@@ -49,6 +48,7 @@ from keyrecon.io.option_tables import (
     check_options,
     flat_options,
     nested_tables,
+    table_of,
     with_changes,
     with_current_names,
 )
@@ -362,17 +362,22 @@ class Workspace:
             or (file.exists() and any(kept.samefile(file) for kept in self.kept_files()))
         )
 
-    def options(self, given: Record, defaults: Record, section: str | None = None) -> Record:
+    def options(
+        self,
+        given: Record,
+        defaults: Record,
+        section: str | None = None,
+        told: Collection[str] = (),
+    ) -> Record:
         """Options that this project has set, and on top of them what `given` sets otherwise.
 
-        `section` names the table of options that are not those of the pipeline.
+        `section` names a table of SECTIONS; what is `told`, by dotted names, counts also where it
+        is as usual.
         """
         check_options(given)
         table = with_current_names(self.project.get("options", {}))
-        if isinstance(table, dict):
-            table = table.get(section, {}) if section else _without_sections(table)
-        kept = with_changes(defaults, table)
-        return with_changes(kept, nested_tables(changed_options(given, defaults)))
+        kept = with_changes(defaults, table_of(table, section, SECTIONS))
+        return with_changes(kept, nested_tables(changed_options(given, defaults, told=told)))
 
     def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:
         """Keep the options that differ from the defaults; what else the file holds stays.
@@ -381,21 +386,13 @@ class Workspace:
         """
         check_options(options)
         kept = flat_options(with_current_names(self.project.get("options", {})))
-        changed = changed_options(options, defaults, f"{section}." if section else "")
-        others = {name: value for name, value in kept.items() if _section_of(name) != section}
+        prefix = f"{section}." if section else ""
+        changed = changed_options(options, defaults, prefix)
+        own = flat_options(table_of(nested_tables(kept), section, SECTIONS), prefix)
+        others = {name: value for name, value in kept.items() if name not in own}
         changed = others | changed
         if with_options(self.project_file, changed) == read_text(self.project_file):
             return
         with self.exclusive():
             write_durably(self.project_file, with_options(self.project_file, changed))
         self.project = read_project(self.project_file)
-
-
-def _section_of(name: str) -> str | None:
-    """The table that an option is in, by its dotted name; None for those of the pipeline."""
-    first = name.partition(".")[0]
-    return first if first in SECTIONS else None
-
-
-def _without_sections(options: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in options.items() if name not in SECTIONS}

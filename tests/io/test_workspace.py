@@ -4,6 +4,7 @@ import pytest
 
 from keyrecon import KeyreconError
 from keyrecon.app.running import settings
+from keyrecon.commands.arguments import typed_options
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
@@ -143,6 +144,10 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
     told = options(0.03, usual.reach)
     assert project.options(told, Options()) == options(0.03, 12)
     assert project.options(Options(), Options()) == options(0.05, 12)
+    typed = typed_options(["keyrecon", "--keyframes.reach=10", "--lift.no-x", "--a.b-c", "3"])
+    assert typed == {"keyframes.reach", "lift.no_x", "lift.x", "a.b_c"}
+    back = project.options(Options(), Options(), told=typed)
+    assert back == options(0.05, usual.reach)
 
 
 def test_the_athletes_height_is_remembered(project):
