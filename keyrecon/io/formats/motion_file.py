@@ -40,7 +40,10 @@ ABOUT = (
 """What else every file holds."""
 FRAME_NUMBERS = ("key_postures",)
 """Further arrays that hold numbers of frames."""
-NOT_BY_FRAME = ("key_posture_names", "vertical", "left_handed", "doubts", "origin")
+NOT_BY_FRAME = (
+    *("key_posture_names", "key_postures_shown", "vertical", "left_handed", "doubts", "notes"),
+    "origin",
+)
 """Further arrays that say one thing of the whole motion; all others have a row for every frame."""
 
 
