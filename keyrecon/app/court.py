@@ -43,7 +43,7 @@ def calibrate(
 ) -> str:
     """Find the court, write camera.npz and court.jpg; returns the text to show.
 
-    Options `told` by name count also where they are as usual.
+    Options `told` by dotted names count also where they are as usual.
     The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
     clicks are taken out first. New clicks that contradict the rest are not kept.
     """

@@ -34,5 +34,5 @@ def court(
         force: Look for the court again.
     """
     clicks = [court_click(text) for text in point]
-    told = typed_options(sys.argv)
+    told = {f"court.{name}" for name in typed_options(sys.argv)}
     print(calibrate(Workspace(project, force), clicks, options, show, forget, told))

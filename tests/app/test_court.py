@@ -7,13 +7,15 @@ import pytest
 from court_walker import court_camera, lifted, walk
 from painted_court import camera_at, paint
 
+from keyrecon import cli
 from keyrecon.app.court import calibrate, court_click, describe_camera
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
+from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.video_writer import write_video
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.world.calibration import CalibrationOptions
@@ -126,6 +128,20 @@ def test_how_lines_are_painted_is_remembered(filmed):
     calibrated(filmed)
     assert np.array_equal(read_camera(workspace.camera_file).t, to_middles.t)
     assert workspace.options(Options(), Options()) == Options()
+
+
+def test_a_width_that_is_typed_counts_also_where_it_is_the_usual_one(bare, monkeypatch):
+    counted, usual = [], CalibrationOptions()
+    narrow = CalibrationOptions(CourtOptions(line_width=0.03, baseline_width=0.05))
+    Workspace(bare).remember(narrow, usual, COURT)
+
+    def spy(workspace, clicks, options, progress, forget, told):
+        counted.append(workspace.options(options, usual, COURT, told))
+
+    monkeypatch.setattr(commands, "calibrate", spy)
+    monkeypatch.setattr("sys.argv", ["keyrecon", "court", str(bare), "--line-width", "0.05"])
+    cli.main()
+    assert counted == [CalibrationOptions(CourtOptions(line_width=0.05, baseline_width=0.05))]
 
 
 def test_a_click_that_contradicts_the_lines_is_named_and_not_kept(filmed):
