@@ -8,7 +8,7 @@ and its id makes sure that it counts once. Listeners are called with every accep
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from threading import RLock
 from typing import Any
@@ -125,10 +125,14 @@ class Store:
         ]
 
     def _show_swing(self) -> None:
-        """The files of a golf swing, from the moment on at which the project is one."""
-        if self._workspace.is_golf:
-            forms = (form(self._workspace, self._limits) for form in (clicks_form, marks_form))
-            self._show(*forms)
+        """The files of a golf swing, from the moment on at which the project is one.
+
+        A project.toml that somebody is just changing holds up no edit.
+        """
+        with suppress(KeyreconError):
+            if self._workspace.is_golf:
+                forms = (form(self._workspace, self._limits) for form in (clicks_form, marks_form))
+                self._show(*forms)
 
     def annotations(self) -> Annotations:
         """The marks as the rest of keyrecon reads them."""

@@ -152,6 +152,15 @@ def test_a_project_that_becomes_a_swing_while_it_is_open_gets_its_files(open_sto
     assert open_store().state.cells == store.state.cells
 
 
+def test_a_project_file_that_somebody_is_changing_holds_up_no_edit(open_store, bare):
+    store, file = open_store(), bare / "project.toml"
+    text = file.read_text()
+    file.write_text(text[:-5])
+    assert submit(store, mark(9, "neck", [4, 5, 2]))[0]["ok"]
+    file.write_text(text)
+    assert open_store().state.cells == {("mark", 9, "neck"): [4, 5, 2]}
+
+
 def test_clicks_that_a_fit_brings_into_an_open_project_come_in(open_store, bare):
     (bare / "project.toml").write_text('[video]\npath = "v.mp4"\nfingerprint = "x"\n')
     store = open_store()
