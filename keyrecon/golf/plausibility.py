@@ -19,6 +19,7 @@ from keyrecon.golf.fit.residuals import (
     sample_distance,
     sight_directions,
 )
+from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import UNKNOWN_SHIFT, TimeShift
 from keyrecon.golf.records import FittedSwing, Observations
 
@@ -132,15 +133,16 @@ def _doubt_order(fitted: FittedSwing) -> list[SwingDoubt]:
     return doubts
 
 
-def shown_keys(keys: Float[np.ndarray, "4"], frames: int) -> tuple[bool, bool, bool, bool]:
-    """Which key postures a film of so many frames shows.
+def shown_keys(keys: Float[np.ndarray, "4"], film: Film) -> tuple[bool, bool, bool, bool]:
+    """Which key postures, frames of the file, a film shows.
 
     One that begins within the upswing has its start in the first frame, and one that ends before
     the finish has it there or where hands are slow on the way. A top or hit at an end is a doubt.
     """
     start, top, hit, finish = keys.tolist()
-    ends = finish < frames - 1 - EDGE and finish - hit >= SHORTEST_FINISH * (hit - top)
-    return start > EDGE, True, True, ends
+    edge = EDGE * float(np.median(np.diff(film.numbers)))
+    ends = finish < film.window[1] - edge and finish - hit >= SHORTEST_FINISH * (hit - top)
+    return start > film.window[0] + edge, True, True, ends
 
 
 def _frame(fitted: FittedSwing, key: float) -> int:

@@ -193,7 +193,7 @@ def swing_found(
     film = observed.film
     doubts = tuple(replace(d, frame=film.frame_in_file(d.frame)) for d in doubts)
     marked = np.isfinite(marks.keys).tolist()
-    seen = shown_keys(fitted.keys, len(film.numbers))
+    seen = shown_keys(film.keys_in_file(fitted.keys), film)
     start, top, hit, finish = (one or other for one, other in zip(seen, marked, strict=True))
     notes = (*_describe_film(observed, len(video)), *_describe_missing(start, finish))
     if not film.is_whole(video):

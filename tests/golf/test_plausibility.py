@@ -9,6 +9,7 @@ from golf_truth import camera_before, even_times, observe
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
 from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import TimeShift
 from keyrecon.golf.plausibility import find_doubts, shown_keys
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
@@ -151,6 +152,16 @@ def test_clicks_that_the_fit_is_not_near_are_told(played):
     assert "clicked joints are 20% of the body height away" in texts(fitted, aside)
 
 
+def film_of(frames):
+    """A film of frames of a file, the first and last of which it shows."""
+    numbers, everywhere = np.arange(frames), np.tile(np.eye(3), (frames, 1, 1))
+    whole, size = (0, frames - 1), (720, 500)
+    return Film(
+        numbers, numbers / 30.0, numbers * 1.0, everywhere, size, np.zeros(2), True, whole, 0.0,
+        whole,
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("keys", "frames", "shown"),
     [
@@ -162,4 +173,12 @@ def test_clicks_that_the_fit_is_not_near_are_told(played):
     ],
 )
 def test_a_film_that_begins_late_or_ends_early_does_not_show_the_whole_swing(keys, frames, shown):
-    assert shown_keys(np.array(keys), frames) == (shown[0], True, True, shown[1])
+    assert shown_keys(np.array(keys), film_of(frames)) == (shown[0], True, True, shown[1])
+
+
+def test_a_finish_that_is_held_in_pictures_that_repeat_is_shown():
+    whole = film_of(60)
+    place = np.minimum(whole.place, 50.0)
+    held = replace(whole, numbers=whole.numbers[:51], time=whole.time[:51], place=place)
+    in_file = held.keys_in_file(np.array([10.0, 30.0, 38.0, 50.0]))
+    assert shown_keys(in_file, held) == (True, True, True, True)
