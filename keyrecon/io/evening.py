@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -23,6 +22,8 @@ def even_exposure(
     """A picture as it would be with an exposure of 1; `black` is how black is stored."""
     if exposure == 1.0:
         return picture
+    import cv2
+
     stored = np.arange(256.0)
     table = np.clip(np.rint(black + (stored - black) / exposure), 0, 255).astype(np.uint8)
     evened: UInt8[np.ndarray, "h w *c"] = cv2.LUT(np.ascontiguousarray(picture), table)
