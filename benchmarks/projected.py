@@ -1,17 +1,18 @@
 """The lift alone: joints of captured people projected, with errors like those of propagated ones.
 
-    python benchmarks/projected.py [--work DIR] [--mocap DIR] [--only NAME ...] [--other]
+    python benchmarks/projected.py [--work DIR] [--mocap DIR] [--only NAME ...] [--other] [--fps 25]
 
 Takes minutes where accuracy.py takes an hour, as nothing is drawn and nothing is looked for: the
 first 12 s of the sequences of `sequences.py`, seen by their cameras. Joints are off by .9 % of the
 player's height, which wanders within a quarter of a second, and by .3 % of noise, elbows and wrists
 by 1.4 times as much; scale by 1 %. 3 % of the frames are marked, at even distances, with the click
-noise of accuracy.py. The depth model has not learnt from the players of the table; `--other` takes
+noise of accuracy.py; with `--fps` as many a second, at another frame rate than 50. The depth model has not learnt from the players of the table; `--other` takes
 motion that is no tennis, and models without it. Prints PA-MPJPE and N-MPJPE, mm, and what a coach
 would read (`posture.py`), with depth signs from the person and without.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -31,7 +32,7 @@ from keyrecon.synthetic.clips import join_clips
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import read_mocap, set_stage
 
-SECONDS, MARKED = 12.0, 0.03
+SECONDS, MARKED, RATE = 12.0, 0.03, 50.0
 WANDERING, NOISE, WANDER_SECONDS, FREE_ARMS = 0.009, 0.003, 0.25, 1.4
 SCALE_ERROR = 0.01
 HIPS = [LSP14.index("right_hip"), LSP14.index("left_hip")]
@@ -67,7 +68,7 @@ def lift(sequence: Sequence, truth: Truth, model: DepthModel, signs: bool) -> np
     frames, fps = len(truth.points2d), sequence.fps
     rng = np.random.default_rng(sequence.seed)
     tall = float(np.median(truth.height_px))
-    count = max(round(MARKED * frames), 4)
+    count = max(round(MARKED * RATE / fps * frames), 4)
     marked = ((np.arange(count) + 0.5) / count * frames).astype(int)
     nearest = marked[np.abs(np.arange(frames)[:, None] - marked).argmin(axis=1)]
     even = HalfKeyframes(marked, nearest, np.ones(frames, bool), 1.0, 0.02, np.zeros(frames), count)
@@ -118,12 +119,14 @@ def main() -> None:
     parser.add_argument("--mocap", type=Path, default=DATA / "mocap")
     parser.add_argument("--only", nargs="*", help="names of sequences")
     parser.add_argument("--other", action="store_true", help="motion that is no tennis")
+    parser.add_argument("--fps", type=float, help="frames per second in place of a sequence's own")
     words = parser.parse_args()
     words.work.mkdir(parents=True, exist_ok=True)
     print(f"{'sequence':<22}{'told':<7}{'PA':>7}{'N':>7}{posture.COLUMNS}")
     table = [
         s for s in (OTHER if words.other else TENNIS) if not words.only or s.name in words.only
     ]
+    table = [replace(s, fps=words.fps or s.fps) for s in table]
     rows = np.array([measure(sequence, words.work, words.mocap) for sequence in table])
     for form, mean in zip(("signs", "none"), rows.mean(axis=0), strict=True):
         print(f"{'mean':<22}{form:<7}{mean[0]:7.1f}{mean[1]:7.1f}")
