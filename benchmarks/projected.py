@@ -96,9 +96,10 @@ def errors(frames: int, fps: float, rng: np.random.Generator) -> np.ndarray:
     return np.array(arms)[:, None] * (WANDERING * wander + NOISE * noise)
 
 
-def measure(sequence: Sequence, work: Path, mocap: Path) -> list[list[float]]:
+def measure(listed: Sequence, fps: float | None, work: Path, mocap: Path) -> list[list[float]]:
     """Print and give the scores of one sequence, with signs and without."""
-    truth, (_, model) = film(sequence, mocap), unseen_model(sequence, work, mocap)
+    (_, model), sequence = unseen_model(listed, work, mocap), replace(listed, fps=fps or listed.fps)
+    truth = film(sequence, mocap)
     known = {"points3d": truth.points3d, "joint_names": np.array(LSP14.names)}
     rows = []
     for signs in (True, False):
@@ -126,8 +127,7 @@ def main() -> None:
     table = [
         s for s in (OTHER if words.other else TENNIS) if not words.only or s.name in words.only
     ]
-    table = [replace(s, fps=words.fps or s.fps) for s in table]
-    rows = np.array([measure(sequence, words.work, words.mocap) for sequence in table])
+    rows = np.array([measure(listed, words.fps, words.work, words.mocap) for listed in table])
     for form, mean in zip(("signs", "none"), rows.mean(axis=0), strict=True):
         print(f"{'mean':<22}{form:<7}{mean[0]:7.1f}{mean[1]:7.1f}")
 
