@@ -101,7 +101,7 @@ class _ObservedLengths:
     group: Int[np.ndarray, "n"]
     frame: Int[np.ndarray, "n"]
 
-    def part(self, rows: slice) -> "_ObservedLengths":
+    def part(self, rows: Int[np.ndarray, "n"]) -> "_ObservedLengths":
         """Some of the observations."""
         values = (self.log_length, self.noise, self.group, self.frame)
         return _ObservedLengths(*(value[rows] for value in values))
@@ -283,8 +283,12 @@ class _Cost:
         return minimize(self, start, jac=True, method="L-BFGS-B")
 
     def thinned(self, most: int) -> "_Cost":
-        """The cost of so many observations at most, taken at even steps."""
-        rows = slice(None, None, -(-len(self.observations.frame) // most))
+        """The cost of so many observations at most, chosen by chance.
+
+        At even steps the same bones would be taken in every frame.
+        """
+        count = len(self.observations.frame)
+        rows = np.sort(np.random.default_rng(0).permutation(count)[:most])
         seen, blend = self.observations.part(rows), self.at_observation[rows]
         return replace(self, observations=seen, at_observation=blend)
 
