@@ -48,6 +48,7 @@ from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_
 from keyrecon.shot_groups import propagate_in_groups
 from keyrecon.timeline import (
     cut_motion,
+    end_at_cuts,
     join_frames,
     motion_in_file,
     part_of_marks,
@@ -143,6 +144,7 @@ def prepare(
         progress=progress,
         spread=spread_of(keep),
     )
+    distances = end_at_cuts(distances, followed.shots.joined())
     keyframes = keep(
         "keyframes",
         choose_keyframes,

@@ -233,8 +233,8 @@ class PoseDistances:
     exemplar_distance: Float[np.ndarray, "2 T"]
     """C between each frame and the one that stands for it, upper and lower body."""
     consecutive_distance: Float[np.ndarray, "2 S"]
-    """C between each frame and the next, upper and lower body; S is T - 1. NaN where frames between
-    the two were left out."""
+    """C between each frame and the next, upper and lower body; S is T - 1. NaN at cuts, and where
+    frames between the two were left out."""
     visibility_score: Float[np.ndarray, "T"]
     """0-1: how well a person could annotate each frame (tracked, not blurred)."""
     seen: Float[np.ndarray, "2 T"]

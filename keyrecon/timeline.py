@@ -130,6 +130,13 @@ def spread_edges(
     return tuple(spread)
 
 
+def end_at_cuts(distances: PoseDistances, shots: Shots) -> PoseDistances:
+    """Pose distances whose steps from one shot to the next are not known."""
+    steps = distances.consecutive_distance.copy()
+    steps[:, [first - 1 for first in shots.first[1:]]] = np.nan
+    return replace(distances, consecutive_distance=steps)
+
+
 def spread_distances(
     distances: PoseDistances, frames: Int[np.ndarray, "n"], count: int
 ) -> PoseDistances:
@@ -143,6 +150,7 @@ def spread_distances(
         usual = np.nanmedian(steps, axis=1, keepdims=True)
     follows = np.minimum(before[:-1], max(steps.shape[1] - 1, 0))
     both = known[:-1] & known[1:]
+    unknown = np.where(known[:-1] == known[1:], usual, np.nan)
     return PoseDistances(
         upper=distances.upper,
         lower=distances.lower,
@@ -151,7 +159,7 @@ def spread_distances(
         exemplar_distance=np.where(known, distances.exemplar_distance[:, before], farthest).astype(
             distances.exemplar_distance.dtype
         ),
-        consecutive_distance=np.where(both, steps[:, follows], usual).astype(steps.dtype),
+        consecutive_distance=np.where(both, steps[:, follows], unknown).astype(steps.dtype),
         visibility_score=np.where(known, distances.visibility_score[before], 0.0),
         seen=np.where(known, distances.seen[:, before], 0.0),
     )

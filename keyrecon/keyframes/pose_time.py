@@ -62,14 +62,17 @@ def pose_seconds(comparison: PoseDistances, fps: float) -> Float[np.ndarray, "T"
 
 def pose_change(comparison: PoseDistances, half: int, lag: int) -> Float[np.ndarray, "T"]:
     """Pose distance between `lag` frames before and after each frame, less the noise of a still
-    pose; player heights."""
+    pose; player heights. Frames that a cut or others left out lie between are not compared."""
     table = comparison.upper if half == 0 else comparison.lower
     frames = np.arange(len(comparison.row))
-    before, after = np.maximum(frames - lag, 0), np.minimum(frames + lag, len(frames) - 1)
+    begins = np.flatnonzero(np.append(True, np.isnan(comparison.consecutive_distance[half])))
+    run = np.searchsorted(begins, frames, side="right") - 1
+    before = np.maximum(frames - lag, begins[run])
+    after = np.minimum(frames + lag, np.append(begins[1:], len(frames))[run] - 1)
     row, apart = comparison.row, comparison.exemplar_distance[half]
     same = row[before] == row[after]
     distance = table[row[before], row[after]]
     distance = np.where(same, np.maximum(apart[before], apart[after]), distance).astype(float)
-    # at the ends the two are nearer in time
+    # at the ends of a shot the two are nearer in time
     distance *= 2 * lag / np.maximum(after - before, 1)
     return np.maximum(distance - np.quantile(distance, STILL_SHARE), 0.0)

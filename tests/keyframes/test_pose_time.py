@@ -9,6 +9,8 @@ from sporting_poses import comparison_of, sporting_poses
 from keyrecon.keyframes.coverage import TIME_UNIT
 from keyrecon.keyframes.pose_time import elapsed_time, pose_change
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
+from keyrecon.records import Shots
+from keyrecon.timeline import end_at_cuts
 
 STROKES = np.concatenate([np.arange(120, 140), np.arange(420, 440)])
 
@@ -91,3 +93,12 @@ def test_the_printed_choice_counts_frames_alone():
     for other in chosen[1:]:
         assert np.array_equal(other.upper.frames, chosen[0].upper.frames)
         assert other.upper.beta == chosen[0].upper.beta
+
+
+def test_a_cut_is_no_motion():
+    """Two shots in which nobody moves, seen from two sides."""
+    poses = np.repeat([[0.0, 0.0], [0.1, 0.0]], 150, axis=0)
+    whole = comparison_of(poses)
+    time = np.diff(elapsed_time(end_at_cuts(whole, Shots.between((150,), 300)), 0, 10, 0.35))
+    assert (time == TIME_UNIT).all()
+    assert np.diff(elapsed_time(whole, 0, 10, 0.35)).max() > 10 * TIME_UNIT
