@@ -91,11 +91,15 @@ def _chunks(shots: Shots) -> Iterator[tuple[int, int, slice]]:
 def _smoothed_joints(
     observed: PreparedTracks, marks: KeyframeMarks, shots: Shots, fps: float
 ) -> Float[np.ndarray, "T J 2"]:
-    """Joints of all frames, smoothed; marked ones as they were marked."""
+    """Joints of all frames, smoothed; marked ones as they were marked. NaN in shots in which a
+    joint is never seen."""
     sigma = _SMOOTHING_SECONDS * fps
-    joints = shots.in_each(
-        lambda part: smooth_joints(part, np.zeros_like(part), sigma), observed.joints
-    )
+
+    def smoothed(part: Float[np.ndarray, "T J 2"]) -> Float[np.ndarray, "T J 2"]:
+        seen = np.isfinite(part).all(axis=2).any(axis=0)
+        return np.where(seen[:, None], smooth_joints(part, np.zeros_like(part), sigma), np.nan)
+
+    joints = shots.in_each(smoothed, observed.joints)
     marked = observed.joints[marks.frames]
     joints[marks.frames] = np.where(marks.marked[..., None], marked, joints[marks.frames])
     return joints

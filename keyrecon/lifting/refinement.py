@@ -38,6 +38,14 @@ _HIPS_ALONG_SPINE = 0.95
 """Part of the bones from neck to hips that goes along the spine: trunk over neck to hip of
 `keyrecon.body.MARKED_LENGTHS`."""
 
+RATE, WHOLE_RATE = 50.0, 25.0
+"""Frames per second for which accelerations are given, and at which each frame counts whole in what
+holds the trunk together, in the key poses and in smoothness: at any other rate these count as much
+per second, as the tracks do. Lifts of eight projected motions (`benchmarks/projected.py`), PA-MPJPE
+with signs and without, mm, and peak hand speed: at 50 frames a second 36.5, 39.4 and .89, with each
+frame whole 36.9, 41.3 and .86; with a quarter of the weight three were better without signs and two
+of them worse with. At 120 (three of them) 36.1, 38.1, .83; with each frame whole 43.2, 47.6, .66;
+with twice the weight 36.5, 39.7, .78."""
 MAX_ACCELERATION = 0.05
 """Second difference over 1/50 s beyond which a bone's end in the tracks has jumped, body heights:
 210 m/s^2. The fastest of captured strokes and serves have 0.04."""
@@ -149,14 +157,15 @@ def refine_motion(
     is what a depth model expects, as shares of the bones' lengths, NaN where it expects nothing.
     """
     recipe = [terms.reprojection(observed, size.lengths, size.skeleton)]
-    recipe += _trunk_terms(size, options)
+    weight = WHOLE_RATE / fps
+    recipe += _trunk_terms(size, weight, options)
     recipe += _balance_terms(start, size, fps, options)
     recipe += _bend_terms(start, size, fps, options)
-    recipe.append(terms.key_pose_prior(initial, options.key_spread))
+    recipe.append(terms.key_pose_prior(initial, options.key_spread, weight))
     if expected_depth is not None:
         tilted = tilted_as(expected_depth, start.directions)
-        weight = 1 / max(options.expectation * fps, 1.0)
-        recipe.append(terms.depth_prior(tilted, depth_spread(size.skeleton), weight))
+        share = 1 / max(options.expectation * fps, 1.0)
+        recipe.append(terms.depth_prior(tilted, depth_spread(size.skeleton), share))
     smoothness = _smoothness(observed, size, fps, options)
     return solve(start, recipe, smoothness, options.rounds, options.tolerance)
 
@@ -184,9 +193,10 @@ def descend_motion(
     return MotionState(valid[:, root, :2], unit_vectors(bone_vectors(valid, skeleton)))
 
 
-def _trunk_terms(size: BodySize, options: RefineOptions) -> list[terms.Term]:
+def _trunk_terms(size: BodySize, weight: float, options: RefineOptions) -> list[terms.Term]:
     """What holds the trunk together: breadths, and the head above it."""
-    lengths, skeleton, spread = size.lengths, size.skeleton, options.breadth_spread
+    lengths, skeleton = size.lengths, size.skeleton
+    spread = options.breadth_spread / np.sqrt(weight)
     recipe = [
         terms.breadth(pair.left, pair.right, float(length), spread, lengths, skeleton)
         for pair, length in zip(skeleton.breadths, size.breadths, strict=True)
@@ -197,7 +207,7 @@ def _trunk_terms(size: BodySize, options: RefineOptions) -> list[terms.Term]:
             share = np.zeros(len(lengths))
             share[list(anatomy.trunk[:2])] = 0.5 / _HIPS_ALONG_SPINE
             share[list(limb.bones)] = 1.0
-            recipe.append(terms.alignment(share, options.head_spread))
+            recipe.append(terms.alignment(share, options.head_spread / np.sqrt(weight)))
     return recipe
 
 
@@ -248,7 +258,7 @@ def _smoothness(
     nothing, the scale alone is taken over. In the picture, too, nothing is held stiffer than a bone
     at rest: what tracks are off would else be explained by depth (knees bent by 4 degrees more).
     """
-    lengths, step = size.lengths, 50.0 / fps
+    lengths, step = size.lengths, RATE / fps
     usual = (options.acceleration * step**2) ** 2
     seen = np.diff(bone_vectors(observed.joints, size.skeleton), 2, axis=0)
     jump = np.linalg.norm(seen, axis=-1, keepdims=True) > MAX_ACCELERATION * step**2
@@ -270,8 +280,10 @@ def _smoothness(
     flat = usual + (1 - trust) * excess
     variance = np.concatenate([flat, flat, usual + options.depth_freedom * excess], axis=-1)
     expected = np.concatenate([trust * seen, np.zeros_like(excess)], axis=-1)
-    root = 1 / (options.root_acceleration * step**2) ** 2
-    return Smoothness(root, lengths[:, None] ** 2 / variance, expected / lengths[:, None])
+    share = WHOLE_RATE / fps
+    root = share / (options.root_acceleration * step**2) ** 2
+    weight = share * lengths[:, None] ** 2 / variance
+    return Smoothness(root, weight, expected / lengths[:, None])
 
 
 def _median_size(seen: Float[np.ndarray, "S B 2"]) -> Float[np.ndarray, "B 1"]:

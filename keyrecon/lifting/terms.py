@@ -91,8 +91,8 @@ def balance(share: Float[np.ndarray, "B"], tilt: float, spread: float) -> Term:
     return term
 
 
-def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Term:
-    """Bone directions stay near those of the slerped key poses.
+def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float, weight: float) -> Term:
+    """Bone directions stay near those of the slerped key poses; `weight` is that of one frame.
 
     Quadratic within `spread`, linear beyond (pseudo-Huber), so a pose that does not fit lets go.
     """
@@ -105,10 +105,10 @@ def key_pose_prior(directions: Float[np.ndarray, "T B 3"], spread: float) -> Ter
         frames = len(directions)
         off = (state.directions - directions) / spread
         size = np.sqrt(1 + (off**2).sum(axis=-1, keepdims=True))
-        weight = 1 / np.sqrt(size)
-        by_direction = (weight[..., None, None] * identity).reshape(frames, -1, bones, 3)
-        cost = float((size - 1).sum())
-        return LinearizedTerm((weight * off).reshape(frames, -1), by_direction, None, cost)
+        root = np.sqrt(weight / size)
+        by_direction = (root[..., None, None] * identity).reshape(frames, -1, bones, 3)
+        cost = weight * float((size - 1).sum())
+        return LinearizedTerm((root * off).reshape(frames, -1), by_direction, None, cost)
 
     return term
 

@@ -159,7 +159,7 @@ def test_slopes_agree_with_finite_differences(name):
 
 def test_the_pull_to_key_poses_is_the_slope_of_its_cost():
     state, wanted = smooth_state(3), smooth_state(3, seed=8).directions
-    term, step = terms.key_pose_prior(wanted, 0.4), 1e-6
+    term, step = terms.key_pose_prior(wanted, 0.4, 0.7), 1e-6
     line = term(state)
     slope = np.einsum("tm,tmbi->tbi", line.residual, line.by_direction)
     for bone in (0, 7):
