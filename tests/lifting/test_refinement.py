@@ -317,6 +317,21 @@ def test_a_stroke_keeps_its_speed_and_rest_stays_still():
     assert np.abs(rest).max() < 0.002
 
 
+def test_a_stroke_that_the_key_poses_miss_is_as_right_at_any_frame_rate():
+    """The same stroke, tracked as surely per second, from a pose that is held throughout."""
+    off, wrist = [], LSP14.index("right_wrist")
+    for fps in (25.0, 50.0, 200.0):
+        frames = round(2.4 * fps)
+        truth = swinging_arm(frames, fps)
+        observed = known(positions(truth)[..., :2], 0.009 * np.sqrt(0.15 * fps))
+        held = np.repeat(truth.directions[:1], frames, axis=0)
+        size = BodySize(LSP14, LENGTHS, np.array([0.145, 0.258]), np.full(frames, 400.0))
+        found = refine_motion(truth, observed, held, size, fps)
+        away = np.linalg.norm(positions(found) - positions(truth), axis=2)[frames // 2 :, wrist]
+        off.append(away.mean())
+    assert max(off) < 1.35 * min(off)
+
+
 def test_a_depth_prior_turns_a_bone_to_where_it_is_expected_and_nothing_else():
     state = smooth_state(5)
     shares = np.full((5, 13), np.nan)
