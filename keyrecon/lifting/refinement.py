@@ -38,14 +38,14 @@ _HIPS_ALONG_SPINE = 0.95
 """Part of the bones from neck to hips that goes along the spine: trunk over neck to hip of
 `keyrecon.body.MARKED_LENGTHS`."""
 
-RATE, WHOLE_RATE = 50.0, 25.0
-"""Frames per second for which accelerations are given, and at which each frame counts whole in what
-holds the trunk together, in the key poses and in smoothness: at any other rate these count as much
-per second, as the tracks do. Lifts of eight projected motions (`benchmarks/projected.py`), PA-MPJPE
-with signs and without, mm, and peak hand speed: at 50 frames a second 36.5, 39.4 and .89, with each
-frame whole 36.9, 41.3 and .86; with a quarter of the weight three were better without signs and two
-of them worse with. At 120 (three of them) 36.1, 38.1, .83; with each frame whole 43.2, 47.6, .66;
-with twice the weight 36.5, 39.7, .78."""
+RATE = 50.0
+"""Frames per second for which accelerations are given, and beyond which a frame counts less in what
+holds the trunk together, in the key poses and in smoothness, so that these count as much per second
+as the tracks do. Three motions projected at 120 frames a second (`benchmarks/projected.py --fps`),
+PA-MPJPE with signs and without, mm, and peak hand speed: 36.5, 39.7 and .78, with every frame whole
+43.2, 47.6 and .66; with half of the weight 36.1, 38.1 and .83, but of rendered ones at 50, whose
+tracks are worse, 34.2 in place of 33.3 and 50.1 in place of 47.0. At 25 every frame counts whole:
+eight projected motions 36.3, 39.4 and .88, with twice the weight 36.8, 41.7 and .83."""
 MAX_ACCELERATION = 0.05
 """Second difference over 1/50 s beyond which a bone's end in the tracks has jumped, body heights:
 210 m/s^2. The fastest of captured strokes and serves have 0.04."""
@@ -157,7 +157,7 @@ def refine_motion(
     is what a depth model expects, as shares of the bones' lengths, NaN where it expects nothing.
     """
     recipe = [terms.reprojection(observed, size.lengths, size.skeleton)]
-    weight = WHOLE_RATE / fps
+    weight = _frame_weight(fps)
     recipe += _trunk_terms(size, weight, options)
     recipe += _balance_terms(start, size, fps, options)
     recipe += _bend_terms(start, size, fps, options)
@@ -191,6 +191,11 @@ def descend_motion(
     )
     valid = lengths(fitted)
     return MotionState(valid[:, root, :2], unit_vectors(bone_vectors(valid, skeleton)))
+
+
+def _frame_weight(fps: float) -> float:
+    """What a frame counts of terms that are given for `RATE`."""
+    return min(1.0, RATE / fps)
 
 
 def _trunk_terms(size: BodySize, weight: float, options: RefineOptions) -> list[terms.Term]:
@@ -280,7 +285,7 @@ def _smoothness(
     flat = usual + (1 - trust) * excess
     variance = np.concatenate([flat, flat, usual + options.depth_freedom * excess], axis=-1)
     expected = np.concatenate([trust * seen, np.zeros_like(excess)], axis=-1)
-    share = WHOLE_RATE / fps
+    share = _frame_weight(fps)
     root = share / (options.root_acceleration * step**2) ** 2
     weight = share * lengths[:, None] ** 2 / variance
     return Smoothness(root, weight, expected / lengths[:, None])
