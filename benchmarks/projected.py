@@ -6,9 +6,10 @@ Takes minutes where accuracy.py takes an hour, as nothing is drawn and nothing i
 first 12 s of the sequences of `sequences.py`, seen by their cameras. Joints are off by .9 % of the
 player's height, which wanders within a quarter of a second, and by .3 % of noise, elbows and wrists
 by 1.4 times as much; scale by 1 %. 3 % of the frames are marked, at even distances, with the click
-noise of accuracy.py; with `--fps` as many a second, at another frame rate than 50. The depth model has not learnt from the players of the table; `--other` takes
-motion that is no tennis, and models without it. Prints PA-MPJPE and N-MPJPE, mm, and what a coach
-would read (`posture.py`), with depth signs from the person and without.
+noise of accuracy.py; with `--fps` as many a second, at another frame rate than 50. The depth model
+has not learnt from the players of the table; `--other` takes motion that is no tennis, and models
+without it. Prints PA-MPJPE and N-MPJPE, mm, and what a coach would read (`posture.py`), with depth
+signs from the person and without.
 """
 
 import argparse
