@@ -71,7 +71,7 @@ def solved(tmp_path_factory):
     joined = [
         *pictures[STARTS[0] : STARTS[0] + LENGTH],
         *map(closer, pictures[30 : 30 + CLOSE_UP]),
-        *[pictures[30 + n // 3] for n in range(REPLAY)],
+        *[pictures[30 + n // 2] for n in range(REPLAY)],
         *[np.full_like(pictures[0], 14)] * BLACK,
         *pictures[STARTS[1] : STARTS[1] + LENGTH],
     ]
