@@ -27,8 +27,9 @@ _SMOOTHING_SECONDS = 0.03
 """Standard deviation of the smoothing of the tracks; half of the fastest stroke's rise."""
 _SMOOTHED_NOISE = 0.02
 """Standard deviation of smoothed joints, body heights; marked joints are sharper."""
-_CHUNK_FRAMES, _MARGIN_FRAMES = 2000, 100
-"""Frames decided together, and further frames on both sides of them that are tracked with them."""
+_CHUNK_FRAMES, _MARGIN_FRAMES, _MARGIN_SECONDS = 2000, 100, 2.0
+"""Frames decided together, and further frames and seconds at least on both sides of them that are
+tracked with them."""
 
 
 def infer_keyframe_signs(
@@ -60,12 +61,13 @@ def infer_keyframe_signs(
     options = replace(at_rate(options, fps), exemplars=0.0, initial_motion=0.0)
     sign = np.ones(nearer.shape, dtype=np.int64)
     probability = np.ones(nearer.shape)
+    margin = max(_MARGIN_FRAMES, round(_MARGIN_SECONDS * fps))
     for first, end, shot in _chunks(shots):
         inside = (frames >= first) & (frames < end)
         if not inside.any():
             continue
-        start = max(first - _MARGIN_FRAMES, shot.start)
-        chunk = slice(start, min(end + _MARGIN_FRAMES, shot.stop))
+        start = max(first - margin, shot.start)
+        chunk = slice(start, min(end + margin, shot.stop))
         part = bones.part(chunk)
         exemplars = ExemplarPrior(
             vectors=vectors,

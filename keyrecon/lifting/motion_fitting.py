@@ -26,8 +26,11 @@ from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Shots
 
-WINDOW_FRAMES, OVERLAP_FRAMES = 2000, 100
-"""Frames solved together, and shared by neighbours."""
+WINDOW_FRAMES = 2000
+"""Frames solved together."""
+OVERLAP_FRAMES, OVERLAP_SECONDS = 100, 2.0
+"""Frames and seconds that neighbouring windows share at least: the depth model is shown .4 s to
+both sides of a frame, and at a window's end nothing of one side."""
 _SMOOTHING_SECONDS = 0.03
 """Smoothing of the tracks from which signs are inferred; half of the fastest stroke's rise."""
 _SMOOTHED_NOISE, _FITTED_NOISE = 0.02, 0.015
@@ -59,7 +62,7 @@ def fit_motion(
     """
     root = np.zeros_like(initial.root)
     directions = np.zeros_like(initial.directions)
-    windows = [window for shot in shots.parts for window in _windows(shot)]
+    windows = [window for shot in shots.parts for window in _windows(shot, fps)]
     for window in progress(windows, "Lifting to 3D", len(windows)):
         part, keys = slice(window.first, window.last), player.keys
         fitted = _fit_window(
@@ -84,22 +87,24 @@ class _Window:
     weight: Float[np.ndarray, "n"]
 
 
-def _windows(shot: slice) -> Iterator[_Window]:
-    first = shot.start
+def _windows(shot: slice, fps: float) -> Iterator[_Window]:
+    """Windows of a shot, which share half of their frames at most."""
+    lasting = max(OVERLAP_FRAMES, round(OVERLAP_SECONDS * fps))
+    first, overlap = shot.start, min(lasting, WINDOW_FRAMES // 2)
     while True:
         last = shot.stop
-        if shot.stop - first > WINDOW_FRAMES + OVERLAP_FRAMES:
+        if shot.stop - first > WINDOW_FRAMES + overlap:
             last = first + WINDOW_FRAMES
         weight = np.ones(last - first)
-        ramp = (np.arange(OVERLAP_FRAMES) + 0.5) / OVERLAP_FRAMES
+        ramp = (np.arange(overlap) + 0.5) / overlap
         if first > shot.start:
-            weight[:OVERLAP_FRAMES] = ramp
+            weight[:overlap] = ramp
         if last < shot.stop:
-            weight[-OVERLAP_FRAMES:] = 1 - ramp
+            weight[-overlap:] = 1 - ramp
         yield _Window(first, last, weight)
         if last == shot.stop:
             return
-        first = last - OVERLAP_FRAMES
+        first = last - overlap
 
 
 def _fit_window(
