@@ -651,6 +651,16 @@ def test_before_the_project_is_read_there_is_nothing_to_press(person, context):
     person.page.wait_for_selector("body[data-view=motion]")
 
 
+def test_a_picture_that_did_not_come_is_asked_for_again(person, context):
+    person.open(10)
+    context.route("**/api/frame/*", lambda route: route.abort())
+    person.page.evaluate("location.hash = 'frame=70'")
+    person.await_text("#position", "frame 70 of")
+    person.page.wait_for_timeout(3000)
+    context.unroute("**/api/frame/*")
+    person.page.wait_for_selector("#picture[data-frame='70']", timeout=10_000)
+
+
 def test_marks_wait_for_the_picture_they_belong_to(person, context):
     person.open(10)
     person.click(place_of(10, "head_top"))

@@ -8,10 +8,12 @@ const CACHE_BYTES = 260e6; // of decoded pictures
 const PREFETCH_REQUESTS = 2;
 const URGENT_REQUESTS = 3;
 const MAX_URGENT = 16; // pictures that were to be drawn and are not here yet
+const RETRY = 1000; // milliseconds until a picture that did not come is asked for again
 const CHUNK = 250; // frames of the motion asked for at a time
 
-// Exact frames as pictures, kept ready to draw while there is room. `ready` is called for each picture,
-// `failed` with the reason where a frame has none: once, it would fail again.
+// Exact frames as pictures, kept ready to draw while there is room. `ready` is called for each picture, and
+// where one did not come, so that it is asked for again if it is still to be drawn; `failed` with the reason
+// where a frame has none: once, it would fail again.
 export function createFrameCache(project, ready, failed) {
   const kept = new Map(); // key -> picture, oldest use first
   const loading = new Set(),
@@ -59,7 +61,7 @@ export function createFrameCache(project, ready, failed) {
         keep(name, picture);
         ready(frame);
       })
-      .catch(() => {}) // asked for again when it is to be drawn again
+      .catch(() => broken.has(name) || setTimeout(() => ready(frame), RETRY))
       .finally(() => {
         loading.delete(name);
         loadMore();
