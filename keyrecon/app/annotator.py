@@ -193,7 +193,8 @@ def _contradictions(output: str) -> str:
     against the track: the page shows everything else in places of its own."""
     named = re.compile(
         r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+|The lower edge of the picture|"
-        r"Something laid over|Another figure|The player found jumps|The light changes"
+        r"Something laid over|Another figure|The player found jumps|The light changes|"
+        r"The video is dark"
     )
     return "\n".join(line for line in output.splitlines() if named.match(line))
 

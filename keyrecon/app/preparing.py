@@ -128,20 +128,24 @@ def _listed(numbers: set[str]) -> str:
 
 
 def describe_light(camera: CameraPath, shots: Shots) -> list[str]:
-    """A line where the light changes within a usable shot so that it is seen."""
+    """Lines where usable shots are dark, and where the light changes in one so that it is seen."""
     used = np.flatnonzero(shots.usable)
     if camera.exposure is None or not len(used):
         return []
     parts = [(shots.parts[number], camera.exposure[shots.parts[number]]) for number in used]
+    gain, lines = max(1 / float(np.median(light)) for _, light in parts), []
+    if gain > LIGHT_CHANGE:
+        lines.append(f"The video is dark: frames are compared as if {gain:.1f} times as bright.")
     part, light = max(parts, key=lambda one: one[1].max() / one[1].min())
     change = light.max() / light.min()
     if change < LIGHT_CHANGE:
-        return []
+        return lines
     darkest, brightest = part.start + int(light.argmin()), part.start + int(light.argmax())
     return [
+        *lines,
         f"The light changes: frame {brightest} is {change:.1f} times as bright as frame "
         f"{darkest}. Frames are compared as if it had not; if the overlay shows that the player "
-        "was lost there, mark a frame of each light."
+        "was lost there, mark a frame of each light.",
     ]
 
 

@@ -56,7 +56,7 @@ def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
 
 
 def test_a_change_of_the_light_within_a_usable_shot_is_told():
-    light = np.r_[np.linspace(0.8, 1.6, 50), np.full(100, 0.5), np.linspace(0.2, 3, 50)]
+    light = np.r_[np.linspace(0.8, 1.6, 50), np.full(100, 0.9), np.linspace(0.2, 3, 50)]
     path = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200), (50, 150), exposure=light)
     shots = Shots((0, 50, 150), 200, (PLAYER, PLAYER, "black"))
     (line,) = describe_light(path, shots)
@@ -64,6 +64,9 @@ def test_a_change_of_the_light_within_a_usable_shot_is_told():
     assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
     assert describe_light(path, replace(shots, shows=("black", PLAYER, "black"))) == []
     assert describe_light(replace(path, exposure=None), shots) == []
+    (line,) = describe_light(replace(path, exposure=0 * light + 0.4), shots)
+    assert "as if 2.5 times as bright" in line
+    assert _contradictions(line) == line
 
 
 def test_what_is_laid_over_the_player_is_told_and_shown_on_the_page():
