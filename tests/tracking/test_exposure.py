@@ -58,8 +58,9 @@ def test_who_walks_by_and_a_camera_that_turns_are_no_change_of_the_light(scene, 
 
 def test_a_camera_is_followed_through_changes_of_the_light(scene, tmp_path):
     video = film(scene, FLICKER * CLOUD, tmp_path / "lit.mp4", 4.0)
-    path = estimate_camera_motion(video).to_reference
-    assert np.abs(np.diff(path[:, 0, 2]) - 4).max() < 0.4
+    off = np.abs(np.diff(estimate_camera_motion(video).to_reference[:, 0, 2]) - 4)
+    assert np.median(off) < 0.05
+    assert off.max() < 0.4  # a tenth of a step; whole steps are lost where light is taken to stay
 
 
 def test_frames_are_read_as_if_the_light_had_stayed(scene, tmp_path):

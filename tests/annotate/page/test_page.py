@@ -180,42 +180,44 @@ def test_undo_takes_the_last_edit_back_after_a_reload(person, folder):
     person.await_text(".joint[data-joint=neck] .visibility", "visible")
 
 
-def test_a_key_that_is_held_goes_on_where_it_moves_and_does_the_rest_once(person, folder):
+def place_by_keys(person, folder, *keys):
+    """The joint asked for in frame 10, placed by keys and chosen again, and its place."""
     person.open(10)
     joint = person.asked()
-    for key in ("ArrowLeft", "Space", "w"):
-        person.press(key)
-    person.await_saved()
-    start = marks_on_file(folder).joints[0, LSP14.index(joint)]
-    for key in ("ArrowRight", "v"):
-        for _ in range(3):
-            person.page.keyboard.down(key)
-        person.page.keyboard.up(key)
-    person.await_text(f".joint[data-joint={joint}] .visibility", "hidden")
-    person.await_saved()
-    marks = marks_on_file(folder)
-    moved = marks.joints[0, LSP14.index(joint)]
-    assert moved == pytest.approx([start[0] + 3, start[1]], abs=0.11)
-    assert not marks.visible[0, LSP14.index(joint)]
-
-
-def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
-    person.open(10)
-    joint = person.asked()
-    for key in ("Shift+ArrowUp", "ArrowLeft", "Space"):
+    for key in (*keys, "Space"):
         person.press(key)
     person.await_saved()
     start = marks_on_file(folder).joints[0, LSP14.index(joint)]
     person.press("w")
-    for _ in range(3):
-        person.press("ArrowRight")
-    person.press("v")
+    return joint, start
+
+
+def await_hidden(person, folder, joint):
+    """What is on the file once a joint is hidden: its place."""
     person.await_text(f".joint[data-joint={joint}] .visibility", "hidden")
     person.await_saved()
     marks = marks_on_file(folder)
-    moved = marks.joints[0, LSP14.index(joint)]
-    assert moved == pytest.approx([start[0] + 3, start[1]], abs=0.11)
     assert not marks.visible[0, LSP14.index(joint)]
+    return marks.joints[0, LSP14.index(joint)]
+
+
+def test_a_key_that_is_held_goes_on_where_it_moves_and_does_the_rest_once(person, folder):
+    joint, start = place_by_keys(person, folder, "ArrowLeft")
+    for key in ("ArrowRight", "v"):
+        for _ in range(3):
+            person.page.keyboard.down(key)
+        person.page.keyboard.up(key)
+    moved = await_hidden(person, folder, joint)
+    assert moved == pytest.approx([start[0] + 3, start[1]], abs=0.11)
+
+
+def test_the_keyboard_alone_places_moves_and_hides_a_joint(person, folder):
+    joint, start = place_by_keys(person, folder, "Shift+ArrowUp", "ArrowLeft")
+    for _ in range(3):
+        person.press("ArrowRight")
+    person.press("v")
+    moved = await_hidden(person, folder, joint)
+    assert moved == pytest.approx([start[0] + 3, start[1]], abs=0.11)
 
 
 def test_one_key_swaps_left_and_right_of_the_arms(person, folder):
