@@ -116,7 +116,8 @@ def train_depth_model(
     """Learn a depth model from joints of captured people: LSP14's, metres, Y up, `rate` a second.
 
     A capture counts by the root of its length, so that a long one does not drown the others. The
-    same captures give the same model on one machine; the last digits hang on its linear algebra.
+    same captures in the same order give the same model on one machine; the last digits hang on its
+    linear algebra.
     Raises KeyreconError without scikit-learn.
     """
     rng = np.random.default_rng(options.seed)
@@ -130,10 +131,17 @@ def train_depth_model(
         network.partial_fit(windows.inputs, np.concatenate(targets, axis=1, dtype=np.float32))
         if draw >= first:
             layers = [*network.coefs_, *network.intercepts_]
-            sums = [np.add(*pair) for pair in zip(sums, layers, strict=True)] if sums else layers
+            sums = _added(sums, layers)
     mean = [total / (draws - first) for total in sums]
     half = len(mean) // 2
     return DepthModel(tuple(mean[:half]), tuple(mean[half:]), provenance)
+
+
+def _added(sums: Sequence[np.ndarray], layers: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Sums with one more draw's weights; new arrays, as the network learns on in its own."""
+    if not sums:
+        return [layer.copy() for layer in layers]
+    return [np.add(*pair) for pair in zip(sums, layers, strict=True)]
 
 
 def _network(options: DepthTrainingOptions) -> Any:  # scikit-learn has no types

@@ -11,6 +11,7 @@ from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
 from keyrecon.lifting.bone_directions import bone_vectors
+from keyrecon.lifting.priors import depth_training
 from keyrecon.lifting.priors.depth_model import INPUTS, DepthModel, expected_depth
 from keyrecon.lifting.priors.depth_training import (
     DepthTrainingOptions,
@@ -66,6 +67,24 @@ def test_the_same_captures_give_the_same_model():
     one, other = (train_depth_model(captures, FPS, "", few) for _ in range(2))
     for first, second in zip(one.weights, other.weights, strict=True):
         np.testing.assert_array_equal(first, second)
+
+
+def test_the_weights_of_a_model_are_the_mean_of_its_last_draws(monkeypatch):
+    class Counting:
+        """Its weights are the number of draws that it was shown, changed in place as Adam does."""
+
+        coefs_, intercepts_ = [np.zeros((INPUTS, 20))], [np.zeros(20)]
+
+        def partial_fit(self, inputs, targets):
+            for layer in (*self.coefs_, *self.intercepts_):
+                layer += 1
+
+    monkeypatch.setattr(depth_training, "_network", lambda options: Counting())
+    monkeypatch.setattr(depth_training, "_DRAWN", 20)
+    ten_draws = replace(QUICK, poses=200)
+    model = train_depth_model([play_tennis(MotionOptions(2.0, seed=3))], FPS, "", ten_draws)
+    last = [10, 9, 8, 7][: round(10 * depth_training._AVERAGED)]
+    np.testing.assert_allclose(model.weights[0], np.mean(last))
 
 
 def test_what_a_model_learns_from_are_unit_bones_and_what_the_picture_leaves_of_them():
