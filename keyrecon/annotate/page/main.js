@@ -34,7 +34,11 @@ const viewer = createViewer({
   frames,
   redraw: model.redraw,
 });
-const actions = createActions(model, { middle: viewer.middle, opened });
+const actions = createActions(model, {
+  middle: viewer.middle,
+  opened,
+  showInSwing: (frame) => Number.isFinite(frame) && swing.goTo(frame),
+});
 const colors = Object.fromEntries(
   ["left", "right", "middle"].map((side) => [side, cssColor(`mark-${side}`)]),
 );

@@ -1,5 +1,6 @@
 // What a person can do on a keyframe; keys, buttons and the pointer all end here.
 import {
+  describeEdit,
   nextVisibility,
   placeJoint,
   placeJoints,
@@ -20,11 +21,22 @@ import {
 
 const NUDGE_MS = 350; // after the last step of the arrow keys, until it is taken as meant
 
-// `middle()` is the middle of the picture as it is shown, `opened(frame)` is called when a keyframe is.
-export function createActions(model, { middle, opened }) {
+// What can be seen to be undone, page by page.
+const BODY = ["mark", "marks", "nearer", "own", "lock"];
+const SEEN = {
+  keyframes: BODY,
+  swing: ["mark", "marks", "shaft", "key"],
+  address: ["click", "golf"],
+  pick: ["pick"],
+};
+const OF_THE_WORLD = ["court", "ground"]; // pages whose points are in no journal
+
+// `middle()` is the middle of the picture as it is shown, `opened(frame)` is called when a keyframe is;
+// `showInSwing(frame)` shows a frame on the page of the swing.
+export function createActions(model, { middle, opened, showInSwing }) {
   const { ui } = model,
     placing = createPlacing(model, middle),
-    navigation = createNavigation(model, placing, opened);
+    navigation = createNavigation(model, placing, { opened, showInSwing });
   const { offKeyframe, ready, dropDragged, selectNext, joints } = placing;
 
   // What a key means: the joint under the pointer, else the selected one.
@@ -276,7 +288,7 @@ function createPlacing(model, middle) {
 
 // From keyframe to keyframe, from joint to joint, a second around a keyframe, and back and forth by
 // undo and redo.
-function createNavigation(model, placing, opened) {
+function createNavigation(model, placing, { opened, showInSwing }) {
   const { ui } = model;
 
   function open(frame, also = {}) {
@@ -319,14 +331,23 @@ function createNavigation(model, placing, opened) {
     open(frame);
   }
 
-  // Goes to where an undo or redo changed something.
-  async function step(turn) {
+  // Goes to where an undo or redo changed something, and tells what it changed out of sight.
+  async function step(turn, told) {
+    if (OF_THE_WORLD.includes(ui.view))
+      return model.notify("Points of this page are not undone here: Backspace or ✕ takes one away.");
     placing.dropDragged();
     const edit = await turn();
     const part = edit?.kind === "group" ? edit.edits[0] : edit;
-    const elsewhere = part?.frame !== undefined && part.frame !== ui.frame;
-    if (elsewhere && model.keyframes().some(({ frame }) => frame === part.frame)) open(part.frame);
-    if (part?.kind === "mark" && part.frame === ui.frame) model.update({ joint: part.joint });
+    if (!part) return undefined;
+    const isKeyframe = model.keyframes().some(({ frame }) => frame === part.frame);
+    if (!SEEN[ui.view]?.includes(part.kind)) {
+      const offer = isKeyframe && { text: `Show frame ${part.frame}`, act: () => open(part.frame) };
+      return model.notify(told(describeEdit(part)), offer || null);
+    }
+    if (ui.view === "swing") return showInSwing(part.kind === "key" ? part.to : part.frame);
+    if (part.frame !== ui.frame && isKeyframe) open(part.frame);
+    if (part.kind === "mark" && part.frame === ui.frame) model.update({ joint: part.joint });
+    return undefined;
   }
 
   return {
@@ -336,7 +357,7 @@ function createNavigation(model, placing, opened) {
     nextKeyframe,
     scrub,
     addKeyframe,
-    undo: () => step(model.undo),
-    redo: () => step(model.redo),
+    undo: () => step(model.undo, (what) => `Taken back: ${what}. Redo brings it back.`),
+    redo: () => step(model.redo, (what) => `Done again: ${what}.`),
   };
 }

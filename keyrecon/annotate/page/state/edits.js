@@ -1,5 +1,6 @@
 // What a person has decided, as plain values, and edits of it. An edit is a record of what is to be
 // there and what was believed to be there before; it makes a new state and leaves the old one.
+import { label } from "./workflow.js";
 
 // `golf`, `clicks` (of the address, by joint), `shafts` (by frame) and `keys` (frames by key posture) are
 // those of a golf swing. `own` are keyframes that the person added, by frame the half of the body; the journal calls them so.
@@ -222,4 +223,24 @@ export function describeRefused(failed, earlier = []) {
   if (overruled.length > 1)
     parts.push(`Another page changed the same ${overruled.length} places; its versions were kept.`);
   return { text: parts.join(" "), overruled };
+}
+
+const WHAT = {
+  mark: ({ joint }) => label(joint),
+  marks: ({ to }) => Object.keys(to).map(label).join(", "),
+  nearer: ({ to }) => `depth of the ${Object.keys(to).map(label).join(", ")}`,
+  own: () => "keyframe of yours",
+  lock: () => "lock",
+  pick: ({ to, from }) => `colour of the ${(to ?? from)?.part}`,
+  click: ({ joint }) => `${label(joint)} at the address`,
+  shaft: () => "club",
+  key: ({ name }) => `${name} of the swing`,
+  golf: ({ name }) => label(name),
+};
+
+// What an edit changed, for a person who does not see it: "left knee, frame 13".
+export function describeEdit(edit) {
+  const what = WHAT[edit.kind]?.(edit) ?? edit.kind,
+    frame = edit.frame ?? (edit.to ?? edit.from)?.frame;
+  return frame === undefined ? what : `${what}, frame ${frame}`;
 }
