@@ -155,14 +155,18 @@ def describe_settings(workspace: Workspace) -> Json:
     }
 
 
-def describe_run(workspace: Workspace) -> Json:
+def describe_run(workspace: Workspace, revision: int) -> Json:
     """What spoke against the track when the motion was made, in the words of the page, and whether
-    it was made from the marks as they are now (true where that is not known)."""
+    it was made from the marks as they are now (true where that is not known).
+
+    `revision` is that of the marks before their files are read: newer marks are not vouched for.
+    """
     notes = read_run(workspace)
     if notes is None:
-        return {"doubts": [], "is_current": True}
+        return {"doubts": [], "is_current": True, "revision": revision}
     doubts = [in_page_words(line) for line in notes.doubts]
-    return {"doubts": doubts, "is_current": notes.evidence == marks_evidence(workspace)}
+    is_current = notes.evidence == marks_evidence(workspace)
+    return {"doubts": doubts, "is_current": is_current, "revision": revision}
 
 
 def describe_state(state: JournalState) -> Json:

@@ -76,6 +76,7 @@ def open_session(
 
 def describe_project(session: Session) -> Json:
     """What does not change from one edit to the next."""
+    revision = session.store.state.revision
     keyframes, cells = session.keyframes.current(), session.store.state.cells
     added = {int(frame): half for frame, half in by_frame(cells, "own").items()}
     explain, skeleton = session.assistant.keyframes, session.limits.skeleton
@@ -96,7 +97,7 @@ def describe_project(session: Session) -> Json:
         "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder)),
-        "run": describe_run(session.workspace),
+        "run": describe_run(session.workspace, revision),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),

@@ -1,6 +1,7 @@
 """From the marks to what they are made for, on the page alone: figure, report, video, files."""
 
 import json
+import time
 from functools import partial
 from typing import get_args
 
@@ -133,6 +134,34 @@ def test_marks_that_came_after_the_motion_are_told_when_the_page_is_opened_again
             person.page.wait_for_selector("body[data-view]:not([inert])")
             person.press("Alt+3")
             person.await_text("#motion-text", text)
+
+
+def wait_for_ever(options, progress):
+    for _ in progress(range(600), "Waiting"):
+        time.sleep(0.1)
+    return ""
+
+
+def test_a_run_that_was_cancelled_is_not_taken_for_one_that_knows_the_marks(folder, visit):
+    write_true_motion(folder)
+    with serving(folder, commands={"run": wait_for_ever}) as server:
+        workspace = Workspace(folder)
+        (folder / "cache").mkdir(exist_ok=True)
+        note_run(workspace, RunNotes("of other marks", ()))
+        person = visit(server)
+        person.open(40)
+        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.await_saved()
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Not yet in the motion")
+        person.page.click("#motion-primary")
+        person.page.wait_for_selector("#job:not([hidden])")
+        person.page.click("#job-cancel")
+        person.page.wait_for_selector("#job", state="hidden")
+        with person.page.expect_response("**/api/project"):
+            server.session.events.publish({"project": True})
+        person.await_drawn()
+        assert "Not yet in the motion" in person.text("#motion-text")
 
 
 NEXT = {"frame": 22, "half": "upper", "gain": 1.0, "why": "Least certain."}

@@ -141,7 +141,9 @@ export function createMotionCache(project, arrived) {
     errors(frame) {
       const number = Math.floor(frame / CHUNK),
         row = chunks.get(number)?.expected_error?.[frame - number * CHUNK];
-      return row ? Object.fromEntries(row.map((px, joint) => [project.joints[joint], px])) : null;
+      const named = (row ?? []).map((px, joint) => [project.joints[joint], px]),
+        known = named.filter(([, px]) => px !== null);
+      return known.length ? Object.fromEntries(known) : null;
     },
     forget() {
       chunks = new Map();

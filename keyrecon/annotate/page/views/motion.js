@@ -40,13 +40,13 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   });
 
   const exists = () => model.project.has.motion;
-  let asked = null, // the state of the marks that a run was asked for
-    made = null; // that of the marks which the motion shows
+  // The state of the marks which the motion shows.
+  const shownMarks = ({ has, run }) => (has.motion && run.is_current ? run.revision : null);
+  let made = shownMarks(project);
   const points = (kind, at = frame) => (exists() ? motion.points(at, kind) : null);
   model.onProject(() => {
     motion.forget(); // a new run makes new motion
-    if (exists()) made = asked ?? made;
-    asked = null;
+    made = shownMarks(model.project);
   });
 
   function show(number) {
@@ -72,15 +72,11 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     if (wrong) byId("height").focus();
     if (wrong || shell.runningJob()) return;
     await model.whenSaved();
-    asked = model.state.revision;
     shell.startJob("run", metres === null ? {} : { height: metres });
   }
 
   // Whether the motion was made from the marks as they are.
-  function showsMarks() {
-    made ??= exists() && model.project.run.is_current ? model.state.revision : null;
-    return exists() && made === model.state.revision;
-  }
+  const showsMarks = () => exists() && made === model.state.revision;
 
   // Whether there is nothing to make anew: neither marks nor the height changed.
   function isMade() {
@@ -108,7 +104,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const at = Object.fromEntries(places.map(([name, place]) => [name, viewer.toScreen(place)]));
     const errors = exists() ? motion.errors(shown) : null;
     for (const [name, place] of Object.entries(at))
-      if (errors) drawHalo(pen, place, errors[name] * viewer.scale(), colors[sides[name]]);
+      if (errors?.[name]) drawHalo(pen, place, errors[name] * viewer.scale(), colors[sides[name]]);
     for (const { name, parent } of project.limbs) {
       const style = { color: colors[sides[name]], sign: 0, alpha: 0.8 };
       if (at[name] && at[parent]) drawLimb(pen, at[parent], at[name], style);
@@ -210,6 +206,10 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     drawSkeleton();
     const body = points("points3d");
     byId("motion-empty").hidden = body !== null;
+    setText(
+      byId("motion-empty"),
+      exists() ? "Nothing is known in this frame." : "The motion in space appears here when it is made.",
+    );
     figure.show(body, null, body && groundBelow(motion.ground(frame), body));
   }
 
