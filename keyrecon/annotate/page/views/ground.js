@@ -43,7 +43,8 @@ export function createGround(model, { frames, shell }) {
   }
 
   const load = async () => take(await api.read("ground"));
-  const change = (request) => api.send("ground", request).then(take, failed);
+  let changing = Promise.resolve(); // what was typed last, on its way
+  const change = (request) => (changing = api.send("ground", request).then(take, failed));
 
   function show(frame) {
     selection.frame = Math.max(0, Math.min(last, frame));
@@ -113,8 +114,12 @@ export function createGround(model, { frames, shell }) {
     else change({ field_of_view: degrees });
   });
 
-  function primary() {
-    if (!shell.runningJob() && ground?.motion && !ground.court) shell.startJob("ground");
+  const isFound = () => ground.camera && !ground.changed;
+
+  // A number that Enter ended in its field is used, too.
+  async function primary() {
+    await changing;
+    if (!shell.runningJob() && ground?.motion && !ground.court && !isFound()) shell.startJob("ground");
   }
 
   function words() {
@@ -124,7 +129,7 @@ export function createGround(model, { frames, shell }) {
     if (!ground.motion)
       return ["Make the motion first", "The player's own height tells where the ground is, best where he walks about."];
     if (selection.start) return [`Click ${ends[1]}`, `${name}: the first end is marked.`];
-    if (ground.camera && !ground.changed)
+    if (isFound())
       return ["Do the squares lie flat, and does the post stand upright?", ground.camera];
     return [
       `Click ${ends[0]}`,
@@ -199,20 +204,19 @@ export function createGround(model, { frames, shell }) {
   function draw() {
     watchWork();
     if (!ground) return;
-    const [text, more] = words(),
-      done = ground.camera && !ground.changed;
+    const [text, more] = words();
     slider.value = selection.frame;
     setText(byId("ground-where"), `frame ${selection.frame} of ${project.n_frames}`);
     setText(byId("ground-text"), text);
     setText(byId("ground-more"), more);
-    byId("ground-primary").hidden = Boolean(shell.runningJob()) || !ground.motion || ground.court || done;
+    byId("ground-primary").hidden = Boolean(shell.runningJob()) || !ground.motion || ground.court || isFound();
     for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.kind === selection.kind);
     drawMarks();
     drawPicture();
   }
 
   const commands = {
-    primary: () => !byId("ground-primary").hidden && primary(),
+    primary,
     clear: () => here().length && remove(here().at(-1)),
     kind: ({ index }) => choose(Object.keys(KINDS)[index]),
     back: () => choose(selection.kind),
