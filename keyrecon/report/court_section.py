@@ -14,7 +14,7 @@ from keyrecon.report.charts import stack_charts, style_chart
 from keyrecon.report.court_drawing import metre_grid
 from keyrecon.report.markup import ReportMaterial, note, pack, section, text, thinning
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, tennis_court
-from keyrecon.world.records import COURT, WorldCamera, WorldMotion
+from keyrecon.world.records import COURT, Origin, WorldCamera, WorldMotion
 from keyrecon.world.run_measures import (
     ON_BASELINE,
     ZONES,
@@ -45,10 +45,11 @@ def court_section(material: ReportMaterial, chart: str) -> str:
     """The way on the court; empty where it is not known. `chart` is that of `run_chart`."""
     if material.court is None or (way := measure_run(material.court[0], material.motion)) is None:
         return ""
-    on_court = material.court[1].origin == COURT
+    place = material.court[1].origin
+    on_court = place == COURT
     tiles = "".join(
         f"<div><dt>{text(name)}</dt><dd>{text(value)}<small>{text(more)}</small></dd></div>"
-        for name, value, more in (*_pace(way), *(_whereabouts(way) if on_court else []))
+        for name, value, more in (*_pace(way, place), *(_whereabouts(way) if on_court else []))
     )
     buttons = "".join(
         f'<button type="button" data-map="{kind}">{name}</button>'
@@ -56,9 +57,9 @@ def court_section(material: ReportMaterial, chart: str) -> str:
     )
     return section(
         "court",
-        "On the court" if on_court else "On the ground",
+        f"On the {place}",
         note(
-            f"The {'court' if on_court else 'ground'} from above, to scale, the camera's end below"
+            f"The {place} from above, to scale, the camera's end below"
             f"{'' if on_court else ', in squares of a metre'}; where the middle of the hips "
             "is over the ground. Press the way to go to a frame. &plusmn; is the standard error on "
             "rendered rallies whose truth is known, of walks and short steps, which come out short "
@@ -73,15 +74,15 @@ def court_section(material: ReportMaterial, chart: str) -> str:
         ),
         f'<dl class="cards">{tiles}</dl>',
         f'<div class="views-bar">{buttons}<output id="court-now"></output></div>'
-        '<canvas id="court-map" tabindex="0" aria-label="The court from above with the way of the '
-        'player"></canvas>',
+        f'<canvas id="court-map" tabindex="0" aria-label="The {place} from above with the way of '
+        'the player"></canvas>',
         chart,
     )
 
 
-def _pace(way: RunMeasures) -> tuple[tuple[str, str, str], ...]:
+def _pace(way: RunMeasures, place: Origin) -> tuple[tuple[str, str, str], ...]:
     speed, turn = way.top_speed, way.top_acceleration
-    known = f"in {way.known_seconds:.1f} s on the court"
+    known = f"in {way.known_seconds:.1f} s on the {place}"
     return (
         ("Distance", f"{way.length.value:.1f} m", f"\u00b1 {way.length.sd:.1f} m, {known}"),
         (
@@ -120,7 +121,8 @@ def run_chart(material: ReportMaterial) -> go.Figure | None:
     """Speed and acceleration over the frames; None where the way is not known."""
     if material.court is None or (way := measure_run(material.court[0], material.motion)) is None:
         return None
-    figure = stack_charts(("Speed over the court, m/s", "Acceleration, m/s²"), len(way.speed))
+    titles = (f"Speed over the {material.court[1].origin}, m/s", "Acceleration, m/s²")
+    figure = stack_charts(titles, len(way.speed))
     for row, values in enumerate((way.speed, way.acceleration), start=1):
         figure.add_scatter(
             x=np.arange(len(values)),
