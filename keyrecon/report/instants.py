@@ -8,13 +8,13 @@ one sport.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor, stature
 from keyrecon.records import Motion
-from keyrecon.report.summary import hinge_angles, hinges
+from keyrecon.report.summary import hinge_angles, hinges, stretch_times
 
 MOST = 8
 """Instants that are shown at most, the fastest."""
@@ -46,17 +46,15 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
 
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
-    peaks: list[tuple[float, int]] = []
+    peaks: list[int] = []
     for part in motion.stretches:
-        places, properties = find_peaks(
+        places, _ = find_peaks(
             np.pad(fastest[part], 1),
             height=LEAST_SPEED * stature(motion),
-            distance=max(1, round(APART_SECONDS * motion.fps)),
             prominence=STANDS_OUT * float(fastest.max()),
         )
-        frames = part.start + places - 1
-        peaks += zip(properties["peak_heights"].tolist(), frames.tolist(), strict=True)
-    chosen = sorted(frame for _, frame in sorted(peaks, reverse=True)[:MOST])
+        peaks += _apart(part.start + places - 1, fastest, motion.time)
+    chosen = sorted(sorted(peaks, key=lambda t: -fastest[t])[:MOST])
     return [
         KeyInstant(t, hands[int(np.nanargmax(speeds[:, t]))].replace("_wrist", ""), float(v))
         for t in chosen
@@ -64,14 +62,31 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
     ]
 
 
+def _apart(
+    peaks: Int[np.ndarray, "n"], height: Float[np.ndarray, "T"], time: Float[np.ndarray, "T"]
+) -> list[int]:
+    """Of peaks that are too near to one another in time, the highest."""
+    kept: list[int] = []
+    for peak in sorted(peaks.tolist(), key=lambda t: -height[t]):
+        if all(abs(time[peak] - time[other]) >= APART_SECONDS for other in kept):
+            kept.append(peak)
+    return kept
+
+
 def hand_speed(motion: Motion, name: str) -> Float[np.ndarray, "T"]:
-    """Speed of a joint relative to the middle of the body, units per second; NaN where unknown."""
+    """Speed of a joint relative to the middle of the body, units per second; NaN where unknown.
+
+    Times are smoothed as the places are, so that what moves evenly stays so at uneven times.
+    """
     points = motion.points3d[:, motion.skeleton.index(name)] - _middle(motion)
-    speed, sigma = np.full(len(points), np.nan), max(SMOOTHING_SECONDS * motion.fps, 0.5)
+    speed = np.full(len(points), np.nan)
     for part in motion.stretches:
         if part.stop - part.start > 1:
+            time = stretch_times(motion, part)
+            sigma = max(SMOOTHING_SECONDS / float(np.median(np.diff(time))), 0.5)
             smooth = gaussian_filter1d(points[part], sigma, axis=0)
-            speed[part] = np.linalg.norm(np.gradient(smooth, 1 / motion.fps, axis=0), axis=1)
+            velocity = np.gradient(smooth, gaussian_filter1d(time, sigma), axis=0)
+            speed[part] = np.linalg.norm(velocity, axis=1)
     return speed
 
 

@@ -136,10 +136,15 @@ def joint_acceleration(
 
     `points2d` are joints of the motion. NaN for a joint never seen in three frames running.
     """
-    placed = _in_heights(points2d, motion, track)
-    size = np.linalg.norm(np.concatenate([np.diff(part, 2, axis=0) for part in placed]), axis=-1)
+    sizes = []
+    for part, placed in zip(motion.stretches, _in_heights(points2d, motion, track), strict=True):
+        time = stretch_times(motion, part)
+        velocity = np.diff(placed, axis=0) / np.diff(time)[:, None, None]
+        between = (time[2:] - time[:-2]) / 2
+        sizes.append(np.linalg.norm(np.diff(velocity, axis=0) / between[:, None, None], axis=-1))
+    size = np.concatenate(sizes)
     known = np.isfinite(size)
-    total = np.where(known, size, 0).sum(axis=0) * motion.fps**2
+    total = np.where(known, size, 0).sum(axis=0)
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
@@ -151,8 +156,24 @@ def foot_speed(motion: Motion, track: Track) -> Float[np.ndarray, "steps"]:
     """
     feet = _leaves(motion.skeleton, motion.skeleton.is_lower)
     placed = _in_heights(motion.points2d[:, feet], motion, track)
-    steps = np.concatenate([np.diff(part, axis=0) for part in placed])
-    return np.linalg.norm(steps, axis=-1).min(axis=1) * motion.fps
+    speeds = [
+        np.linalg.norm(np.diff(own, axis=0), axis=-1).min(axis=1)
+        / np.diff(stretch_times(motion, part))
+        for part, own in zip(motion.stretches, placed, strict=True)
+    ]
+    return np.concatenate(speeds)
+
+
+ROUNDED = 1.001e-3
+"""Seconds by which the times of even frames may be off: files round them to a millisecond at the
+coarsest, which at 240 frames a second is a quarter of a frame."""
+
+
+def stretch_times(motion: Motion, part: slice) -> Float[np.ndarray, "n"]:
+    """Seconds of the frames of a stretch, without what the file rounded where they are even."""
+    time = motion.time[part]
+    even = np.linspace(time[0], time[-1], len(time))
+    return even if np.abs(time - even).max() <= ROUNDED else time
 
 
 def _in_heights(

@@ -7,7 +7,7 @@ import pytest
 from small_motion import FPS, make_motion
 
 from keyrecon.body import LSP14
-from keyrecon.report.instants import instant_angles, key_instants, separation
+from keyrecon.report.instants import hand_speed, instant_angles, key_instants, separation
 
 WRIST = LSP14.index("right_wrist")
 
@@ -28,6 +28,42 @@ def test_strokes_are_found_where_the_hand_is_fastest():
     assert [instant.frame for instant in found] == pytest.approx([100, 220, 400], abs=1)
     assert {instant.hand for instant in found} == {"right"}
     assert all(instant.speed == pytest.approx(6, rel=0.1) for instant in found)
+
+
+def timed(motion, steps):
+    """The same frames, so many seconds apart."""
+    return replace(motion, time=np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+def test_a_hand_is_slower_where_frames_are_farther_apart_in_time():
+    strokes = swinging([100, 300])
+    usual, slower = key_instants(timed(strokes, np.where(np.arange(499) < 200, 1, 1.5) / FPS))
+    assert (usual.frame, slower.frame) == pytest.approx((100, 300), abs=1)
+    assert usual.speed == pytest.approx(6, rel=0.1)
+    assert slower.speed == pytest.approx(4, rel=0.1)
+
+
+def test_a_hand_that_moves_evenly_is_evenly_fast_at_uneven_times():
+    motion = make_motion(100, wildness=0.0)
+    uneven = timed(motion, np.resize([0.01, 0.03, 0.02], 99))
+    points = motion.points3d.copy()
+    points[:, WRIST, 0] += 3.0 * uneven.time
+    assert hand_speed(replace(uneven, points3d=points), "right_wrist") == pytest.approx(3.0)
+
+
+def test_a_backswing_is_no_stroke_however_many_frames_show_it():
+    motion = swinging([100, 160])
+    assert len(key_instants(motion)) == 2
+    filmed_faster = timed(motion, np.full(499, 0.25 / FPS))
+    assert len(key_instants(filmed_faster)) == 1  # 60 frames are .3 s there
+
+
+def test_times_that_a_file_rounds_to_milliseconds_leave_a_speed_as_it_is():
+    motion = make_motion(100, wildness=0.0)
+    points = motion.points3d.copy()
+    points[:, WRIST, 0] += 3.0 * np.arange(100) / 240
+    rounded = replace(motion, points3d=points, fps=240.0, time=np.round(np.arange(100) / 240, 3))
+    assert hand_speed(rounded, "right_wrist") == pytest.approx(3.0, rel=0.01)
 
 
 def test_strokes_on_both_sides_of_a_cut_are_two():

@@ -51,6 +51,26 @@ def test_a_speed_of_the_feet_is_told_in_heights_of_the_shot_that_shows_it():
     assert found == pytest.approx(0.5)
 
 
+def at_uneven_times(along):
+    """A motion in one shot whose joints are at `along` of their time across the picture, heights."""
+    time = np.cumsum(np.resize([0.01, 0.03, 0.02], FRAMES))
+    pixels = np.tile((100 * along(time))[:, None, None], (1, 14, 2))
+    return replace(make_motion(FRAMES, time=time), points2d=pixels)
+
+
+def test_feet_that_go_evenly_have_one_speed_at_uneven_times():
+    motion = at_uneven_times(lambda time: 0.5 * time)
+    even_track = replace(track(), height=np.full(FRAMES, 100.0))
+    assert summary.foot_speed(motion, even_track) == pytest.approx(0.5 * np.sqrt(2))
+
+
+def test_a_fall_has_one_acceleration_at_uneven_times():
+    motion = at_uneven_times(lambda time: 0.5 * 2.0 * time**2)
+    even_track = replace(track(), height=np.full(FRAMES, 100.0))
+    found = summary.joint_acceleration(motion.points2d, motion, even_track)
+    np.testing.assert_allclose(found, 2.0 * np.sqrt(2))
+
+
 def test_steady_motion_has_no_acceleration():
     steady = np.arange(float(FRAMES))[:, None, None] * np.ones((14, 2))
     found = summary.joint_acceleration(steady, two_shots(steady), track())
