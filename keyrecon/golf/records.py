@@ -286,3 +286,13 @@ class RecordedSwing:
     """What a reader of its numbers should know of the film."""
     shown: tuple[bool, bool, bool, bool] = (True, True, True, True)
     """Which key postures the film shows; where one is not, its frame only bounds it."""
+
+    @property
+    def fitted(self) -> Bool[np.ndarray, "T"]:
+        """Frames to which the swing was fitted."""
+        return fitted_frames(self.motion)
+
+
+def fitted_frames(motion: Motion) -> Bool[np.ndarray, "T"]:
+    """Frames to which a swing was fitted: in the others no joint has any confidence."""
+    return motion.confidence.any(axis=1)

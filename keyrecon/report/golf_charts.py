@@ -76,9 +76,11 @@ def _add_curve(
     number, name = swing
     label = f"{curve.label} {name}".strip()
     if number == 0:
+        known = np.isfinite(curve.values)  # a band is filled in one piece
         over, under = curve.values + curve.error, curve.values - curve.error
+        over, under, inside = over[known], under[known], frames[known]
         figure.add_scatter(
-            x=np.concatenate([frames, frames[::-1]]),
+            x=np.concatenate([inside, inside[::-1]]),
             y=np.concatenate([over, under[::-1]]).round(1),
             fill="toself", fillcolor=color, opacity=0.10, line={"width": 0}, hoverinfo="skip",
             showlegend=False, mode="lines",

@@ -145,7 +145,7 @@ def measure_swing(swing: RecordedSwing) -> SwingMeasures:
 
 
 def measure_curves(swing: RecordedSwing) -> tuple[Curve, ...]:
-    """Everything that is measured in every frame."""
+    """Everything that is measured in every frame; NaN in those to which nothing was fitted."""
     start = _nearest(swing, swing.keys[0])
     across, ahead, up = _player_axes(swing, start)
     shoulders, hips = (_turn(swing, part, start) for part in ("shoulder", "hip"))
@@ -166,10 +166,14 @@ def measure_curves(swing: RecordedSwing) -> tuple[Curve, ...]:
     }
     if not swing.shown[0]:
         values = {n: v if n in ABSOLUTE else np.full_like(v, np.nan) for n, v in values.items()}
+    fitted = np.where(swing.fitted, 1.0, np.nan)
     return tuple(
-        Curve(name, *LABELS[name], of_name, _spread_errors(swing, MEASURE_ERRORS[name]))
+        Curve(
+            name, *LABELS[name], fitted * of_name,
+            fitted * _spread_errors(swing, MEASURE_ERRORS[name]),
+        )
         for name, of_name in values.items()
-    )
+    )  # fmt: skip
 
 
 def _spread_errors(swing: RecordedSwing, at_keys: tuple[float, ...]) -> Float[np.ndarray, "T"]:
@@ -220,12 +224,12 @@ def _measure_tempo(swing: RecordedSwing) -> list[KeyMeasure]:
 
 def _measure_key(swing: RecordedSwing, curve: Curve, posture: int) -> KeyMeasure:
     """A curve's value at a key posture."""
-    frames, time = np.arange(len(curve.values)), swing.motion.time
-    moment = float(np.interp(swing.keys[posture], frames, time))
-    value = float(np.interp(moment, time, curve.values)) if swing.shown[posture] else np.nan
+    moment = float(np.interp(swing.keys[posture], np.arange(len(curve.values)), swing.motion.time))
+    time, values = swing.motion.time[swing.fitted], curve.values[swing.fitted]
+    value = float(np.interp(moment, time, values)) if swing.shown[posture] else np.nan
     around = moment + np.array([-RATE_WINDOW, RATE_WINDOW])
     around = np.clip(around, time[0], time[-1])
-    before, after = np.interp(around, time, curve.values)
+    before, after = np.interp(around, time, values)
     rate = (after - before) / max(around[1] - around[0], 1e-9)
     doubt = float(
         np.hypot(MEASURE_ERRORS[curve.name][posture], rate * key_time_errors(swing)[posture])

@@ -13,7 +13,13 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
-from keyrecon.golf.records import FittedSwing, MotionModel, Observations, RecordedSwing
+from keyrecon.golf.records import (
+    FittedSwing,
+    MotionModel,
+    Observations,
+    RecordedSwing,
+    fitted_frames,
+)
 from keyrecon.io.durable import write_durably
 from keyrecon.io.video import Video
 from keyrecon.progress import Progress, silent
@@ -44,7 +50,7 @@ def time_chart(fitted: FittedSwing, observations: Observations, model: MotionMod
     )
     figure.add_scatter(
         x=frames,
-        y=fitted.state.phase.round(4),
+        y=np.where(fitted_frames(fitted.motion), fitted.state.phase, np.nan).round(4),
         name="fitted",
         mode="lines",
         line={"width": 2, "color": "var(--accent)"},

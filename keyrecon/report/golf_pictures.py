@@ -16,7 +16,14 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.golf.prior.skeleton import NAMES
-from keyrecon.golf.records import Camera, Capsules, FittedSwing, Observations, RootPose
+from keyrecon.golf.records import (
+    Camera,
+    Capsules,
+    FittedSwing,
+    Observations,
+    RootPose,
+    fitted_frames,
+)
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
@@ -195,9 +202,9 @@ def write_golf_overlay(
 def _overlay_frames(
     video: Video, fitted: FittedSwing, camera: Camera, progress: Progress
 ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    shown = fitted_frames(fitted.motion)
     for frame, picture in enumerate(progress(video.frames(), "Drawing the overlay", len(video))):
-        fits = fitted.motion.confidence[frame].any()
-        yield draw_overlay(picture, fitted, camera, frame) if fits else picture
+        yield draw_overlay(picture, fitted, camera, frame) if shown[frame] else picture
 
 
 def draw_overlay(

@@ -157,7 +157,7 @@ def _numbers(swings: Sequence[RecordedSwing], clips: Sequence[SwingClip]) -> dic
 
 def _swing_numbers(swing: RecordedSwing, clip: SwingClip) -> dict[str, object]:
     motion, skeleton = swing.motion, swing.motion.skeleton
-    shown = np.where(motion.confidence.any(axis=1), 1.0, np.nan)[:, None, None]
+    shown = np.where(swing.fitted, 1.0, np.nan)[:, None, None]
     flat = shown * np.concatenate([motion.points2d, swing.club2d], axis=1)
     solid = np.concatenate([motion.points3d, swing.club], axis=1)
     solid = solid @ Rotation.align_vectors([[0, -1, 0]], [swing.vertical])[0].as_matrix().T

@@ -2,7 +2,7 @@
 
 One row per number. Rows whose `frame` is empty are of the whole swing. Rows at a key posture come
 first, then every number in every frame, in the order of time; `doubt` is one standard deviation
-(`golf_measures` says of what).
+(`golf_measures` says of what). Frames to which nothing was fitted have empty values.
 """
 
 import csv
@@ -47,6 +47,7 @@ def _key_rows(swing: RecordedSwing, measures: SwingMeasures) -> Iterator[tuple[s
 
 
 def _frame_rows(swing: RecordedSwing, measures: SwingMeasures) -> Iterator[tuple[str, ...]]:
+    club = np.where(swing.fitted[:, None, None], swing.club2d, np.nan)
     for frame, moment in enumerate(swing.motion.time):
         at = ("", str(frame), f"{moment:.4f}")
         for curve in measures.curves:
@@ -55,7 +56,7 @@ def _frame_rows(swing: RecordedSwing, measures: SwingMeasures) -> Iterator[tuple
             yield (curve.name, *at, value, error, curve.unit)
         for end, name in enumerate(("hands", "club_head")):
             for axis, letter in enumerate("xy"):
-                place = _cell(float(swing.club2d[frame, end, axis]), 1)
+                place = _cell(float(club[frame, end, axis]), 1)
                 yield (f"{name}_{letter}", *at, place, "", "px")
 
 

@@ -5,7 +5,7 @@ parallel projection, the middle of its hips in the middle.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.errors import KeyreconError
+from keyrecon.golf.records import fitted_frames
 from keyrecon.io.formats.conventions import stand_on_floor
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
@@ -74,8 +75,8 @@ def write_overlay(
 
     The pose is the projection of the 3D joints; near limbs cross over far ones. `frames` are the
     first and the last to be shown; those after the last one of the motion are shown as they are.
-    `club` is that of a golf swing, from between the hands to its head, px. Raises KeyreconError for
-    options that no video can follow.
+    `club` is that of a golf swing, from between the hands to its head, px; neither it nor the body
+    is drawn where no swing was fitted. Raises KeyreconError for options that no video can follow.
     """
     check_overlay(options)
     pictures = overlay_frames(video, motion, progress, options, frames, court, club)
@@ -110,6 +111,8 @@ def overlay_frames(
     """The pictures of `write_overlay`, one at a time."""
     first, last = frames or (0, len(video) - 1)
     height = options.size or video.height
+    if club is not None:
+        motion, club = _where_fitted(motion, club)
     hidden = _hidden_joints(motion, options.skeleton)
     sides = [view for view in options.view if view != "camera"]
     seen = {view: _side_view(motion, view, height) for view in sides}
@@ -131,6 +134,17 @@ def overlay_frames(
         shown = np.concatenate(panes, axis=1)
         _write_label(shown, f"frame {frame}   {video.time[frame]:.2f} s")
         yield shown
+
+
+def _where_fitted(
+    swing: Motion, club: Float[np.ndarray, "T 2 2"]
+) -> tuple[Motion, Float[np.ndarray, "T 2 2"]]:
+    """Body and club of a golf swing, unknown in frames to which nothing was fitted."""
+    fitted = fitted_frames(swing)[:, None, None]
+    points3d, points2d, ends = (
+        np.where(fitted, points, np.nan) for points in (swing.points3d, swing.points2d, club)
+    )
+    return replace(swing, points3d=points3d, points2d=points2d), ends
 
 
 def _hidden_joints(motion: Motion, limbs: Limbs) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from keyrecon.io.formats.swing_file import read_swing, write_swing
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import Motion
-from keyrecon.report.golf_charts import align_frames
+from keyrecon.report.golf_charts import align_frames, curve_charts
 from keyrecon.report.golf_measures import KEY_ERRORS, measure_swing, record_swing
 from keyrecon.report.golf_player import cut_clip
 from keyrecon.report.golf_table import write_golf_table
@@ -219,6 +220,52 @@ def test_what_the_film_does_not_show_has_no_numbers(tmp_path):
     assert all(np.isnan(key.doubt) for key in unknown)
     write_swing(tmp_path / "motion.npz", swing)
     assert read_swing(tmp_path / "motion.npz").shown == swing.shown
+
+
+def shown_within(fitted, first, last):
+    """The swing in a file that goes on before and after what was fitted."""
+    frames = np.arange(FRAMES)
+    inside = (frames >= first) & (frames <= last)
+    motion = replace(fitted.motion, confidence=np.tile(inside[:, None] * 1.0, (1, 14)))
+    return replace(fitted, motion=motion, keys=np.clip(fitted.keys, first, last))
+
+
+def test_frames_to_which_nothing_was_fitted_have_no_numbers_and_no_doubts(tmp_path):
+    ramp = np.radians(90) * np.linspace(0, 1, FRAMES)
+    swing = record_swing(shown_within(turning(ramp, ramp), 4, 27), seen())
+    outside = np.r_[0:4, 28:FRAMES]
+    measures = measure_swing(swing)
+    for curve in measures.curves:
+        for numbers in (curve.values, curve.error):
+            assert np.isnan(numbers[outside]).all()
+            assert np.isfinite(np.delete(numbers, outside)).all()
+    assert all(np.isfinite(key.doubt) for key in measures.keys)
+    write_golf_table(tmp_path / "golf.csv", swing)
+    lines = (tmp_path / "golf.csv").read_text().splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    for row in rows:
+        if row["frame"] and not row["posture"]:
+            fitted = int(row["frame"]) not in outside
+            assert (row["value"] != "") == fitted
+            assert (row["doubt"] != "") == (fitted and row["unit"] != "px")
+
+
+def test_charts_of_a_swing_end_where_nothing_was_fitted():
+    swing = record_swing(shown_within(still(), 4, 27), seen())
+    for chart in curve_charts([swing], [measure_swing(swing)]):
+        block = chart.partition('type="application/json"')[2].partition(">")[2]
+        for trace in json.loads(block.partition("</script>")[0])["data"]:
+            x, y = (decode(trace[axis]) for axis in "xy")
+            drawn = x[np.isfinite(y)]
+            assert (drawn.min(), drawn.max()) == (4, 27)
+            assert trace.get("fill") is None or np.isfinite(y).all()  # a band in one piece
+
+
+def decode(values):
+    """Numbers as plotly writes them: a list, or bytes."""
+    if isinstance(values, dict):
+        return np.frombuffer(base64.b64decode(values["bdata"]), values["dtype"]).astype(float)
+    return np.array(values, float)
 
 
 def test_the_clip_of_a_swing_goes_at_the_pace_of_its_motion(tmp_path):

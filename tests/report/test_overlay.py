@@ -1,6 +1,9 @@
 """Poses drawn on pictures."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from report_material import make_material, on_court, on_ground
 
 from keyrecon.body import LSP14
@@ -136,6 +139,28 @@ def test_a_golf_club_is_drawn_where_it_is(tmp_path):
     assert changed[18:23, 25:55].all(axis=1).any()
     assert not changed[30:].any()
     assert (next(held) == next(bare)).all()
+
+
+@pytest.mark.parametrize("view", ["camera", "right"])
+def test_no_golfer_is_drawn_where_none_was_fitted(tmp_path, view):
+    material = make_material(tmp_path, 12)
+    confidence = np.ones_like(material.motion.confidence)
+    confidence[1] = 0
+    club = np.tile([[20.0, 20.0], [60.0, 20.0]], (len(confidence), 1, 1))
+
+    def drawn(skeleton):
+        motion = replace(material.motion, confidence=confidence)
+        options = OverlayOptions(view=(view,), skeleton=skeleton, court=False)
+        nobody = np.full_like(club, np.nan)
+        held = nobody if skeleton == "none" else club
+        return [*overlay_frames(material.video, motion, silent, options, (0, 2), club=held)]
+
+    whole, bare = drawn("all"), drawn("none")
+    assert [(one != other).any() for one, other in zip(whole, bare, strict=True)] == [
+        True,
+        False,
+        True,
+    ]
 
 
 def test_the_figure_from_elsewhere_stands_on_its_floor(tmp_path):

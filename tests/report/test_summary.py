@@ -52,7 +52,7 @@ def test_a_speed_of_the_feet_is_told_in_heights_of_the_shot_that_shows_it():
 
 
 def at_uneven_times(along):
-    """A motion in one shot whose joints are at `along` of their time across the picture, heights."""
+    """A motion in one shot whose joints are at `along` of their time, in heights."""
     time = np.cumsum(np.resize([0.01, 0.03, 0.02], FRAMES))
     pixels = np.tile((100 * along(time))[:, None, None], (1, 14, 2))
     return replace(make_motion(FRAMES, time=time), points2d=pixels)

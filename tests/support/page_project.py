@@ -142,11 +142,13 @@ CLUB = np.array([[300.0, 120.0], [420.0, 200.0]])
 """Both ends of a club in all frames, px."""
 
 
-def make_golf_project(folder, video_file, doubts=()):
-    """A golf project with its clicks and a fit, which is the motion that is known."""
+def make_golf_project(folder, video_file, doubts=(), first=0):
+    """A golf project with its clicks and a fit, which is the motion that is known; nothing is
+    fitted to the frames before `first`."""
     start(video_file, folder, golf=True)
     write_clicks(folder / "golf_clicks.json", GolfClicks(3, SIZE, ADDRESS))
     motion = true_motion()
+    motion.confidence[:first] = 0
     swing = RecordedSwing(
         motion=motion,
         club=np.concatenate([motion.points3d[:, :1], motion.points3d[:, :1] + 1], axis=1),

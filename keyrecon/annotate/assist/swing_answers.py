@@ -94,9 +94,11 @@ def _read_fit(file: Path, changed: int) -> Json:
         swing = read_swing(file)
     except KeyreconError:
         return {}
+    club = np.where(swing.fitted[:, None, None], swing.club2d, np.nan)
     return {
         "keys": {n: _number(key) for n, key in zip(KEYS, swing.keys.tolist(), strict=True)},
-        "club": [_rounded(ends) for ends in swing.club2d.reshape(-1, 4)],
+        "fitted": swing.fitted.tolist(),
+        "club": [_rounded(ends) for ends in club.reshape(-1, 4)],
         "seen": swing.club_seen.tolist(),
         "doubts": [_describe_doubt(doubt) for doubt in swing.doubts],
         "tempo": None if swing.doubts else _describe_tempo(swing),

@@ -29,8 +29,8 @@ def visit(tmp_path, video, chromium):
     """Opens the page of a swing with these doubts."""
     opened = []
 
-    def go(doubts=(), size=(1440, 900)):
-        folder = make_golf_project(tmp_path / "swing", video, doubts)
+    def go(doubts=(), size=(1440, 900), first=0):
+        folder = make_golf_project(tmp_path / "swing", video, doubts, first)
         server = serving(folder, make_assistant(Workspace(folder)))
         context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
         person = Golfer(context, server.__enter__().credentials.address)
@@ -62,6 +62,23 @@ def test_a_doubtful_fit_says_so_everywhere_and_leads_to_the_frames(visit):
     person.await_frame("swing", 40)
     person.press("Alt+3")
     person.await_text("#report-text", "doubtful: do not use its numbers")
+
+
+def test_no_golfer_stands_in_frames_to_which_nothing_was_fitted(visit):
+    person, folder = visit(first=8)
+    person.press("1")
+    person.await_frame("swing", 10)
+    person.page.wait_for_selector("#swing-empty", state="hidden")
+    for _ in range(5):
+        person.press("q")
+    person.await_frame("swing", 5)
+    person.await_text("#swing-empty", "Nothing is fitted to this frame")
+    wrist, aside = truth()[1][5, WRIST], truth()[1][5, WRIST] + (12, 8)
+    person.drag(wrist, aside)  # moves the picture, since there is no joint to drag
+    person.drag(CLUB[1], CLUB[1] + (9, -6))
+    person.await_drawn()
+    person.await_text("#swing-text", "The swing is found")
+    assert not (folder / "golf_marks.json").exists() or not marks(folder)["frames"]
 
 
 def test_joint_club_and_key_postures_are_put_right_and_taken_back(visit):

@@ -20,6 +20,9 @@ const PREFETCHED = 24; // frames fetched ahead while playing
 const WIDTH = 960; // of the pictures while they play, px
 const ENDS_NAMED = { hands: "the club between the hands", head: "the club's head" };
 
+const BEFORE_FIT = "The body in space appears here when the swing is fitted.";
+const OUTSIDE = "Nothing is fitted to this frame: it lies before or after the swing that was found.";
+
 const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
 
 export function createSwing(model, { frames, shell, actions, colors, go }) {
@@ -66,9 +69,12 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     show(number);
   }
 
+  // Whether the swing that was found has a body in a frame; before and after it, nothing was fitted.
+  const isFitted = (number) => exists() && found().fitted[number];
+
   // The body as it was found, marked joints where they were marked: {joint: [x, y, v or undefined]}.
   function body(number) {
-    const points = exists() ? (motion.points(number, "points2d") ?? {}) : {},
+    const points = isFitted(number) ? (motion.points(number, "points2d") ?? {}) : {},
       placed = Object.entries(marks(number)).filter(([, [, , v]]) => v);
     return { ...points, ...Object.fromEntries(placed) };
   }
@@ -300,8 +306,9 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     panels.draw(frame, asked);
     viewer.drawPicture(frame, player.playing() ? [WIDTH] : [undefined, WIDTH]);
     drawFigure();
-    const points = exists() ? motion.points(frame, "points3d") : null;
-    byId("swing-empty").hidden = points !== null;
+    const points = isFitted(frame) ? motion.points(frame, "points3d") : null;
+    byId("swing-empty").hidden = isFitted(frame);
+    setText(byId("swing-empty"), exists() ? OUTSIDE : BEFORE_FIT);
     figure.show(points, null, points && groundBelow(motion.ground(frame), points));
   }
 
