@@ -1,20 +1,23 @@
 // Plotly charts over the frames, in the colours of the present scheme, with the page's cursor.
 import { painted } from "./colors.js";
-import { byId, read, data, count, frame, show, followers, restyled } from "./cursor.js";
+import { byId, read, data, count, cuts, frame, show, followers, restyled } from "./cursor.js";
 import { unpack } from "./packed.js";
 
 const config = { displaylogo: false, responsive: true, displayModeBar: false };
 const charts = new Map(); // element -> figure whose colours are still names
-const curves = ["raw", "refined", "truth2d"].map((name) => unpack(data[name])).filter(Boolean);
+const curves = ["raw", "refined", "truth2d"].map((name) => unpack(data[name], cuts)).filter(Boolean);
 const marks = unpack(data.marked.points),
   joints = marks.shape[1];
 
+// All frames, and between two shots a place without a value, where lines end.
+const places = Array.from({ length: count }, (_, t) => (cuts.has(t) ? [t - 0.5, t] : [t])).flat();
+
 function fillJoint(figure, joint) {
-  const frames = Array.from({ length: count }, (_, t) => t),
-    marked = data.marked.frames;
-  const pick = (points, rows, axis) => rows.map((t) => points.values[(t * joints + joint) * 2 + axis]);
+  const marked = data.marked.frames;
+  const pick = (points, rows, axis) =>
+    rows.map((t) => (Number.isInteger(t) ? points.values[(t * joints + joint) * 2 + axis] : NaN));
   const traces = [0, 1].flatMap((axis) => [
-    ...curves.map((points) => [frames, pick(points, frames, axis)]),
+    ...curves.map((points) => [places, pick(points, places, axis)]),
     [marked, pick(marks, marked.map((_, k) => k), axis)],
   ]);
   figure.data.forEach((trace, n) => { [trace.x, trace.y] = traces[n]; });

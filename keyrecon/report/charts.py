@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Num
 from plotly.subplots import make_subplots
 
 from keyrecon.body import Skeleton
@@ -31,12 +31,14 @@ def plain_name(name: str) -> str:
     return name.replace("_", " ")
 
 
-def keyframe_chart(keyframes: Keyframes, comparison: PoseDistances) -> go.Figure:
+def keyframe_chart(
+    keyframes: Keyframes, comparison: PoseDistances, cuts: Int[np.ndarray, "C"] | None = None
+) -> go.Figure:
     """Which keyframe stands for which frame (Fig. 6), both halves of the body."""
     figure = stack_charts(("Upper body", "Lower body"), len(comparison.row))
     halves = ((keyframes.upper, comparison.upper), (keyframes.lower, comparison.lower))
     for row, (half, distances) in enumerate(halves, start=1):
-        _add_occurrence(figure, row, half, _between_keyframes(half, comparison, distances))
+        _add_occurrence(figure, row, half, _between_keyframes(half, comparison, distances), cuts)
         figure.update_yaxes(title_text="keyframe", row=row, col=1, rangemode="tozero")
     return style_chart(figure, 460, legend=False)
 
@@ -49,7 +51,11 @@ def _between_keyframes(
 
 
 def _add_occurrence(
-    figure: go.Figure, row: int, half: HalfKeyframes, between: Float[np.ndarray, "K K"]
+    figure: go.Figure,
+    row: int,
+    half: HalfKeyframes,
+    between: Float[np.ndarray, "K K"],
+    cuts: Int[np.ndarray, "C"] | None,
 ) -> None:
     """One line that jumps between keyframes; frames that none represents are hollow."""
     rank = np.empty(len(half.frames), dtype=np.int64)
@@ -58,10 +64,11 @@ def _add_occurrence(
     frames = np.arange(len(height))
     hover = "frame %{x}: keyframe at frame %{customdata}<extra></extra>"
     well = half.represented
+    places, broken = end_at_cuts(height, cuts)
     figure.add_scatter(
-        x=frames,
-        y=height,
-        customdata=half.nearest,
+        x=places,
+        y=broken,
+        customdata=end_at_cuts(half.nearest, cuts)[1],
         hovertemplate=hover,
         row=row,
         col=1,
@@ -129,9 +136,10 @@ def angle_chart(motion: Motion) -> go.Figure:
     figure = stack_charts(tuple(title.capitalize() for title in titles), len(degrees))
     for column, joint in enumerate(joints):
         row = titles.index(_pair_name(skeleton, joint)) + 1
+        places, bends = end_at_cuts(degrees[:, column].round(1), motion.cuts)
         figure.add_scatter(
-            x=np.arange(len(degrees)),
-            y=degrees[:, column].round(1),
+            x=places,
+            y=bends,
             row=row,
             col=1,
             name=("left", "right", "middle")[sides[joint]],
@@ -194,14 +202,13 @@ def source_chart(motion: Motion) -> go.Figure:
     )
 
 
-def doubt_chart(
-    values: Float[np.ndarray, "T"], keyframes: Int[np.ndarray, "K"], title: str
-) -> go.Figure:
+def doubt_chart(values: Float[np.ndarray, "T"], motion: Motion, title: str) -> go.Figure:
     """One number of every frame that tells how good it is, with the annotated frames marked."""
-    figure = stack_charts((title,), len(values))
+    figure, keyframes = stack_charts((title,), len(values)), motion.keyframes
+    places, broken = end_at_cuts(values.astype(np.float32).round(4), motion.cuts)
     figure.add_scatter(
-        x=np.arange(len(values)),
-        y=values.astype(np.float32).round(4),
+        x=places,
+        y=broken,
         mode="lines",
         line={"width": 1.4, "color": "var(--accent)"},
         name="every frame",
@@ -215,6 +222,17 @@ def doubt_chart(
     )
     figure.update_yaxes(rangemode="tozero")
     return style_chart(figure, 250)
+
+
+def end_at_cuts(
+    values: Num[np.ndarray, "T"], cuts: Int[np.ndarray, "C"] | None
+) -> tuple[Num[np.ndarray, "P"], Num[np.ndarray, "P"]]:
+    """Frames and their values as a line that ends with every shot: between two of them lies a
+    place without a value."""
+    frames = np.arange(len(values))
+    if cuts is None or not len(cuts):
+        return frames, values
+    return np.insert(frames + 0.0, cuts, cuts - 0.5), np.insert(values + 0.0, cuts, np.nan)
 
 
 def stack_charts(titles: tuple[str, ...], frames: int) -> go.Figure:

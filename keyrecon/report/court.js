@@ -23,8 +23,8 @@ export function rampColor(share) {
 }
 
 function createMap(canvas, court) {
-  const root = unpack(court.root).values,
-    speed = unpack(court.speed).values,
+  const root = unpack(court.root, cuts).values,
+    speed = unpack(court.speed, cuts).values,
     heat = unpack(court.heat.seconds);
   const [left, near, right, far] = court.frame,
     top = speed.reduce((most, value) => (value > most ? value : most), 0.1),

@@ -16,8 +16,8 @@ const STYLE = {
   wheelScrolls: true,
 };
 
-const points3d = unpack(data.points3d),
-  truth3d = unpack(data.truth3d);
+const points3d = unpack(data.points3d, cuts),
+  truth3d = unpack(data.truth3d, cuts);
 const joints = points3d.shape[1],
   truthShown = byId("show-truth");
 const bones = data.bones.map(([from, to], n) => ({ from, to, side: SIDES[data.sides[n]] }));
@@ -50,10 +50,10 @@ const court = data.court,
   onCourt = byId("on-court");
 const inFigure = ([x, y, z = 0]) => [x, -z, y];
 const places = court && {
-  points: unpack(court.points),
-  root: unpack(court.root).values,
-  contact: unpack(court.contact).values,
-  camera: unpack(court.camera).values,
+  points: unpack(court.points, cuts),
+  root: unpack(court.root, cuts).values,
+  contact: unpack(court.contact, cuts).values,
+  camera: unpack(court.camera, cuts).values,
   lines: court.lines.flatMap(cutLine),
 };
 

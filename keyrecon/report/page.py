@@ -147,7 +147,7 @@ def _doubt_over_time(material: ReportMaterial) -> str:
         values, title = size * expected.mean(axis=1), f"Expected error across the picture, {unit}"
     else:
         return ""
-    return _chart("doubt", charts.doubt_chart(values, motion.keyframes, title))
+    return _chart("doubt", charts.doubt_chart(values, motion, title))
 
 
 def _occurrence(material: ReportMaterial) -> str:
@@ -160,7 +160,12 @@ def _occurrence(material: ReportMaterial) -> str:
             "farther than β from every keyframe. Press a chart to go to a frame. "
             f"{_coverage(material)}"
         ),
-        _chart("occurrence", charts.keyframe_chart(material.keyframes, material.pose_distances)),
+        _chart(
+            "occurrence",
+            charts.keyframe_chart(
+                material.keyframes, material.pose_distances, material.motion.cuts
+            ),
+        ),
     )
 
 

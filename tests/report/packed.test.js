@@ -22,6 +22,14 @@ test("beside an unknown row the nearer one counts", () => {
   assert.deepEqual(unpackRows([[2], [UNKNOWN], [4]], [10, 1], 4), [1, 1, NaN, NaN, NaN, NaN, 2, 2, 2, 2]);
 });
 
+test("no frame lies between those of two shots: each is that of the nearest frame held of its own", () => {
+  const unpackShots = (rows, shape, every, cuts) =>
+    Array.from(unpack(packed(rows, shape, every), new Set(cuts)).values);
+  assert.deepEqual(unpackShots([[0], [6], [20]], [8, 1], 3, [5]), [0, 1, 2, 3, 3, 10, 10, 10]);
+  assert.deepEqual(unpackShots([[2], [UNKNOWN], [4]], [10, 1], 4, [3, 7]), [1, 1, 1, NaN, NaN, NaN, NaN, 2, 2, 2]);
+  assert.deepEqual(unpackShots([[2], [4]], [6, 1], 5, [2, 4]), [1, 1, NaN, NaN, 2, 2]);
+});
+
 test("nothing stays nothing", () => {
   assert.equal(unpack(null), null);
 });

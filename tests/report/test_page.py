@@ -1,6 +1,7 @@
 """report.html: complete, self-contained, and true to its numbers."""
 
 import base64
+import json
 import re
 import shutil
 import subprocess
@@ -277,6 +278,36 @@ def test_every_frame_is_stood_for_once(material):
 
 def test_half_body_marks_count_half(material):
     assert annotation_cost(material.keyframes, 40) == pytest.approx((5 + 4) / 2 / 40)
+
+
+def chart_lines(page):
+    """Numbers (x, y) of every line of the charts over the frames, by chart."""
+    blocks = re.findall(r'id="chart-(\w+)">(.*?)</script>', page)
+    return {
+        name: [
+            (decode(trace["x"]), decode(trace["y"]))
+            for trace in json.loads(figure)["data"]
+            if trace.get("mode") == "lines" and len(trace["x"])
+        ]
+        for name, figure in blocks
+    }
+
+
+def decode(values):
+    """Numbers as plotly writes them: a list, or bytes."""
+    if isinstance(values, dict):
+        return np.frombuffer(base64.b64decode(values["bdata"]), values["dtype"]).astype(float)
+    return np.array(values, float)
+
+
+def test_no_line_of_a_chart_leads_from_one_shot_to_the_next(material, pictures):
+    two = replace(on_court(material), motion=replace(material.motion, cuts=np.array([20])))
+    lines = chart_lines(build_page(two, pictures))
+    for name in ("angles", "doubt", "run", "occurrence"):
+        assert lines[name]
+        for x, y in lines[name]:
+            assert np.isnan(y[(x > 19) & (x < 20)]).any(), name
+            assert np.isfinite(y[np.isin(x, [18, 21])]).all()
 
 
 def test_poses_on_a_line_are_ordered_along_it():

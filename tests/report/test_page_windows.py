@@ -107,6 +107,20 @@ def jumping(material, cuts):
     return replace(material, court=(moved, camera), motion=replace(material.motion, cuts=cuts))
 
 
+def test_no_curve_of_a_joint_leads_from_one_shot_to_the_next(chromium, tmp_path):
+    write_report(tmp_path / "report.html", jumping(make_material(tmp_path), np.array([20])))
+    page = chromium.new_page(viewport={"width": 1366, "height": 900})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector("[data-chart=joint] .main-svg")
+    joint = "document.querySelector('[data-chart=joint]').data[1]"
+    x, y = (page.evaluate(f"Array.from({joint}.{axis}, (n) => n)") for axis in "xy")
+    page.close()
+    assert len(x) == 41
+    assert [at for at, value in zip(x, y, strict=True) if not np.isfinite(value or np.nan)] == [
+        19.5
+    ]
+
+
 def test_no_way_leads_from_one_shot_to_the_next(chromium, tmp_path):
     material = make_material(tmp_path)
     seen = {}
