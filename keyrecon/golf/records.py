@@ -295,4 +295,4 @@ class RecordedSwing:
 
 def fitted_frames(motion: Motion) -> Bool[np.ndarray, "T"]:
     """Frames to which a swing was fitted: in the others no joint has any confidence."""
-    return motion.confidence.any(axis=1)
+    return motion.confidence.max(axis=1) > 0
