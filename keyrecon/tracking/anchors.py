@@ -60,9 +60,10 @@ def with_bridge_costs(
 ) -> list[Float[np.ndarray, "_"]]:
     """Costs of states, more for those far from the straight way between the marks around them.
 
-    A path of independent steps that is known at two times is a Brownian bridge: n frames after the
-    one and m before the other its deviation is `step` sqrt(nm / (n + m)). Transitions alone forgive
-    a jump once and for all; a head that is taken for a shoe between two marks pays in each frame.
+    Who runs keeps the speed for a while: n frames after a mark the deviation is `step` n, and of
+    two marks each tells what it knows. (Independent steps deviate by `step` sqrt(n) only, and who
+    ran away from the last mark was given up for whoever stood there.) Transitions alone forgive a
+    jump once and for all; a head that is taken for a shoe between two marks pays in each frame.
     """
     known = np.flatnonzero(np.isfinite(marked).all(axis=(1, 2)))
     if not len(known):
@@ -87,8 +88,8 @@ def _bridges(
     after = np.searchsorted(known, frames)
     since = np.where(after > 0, frames - known[after - 1], np.inf)
     until = np.where(after < len(known), known[np.minimum(after, len(known) - 1)] - frames, np.inf)
-    frames_apart = 1 / (1 / np.maximum(since, 1) + 1 / np.maximum(until, 1))
-    return place, step * np.sqrt(np.maximum(frames_apart, 1))
+    told = np.square(1 / np.maximum(since, 1)) + np.square(1 / np.maximum(until, 1))
+    return place, step / np.sqrt(np.minimum(told, 1))
 
 
 def marked_places(

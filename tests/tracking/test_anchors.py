@@ -67,6 +67,18 @@ def test_between_two_marks_a_head_is_not_taken_for_what_looks_more_like_one_far_
     assert (find_cheapest_track(anchored, places, TransitionModel(2.0, 25)) == 0).all()
 
 
+def test_who_runs_away_from_the_last_mark_is_not_given_up_for_who_stands_there():
+    seconds = np.arange(60) / 30
+    runner = np.stack([80 + 200 * seconds, 0 * seconds], axis=1)  # an athlete 80 px tall: 4.5 m/s
+    marked = np.full((60, 1, 2), np.nan)
+    marked[0] = runner[0]
+    states = [np.array([[place], [[80.0, 8.0]]]) for place in runner]
+    costs = [np.array([0.5, 1.5])] * 60
+    costs = with_bridge_costs(states, costs, marked, 3.0 * 80 / 30)
+    places, anchored = anchored_states(states, costs, marked)
+    assert (find_cheapest_track(anchored, places, TransitionModel(3.0 * 80 / 30, 15)) == 0).all()
+
+
 def test_a_bridge_forgives_more_the_farther_a_mark_is_and_most_between_marks():
     marked = np.full((101, 1, 2), np.nan)
     marked[[0, 40]] = 0.0
