@@ -270,7 +270,7 @@ class HalfKeyframes:
     beta: float
     """Distance under which a keyframe represents a frame, player heights."""
     distance: Float[np.ndarray, "T"]
-    """D between each frame and its keyframe, player heights."""
+    """D between each frame and its keyframe, player heights; infinite without the player."""
     printed_count: int
     """Keyframes that Eq. 2-4 as printed would take at this beta and coverage."""
     gains: MarkGains | None = None

@@ -139,11 +139,8 @@ def _describe_gains(keyframes: Keyframes) -> list[str]:
 
 def _describe_absence(preparation: Preparation) -> list[str]:
     """Stretches in which no keyframes are asked for."""
-    visibility_score, reach = (
-        preparation.pose_distances.visibility_score,
-        preparation.keyframes.reach,
-    )
-    absent = absent_frames(visibility_score, reach) & preparation.track.known
+    reach = preparation.keyframes.reach
+    absent = absent_frames(preparation.pose_distances, reach) & preparation.track.known
     stretches = list_stretches(absent)
     if not stretches:
         return []

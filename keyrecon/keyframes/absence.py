@@ -2,24 +2,33 @@
 
 A frame or two in which the player was not detected are bridged like any other gap (Eq. 1). A
 stretch longer than that, in which the player has left the picture or is hidden, is taken out before
-keyframes are chosen, as if the video had been cut there, and put back afterwards.
+keyframes are chosen, as if the video had been cut there, and put back afterwards. So is a shot that
+does not show the player at all, however short.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 from scipy.ndimage import binary_opening
 
 from keyrecon.records import HalfKeyframes, PoseDistances
 from keyrecon.timeline import frames_before
 
 
-def absent_frames(visibility_score: Float[np.ndarray, "T"], reach: int) -> Bool[np.ndarray, "T"]:
-    """Frames of stretches longer than `reach` in which nothing can be annotated."""
-    if not visibility_score.any():
-        return np.zeros(len(visibility_score), dtype=bool)
-    return binary_opening(visibility_score == 0, np.ones(reach + 1))
+def absent_frames(comparison: PoseDistances, reach: int) -> Bool[np.ndarray, "T"]:
+    """Frames of stretches longer than `reach`, and of shots, in which nothing can be annotated."""
+    visible, shot = comparison.visibility_score > 0, shot_numbers(comparison)
+    if not visible.any():
+        return np.zeros(len(visible), dtype=bool)
+    never = np.bincount(shot, visible) == 0
+    return never[shot] | binary_opening(~visible, np.ones(reach + 1))
+
+
+def shot_numbers(comparison: PoseDistances) -> Int[np.ndarray, "T"]:
+    """The shot of each frame, counted from 0; frames that were taken out begin another as well."""
+    cut = np.isnan(comparison.consecutive_distance).any(axis=0)
+    return np.append(0, np.cumsum(cut))[: len(comparison.row)]
 
 
 def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
@@ -59,8 +68,11 @@ def select_frames(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> Pose
 def restore_frames(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int) -> HalfKeyframes:
     """Keyframes of the kept frames as keyframes of all `frames`; the others stay unrepresented.
 
-    They are given the keyframe of the last frame before them, for want of a better one.
+    They are given the keyframe of the last frame before them, for want of a better one, at an
+    infinite distance: it does not stand for them.
     """
+    distance = np.full(frames, np.inf)
+    distance[kept] = half.distance
     before = frames_before(kept, frames)
     represented = np.zeros(frames, dtype=bool)
     represented[kept] = half.represented
@@ -71,5 +83,5 @@ def restore_frames(half: HalfKeyframes, kept: Int[np.ndarray, "n"], frames: int)
         gains=gains,
         nearest=kept[half.nearest][before],
         represented=represented,
-        distance=half.distance[before],
+        distance=distance,
     )

@@ -21,7 +21,7 @@ def adopt_keyframes(
     Frames that nobody asked for count like the others, also where the player seemed to be absent.
     Beta stays, so that coverage tells what the missing ones cost or more ones bring.
     """
-    away = absent_frames(comparison.visibility_score, asked.reach)
+    away = absent_frames(comparison, asked.reach)
     away[np.concatenate(annotated)] = False
     kept, everyone = np.flatnonzero(~away), len(comparison.row)
     comparison = select_frames(comparison, kept)

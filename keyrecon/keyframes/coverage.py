@@ -22,30 +22,47 @@ without frames it is the same everywhere between the ends."""
 
 
 def uncovered_cost(
-    n_frames: int, reach: int, elapsed: Int[np.ndarray, "ends"] | None = None
+    n_frames: int,
+    reach: int,
+    elapsed: Int[np.ndarray, "ends"] | None = None,
+    shot: Int[np.ndarray, "T"] | None = None,
 ) -> GapCost:
     """Frames that are neither represented nor in a gap of at most `reach` (Eq. 1).
 
     With `elapsed`, the time before each frame and at the end in hundredths of a frame, frames count
     for the time that they take, and a gap is bridged that is no longer than `reach` in that time
-    either.
+    either. With `shot`, the number of the shot of each frame, none is bridged from one shot to the
+    next: nothing moves on there.
     """
+    # the ends of the video as shots of their own, from which nothing is bridged either
+    number = np.zeros(n_frames, dtype=np.int64) if shot is None else shot
+    shots = np.concatenate([number, [-1, -2]])
     if elapsed is None:
-        return partial(_open_frames, n_frames, reach)
-    return partial(_open_time, n_frames, reach, elapsed)
+        return partial(_open_frames, reach, shots)
+    return partial(_open_time, reach, shots, elapsed)
 
 
-def _open_frames(n_frames: int, reach: int, left: Gaps, right: Gaps) -> Gaps:
-    bridged = (left >= 0) & (right < n_frames) & (right - left <= reach)
+def _open_frames(reach: int, shots: Int[np.ndarray, "S"], left: Gaps, right: Gaps) -> Gaps:
+    bridged = _in_one_shot(shots, left, right) & (right - left <= reach)
     return (right - left - 1) * ~bridged
 
 
 def _open_time(
-    n_frames: int, reach: int, elapsed: Int[np.ndarray, "ends"], left: Gaps, right: Gaps
+    reach: int,
+    shots: Int[np.ndarray, "S"],
+    elapsed: Int[np.ndarray, "ends"],
+    left: Gaps,
+    right: Gaps,
 ) -> Gaps:
     inside = elapsed[right] - elapsed[left + 1]
     short = (right - left <= reach) & (inside <= (reach - 1) * TIME_UNIT)
-    return inside * ~((left >= 0) & (right < n_frames) & short)
+    return inside * ~(_in_one_shot(shots, left, right) & short)
+
+
+def _in_one_shot(shots: Int[np.ndarray, "S"], left: Gaps, right: Gaps) -> Bool[np.ndarray, "P"]:
+    """Whether both ends of a gap lie in one shot; -1 and T, the ends of the video, in none."""
+    same: Bool[np.ndarray, "P"] = shots[left] == shots[right]
+    return same
 
 
 TIME_UNIT = 100
@@ -179,13 +196,14 @@ def choose_greedily(
     max_keyframes: int,
     tie: Float[np.ndarray, "M"],
     elapsed: Int[np.ndarray, "ends"] | None = None,
+    shot: Int[np.ndarray, "T"] | None = None,
 ) -> list[int]:
     """Candidates that each bridge or represent the most further frames, at most `max_keyframes`.
 
     Stops when at most `uncovered` frames (with `elapsed`: hundredths of measured time) are left.
     Among equals the one that represents most wins, then the one with the largest `tie` (0-1).
     """
-    cost = uncovered_cost(hoods.n_frames, reach, elapsed)
+    cost = uncovered_cost(hoods.n_frames, reach, elapsed, shot)
     everyone = np.arange(len(tie))
     chosen: list[int] = []
     represented = np.zeros(hoods.n_frames, dtype=bool)

@@ -9,7 +9,7 @@ candidates the second.
 import numpy as np
 from jaxtyping import Int
 
-from keyrecon.keyframes.coverage import measure_gains, total_cost, uncovered_cost
+from keyrecon.keyframes.coverage import measure_gains, total_cost
 from keyrecon.keyframes.swaps import CoverageGoal
 from keyrecon.records import MarkGains, PoseDistances
 
@@ -19,7 +19,7 @@ def order_by_gain(
 ) -> MarkGains:
     """Keyframes by what they add to the coverage of `goal`, whose neighbourhoods `beta` made."""
     n_frames = goal.hoods.n_frames
-    cost = uncovered_cost(n_frames, goal.reach)
+    cost = goal.frame_cost()
     rows = comparison.row[keyframes]
     hoods = goal.hoods.only(rows)
     represented = np.zeros(n_frames, dtype=bool)

@@ -24,7 +24,7 @@ to 95.2, but a serve fell from 92.5 to 88.0 (a loss that grows with the square: 
 before the serve, where little is lost, and coverage spreads its keyframes over the stroke.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -33,7 +33,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.annotation_budget import check_budget, least_labels, usual_budget
 from keyrecon.errors import KeyreconError
-from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
+from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames, shot_numbers
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
 from keyrecon.keyframes.coverage import TIME_UNIT, choose_greedily
 from keyrecon.keyframes.mark_gains import order_by_gain
@@ -156,8 +156,10 @@ class HalfDistances:
             self.distances(beta), self.pose_distances, self.exemplar_distance, beta
         )
         visibility_score = self.pose_distances.visibility_score[self.pose_distances.frames]
-        elapsed = None if self.options.method == "paper" else self.elapsed
-        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score, elapsed)
+        goal = CoverageGoal(hoods, self.reach, self.uncovered, visibility_score)
+        if self.options.method == "paper":  # which knows of neither
+            return goal
+        return replace(goal, elapsed=self.elapsed, shot=shot_numbers(self.pose_distances))
 
 
 def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
@@ -197,7 +199,7 @@ def choose_keyframes(
     frames = len(comparison.row)
     labels = count_labels(options, frames, fps)
     reach = max(1, round(options.reach * fps / 50))
-    kept = np.flatnonzero(~absent_frames(comparison.visibility_score, reach))
+    kept = np.flatnonzero(~absent_frames(comparison, reach))
     comparison = select_frames(comparison, kept)
     halves: list[HalfKeyframes] = []
     flexible = options.budget is None and options.method == "coverage"
@@ -294,6 +296,7 @@ def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list
         max_keyframes + max_keyframes // 5 + 1,
         goal.visibility_score,
         goal.elapsed,
+        goal.shot,
     )
     return drop_redundant(goal, chosen)[:max_keyframes]
 
@@ -333,6 +336,7 @@ def _lower_beta(
             max_keyframes,
             goal.visibility_score,
             goal.elapsed,
+            goal.shot,
         )
         swapped = swap_for_coverage(goal, start)
         if not goal.reached(swapped):

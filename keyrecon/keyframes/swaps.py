@@ -41,6 +41,8 @@ class CoverageGoal:
     elapsed: Int[np.ndarray, "ends"] | None = None
     """Time before each frame and at the end, hundredths of a frame, where it is measured in pose
     change (`pose_time`): of it, too, no more than (1 - alpha) may be left uncovered."""
+    shot: Int[np.ndarray, "T"] | None = None
+    """The shot of each frame: no gap is bridged from one to the next; None where there is one."""
 
     @property
     def allowed(self) -> int:
@@ -49,7 +51,7 @@ class CoverageGoal:
 
     def left_over(self, represented: Bool[np.ndarray, "T"]) -> int:
         """Frames not covered."""
-        return total_cost(represented, uncovered_cost(self.hoods.n_frames, self.reach))
+        return total_cost(represented, self.frame_cost())
 
     def time_left(self, represented: Bool[np.ndarray, "T"]) -> int:
         """What is not covered, in the measure that keyframes are chosen by."""
@@ -72,8 +74,12 @@ class CoverageGoal:
             self, uncovered=int(frames + (1 - coverage) * (self.hoods.n_frames - frames))
         )
 
+    def frame_cost(self) -> GapCost:
+        """What gaps cost where every frame counts alike."""
+        return uncovered_cost(self.hoods.n_frames, self.reach, shot=self.shot)
+
     def _cost(self) -> GapCost:
-        return uncovered_cost(self.hoods.n_frames, self.reach, self.elapsed)
+        return uncovered_cost(self.hoods.n_frames, self.reach, self.elapsed, self.shot)
 
     def replacements(self, others: list[int]) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
         """What is left uncovered with each candidate beside `others`, and how many frames it adds.
@@ -87,8 +93,7 @@ class CoverageGoal:
         left, _ = self.replacements(others)
         enough = left <= self.allowed
         if self.elapsed is not None:
-            frames = uncovered_cost(self.hoods.n_frames, self.reach)
-            enough &= self._replacements(others, frames)[0] <= self.uncovered
+            enough &= self._replacements(others, self.frame_cost())[0] <= self.uncovered
         return enough
 
     def _replacements(

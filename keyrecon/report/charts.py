@@ -57,13 +57,15 @@ def _add_occurrence(
     between: Float[np.ndarray, "K K"],
     cuts: Int[np.ndarray, "C"] | None,
 ) -> None:
-    """One line that jumps between keyframes; frames that none represents are hollow."""
+    """One line that jumps between keyframes; frames that none represents are hollow, and there is
+    nothing where the player is not to be seen."""
     rank = np.empty(len(half.frames), dtype=np.int64)
     rank[order_by_pose(between)] = np.arange(1, len(half.frames) + 1)
-    height = rank[np.searchsorted(half.frames, half.nearest)]
+    shown = np.isfinite(half.distance)
+    height = np.where(shown, rank[np.searchsorted(half.frames, half.nearest)], np.nan)
     frames = np.arange(len(height))
     hover = "frame %{x}: keyframe at frame %{customdata}<extra></extra>"
-    well = half.represented
+    well = half.represented | ~shown
     places, broken = end_at_cuts(height, cuts)
     figure.add_scatter(
         x=places,

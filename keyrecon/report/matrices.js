@@ -4,6 +4,9 @@ import { frame, show, followers } from "./cursor.js";
 const STEPS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74",
   "#c3b369", "#e1cc55", "#fee838"].map((hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)));
 
+const TOP = 254, UNKNOWN = 255; // grey values: the largest distance, and none
+const NOT_COMPARED = [255, 255, 255];
+
 // Cividis, even in lightness also for the colour-blind (Nunez, Anderton and Renslow 2018).
 function cividis(share) {
   const at = Math.min(share, 0.9999) * (STEPS.length - 1), low = Math.floor(at);
@@ -17,7 +20,7 @@ function colored(image) {
   const pen = canvas.getContext("2d");
   pen.drawImage(image, 0, 0);
   const pixels = pen.getImageData(0, 0, side, side);
-  const lookup = Array.from({ length: 256 }, (_, n) => cividis(n / 255));
+  const lookup = Array.from({ length: 256 }, (_, n) => (n === UNKNOWN ? NOT_COMPARED : cividis(n / TOP)));
   const grey = Uint8Array.from({ length: side * side }, (_, n) => pixels.data[4 * n]);
   grey.forEach((value, n) => pixels.data.set(lookup[value], 4 * n));
   pen.putImageData(pixels, 0, 0);
@@ -67,10 +70,11 @@ function setUp(figure) {
   over.addEventListener("pointermove", (event) => {
     pointed = pairAt(event);
     const [column, row] = pointed.map((at) => Math.min(side - 1, Math.floor((at / frames) * side)));
-    const value = grey[row * side + column], distance = (value / 255) * top;
-    readout.textContent = `frames ${pointed[1]} and ${pointed[0]}: `
-      + `${value === 255 ? "at least " : ""}${distance.toFixed(3)} player heights`
-      + (distance < beta ? ", alike" : "");
+    const value = grey[row * side + column], distance = (value / TOP) * top;
+    const told = value === UNKNOWN ? "not compared"
+      : `${value === TOP ? "at least " : ""}${distance.toFixed(3)} player heights`
+        + (distance < beta ? ", alike" : "");
+    readout.textContent = `frames ${pointed[1]} and ${pointed[0]}: ${told}`;
     mark();
   });
   over.addEventListener("pointerleave", () => {

@@ -2,7 +2,7 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import counted
@@ -145,12 +145,15 @@ def keyframe_pictures(material: ReportMaterial, pictures: Pictures) -> str:
 
 def stands_for(half: HalfKeyframes, frame: int) -> int | None:
     """How many frames a keyframe stands for; None where it is no keyframe of this half."""
-    return int((half.nearest == frame).sum()) if frame in half.frames else None
+    if frame not in half.frames:
+        return None
+    return int(((half.nearest == frame) & np.isfinite(half.distance)).sum())
 
 
 def matrices(material: ReportMaterial) -> str:
     """Pose distance of every two frames, as pictures with a readout."""
     keyframes, comparison = material.keyframes, material.pose_distances
+    unseen = not np.isfinite(keyframes.upper.distance).all()
     halves = (
         ("Upper body", keyframes.upper, comparison.upper),
         ("Lower body", keyframes.lower, comparison.lower),
@@ -162,6 +165,7 @@ def matrices(material: ReportMaterial) -> str:
         "Dark: the two frames show alike poses. Diagonal stripes are movements that come back. "
         "Distances are in player heights; the line on the scale is β, under which a keyframe "
         "stands for a frame. Point at a pair to read it, press to go to the frame."
+        + (" White: frames without the player are compared with none." if unseen else "")
     )
     return section(
         "distances", "Which frames look alike", about, f'<div class="pair">{figures}</div>'
@@ -174,7 +178,7 @@ def _matrix(
     distances: Float[np.ndarray, "M M"],
     row: Int[np.ndarray, "T"],
 ) -> str:
-    grey, top = reduce_matrix(distances, row)
+    grey, top = reduce_matrix(distances, row, np.isfinite(half.distance))
     setting = {
         "title": title,
         "top": top,
@@ -191,21 +195,26 @@ def _matrix(
 
 
 def reduce_matrix(
-    distances: Float[np.ndarray, "M M"], row: Int[np.ndarray, "T"]
+    distances: Float[np.ndarray, "M M"],
+    row: Int[np.ndarray, "T"],
+    compared: Bool[np.ndarray, "T"] | None = None,
 ) -> tuple[UInt8[np.ndarray, "side side"], float]:
-    """The matrix over all frames as grey values, at most MATRIX_SIDE px; 255 is `top`."""
+    """The matrix over all frames as grey values, at most MATRIX_SIDE px; 254 is `top`, player
+    heights, and 255 where a frame is compared with none: those that are not `compared`."""
     side = min(len(row), MATRIX_SIDE)
+    shown = np.linspace(0, len(row) - 1, side).round().astype(int)
     if len(distances) <= MATRIX_SIDE or len(distances) < len(row):
-        at = row[np.linspace(0, len(row) - 1, side).round().astype(int)]
-        small = distances[np.ix_(at, at)]
+        small = distances[np.ix_(row[shown], row[shown])]
     else:
         small = cv2.resize(
             np.asarray(distances, np.float32), (side, side), interpolation=cv2.INTER_AREA
         )
     known = np.isfinite(small)
+    if compared is not None:
+        known &= np.outer(compared[shown], compared[shown])
     top = float(np.quantile(small[known], 0.995)) if known.any() else 1.0
-    scaled = np.where(known, small, top) / max(top, 1e-9)
-    return np.round(255 * np.clip(scaled, 0, 1)).astype(np.uint8), round(top, 5)
+    scaled = np.clip(np.where(known, small, top) / max(top, 1e-9), 0, 1)
+    return np.where(known, np.round(254 * scaled), 255).astype(np.uint8), round(top, 5)
 
 
 def reference_views(material: ReportMaterial, frames: list[int]) -> str:

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from sporting_poses import comparison_of, sporting_poses
 
+from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.keyframes.absence import absent_frames, list_stretches, select_frames
 from keyrecon.keyframes.adoption import adopt_keyframes
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Track
+from keyrecon.report.sections import stands_for
 from keyrecon.segmentation.player_crops import Cropping, Crops
 from keyrecon.tracking.visibility import is_visible
 
@@ -33,6 +35,14 @@ def test_nobody_is_asked_to_mark_where_nobody_is(poses, stand_ins):
     for half in (chosen.upper, chosen.lower):
         assert not AWAY[half.frames].any() and not AWAY[half.nearest].any()
         assert not half.represented[AWAY].any() and half.coverage >= 0.95
+
+
+def test_no_keyframe_stands_for_frames_without_the_player(poses):
+    chosen = choose_keyframes(comparison_of(*poses, 1.0 - AWAY), 50.0, SPARSE)
+    again = keyframes_from_json(keyframes_to_json(chosen))
+    for half in (chosen.upper, again.lower):
+        assert np.isinf(half.distance[AWAY]).all() and np.isfinite(half.distance[~AWAY]).all()
+        assert sum(stands_for(half, frame) for frame in half.frames.tolist()) == (~AWAY).sum()
 
 
 def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
@@ -60,11 +70,13 @@ def test_some_of_some_frames_are_those_frames(poses):
 
 
 def test_a_player_missed_for_a_moment_is_not_away():
-    visibility_score = np.ones(100)
+    visibility_score, poses = np.ones(100), np.zeros((100, 2))
     visibility_score[40:50] = 0
-    assert not absent_frames(visibility_score, reach=10).any()
+    for_ten = comparison_of(poses, visibility_score=visibility_score.copy())
+    assert not absent_frames(for_ten, reach=10).any()
     visibility_score[50] = 0
-    assert list_stretches(absent_frames(visibility_score, reach=10)) == [(40, 50)]
+    for_eleven = comparison_of(poses, visibility_score=visibility_score)
+    assert list_stretches(absent_frames(for_eleven, reach=10)) == [(40, 50)]
 
 
 def test_stretches_at_either_end_are_listed_whole():

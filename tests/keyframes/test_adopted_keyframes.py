@@ -39,6 +39,39 @@ def test_adopting_the_choice_gives_the_choice_back(comparison, chosen):
         assert ours.coverage == theirs.coverage
 
 
+def one_pose_around_a_turn(cut=None):
+    """40 frames of one pose, of which the 9 from frame 16 on show nine others; a cut in them."""
+    poses = np.zeros((40, 2))
+    poses[16:25] = 1 + np.arange(18).reshape(9, 2)
+    comparison = comparison_of(poses)
+    steps = comparison.consecutive_distance.copy()
+    if cut is not None:
+        steps[:, cut - 1] = np.nan
+    return replace(comparison, consecutive_distance=steps)
+
+
+def test_frames_before_a_cut_are_no_neighbours_of_those_after_it(chosen):
+    first = np.array([0])
+    whole, cut = (
+        adopt_keyframes(one_pose_around_a_turn(at), chosen, (first, first)).upper
+        for at in (None, 20)
+    )
+    assert whole.coverage == 1
+    assert cut.coverage == pytest.approx(1 - 9 / 40)
+    assert cut.gains.coverage == pytest.approx([1 - 9 / 40])
+
+
+def test_of_a_shot_without_the_player_nothing_is_covered_however_short_it_is(chosen):
+    comparison = one_pose_around_a_turn()
+    steps, visible = comparison.consecutive_distance.copy(), np.ones(40)
+    steps[:, [15, 24]], visible[16:25] = np.nan, 0
+    left_out = replace(comparison, consecutive_distance=steps, visibility_score=visible)
+    half = adopt_keyframes(left_out, chosen, (np.array([0]), np.array([0]))).upper
+    assert half.coverage == 1  # of the frames that show the player
+    assert not np.isfinite(half.distance[16:25]).any()
+    assert np.isfinite(np.delete(half.distance, slice(16, 25))).all()
+
+
 @pytest.mark.parametrize("method", ["coverage", "paper"])
 def test_keyframes_that_were_annotated_tell_how_those_asked_for_were_chosen(comparison, method):
     asked = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015, method=method))

@@ -33,12 +33,13 @@ def literal_eq2(represented):
     return total
 
 
-def literal_uncovered(represented, reach):
-    """Eq. 1 frame by frame."""
+def literal_uncovered(represented, reach, shot=None):
+    """Eq. 1 frame by frame; nothing is bridged from one shot to the next."""
     n, left = len(represented), 0
+    shot = np.zeros(n) if shot is None else shot
     for i in range(n):
-        before = [f for f in range(i) if represented[f]]
-        after = [f for f in range(i + 1, n) if represented[f]]
+        before = [f for f in range(i) if represented[f] and shot[f] == shot[i]]
+        after = [f for f in range(i + 1, n) if represented[f] and shot[f] == shot[i]]
         bridged = before and after and min(after) - max(before) <= reach
         left += not (represented[i] or bridged)
     return left
@@ -63,7 +64,28 @@ def test_gaps_count_uncovered_frames_as_equation_1_does():
             assert counted == literal_uncovered(represented, reach)
 
 
-@pytest.mark.parametrize("make_cost", [printed_cost, lambda n: uncovered_cost(n, 6)])
+def test_no_gap_is_bridged_from_one_shot_to_the_next():
+    rng = np.random.default_rng(4)
+    shot = np.repeat([0, 1, 2, 3], [13, 4, 40, 23])
+    for share in (0, 0.1, 0.4, 1):
+        represented = rng.random(80) < share
+        counted = total_cost(represented, uncovered_cost(80, 10, shot=shot))
+        assert counted == literal_uncovered(represented, 10, shot)
+    ends = np.zeros(80, dtype=bool)
+    ends[[0, 79]] = True
+    even = 100 * np.arange(81)
+    for cost in (uncovered_cost(80, 80, shot=shot), uncovered_cost(80, 80, even, shot)):
+        assert total_cost(ends, cost) in (78, 7800)
+
+
+@pytest.mark.parametrize(
+    "make_cost",
+    [
+        printed_cost,
+        lambda n: uncovered_cost(n, 6),
+        lambda n: uncovered_cost(n, 6, shot=np.arange(n) // 17),
+    ],
+)
 def test_gains_of_all_candidates_are_differences_of_the_total(make_cost):
     rng = np.random.default_rng(2)
     hoods = Neighborhoods.of_members(random_near(rng, 90))

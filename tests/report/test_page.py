@@ -270,6 +270,32 @@ def test_exemplars_stand_for_their_frames_in_the_matrix():
     assert top == pytest.approx(4.0)
 
 
+def left_out(material, frames):
+    """The material of a video of which some frames show no player."""
+    halves = (
+        replace(half, distance=np.where(np.isin(np.arange(40), frames), np.inf, half.distance))
+        for half in (material.keyframes.upper, material.keyframes.lower)
+    )
+    upper, lower = halves
+    return replace(material, keyframes=replace(material.keyframes, upper=upper, lower=lower))
+
+
+def test_frames_without_the_player_are_alike_to_none_and_no_keyframe_stands_for_them(
+    material, pictures
+):
+    frames = np.arange(25, 30)
+    told = left_out(material, frames)
+    half = told.keyframes.upper
+    assert sum(stands_for(half, frame) for frame in half.frames.tolist()) == 35
+    grey, _ = reduce_matrix(
+        told.pose_distances.upper, told.pose_distances.row, np.isfinite(half.distance)
+    )
+    unknown = np.isin(np.arange(40), frames)
+    np.testing.assert_array_equal(grey == 255, unknown[:, None] | unknown[None])
+    for x, y in chart_lines(build_page(told, pictures))["occurrence"]:
+        assert np.isnan(y[np.isin(x, frames)]).all() and np.isfinite(y[x < 25]).all()
+
+
 def test_every_frame_is_stood_for_once(material):
     half = material.keyframes.upper
     assert sum(stands_for(half, frame) for frame in half.frames.tolist()) == 40

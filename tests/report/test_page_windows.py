@@ -98,6 +98,35 @@ def test_the_way_lies_on_the_ground_where_there_is_no_court(chromium, tmp_path):
     assert faults == []
 
 
+READ_MATRIX = """
+(place) => {
+  const figure = document.querySelector(".matrix");
+  const box = figure.querySelector("canvas:last-of-type");
+  const { left, top, width, height } = box.getBoundingClientRect();
+  box.dispatchEvent(new PointerEvent("pointermove", {
+    clientX: left + (place[0] + 0.5) * width / 40, clientY: top + (place[1] + 0.5) * height / 40,
+  }));
+  return figure.querySelector("output").textContent;
+}
+"""
+
+
+def test_a_frame_without_the_player_is_said_to_be_compared_with_none(chromium, tmp_path):
+    material = make_material(tmp_path)
+    distance = material.keyframes.upper.distance.copy()
+    distance[25:30] = np.inf
+    upper = replace(material.keyframes.upper, distance=distance)
+    told = replace(material, keyframes=replace(material.keyframes, upper=upper))
+    write_report(tmp_path / "report.html", told)
+    page = chromium.new_page(viewport={"width": 1366, "height": 900})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector(".matrix canvas")
+    said = [page.evaluate(READ_MATRIX, place) for place in ([27, 24], [24, 24])]
+    page.close()
+    assert said[0] == "frames 24 and 27: not compared"
+    assert said[1].endswith("player heights, alike")
+
+
 def jumping(material, cuts):
     """The walk on the court, which goes on 4 m further to the right from frame 20 on."""
     world, camera = on_court(material).court

@@ -45,6 +45,8 @@ class _HalfCoverage:
     distance: Float[np.ndarray, "T K"]
     """Pose distance, player heights."""
     beta: float
+    shown: Bool[np.ndarray, "T"]
+    """Frames with the player."""
 
 
 def explain_keyframes(
@@ -60,9 +62,9 @@ def explain_keyframes(
             if frame not in coverage.frames:
                 continue
             column = int(np.searchsorted(coverage.frames, frame))
-            nearest = coverage.distance.argmin(axis=1) == column
+            nearest = (coverage.distance.argmin(axis=1) == column) & coverage.shown
             covered = coverage.distance < coverage.beta
-            alone = covered[:, column] & (covered.sum(axis=1) == 1)
+            alone = covered[:, column] & (covered.sum(axis=1) == 1) & coverage.shown
             served |= nearest
             sentences.append(_describe(coverage.half, nearest, int(alone.sum())))
         reasons[frame] = Reason(int(served.sum()), " ".join(sentences))
@@ -75,7 +77,8 @@ def _cover_half(
     chosen = getattr(keyframes, half)
     added_here = [frame for frame, wanted in added.items() if wanted in (half, "both")]
     frames = np.union1d(chosen.frames, np.array(added_here, dtype=np.int64))
-    return _HalfCoverage(half, frames, distances_to(distances, half, frames), chosen.beta)
+    shown = np.isfinite(chosen.distance)
+    return _HalfCoverage(half, frames, distances_to(distances, half, frames), chosen.beta, shown)
 
 
 def _describe(half: HalfName, nearest: Bool[np.ndarray, "T"], alone: int) -> str:

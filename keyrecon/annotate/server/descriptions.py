@@ -123,15 +123,17 @@ def describe_keyframes(
 
 
 def _represented(keyframes: Keyframes | None) -> dict[int, int]:
-    """For how many frames each keyframe stands, in either half."""
+    """For how many frames with the player each keyframe stands, in either half."""
     if keyframes is None:
         return {}
-    counts = {}
-    for frame in keyframes.frames.tolist():
-        counts[frame] = int(
-            ((keyframes.upper.nearest == frame) | (keyframes.lower.nearest == frame)).sum()
-        )
-    return counts
+    upper, lower = (
+        np.where(np.isfinite(half.distance), half.nearest, -1)
+        for half in (keyframes.upper, keyframes.lower)
+    )
+    return {
+        frame: int(((upper == frame) | (lower == frame)).sum())
+        for frame in keyframes.frames.tolist()
+    }
 
 
 def gains_of_frames(keyframes: Keyframes | None) -> dict[int, float]:

@@ -9,13 +9,14 @@
 `method` tells how they were chosen, "paper" by Eq. 2-4 as printed; older files are without it.
 `cost` is the share of frames to mark, a half body counted half, `printed_count` the keyframes
 that the choice as printed (Eq. 2-4) would take at the same beta. `nearest` has the keyframe of
-every frame, `distance` how far it is (player heights), `represented` the frames closer than beta,
-as [first, end) stretches. `gains` lists the keyframes by what they bring, the best first, with the
-coverage that each and those before it reach at the distance `beta`, and what one more would add;
-older files are without it.
+every frame, `distance` how far it is (player heights; null in frames without the player, for which
+it does not stand), `represented` the frames closer than beta, as [first, end) stretches. `gains`
+lists the keyframes by what they bring, the best first, with the coverage that each and those before
+it reach at the distance `beta`, and what one more would add; older files are without it.
 """
 
 import json
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,8 @@ def keyframes_to_json(keyframes: Keyframes) -> str:
         "gains": {name: _gains_to_json(half.gains) for name, half in halves.items() if half.gains},
         "nearest": {name: half.nearest.tolist() for name, half in halves.items()},
         "distance": {
-            name: np.round(half.distance.astype(float), 5).tolist() for name, half in halves.items()
+            name: [round(far, 5) if isfinite(far) else None for far in half.distance.tolist()]
+            for name, half in halves.items()
         },
         "represented": {name: _stretches(half.represented) for name, half in halves.items()},
     }
@@ -109,7 +111,7 @@ def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
     n_frames = _at_least(1, whole(data["n_frames"]), "n_frames")
     frames = np.array([whole(frame) for frame in data[name]], dtype=np.int64)
     nearest = np.array([whole(frame) for frame in data["nearest"][name]], dtype=np.int64)
-    distance = np.array([real(value) for value in data["distance"][name]])
+    distance = np.array([inf if v is None else real(v) for v in data["distance"][name]])
     if not len(frames) or (np.diff(frames) <= 0).any():
         raise ValueError(f"'{name}' must list frame numbers in ascending order")
     if frames[0] < 0 or frames[-1] >= n_frames:

@@ -7,6 +7,7 @@ import pytest
 from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.annotate.assist.frame_suggestions import explain_keyframes, suggest_frames
+from keyrecon.annotate.server.descriptions import describe_keyframes
 from keyrecon.body import LSP14
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Annotations, Motion
@@ -47,6 +48,18 @@ def test_every_frame_is_best_served_by_some_keyframe(comparison, keyframes):
     assert reasons.keys() == set(keyframes.frames.tolist())
     assert sum(reason.stands_for for reason in reasons.values()) >= COUNT
     assert all(reason.why for reason in reasons.values())
+
+
+def test_frames_without_the_player_are_no_reason_for_a_keyframe():
+    visible = np.ones(COUNT)
+    visible[60:120] = 0
+    comparison = comparison_of(sporting_poses(COUNT, seed=1), visibility_score=visible)
+    chosen = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015))
+    only = replace(chosen, lower=chosen.upper)
+    reasons = explain_keyframes(comparison, only, {})
+    assert sum(reason.stands_for for reason in reasons.values()) == COUNT - 60
+    described = describe_keyframes(only, {}, LSP14, {})
+    assert sum(keyframe["stands_for"] for keyframe in described) == COUNT - 60
 
 
 def test_what_a_keyframe_is_for_is_told_for_the_halves_it_was_chosen_for(comparison, keyframes):
