@@ -33,7 +33,13 @@ from keyrecon.timeline import (
     part_of_picks,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
-from keyrecon.tracking.shot_sorting import ShotOptions, Sighting, sight_player, sort_shots
+from keyrecon.tracking.shot_sorting import (
+    ShotOptions,
+    Sighting,
+    numbered_shots,
+    sight_player,
+    sort_shots,
+)
 from keyrecon.tracking.tracker import TrackOptions, track_player
 from keyrecon.tracking.verification import verify_track
 
@@ -104,7 +110,8 @@ def follow_player(
         )  # fmt: skip
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
-    sightings = _sight_each(each, options.find, keep, progress)
+    asked = numbered_shots(options.shots.use, len(each))
+    sightings = _sight_each(each, asked, options.find, keep, progress)
     picked = np.array([shot.picked for shot in each])
     shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
@@ -114,18 +121,25 @@ def follow_player(
 
 
 def _sight_each(
-    shots: Sequence[_Shot], options: FindOptions, keep: Keep, progress: Progress
+    shots: Sequence[_Shot],
+    asked: set[int],
+    options: FindOptions,
+    keep: Keep,
+    progress: Progress,
 ) -> list[Sighting]:
-    """What was found of the player in each shot."""
+    """What was found of the player in each shot; in those that are `asked` for by number a person
+    vouches for the player, however few frames show the head."""
 
-    def sight(shot: _Shot) -> Sighting:
+    def sight(number: int) -> Sighting:
+        shot = shots[number]
         shown = hold_if_small(shot.video, HELD)
         return keep(
             f"find{shot.name}", sight_player, shown, shot.colors, shot.camera, shot.anchors,
-            options=options, progress=silent,
+            options=replace(options, detected=0.0) if number in asked else options,
+            progress=silent,
         )  # fmt: skip
 
-    looked = work_on_each(keep, sight, shots)
+    looked = work_on_each(keep, sight, range(len(shots)))
     return [*progress(looked, "Looking for the player in each shot", len(shots))]
 
 

@@ -176,7 +176,7 @@ def _link(
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
-    if (chosen >= 0).mean() < options.detected:
+    if not (chosen >= 0).any() or (chosen >= 0).mean() < options.detected:
         raise _missed_head(chosen, numbers)
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
     pairs, costs = _pair(candidates, head[numbers], height)

@@ -59,8 +59,8 @@ class ShotOptions:
     what frames of these have with one another.
     """
     use: str = ""
-    """Shots that are used whatever they seem to show, by number: '3,5'. `keyrecon keyframes` lists
-    them; the first is 1."""
+    """Shots that are used whatever they seem to show, in however few frames the head is found, by
+    number: '3,5'. `keyrecon keyframes` lists them; the first is 1."""
     skip: str = ""
     """Shots that are left out, by number: '2'."""
 
@@ -148,7 +148,7 @@ def sort_shots(
     likeness = _likeness(sightings, picked)
     repeats = [seen.repeated for seen, tell in zip(sightings, picked, strict=True) if tell]
     usual = float(np.median(repeats)) if repeats else 0.0
-    used, skipped = (_numbers(text, len(picked)) for text in (options.use, options.skip))
+    used, skipped = (numbered_shots(text, len(picked)) for text in (options.use, options.skip))
     shows = []
     for number, (part, seen) in enumerate(zip(shots.parts, sightings, strict=True)):
         if number in skipped:
@@ -202,8 +202,11 @@ def _centred(layouts: Float[np.ndarray, "n P y x"]) -> Float[np.ndarray, "n q"]:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
 
 
-def _numbers(text: str, count: int) -> set[int]:
-    """Shots by the numbers that a person gave, from 0 on."""
+def numbered_shots(text: str, count: int) -> set[int]:
+    """Shots by the numbers that a person gave, such as '3,5', counted from 0 here and from 1 there.
+
+    Raises KeyreconError for anything else than numbers of the `count` shots.
+    """
     words = text.replace(",", " ").split()
     if not all(word.isdigit() and 1 <= int(word) <= count for word in words):
         raise KeyreconError(

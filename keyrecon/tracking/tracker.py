@@ -281,7 +281,8 @@ def _link(
     height = standing_height(head, feet.mean(axis=1), frames.magnification, window)
     confidence = np.sqrt(head_confidence * feet_confidence)
     track = Track(head, feet, height, player_boxes(head, feet, height), confidence)
-    return replace(track, confidence=confidence * is_visible(frames.crops, cropping, track))
+    visible = is_visible(frames.crops, cropping, track, frames.rough.confidence > 0)
+    return replace(track, confidence=confidence * visible)
 
 
 def detect_in_crop(

@@ -23,10 +23,17 @@ SAMPLES_ALONG, SAMPLES_ACROSS = 24, 9
 clip."""
 
 
-def is_visible(crops: Crops, cropping: Cropping, track: Track) -> Bool[np.ndarray, "T"]:
-    """Frames in which something stands between the track's head and feet."""
+def is_visible(
+    crops: Crops, cropping: Cropping, track: Track, detected: Bool[np.ndarray, "T"]
+) -> Bool[np.ndarray, "T"]:
+    """Frames in which something stands between the track's head and feet.
+
+    What is usual is told by the frames in which head and feet were `detected` by their colours, few
+    or many; by all frames where there are none.
+    """
     share = _foreground_share(crops, cropping, track)
-    return share >= MIN_FOREGROUND_SHARE * np.median(share)
+    usual = float(np.median(share[detected] if detected.any() else share))
+    return share >= MIN_FOREGROUND_SHARE * usual
 
 
 def _foreground_share(crops: Crops, cropping: Cropping, track: Track) -> Float[np.ndarray, "T"]:

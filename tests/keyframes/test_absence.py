@@ -119,5 +119,5 @@ def test_an_empty_scene_between_head_and_feet_is_no_player():
     foreground[20:25] = 0
     crops = Crops(np.zeros((frames, rows, columns, 3), np.uint8), foreground)
     np.testing.assert_array_equal(
-        np.flatnonzero(~is_visible(crops, cropping, track)), range(20, 25)
+        np.flatnonzero(~is_visible(crops, cropping, track, track.confidence > 0)), range(20, 25)
     )

@@ -1,0 +1,50 @@
+"""The player followed through a video of several shots."""
+
+import numpy as np
+import pytest
+from drawn_player import film, picks
+
+from keyrecon.following import FollowOptions, follow_player
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.keeping import call_stage
+from keyrecon.records import PLAYER, CameraPath, TrackAnchors
+from keyrecon.segmentation.color_model import learn_colors
+from keyrecon.tracking.shot_sorting import ShotOptions
+
+COUNT, SHOWN = 40, 12
+
+
+@pytest.fixture(scope="module")
+def two_shots(tmp_path_factory):
+    """The player in every frame of the first shot, and in the first 12 of 40 of the second."""
+    folder = tmp_path_factory.mktemp("shots")
+    player = list(film(folder / "player.mp4", COUNT).frames())
+    nobody = list(film(folder / "nobody.mp4", COUNT, empty=True).frames())
+    pictures = [*player, *player[:SHOWN], *nobody[SHOWN:]]
+    write_video(folder / "both.mp4", pictures, open_video(folder / "player.mp4").fps)
+    return open_video(folder / "both.mp4")
+
+
+@pytest.fixture(scope="module")
+def follow(two_shots):
+    still = np.tile(np.eye(3), (2 * COUNT, 1, 1))
+    camera = CameraPath(still, np.ones(2 * COUNT), cuts=(COUNT,))
+    clicks = tuple(picks(COUNT))
+    colors = learn_colors(two_shots, clicks)
+
+    def follow(use):
+        options = FollowOptions(shots=ShotOptions(use=use))
+        nothing = TrackAnchors.none()
+        return follow_player(two_shots, camera, colors, clicks, nothing, options, call_stage)
+
+    return follow
+
+
+def test_a_shot_that_hardly_shows_the_player_is_left_out_unless_it_is_asked_for(follow):
+    assert follow("").shots.shows == (PLAYER, "nobody found")
+    asked = follow("2")
+    assert asked.shots.shows == (PLAYER, PLAYER)
+    seen, unseen = np.split(asked.track.confidence[COUNT:], [SHOWN])
+    assert seen[:-2].min() > 0.2
+    assert unseen[3:].max() == 0
