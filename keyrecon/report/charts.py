@@ -126,7 +126,7 @@ def joint_chart(frames: int, has_truth: bool) -> go.Figure:
                 x=[], y=[], showlegend=shown, legendgroup=trace["name"], row=row, col=1, **trace
             )
         figure.update_yaxes(autorange="reversed", row=row, col=1)
-    return style_chart(figure, 460)
+    return _names_below(style_chart(figure, 460))
 
 
 def angle_chart(motion: Motion) -> go.Figure:
@@ -223,7 +223,18 @@ def doubt_chart(values: Float[np.ndarray, "T"], motion: Motion, title: str) -> g
         marker={"size": 8, "symbol": "diamond", "color": "var(--annotated)"},
     )
     figure.update_yaxes(rangemode="tozero")
-    return style_chart(figure, 250)
+    return _names_below(style_chart(figure, 250))
+
+
+def _names_below(figure: go.Figure) -> go.Figure:
+    """The legend under the chart: a narrow one has no room for it beside its title."""
+    height, margin = figure.layout.height, figure.layout.margin
+    lower = 55 / (height - margin.t - margin.b)  # px, below the axis and its title
+    return figure.update_layout(
+        height=height + 40,
+        margin={"b": margin.b + 40},
+        legend={"y": -lower, "x": 0, "xanchor": "left", "yanchor": "top"},
+    )
 
 
 def end_at_cuts(

@@ -175,8 +175,8 @@ def _coverage(material: ReportMaterial) -> str:
     return (
         f"Asked for were {len(keyframes.upper.frames)} upper and {len(keyframes.lower.frames)} "
         f"lower bodies ({cost:.2%} of the frames, a half body counted half), which stand for "
-        f"{keyframes.upper.coverage:.1%} and {keyframes.lower.coverage:.1%} of the frames; "
-        f"{keyframes.alpha:.0%} were asked for."
+        f"{keyframes.upper.coverage:.1%} and {keyframes.lower.coverage:.1%} of the frames with the "
+        f"player, short gaps between such frames included; {keyframes.alpha:.0%} were asked for."
     )
 
 
@@ -223,8 +223,8 @@ def _figure_player(pictures: Pictures, material: ReportMaterial) -> str:
         'aria-label="The player with the reconstructed pose"></video>'
         '<div class="plate"><canvas id="figure-canvas" tabindex="0" '
         'aria-label="Turnable 3D figure"></canvas></div></div>'
-        f'<div class="views-bar">{view_buttons(material)}<span class="off-court">{views}</span>'
-        f"{truth_switch}</div>",
+        f'<div class="views-bar">{view_buttons(material)}'
+        f'<span class="off-court">{views} {truth_switch}</span></div>',
         note(
             "Play it at the foot of the page. Drag the figure to turn it, arrow keys while it has "
             "the focus, Ctrl and wheel to zoom. "

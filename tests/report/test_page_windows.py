@@ -56,6 +56,32 @@ def test_a_report_fits_its_window_and_its_pictures_stand_in_rows(chromium, repor
     assert all(picture - card <= 1 for card, picture in tops)
 
 
+LEGENDS_OVER_TITLES = """
+[...document.querySelectorAll(".chart")].flatMap((chart) => {
+  const boxes = (what) =>
+    [...chart.querySelectorAll(what)].map((one) => one.getBoundingClientRect());
+  const legends = boxes(".legend"), titles = boxes(".annotation-text");
+  return legends.flatMap((one) => titles.filter((other) =>
+    one.left < other.right && other.left < one.right
+    && one.top < other.bottom && other.top < one.bottom).map(() => chart.dataset.chart));
+})
+"""
+
+
+def test_on_a_phone_no_legend_lies_on_a_title_and_key_instants_can_be_seen(chromium, report):
+    page = chromium.new_page(viewport={"width": 390, "height": 844})
+    page.goto(report.as_uri())
+    page.wait_for_selector("[data-chart=sources] .main-svg")
+    over = page.evaluate(LEGENDS_OVER_TITLES)
+    page.evaluate("document.querySelector('.strip').classList.add('four')")
+    widths = page.evaluate(
+        "[...document.querySelectorAll('.four .still')].map((still) => still.clientWidth)"
+    )
+    page.close()
+    assert over == []
+    assert min(widths) > 120
+
+
 def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
     page = chromium.new_page(viewport={"width": 1366, "height": 900})
     faults = []
@@ -63,6 +89,7 @@ def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
     page.goto(report.as_uri())
     page.wait_for_selector(".js-plotly-plot .main-svg")
     figure = "document.getElementById('figure-canvas').toDataURL()"
+    assert not page.is_visible("#show-truth")  # which is not drawn there
     seen = set()
     for eye in ("camera", "umpire", "above", "opponent"):
         page.click(f"[data-eye={eye}]")
@@ -76,6 +103,7 @@ def test_the_player_is_looked_at_from_all_around_the_court(chromium, report):
     way = box["x"] + 0.5 * box["width"], box["y"] + box["height"] * 15.1 / 16.6
     page.mouse.click(*way)
     page.uncheck("#on-court")
+    assert page.is_visible("#show-truth")
     page.close()
     assert len(seen) == 4
     assert faults == []
