@@ -27,7 +27,14 @@ test("a box that is fitted lies in the middle and touches the margin", () => {
 
 test("a picture cannot be pushed off its canvas", () => {
   const far = geometry.clampToCanvas({ scale: 1, x: 9999, y: -9999 }, [400, 300], [640, 360]);
-  assert.deepEqual([far.x, far.y], [320, 80 - 360]);
+  assert.deepEqual([far.x, far.y], [320.5, 80 - 359.5]);
+});
+
+test("a click on half a pixel at the edge is one on that pixel, and one beside the picture is none", () => {
+  assert.deepEqual(geometry.placeIn([64, 36], [-0.4, 35.4]), [0, 35]);
+  assert.deepEqual(geometry.placeIn([64, 36], [10.04, 20.26]), [10, 20.3]);
+  for (const outside of [[-0.6, 3], [63.6, 3], [3, 35.6]])
+    assert.equal(geometry.placeIn([64, 36], outside), null);
 });
 
 test("a keyframe opens on all that is marked there", () => {

@@ -1,11 +1,28 @@
 // Where things are on the screen, and what lies under the pointer. A view maps picture to screen:
-// screen = scale * picture + (x, y), in CSS pixels of the canvas.
+// screen = scale * picture + (x, y), in CSS pixels of the canvas. Pixel centres are at integers in the
+// picture, so its edges lie half a pixel outside of the first and the last.
 
 export const toScreen = (view, [px, py]) => [view.scale * px + view.x, view.scale * py + view.y];
 export const toPicture = (view, [sx, sy]) => [
   (sx - view.x) / view.scale,
   (sy - view.y) / view.scale,
 ];
+
+// The outer edges of a picture of some width and height, as a box.
+export const pictureBox = ([width, height]) => [-0.5, -0.5, width - 0.5, height - 0.5];
+
+// [left, top, width, height] of a picture on the screen, for `drawImage`.
+export function pictureOnScreen(view, picture) {
+  return [...toScreen(view, [-0.5, -0.5]), ...picture.map((extent) => view.scale * extent)];
+}
+
+// Where a picture was clicked, to a tenth of a pixel and no farther out than its outermost pixel centres;
+// null for a click beside it.
+export function placeIn(picture, place) {
+  const inside = place.every((value, axis) => value >= -0.5 && value < picture[axis] - 0.5);
+  if (!inside) return null;
+  return place.map((value, axis) => between(0, Math.round(value * 10) / 10, picture[axis] - 1));
+}
 
 const between = (low, value, high) => Math.max(low, Math.min(high, value));
 
@@ -26,10 +43,11 @@ export const pan = (view, [dx, dy]) => ({ ...view, x: view.x + dx, y: view.y + d
 
 // Keeps at least a strip of the picture on the canvas.
 export function clampToCanvas(view, [width, height], picture, strip = 80) {
+  const [x0, y0, x1, y1] = pictureBox(picture).map((edge) => view.scale * edge);
   return {
     scale: view.scale,
-    x: between(strip - view.scale * picture[0], view.x, width - strip),
-    y: between(strip - view.scale * picture[1], view.y, height - strip),
+    x: between(strip - x1, view.x, width - strip - x0),
+    y: between(strip - y1, view.y, height - strip - y0),
   };
 }
 
@@ -46,16 +64,15 @@ export function enclosing(box, places) {
 }
 
 // A box widened about its middle, cut at the picture's edge.
-export function enlarged([x0, y0, x1, y1], share, [width, height]) {
+export function enlarged([x0, y0, x1, y1], share, picture) {
   const dx = (x1 - x0) * share,
     dy = (y1 - y0) * share;
-  return [
-    Math.max(0, x0 - dx),
-    Math.max(0, y0 - dy),
-    Math.min(width, x1 + dx),
-    Math.min(height, y1 + dy),
-  ];
+  return intersection([x0 - dx, y0 - dy, x1 + dx, y1 + dy], pictureBox(picture));
 }
+
+// What two boxes have in common.
+export const intersection = (a, b) =>
+  a.map((edge, n) => (n < 2 ? Math.max(edge, b[n]) : Math.min(edge, b[n])));
 
 export const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
 

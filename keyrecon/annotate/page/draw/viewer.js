@@ -1,7 +1,17 @@
 // A picture on a canvas that is zoomed at the pointer and panned by dragging, with an overlay on top.
 // Used wherever frames are shown; what a click means is the caller's business.
 import { prepareCanvas } from "./canvas.js";
-import { clampToCanvas, enlarged, fit, pan, toPicture, toScreen, zoomAt } from "./geometry.js";
+import {
+  clampToCanvas,
+  enlarged,
+  fit,
+  pan,
+  pictureBox,
+  pictureOnScreen,
+  toPicture,
+  toScreen,
+  zoomAt,
+} from "./geometry.js";
 
 const CLICK_SLOP = 4; // px a pressed pointer may move and still be a click
 const MAX_SCALE = 16; // screen pixels per picture pixel
@@ -18,8 +28,10 @@ export function createViewer({ root, project, frames, redraw }) {
     shown = null; // the frame that is on the canvas
 
   const size = () => [above.clientWidth, above.clientHeight];
-  const whole = () => fit([0, 0, ...picture], size());
+  const whole = () => fit(pictureBox(picture), size());
   const near = () => (box ? fit(enlarged(box, SURROUNDINGS, picture), size(), 12) : whole());
+
+  const onScreen = () => pictureOnScreen(view, picture);
 
   function setView(next) {
     view = clampToCanvas(next, size(), picture);
@@ -37,7 +49,7 @@ export function createViewer({ root, project, frames, redraw }) {
     if (!image || drawn === label) return Boolean(image);
     const [pen] = prepareCanvas(below);
     pen.imageSmoothingQuality = "medium";
-    pen.drawImage(image, view.x, view.y, view.scale * picture[0], view.scale * picture[1]);
+    pen.drawImage(image, ...onScreen());
     drawn = label;
     shown = frame;
     root.dataset.frame = frame;
@@ -108,6 +120,8 @@ export function createViewer({ root, project, frames, redraw }) {
         size().map((extent) => extent / 2),
       ),
     scale: () => view.scale,
+    // [left, top, width, height] of the whole picture, for what is laid over it.
+    onScreen,
     // The frame whose picture is on the canvas, null before the first: what is drawn over it belongs to it.
     shown: () => shown,
     // Shows the surroundings of a box, or the whole picture.

@@ -3,7 +3,7 @@
 import { drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { drawCross, drawLabel } from "../draw/canvas.js";
-import { enclosing, nearestPlace } from "../draw/geometry.js";
+import { enclosing, nearestPlace, placeIn } from "../draw/geometry.js";
 import { placeClick, setGolf } from "../state/edits.js";
 import { jointWords } from "../state/joint_words.js";
 import { CLICKS, beginIn, clickIn, clickWords, nextAddress } from "../state/swing.js";
@@ -46,9 +46,9 @@ export function createAddress(model, { frames, shell, colors }) {
     model.redraw();
   }
 
-  function put(joint, [x, y], v) {
-    if (viewer.shown() !== frame || x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
-    model.edit(clickIn(model.state, frame, joint, [x, y, v]));
+  function put(joint, at, v) {
+    const place = viewer.shown() === frame ? placeIn([project.width, project.height], at) : null;
+    if (place) model.edit(clickIn(model.state, frame, joint, [...place, v]));
   }
 
   function removeLast() {

@@ -1,5 +1,6 @@
 // The page where everything begins: a clear frame is found and its whole body marked, then more bodies
 // where the program is least sure; from them it knows the player, and chooses the keyframes.
+import { intersection, pictureBox } from "../draw/geometry.js";
 import { drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { jointWords } from "../state/joint_words.js";
@@ -38,7 +39,7 @@ export function createBodies(model, { frames, shell, actions, colors }) {
   function inSight() {
     const [x0, y0] = viewer.toPicture([0, 0]),
       [x1, y1] = viewer.toPicture([root.clientWidth, root.clientHeight]);
-    const box = [Math.max(0, x0), Math.max(0, y0), Math.min(project.width, x1), Math.min(project.height, y1)];
+    const box = intersection([x0, y0, x1, y1], pictureBox([project.width, project.height]));
     return box[2] - box[0] < 0.9 * project.width && box[3] > box[1] ? box : null;
   }
 

@@ -1,7 +1,7 @@
 // The page of the court: the model's lines over every frame, and points of the court to click where
 // the lines do not tell; dragging a point mends a wrong court.
 import { CASING, cssColor, drawCross, drawLabel, prepareCanvas } from "../draw/canvas.js";
-import { nearestPlace } from "../draw/geometry.js";
+import { nearestPlace, placeIn } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import * as api from "../state/api.js";
 import { ASKED, namedInWords, nextPoint } from "../state/court_points.js";
@@ -66,11 +66,11 @@ export function createCourt(model, { frames, shell }) {
     model.redraw();
   }
 
-  async function put(name, [x, y]) {
+  async function put(name, at) {
     if (viewer.shown() !== selection.frame || name === null) return;
-    if (x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
-    const [px, py] = [x, y].map((value) => Math.round(value * 10) / 10);
-    await keep({ name, frame: selection.frame, place: [px, py] });
+    const place = placeIn([project.width, project.height], at);
+    if (!place) return;
+    await keep({ name, frame: selection.frame, place });
     choose(nextPoint(court.clicks));
   }
 

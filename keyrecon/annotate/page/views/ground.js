@@ -1,6 +1,7 @@
 // The page of the ground where there is no court: both ends of upright things, of a known length or two
 // points of the horizon are clicked; squares of a metre show what they and the player tell.
 import { CASING, drawCross, drawLabel } from "../draw/canvas.js";
+import { placeIn } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import * as api from "../state/api.js";
 import { byId, make, numberIn, setText } from "./dom.js";
@@ -67,8 +68,8 @@ export function createGround(model, { frames, shell }) {
 
   function click(at) {
     if (!ground || viewer.shown() !== selection.frame) return;
-    const place = viewer.toPicture(at).map((value) => Math.round(value * 10) / 10);
-    if (place.some((value, axis) => value < 0 || value > [project.width, project.height][axis] - 1)) return;
+    const place = placeIn([project.width, project.height], viewer.toPicture(at));
+    if (!place) return;
     const length = typedLength();
     if (length === undefined) {
       model.notify("Type the length in metres first.");

@@ -1,7 +1,7 @@
 // The page where colours are picked: click a part on any frame, and see on a strip of other frames
 // whether head and feet are found.
 import { drawCross, drawLabel } from "../draw/canvas.js";
-import { nearestPlace } from "../draw/geometry.js";
+import { nearestPlace, placeIn } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import { addPick, newId, removePick } from "../state/edits.js";
 import { REQUIRED_PARTS, budgetText, missingParts, nextPart, partsOf } from "../state/workflow.js";
@@ -51,12 +51,13 @@ export function createPick(model, { frames, shell }) {
     choose(part);
   }
 
-  function add([x, y]) {
+  function add(at) {
     if (viewer.shown() !== selection.frame) return; // its picture is still to come
     if (selection.part === null) return model.notify("Choose on the right what the click is to show.");
-    if (x < 0 || y < 0 || x > project.width - 1 || y > project.height - 1) return;
-    const [px, py] = [x, y].map((value) => Math.round(value * 10) / 10);
-    model.edit(addPick({ id: newId(), frame: selection.frame, part: selection.part, x: px, y: py }));
+    const place = placeIn([project.width, project.height], at);
+    if (!place) return;
+    const [x, y] = place;
+    model.edit(addPick({ id: newId(), frame: selection.frame, part: selection.part, x, y }));
     const now = parts().find(({ part }) => part === selection.part);
     selection.last = now.text;
     if (now.picked >= now.count) choose(nextPart(parts())?.part ?? null);
@@ -122,10 +123,7 @@ export function createPick(model, { frames, shell }) {
   function drawPicture() {
     viewer.drawPicture(selection.frame, [undefined, SMALL_WIDTH]);
     const [pen] = viewer.overlay();
-    if (map) {
-      const scale = viewer.scale();
-      pen.drawImage(map, ...viewer.toScreen([0, 0]), scale * project.width, scale * project.height);
-    }
+    if (map) pen.drawImage(map, ...viewer.onScreen());
     for (const pick of on(viewer.shown() ?? selection.frame)) {
       const at = viewer.toScreen([pick.x, pick.y]);
       drawCross(pen, at, palette.colorOf(pick.part));

@@ -1,7 +1,7 @@
 // Small pictures of frames spread over the video, with the head and the feet that the picks find there.
 import * as api from "../state/api.js";
 import { prepareCanvas } from "../draw/canvas.js";
-import { fit, toScreen } from "../draw/geometry.js";
+import { fit, pictureBox, pictureOnScreen, toScreen } from "../draw/geometry.js";
 import { spreadFrames } from "../state/workflow.js";
 import { byId, make, setText } from "./dom.js";
 
@@ -10,6 +10,7 @@ const WIDTH = 320; // of the small pictures, px
 
 export function createStrip(model, frames, choose) {
   const { project } = model,
+    extent = [project.width, project.height],
     numbers = spreadFrames(project.n_frames, COUNT);
   const detections = new Map(); // frame -> {head, feet, box}
   let confidence = null;
@@ -49,10 +50,9 @@ export function createStrip(model, frames, choose) {
     for (const { frame, cell, canvas } of cells) {
       const [pen, width, height] = prepareCanvas(canvas),
         row = detections.get(frame),
-        view = fit([0, 0, project.width, project.height], [width, height]);
-      const picture = frames.get(frame, WIDTH),
-        extent = [project.width * view.scale, project.height * view.scale];
-      if (picture) pen.drawImage(picture, view.x, view.y, ...extent);
+        view = fit(pictureBox(extent), [width, height]);
+      const picture = frames.get(frame, WIDTH);
+      if (picture) pen.drawImage(picture, ...pictureOnScreen(view, extent));
       cell.setAttribute("aria-current", frame === current);
       if (row?.head) mark(pen, toScreen(view, row.head), "#56b4e9", 5);
       for (const foot of row?.feet ?? []) mark(pen, toScreen(view, foot), "#e69f00", 3.5);

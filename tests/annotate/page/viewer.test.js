@@ -1,0 +1,47 @@
+// What is drawn over a picture lies where the picture has it: pixel centres are at integers.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { createViewer } from "../../../keyrecon/annotate/page/draw/viewer.js";
+
+const PROJECT = { width: 64, height: 36, n_frames: 3 };
+
+// A canvas of 640 x 400 CSS pixels that keeps what is drawn on it.
+function canvas(drawn) {
+  const pen = new Proxy({}, { get: (_, name) => (...given) => drawn.push([name, ...given]), set: () => true });
+  return { clientWidth: 640, clientHeight: 400, width: 640, height: 400, getContext: () => pen, addEventListener() {} };
+}
+
+function fakeBrowser() {
+  globalThis.ResizeObserver = class {
+    observe() {}
+  };
+  globalThis.window = { devicePixelRatio: 1 };
+}
+
+// {viewer, drawn}: a viewer that has drawn frame 1, and how: left, top, width, height.
+function drawOne() {
+  fakeBrowser();
+  const drawn = [],
+    canvases = [canvas(drawn), canvas([])],
+    root = { querySelectorAll: () => canvases, dataset: {}, classList: { toggle() {} } };
+  const frames = { get: () => ({ width: PROJECT.width }) },
+    viewer = createViewer({ root, project: PROJECT, frames, redraw() {} });
+  viewer.drawPicture(1);
+  const [, , ...placed] = drawn.find(([name]) => name === "drawImage");
+  return { viewer, placed };
+}
+
+test("a mark on a pixel is drawn on its middle, and a click on its middle marks it", () => {
+  const { viewer, placed } = drawOne(),
+    [left, top, width, height] = placed,
+    side = width / PROJECT.width;
+  assert.equal(height / PROJECT.height, side);
+  for (const [column, row] of [[0, 0], [10, 20], [63, 35]]) {
+    const middle = [left + (column + 0.5) * side, top + (row + 0.5) * side];
+    for (const [got, expected] of [
+      [viewer.toScreen([column, row]), middle],
+      [viewer.toPicture(middle), [column, row]],
+    ])
+      got.forEach((value, axis) => assert.ok(Math.abs(value - expected[axis]) < 1e-9, `${got} ${expected}`));
+  }
+});
