@@ -395,6 +395,6 @@ def as_printed(options: Options = Options()) -> Options:
     )
 
 
-def with_height(options: Options, height: float) -> Options:
-    """Options for an athlete of a known height, metres."""
+def with_height(options: Options, height: float | None) -> Options:
+    """Options for an athlete of some height, metres; None where it is not known."""
     return replace(options, lift=replace(options.lift, height=height))

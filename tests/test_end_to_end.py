@@ -7,10 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_line import keyrecon
+from court_walker import court_camera
+from painted_court import camera_at
 
 from keyrecon.app import running
+from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion
@@ -118,6 +122,16 @@ def test_a_second_run_makes_no_stage_again(clip, solved):
     chosen = running.settings(workspace, Options(), 1.7)
     running.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
+
+
+def test_why_there_is_no_way_on_the_court_is_in_the_report_and_on_the_page(clip, solved, tmp_path):
+    made = shutil.copytree(clip / "project", tmp_path / "p")
+    shutil.copy(clip / "video.mp4", tmp_path)
+    write_camera(made / "camera.npz", court_camera(camera_at((2, -20, 3), (0, -9, 0.8), 1.6), 7))
+    text = job_commands(made)["run"]({}, silent)
+    assert "No way on the court: camera.npz was made for 7 frames" in text
+    report = (made / "report.html").read_text()
+    assert "No way on the court: camera.npz was made for 7 frames" in report
 
 
 def test_the_paper_form_runs_too(clip, solved, capsys):

@@ -35,7 +35,7 @@ from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options, marked_frames
+from keyrecon.pipeline import Options, marked_frames, with_height
 from keyrecon.progress import Progress
 from keyrecon.report.overlay import Limbs, OverlayOptions, View
 from keyrecon.world.calibration import CalibrationOptions
@@ -160,20 +160,22 @@ def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -
 def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     workspace = Workspace(folder)
     settings = running.settings(workspace, Options(), options.get("height"))
+    if options.get("height", settings.lift.height) is None:  # its field was cleared
+        settings = with_height(settings, None)
     return _contradictions(running.run(workspace, settings, progress, partial=True))
 
 
 def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
-    """The court from its lines and the points clicked so far."""
+    """The court from its lines and the points clicked so far; why it tells no way is returned."""
     workspace = Workspace(folder)
     try:
-        calibrate(workspace, (), CalibrationOptions(), progress)
+        text = calibrate(workspace, (), CalibrationOptions(), progress)
     except KeyreconError as fault:
-        text = str(fault).replace(ASK, "click four of its points in the picture.")
+        said = str(fault).replace(ASK, "click four of its points in the picture.")
         raise KeyreconError(
-            text.split(" Clicked so far")[0].split(" Clicks of former")[0]
+            said.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
-    return ""
+    return _contradictions(text)
 
 
 def _find_ground(folder: Path, _: dict[str, Any], progress: Progress) -> str:
@@ -190,11 +192,11 @@ def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
 
 def _contradictions(output: str) -> str:
     """Of what a command tells, the cuts, clicks and marks that do not fit the rest, and what speaks
-    against the track: the page shows everything else in places of its own."""
+    against the track or the camera: the page shows everything else in places of its own."""
     named = re.compile(
         r"\d+ shots, |The [\w ]+ (clicked|marked) in frame \d+|The lower edge of the picture|"
         r"Something laid over|Another figure|The player found jumps|The light changes|"
-        r"The video is dark"
+        r"The video is dark|No way on the"
     )
     return "\n".join(line for line in output.splitlines() if named.match(line))
 

@@ -39,6 +39,11 @@ class PlacedMotion:
     lines: tuple[str, ...] = ()
     court: tuple[WorldMotion, WorldCamera] | None = None
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the camera that there is tells no way; none where it tells one."""
+        return () if self.court else self.lines
+
 
 def place_again(workspace: Workspace) -> PlacedMotion:
     """The motion that there is in the world of a new camera; what else its file holds stays."""

@@ -73,7 +73,7 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=doubts,
+        contradictions=[*doubts, *placed.doubts],
         court=placed.court,
         shots=shots,
     )

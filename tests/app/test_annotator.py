@@ -14,7 +14,11 @@ from annotator_edits import mark
 
 from keyrecon import KeyreconError
 from keyrecon.annotate.server import address
-from keyrecon.app.annotator import announce
+from keyrecon.app import annotator
+from keyrecon.app.annotator import announce, job_commands
+from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options, with_height
+from keyrecon.progress import silent
 
 
 @pytest.fixture
@@ -90,6 +94,21 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
 )
 def test_only_this_machine_reaches_a_loopback_address(host, ours):
     assert address.is_loopback(host) == ours
+
+
+def test_a_height_that_was_cleared_is_none_and_one_that_is_not_told_stays(bare, monkeypatch):
+    heights = []
+    run = job_commands(bare)["run"]
+
+    def note_height(workspace, options, progress, partial):
+        heights.append(options.lift.height)
+        return ""
+
+    monkeypatch.setattr(annotator.running, "run", note_height)
+    Workspace(bare).remember(with_height(Options(), 1.8), Options())
+    for told in ({}, {"height": 1.7}, {"height": None}):
+        run(told, silent)
+    assert heights == [1.8, 1.7, None]
 
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 9999, '{"port": 80, "session": "guess"}', "null"])

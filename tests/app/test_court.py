@@ -8,12 +8,15 @@ from court_walker import court_camera, lifted, walk
 from painted_court import camera_at, paint
 
 from keyrecon import cli
+from keyrecon.annotate.server.page_words import in_page_words
+from keyrecon.app.annotator import job_commands
 from keyrecon.app.court import calibrate, court_click, describe_camera
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera
+from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
@@ -47,8 +50,10 @@ def test_with_a_camera_the_motion_is_on_the_court_too(bare, motion):
     write_placed_motion(workspace, motion)
     before = stored(workspace)
     write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
-    (line,) = write_placed_motion(workspace, motion).lines
+    placed = write_placed_motion(workspace, motion)
+    (line,) = placed.lines
     assert "m run, top speed" in line
+    assert placed.doubts == ()
     after = stored(workspace)
     assert all(np.array_equal(before[name], after[name]) for name in before)
     assert after["root_world"].shape == (len(motion.time), 3)
@@ -66,7 +71,9 @@ def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bar
 def test_a_camera_of_another_trim_is_told_of(bare, motion):
     workspace = Workspace(bare)
     write_camera(workspace.camera_file, court_camera(PINHOLE, 7))
-    (line,) = write_placed_motion(workspace, motion).lines
+    placed = write_placed_motion(workspace, motion)
+    (line,) = placed.doubts
+    assert placed.lines == (line,)
     assert "made for 7 frames" in line
     assert "points3d_world" not in stored(workspace)
 
@@ -118,6 +125,16 @@ def test_points_that_were_clicked_are_kept_and_used_again(filmed):
     assert "By" not in calibrated(filmed, forget=["all"])
     with pytest.raises(KeyreconError, match="no click on near-left to forget; it has none"):
         calibrated(filmed, forget=["near-left"])
+
+
+def test_the_page_tells_why_there_is_no_way_on_the_court(filmed, motion):
+    workspace = Workspace(filmed)
+    find_court = job_commands(filmed)["court"]
+    assert find_court({}, silent) == ""
+    write_motion(workspace.motion_file, motion)
+    text = find_court({}, silent)
+    assert text.startswith("No way on the court: camera.npz was made for 4 frames")
+    assert "keyrecon" not in in_page_words(text)
 
 
 def test_how_lines_are_painted_is_remembered(filmed):

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct, to_builtins
+from msgspec import UNSET, Meta, Struct, UnsetType, to_builtins
 from starlette.responses import FileResponse, Response
 
 from keyrecon.annotate.server.descriptions import (
@@ -91,12 +91,12 @@ class PreviewRequest(Struct, forbid_unknown_fields=True):
 
 
 class JobOptions(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """How work is done; what is not told is as in the project."""
+    """How work is done; what is not told is as in the project, and a height of null is none."""
 
     budget: float | None = None
     coverage: float | None = None
     reach: float | None = None
-    height: float | None = None
+    height: float | UnsetType | None = UNSET
     formats: Annotated[tuple[Annotated[str, Meta(max_length=8)], ...], Meta(max_length=12)] = ()
     """Suffixes of the files to be written; what follows is said for these alone."""
     first: Frame | None = None

@@ -51,6 +51,7 @@ OTHER = {
     "annotate": "mark joints (2 Keyframes)",
     "import": "take marks from a file (4 Files)",
     "run": "make the motion (3 Motion)",
+    "court": "find the court (5 Court)",
     "ground": "find the ground (6 Ground)",
     "golf": "fit the swing (2 Swing)",
     "export": "write the files (4 Files)",

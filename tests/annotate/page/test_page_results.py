@@ -193,7 +193,7 @@ def test_a_height_in_centimetres_is_taken_as_such_and_said_at_once(
         person = visit(server)
         mark_and_run(person, typed)
         assert said in person.text("#height-said")
-        assert json.loads((folder / "told.json").read_text()).get("height") == metres
+        assert json.loads((folder / "told.json").read_text())["height"] == metres
 
 
 def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):

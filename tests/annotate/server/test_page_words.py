@@ -27,6 +27,8 @@ COMMANDS = (
     "export",
     "evaluate",
     "relink",
+    "court",
+    "ground",
 )
 COMMAND_LINE = re.compile(rf"keyrecon ({'|'.join(COMMANDS)})\b|--[a-z]")
 

@@ -72,7 +72,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     if (wrong) byId("height").focus();
     if (wrong || shell.runningJob()) return;
     await model.whenSaved();
-    shell.startJob("run", metres === null ? {} : { height: metres });
+    shell.startJob("run", { height: metres });
   }
 
   // Whether the motion was made from the marks as they are.
