@@ -1,7 +1,7 @@
 // What the page knows while the server is slow, refuses, or another page was faster.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { placeJoint } from "../../../keyrecon/annotate/page/state/edits.js";
+import { placeJoint, setLock } from "../../../keyrecon/annotate/page/state/edits.js";
 import { createModel } from "../../../keyrecon/annotate/page/state/model.js";
 
 const PROJECT = { id: "p", joints: ["neck", "left_knee"], mirror: [], keyframes: [], has: {} };
@@ -9,7 +9,7 @@ const rest = () => new Promise((done) => setTimeout(done, 5));
 
 // A page whose server answers edits as `answer(edits)` does, once `arrive()` is called.
 async function createTrial(answer) {
-  const trial = { received: [], waiting: [] };
+  const trial = { received: [], waiting: [], states: [] };
   const arrived = () => new Promise((done) => trial.waiting.push(done));
   trial.arrive = async () => {
     trial.waiting.splice(0).forEach((done) => done());
@@ -17,7 +17,11 @@ async function createTrial(answer) {
   };
   const answers = {
     "/api/project": () => PROJECT,
-    "/api/state": () => ({ revision: 0 }),
+    async "/api/state"() {
+      const state = trial.states.shift();
+      if (state) await arrived();
+      return state ?? { revision: 0 };
+    },
     async "/api/edits"({ edits }) {
       await arrived();
       trial.received.push(...edits.map(({ joint }) => joint));
@@ -101,4 +105,40 @@ test("all edits for which another page was faster are offered, and what was refu
   for (let n = 0; n < 3; n++) await arrive();
   assert.deepEqual(received, ["neck", "neck"]);
   assert.deepEqual(model.marks(3), { neck: [2, 1, 2] });
+});
+
+test("a state that was read before an edit arrived does not take the edit off the page", async () => {
+  const { model, arrive, states } = await createTrial(() => ({ ok: true })),
+    marked = { 3: { neck: [1, 1, 2] } };
+  place(model, "neck", 1);
+  states.push({ revision: 0, marks: {} }, { revision: 1, marks: marked });
+  const read = model.readState();
+  for (let n = 0; n < 3; n++) await arrive();
+  await read;
+  assert.deepEqual(model.marks(3), marked[3]);
+  assert.deepEqual(states, []);
+});
+
+test("of a server that was put back to an older state that state is taken", async () => {
+  const { model, arrive, states } = await createTrial(() => ({ ok: true }));
+  place(model, "neck", 1);
+  await arrive();
+  states.push({ revision: 0, marks: {} });
+  const read = model.readState();
+  await arrive();
+  await read;
+  assert.deepEqual(model.marks(3), {});
+});
+
+test("only edits of marks make the marks others than those that a motion was made from", async () => {
+  const { model, arrive } = await createTrial(() => ({ ok: true })),
+    made = model.state.revision;
+  assert.ok(model.marksAreOf(made));
+  model.edit(setLock(model.state, 3, true));
+  await arrive();
+  assert.equal(model.state.revision, 1);
+  assert.ok(model.marksAreOf(made));
+  place(model, "neck", 1);
+  await arrive();
+  assert.ok(!model.marksAreOf(made));
 });

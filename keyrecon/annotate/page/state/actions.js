@@ -2,6 +2,7 @@
 import {
   describeEdit,
   nextVisibility,
+  partsOf,
   placeJoint,
   placeJoints,
   setLock,
@@ -9,8 +10,9 @@ import {
   setOwnKeyframe,
   swapSides,
 } from "./edits.js";
-import { TRUNK, facingOfMarks, undecidedTurn } from "./facing.js";
+import { TRUNK, firstFacing, undecidedTurn } from "./facing.js";
 import {
+  joinHalves,
   nextOpen,
   nextStep,
   nextUnmarked,
@@ -126,13 +128,9 @@ export function createActions(model, { middle, opened, showInSwing }) {
       joint: ui.joint,
     });
 
-  // Asked once in a project, of the first whole body: whether left and right are the player's own.
+  // Asked once in a project, of the first body that tells it: whether left and right are the player's own.
   const answered = `facing ${model.project.id}`;
-  function facing() {
-    const first = Object.keys(model.state.marks).every((frame) => Number(frame) === ui.frame);
-    if (!first || localStorage.getItem(answered)) return 0;
-    return facingOfMarks(model.marks());
-  }
+  const facing = () => (localStorage.getItem(answered) ? 0 : firstFacing(model.state.marks, ui.frame));
   function answerFacing(towards) {
     const wrong = facing() !== (towards ? 1 : -1);
     localStorage.setItem(answered, "yes");
@@ -326,8 +324,11 @@ function createNavigation(model, placing, { opened, showInSwing }) {
     model.update({ offset: Math.max(-second, -ui.frame, Math.min(second, last, offset)) });
   }
 
+  // A keyframe that was added for one half, and now for the other, is one of the whole body.
   function addKeyframe(frame, half) {
-    if (model.state.own[frame] !== half) model.edit(setOwnKeyframe(model.state, frame, half));
+    const before = model.state.own[frame],
+      joined = joinHalves(before, half);
+    if (before !== joined) model.edit(setOwnKeyframe(model.state, frame, joined));
     open(frame);
   }
 
@@ -337,12 +338,12 @@ function createNavigation(model, placing, { opened, showInSwing }) {
       return model.notify("Points of this page are not undone here: Backspace or ✕ takes one away.");
     placing.dropDragged();
     const edit = await turn();
-    const part = edit?.kind === "group" ? edit.edits[0] : edit;
-    if (!part) return undefined;
+    if (!edit) return undefined;
+    const [part] = partsOf(edit);
     const isKeyframe = model.keyframes().some(({ frame }) => frame === part.frame);
     if (!SEEN[ui.view]?.includes(part.kind)) {
       const offer = isKeyframe && { text: `Show frame ${part.frame}`, act: () => open(part.frame) };
-      return model.notify(told(describeEdit(part)), offer || null);
+      return model.notify(told(describeEdit(edit)), offer || null);
     }
     if (ui.view === "swing") return showInSwing(part.kind === "key" ? part.to : part.frame);
     if (part.frame !== ui.frame && isKeyframe) open(part.frame);

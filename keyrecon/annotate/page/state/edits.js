@@ -52,6 +52,9 @@ const appliers = {
   lock: (state, { frame, to }) => ({ locked: withValues(state.locked, { [frame]: to || null }) }),
 };
 
+// The edits that one consists of.
+export const partsOf = (edit) => (edit.kind === "group" ? edit.edits.flatMap(partsOf) : [edit]);
+
 // An edit of several parts is applied part by part; kinds of a newer server are left alone.
 export function apply(state, edit) {
   if (edit.kind === "group") return edit.edits.reduce(apply, state);
@@ -225,10 +228,12 @@ export function describeRefused(failed, earlier = []) {
   return { text: parts.join(" "), overruled };
 }
 
+const MOST_NAMED = 3; // joints or limbs; of more their number is told
+const listed = (names, plural) =>
+  names.length > MOST_NAMED ? `${names.length} ${plural}` : names.map(label).join(", ");
+const limbsListed = (names) => (names.length > MOST_NAMED ? "" : "the ") + listed(names, "limbs");
+
 const WHAT = {
-  mark: ({ joint }) => label(joint),
-  marks: ({ to }) => Object.keys(to).map(label).join(", "),
-  nearer: ({ to }) => `depth of the ${Object.keys(to).map(label).join(", ")}`,
   own: () => "keyframe of yours",
   lock: () => "lock",
   pick: ({ to, from }) => `colour of the ${(to ?? from)?.part}`,
@@ -240,7 +245,17 @@ const WHAT = {
 
 // What an edit changed, for a person who does not see it: "left knee, frame 13".
 export function describeEdit(edit) {
-  const what = WHAT[edit.kind]?.(edit) ?? edit.kind,
-    frame = edit.frame ?? (edit.to ?? edit.from)?.frame;
-  return frame === undefined ? what : `${what}, frame ${frame}`;
+  const parts = partsOf(edit),
+    named = (...kinds) =>
+      parts.filter(({ kind }) => kinds.includes(kind)).flatMap(({ joint, to }) => joint ?? Object.keys(to)),
+    [joints, limbs] = [named("mark", "marks"), named("nearer")];
+  const whats = [
+    ...(joints.length ? [listed(joints, "joints")] : []),
+    ...(limbs.length ? [`depth of ${limbsListed(limbs)}`] : []),
+    ...parts.filter(({ kind }) => kind in WHAT).map((part) => WHAT[part.kind](part)),
+  ];
+  const what = [...new Set(whats)].join(" and ") || edit.kind,
+    frames = [...new Set(parts.map(({ frame, to, from }) => frame ?? (to ?? from)?.frame))].filter(Number.isFinite);
+  if (frames.length > 1) return `${what} in ${frames.length} frames`;
+  return frames.length ? `${what}, frame ${frames[0]}` : what;
 }

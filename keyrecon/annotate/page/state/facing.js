@@ -21,6 +21,13 @@ export function facingOfMarks(marks) {
   return Math.abs(breadth) < SIDEWAYS ? 0 : Math.sign(breadth);
 }
 
+// What a frame's marks tell of the way the player faces, where no other frame's marks tell it; else 0. `marks`
+// are those of all frames, by frame.
+export function firstFacing(marks, frame) {
+  const told = Object.keys(marks).filter((other) => facingOfMarks(marks[other]));
+  return told.length === 1 && Number(told[0]) === frame ? facingOfMarks(marks[frame]) : 0;
+}
+
 // {left, right}: the likeliest readings of the depth whose chest is turned to either side of the picture
 // where both are likely; else null. The readings are those of the server, with their costs in nats.
 export function undecidedTurn(alternatives) {

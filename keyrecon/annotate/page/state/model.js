@@ -12,6 +12,8 @@ import {
   nearerOf,
   newId,
   rebased,
+  same,
+  together,
 } from "./edits.js";
 import { createOutbox, pendingEdits } from "./outbox.js";
 import { createPoses } from "./poses.js";
@@ -78,8 +80,15 @@ export async function createModel() {
     rejected: (edit, error) => yieldTo([{ edit, error }]),
   });
 
+  // An answer that edits or news have overtaken is read again.
+  async function readNewest() {
+    const before = model.state.revision,
+      fresh = await api.read("state");
+    return model.state.revision > Math.max(before, fresh.revision) ? readNewest() : fresh;
+  }
   model.readState = async () => {
-    const fresh = await api.read("state");
+    const fresh = await readNewest();
+    if (!same([fresh.marks, fresh.nearer], [model.state.marks, model.state.nearer])) marksRevision = fresh.revision;
     model.state = outbox.waiting().reduce(apply, { ...emptyState(), ...fresh });
     model.redraw();
   };
@@ -108,7 +117,15 @@ export async function createModel() {
     model.redraw();
   };
 
+  let marksRevision = 0; // of the last change of a mark, or of the depth of a limb, that is known
+  function noteMarks(revision, edits) {
+    if (edits.flatMap(cellsOf).some((cell) => /^(marks|nearer)[/]/.test(cell))) marksRevision = revision;
+  }
+  // Whether the marks are still those of a revision.
+  model.marksAreOf = (revision) => marksRevision <= revision;
+
   function delivered({ revision, results, undo, redo }, batch) {
+    noteMarks(revision, batch);
     model.state = {
       ...model.state,
       revision,
@@ -150,6 +167,7 @@ export async function createModel() {
     const free = changes
       .map(editFromChange)
       .filter((edit) => !cellsOf(edit).some((cell) => ours.has(cell)));
+    noteMarks(revision, free);
     const counts = undo === undefined ? {} : { undo, redo };
     model.state = { ...free.reduce(apply, model.state), revision, ...counts };
     model.redraw();
@@ -178,7 +196,8 @@ export async function createModel() {
     try {
       const { changes, ...counts } = await outbox.inTurn(() => api.send(direction, { id }));
       merge(counts, changes);
-      return changes.length ? editFromChange(changes[0]) : null;
+      const edits = changes.map(editFromChange);
+      return edits.length > 1 ? together(edits) : (edits[0] ?? null);
     } catch (fault) {
       if (!last || !(fault instanceof api.Gone)) throw fault;
       return takeBack(last);

@@ -94,7 +94,8 @@ export function allKeyframes(project, state) {
     .sort((a, b) => a.frame - b.frame);
 }
 
-const joinHalves = (a, b) => (!a || a === b ? b : "both");
+// "upper", "lower" or "both", of what is asked for in one frame by two.
+export const joinHalves = (a, b) => (!a || a === b ? b : "both");
 
 // The pages of a project, in the order of the work; a golf swing has pages of its own.
 export const stepsOf = ({ golf, has }) =>

@@ -76,7 +76,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   }
 
   // Whether the motion was made from the marks as they are.
-  const showsMarks = () => exists() && made === model.state.revision;
+  const showsMarks = () => exists() && made !== null && model.marksAreOf(made);
 
   // Whether there is nothing to make anew: neither marks nor the height changed.
   function isMade() {

@@ -1,0 +1,73 @@
+// What a person does on a keyframe, and what is asked and told.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { createActions } from "../../../keyrecon/annotate/page/state/actions.js";
+import * as edits from "../../../keyrecon/annotate/page/state/edits.js";
+import { allKeyframes } from "../../../keyrecon/annotate/page/state/workflow.js";
+
+const FRONT = { left_shoulder: [60, 20, 2], right_shoulder: [40, 20, 2], left_hip: [55, 60, 2], right_hip: [45, 60, 2] };
+const SIDE = { left_shoulder: [51, 20, 2], right_shoulder: [49, 20, 2], left_hip: [50, 60, 2], right_hip: [50, 60, 2] };
+const PROJECT = {
+  id: "p",
+  joints: Object.keys(FRONT),
+  order: Object.keys(FRONT),
+  halves: { upper: ["left_shoulder", "right_shoulder"], lower: ["left_hip", "right_hip"] },
+  limbs: [],
+  mirror: [],
+  keyframes: [{ frame: 5, half: "lower" }],
+  has: { keyframes: true },
+};
+
+// A model of a project without a server, and what can be done with it.
+function trial(changes = {}) {
+  const model = {
+    project: PROJECT,
+    state: { ...edits.emptyState(), ...changes },
+    ui: { view: "keyframes", frame: 5, offset: 0 },
+    poses: { suggestion: () => null, current: () => null },
+    edit: (edit) => (model.state = edits.apply(model.state, edit)),
+    update: (ui) => Object.assign(model.ui, ui),
+    notify: (text) => (model.told = text),
+    marks: (frame = model.ui.frame) => edits.marksOf(model.state, frame),
+    nearer: (frame = model.ui.frame) => edits.nearerOf(model.state, frame),
+    keyframes: () => allKeyframes(PROJECT, model.state),
+    keyframe: () => model.keyframes().find(({ frame }) => frame === model.ui.frame),
+    isDone: () => false,
+  };
+  globalThis.localStorage = { getItem: () => null, setItem() {} };
+  const actions = createActions(model, { middle: () => [0, 0], opened() {}, showInSwing() {} });
+  return { model, actions };
+}
+
+test("whether the player faces you is asked though elsewhere a mark was cleared, or tells nothing of it", () => {
+  for (const other of [{}, { neck: [1, 1, 2] }, SIDE, { ...FRONT, left_hip: [0, 0, 0] }])
+    assert.equal(trial({ marks: { 2: other, 5: FRONT } }).actions.next().do, "facing");
+  assert.equal(trial({ marks: { 2: FRONT, 5: FRONT } }).actions.next().do, "next");
+});
+
+test("a keyframe that a person added for the whole body stays whole when half of it is asked for", () => {
+  const { model, actions } = trial({ own: { 20: "both", 30: "upper" } });
+  const halves = () => Object.fromEntries(model.keyframes().map(({ frame, half }) => [frame, half]));
+  actions.addKeyframe(20, "upper");
+  actions.addKeyframe(30, "lower");
+  actions.addKeyframe(40, "lower");
+  assert.deepEqual(halves(), { 5: "lower", 20: "both", 30: "both", 40: "lower" });
+});
+
+test("an undo of many joints tells of all of them", async () => {
+  const { model, actions } = trial();
+  model.ui.view = "motion";
+  const mark = (frame, joint) => ({ kind: "mark", frame, joint, to: null });
+  const nearer = (frame, limb) => ({ kind: "nearer", frame, to: { [limb]: null } });
+  const told = async (...parts) => {
+    model.undo = async () => (parts.length > 1 ? edits.together(parts) : parts[0]);
+    await actions.undo();
+    return model.told.replace(/^Taken back: |\. Redo.*$/g, "");
+  };
+  const body = (frame) => Object.keys(FRONT).map((joint) => mark(frame, joint));
+  assert.equal(await told(mark(5, "left_hip")), "left hip, frame 5");
+  assert.equal(await told(mark(5, "left_hip"), mark(5, "neck")), "left hip, neck, frame 5");
+  assert.equal(await told(...body(5), nearer(5, "left_hip")), "4 joints and depth of the left hip, frame 5");
+  assert.equal(await told(...body(5), ...body(9)), "8 joints in 2 frames");
+  assert.equal(await told({ kind: "key", name: "top", to: 9 }), "top of the swing");
+});
