@@ -72,6 +72,11 @@ def is_fitted(workspace: Workspace) -> bool:
     return noted.is_file() and noted.read_bytes() == golf_evidence(workspace).encode()
 
 
+def note_files(workspace: Workspace) -> tuple[Path, Path]:
+    """Where it is kept what the motion, and the last golf fit, were made from."""
+    return _run_file(workspace), _fitted_file(workspace)
+
+
 def _run_file(workspace: Workspace) -> Path:
     return workspace.folder / "cache" / "run.json"
 

@@ -282,6 +282,7 @@ def exports(session: Session, request: ApiRequest) -> list[Json]:
             "name": file.name,
             "bytes": stamps[file].st_size,
             "place": str(file.parent),
+            "fitted": file in fitted,
             "current": file in fitted
             or stamps[file].st_mtime_ns >= _last_change(workspace.motion_file),
         }
@@ -294,9 +295,17 @@ def _last_change(file: Path) -> int:
 
 
 def exported_file(session: Session, request: ApiRequest) -> Response:
-    """One of these files, to be kept."""
-    name = request.path["name"]
-    for file in (*session.workspace.golf_results(), *session.workspace.exported_files()):
+    """One of the files that were exported, to be kept."""
+    return _sent(request.path["name"], session.workspace.exported_files())
+
+
+def fitted_file(session: Session, request: ApiRequest) -> Response:
+    """One of the files that a golf fit wrote, to be kept."""
+    return _sent(request.path["name"], session.workspace.golf_results())
+
+
+def _sent(name: str, files: list[Path]) -> Response:
+    for file in files:
         if file.name == name:
             return FileResponse(file, filename=name, media_type="application/octet-stream")
     raise KeyreconError(f"There is no file '{name}' among the exports.")

@@ -78,6 +78,7 @@ ROUTES = (
     ApiRoute("GET", "/api/report", handlers.report),
     ApiRoute("GET", "/api/exports", handlers.exports),
     ApiRoute("GET", "/api/exports/{name}", handlers.exported_file),
+    ApiRoute("GET", "/api/fitted/{name}", handlers.fitted_file),
     ApiRoute("POST", "/api/import", handlers.import_file, handlers.ImportRequest),
     ApiRoute("GET", "/api/export/{format}", handlers.export_file),
 )

@@ -26,12 +26,13 @@ from keyrecon.annotate.store.edits import Limits
 from keyrecon.annotate.store.kept_keyframes import KeptKeyframes, halves_by_frame
 from keyrecon.annotate.store.store import Store
 from keyrecon.errors import KeyreconError
+from keyrecon.io.provenance import note_files
 from keyrecon.io.workspace import Workspace
 
 logger = logging.getLogger(__name__)
 Json = dict[str, Any]
 WATCH_SECONDS = 1.0
-"""How often the files are checked: the times of three files, which costs nothing."""
+"""How often the files are checked: the times of a few files, which costs nothing."""
 
 
 @dataclass(frozen=True)
@@ -147,9 +148,17 @@ class ProjectWatch:
             self._session.events.publish({"project": True})
 
     def _file_stamps(self) -> list[int]:
-        """When the project's kind was told, and keyframes and motion were made."""
+        """When the project's kind was told, and when each thing that is described was made."""
         workspace = self._session.workspace
-        files = (workspace.project_file, workspace.keyframes_file, workspace.motion_file)
+        files = (
+            workspace.project_file,
+            workspace.keyframes_file,
+            workspace.motion_file,
+            workspace.report_file,
+            *note_files(workspace),
+            *workspace.golf_results(),
+            workspace.exports,
+        )
         return [_stamp(file) for file in files]
 
 

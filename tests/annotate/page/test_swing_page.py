@@ -33,7 +33,9 @@ def visit(tmp_path, video, chromium):
         folder = make_golf_project(tmp_path / "swing", video, doubts, first)
         server = serving(folder, make_assistant(Workspace(folder)))
         context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
-        person = Golfer(context, server.__enter__().credentials.address)
+        serves = server.__enter__()
+        person = Golfer(context, serves.credentials.address)
+        person.server = serves
         opened.append((server, context, person))
         person.page.wait_for_selector("#swing-picture[data-frame='0']")
         return person, folder
@@ -79,6 +81,17 @@ def test_no_golfer_stands_in_frames_to_which_nothing_was_fitted(visit):
     person.await_drawn()
     person.await_text("#swing-text", "The swing is found")
     assert not (folder / "golf_marks.json").exists() or not marks(folder)["frames"]
+
+
+def test_the_report_of_the_first_fit_can_be_opened_at_once(visit):
+    person, folder = visit()
+    report = (folder / "report.html").rename(folder / "kept.html")
+    person.page.reload()
+    person.page.wait_for_selector("#swing-picture[data-frame='0']")
+    person.page.wait_for_selector("#swing-report", state="hidden")
+    report.rename(folder / "report.html")
+    person.server.session.events.publish({"project": True})
+    person.page.wait_for_selector("#swing-report")
 
 
 def test_joint_club_and_key_postures_are_put_right_and_taken_back(visit):

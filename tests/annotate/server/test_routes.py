@@ -215,6 +215,24 @@ def test_what_stands_in_the_way_is_reported_once_and_when_it_is_gone(opened, fol
     assert [bool(news["trouble"]) for news in heard] == [True, False]
 
 
+def test_whatever_another_program_makes_of_the_project_is_news(opened, folder):
+    session = opened()
+    watch = ProjectWatch(session)
+    watch.close()
+    heard = []
+    session.events.publish = heard.append
+    (folder / "cache").mkdir(exist_ok=True)
+    (folder / "exports").mkdir()
+    written = ("motion.npz", "report.html", "cache/run.json", "exports/p.bvh")
+    for name in ("exports", *written):
+        if name != "exports":
+            (folder / name).write_text("written")
+        watch.check()
+        assert heard.pop() == {"project": True}, name
+        watch.check()
+        assert heard == []
+
+
 def test_a_frame_beyond_the_last_one_and_a_joint_that_nobody_has_are_refused(opened):
     session = opened(Assistant(suggestion=lambda *_: {}, pose=lambda *_: {}))
     place = {"frame": 50, "marks": {}, "nearer": {}}

@@ -105,5 +105,21 @@ def test_what_a_fit_wrote_can_be_taken_along(session):
     (session.workspace.folder / "golf.csv").write_text("name,value\n")
     rows = ask(session, "GET", "/api/exports").json()
     assert [(row["name"], row["current"]) for row in rows] == [("golf.csv", True)]
-    assert ask(session, "GET", "/api/exports/golf.csv").status == 200
-    assert ask(session, "GET", "/api/exports/project.toml").status == 400
+    assert ask(session, "GET", "/api/fitted/golf.csv").status == 200
+    for kind in ("fitted", "exports"):
+        assert ask(session, "GET", f"/api/{kind}/project.toml").status == 400
+
+
+def test_an_export_named_as_what_the_fit_wrote_can_be_taken_along_too(session):
+    exports = session.workspace.exports
+    exports.mkdir()
+    for folder, text in ((exports.parent, "of the fit"), (exports, "exported")):
+        (folder / "golf.csv").write_text(text)
+    rows = ask(session, "GET", "/api/exports").json()
+    assert [(row["name"], row["fitted"]) for row in rows] == [
+        ("golf.csv", True),
+        ("golf.csv", False),
+    ]
+    for row, kind in zip(rows, ("fitted", "exports"), strict=True):
+        sent = ask(session, "GET", f"/api/{kind}/golf.csv")
+        assert int(sent.headers["content-length"]) == row["bytes"]

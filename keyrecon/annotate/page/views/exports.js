@@ -112,9 +112,10 @@ export function createExports(model, shell) {
     }),
   );
 
-  function fileRow({ name, bytes, current }) {
-    const link = make("a", { href: `/api/exports/${encodeURIComponent(name)}`, download: name }, name);
-    const told = current ? [FITTED[name], sizeText(bytes)].filter(Boolean).join(", ") : "of an earlier motion";
+  function fileRow({ name, bytes, current, fitted }) {
+    const address = `/api/${fitted ? "fitted" : "exports"}/${encodeURIComponent(name)}`,
+      link = make("a", { href: address, download: name }, name);
+    const told = current ? [fitted ? FITTED[name] : null, sizeText(bytes)].filter(Boolean).join(", ") : "of an earlier motion";
     return make("div", {}, link, make("small", {}, told));
   }
 
@@ -124,8 +125,8 @@ export function createExports(model, shell) {
     if (list.dataset.content === content) return;
     list.dataset.content = content;
     list.replaceChildren(...files.map(fileRow));
-    const place = files[0]?.place;
-    setText(byId("export-note"), place ? `They lie in the folder ${place}.` : "Nothing yet.");
+    const places = [...new Set(files.map(({ place }) => place))].join(" and ");
+    setText(byId("export-note"), places ? `They lie in the folder ${places}.` : "Nothing yet.");
   }
 
   function draw() {

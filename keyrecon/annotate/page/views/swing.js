@@ -298,7 +298,7 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     byId("swing-primary").hidden = !button;
     setText(byId("swing-primary"), button ?? "");
     byId("swing-again").hidden = next !== "doubt";
-    byId("swing-report").hidden = !exists() || !project.has.report;
+    byId("swing-report").hidden = !exists() || !model.project.has.report;
     slider.value = frame;
     const seconds = project.time?.[frame] ?? frame / project.fps;
     setText(byId("swing-where"), `frame ${frame} of ${project.n_frames}, ${seconds.toFixed(2)} s`);
