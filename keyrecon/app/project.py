@@ -163,9 +163,16 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
         [
             f"{workspace.annotations_file}: marks on {counted(len(merged.frames), 'frame')}.",
             *(f"Warning: {text}" for text in warnings),
-            f"Next: keyrecon run {quoted(workspace.folder)}",
+            f"Next: keyrecon {_after_marks(workspace)} {quoted(workspace.folder)}",
         ]
     )
+
+
+def _after_marks(workspace: Workspace) -> str:
+    """The command that uses marks first."""
+    if workspace.keyframes_file.is_file():
+        return "run"
+    return "golf fit" if workspace.is_golf else "keyframes"
 
 
 def _conflict_error(conflicts: list[str]) -> KeyreconError:

@@ -54,3 +54,21 @@ def test_a_mark_that_a_file_replaces_is_the_one_that_a_fit_holds(workspace):
     there = load_annotations(workspace, workspace.video())
     assert there.joints[0, WRIST].tolist() == [70, 50]
     assert "[60" in (workspace.folder / "golf_marks.old-1.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("golf", "chosen", "step"),
+    [(False, False, "keyframes"), (False, True, "run"), (True, False, "golf fit")],
+)
+def test_what_comes_after_an_import_is_what_the_project_can_do(tmp_path, golf, chosen, step):
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * 12, 25.0)
+    start(tmp_path / "v.mp4", tmp_path / "p", golf=golf)
+    joints, nearer = np.full((1, len(LSP14.names), 2), 40.0), np.zeros((1, len(LSP14.bones)), int)
+    joints += np.arange(len(LSP14.names))[None, :, None]
+    body = Annotations(LSP14, np.array([5]), joints, np.isfinite(joints[..., 0]), nearer)
+    write_coco(tmp_path / "marks.json", body, SIZE)
+    workspace = Workspace(tmp_path / "p")
+    if chosen:
+        workspace.keyframes_file.write_text("{}")
+    text = import_annotations(workspace, tmp_path / "marks.json", replacing=False)
+    assert text.endswith(f"\nNext: keyrecon {step} {workspace.folder}")
