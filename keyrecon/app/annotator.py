@@ -202,7 +202,8 @@ def _contradictions(output: str) -> str:
 
 
 def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
-    """Files for other programs, named after the project, into its folder `exports`."""
+    """Files for other programs into the folder `exports`, named after the project; what they hold
+    is returned."""
     workspace = Workspace(folder)
     make_folder(workspace.exports)
     first, last = options.get("first"), options.get("last")
@@ -218,8 +219,8 @@ def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     overlay = OverlayOptions(**chosen)
     name = folder.resolve().name + "".join(f"_{part}" for part in _told_in_name(frames, overlay))
     files = [workspace.exports / f"{name}{suffix}" for suffix in options.get("formats", ())]
-    export(workspace, files, progress, frames, overlay)
-    return ""
+    lines = export(workspace, files, progress, frames, overlay)
+    return "\n".join(line.replace(f"{workspace.exports}/", "") for line in lines)
 
 
 def _told_in_name(frames: str | None, overlay: OverlayOptions) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from small_motion import make_motion
 
+from keyrecon.app.annotator import job_commands
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
@@ -136,6 +137,14 @@ def test_views_stand_beside_the_video_at_the_size_asked_for(project):
 def test_choices_for_the_overlay_without_an_overlay_are_told(project):
     with pytest.raises(KeyreconError, match=r"for the overlay video; name an \.mp4"):
         export(project, [project.folder.parent / "a.bvh"], silent, None, OverlayOptions(slowmo=2.0))
+
+
+def test_the_page_tells_what_a_file_holds_by_its_name(project):
+    text = job_commands(project.folder)["export"]({"formats": (".bvh", ".csv")}, silent)
+    bvh, csv = text.splitlines()
+    assert re.match(r"Wrote p\.bvh: \S+", bvh) and re.match(r"Wrote p\.csv: \S+", csv)
+    (line,) = export(project, [project.exports / "p.bvh"], silent)
+    assert line.removeprefix(f"Wrote {project.exports}/") == bvh.removeprefix("Wrote ")
 
 
 def test_a_motion_on_the_court_is_exported_where_it_stands(project):

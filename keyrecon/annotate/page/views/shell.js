@@ -13,7 +13,7 @@ const SAVING = {
 };
 const LASTING = {}; // an offer of nothing: the notice stays until it is read
 const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
-const GOOD_NEWS = /^(Player found in|Note: )/;
+const GOOD_NEWS = /^(Player found in|Note: |Wrote )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court", ground: "Ground" };
 
