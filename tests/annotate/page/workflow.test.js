@@ -4,7 +4,7 @@ import { test } from "node:test";
 import * as workflow from "../../../keyrecon/annotate/page/state/workflow.js";
 import { facingOfMarks, undecidedTurn } from "../../../keyrecon/annotate/page/state/facing.js";
 import { FIGURE, jointWords } from "../../../keyrecon/annotate/page/state/joint_words.js";
-import { KEYS, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
+import { KEYS, belongsTo, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
 
 const PROJECT = {
   joints: ["neck", "left_wrist", "left_knee"],
@@ -98,6 +98,19 @@ test("a key means one thing on a page, and is written as it stands on the keyboa
   assert.equal(key({ key: "d" }).index, 1);
   assert.equal(key({ key: "F9" }), null);
   assert.equal(keyText("Ctrl+Shift+z"), "Ctrl Shift Z");
+});
+
+test("Alt and a digit go to a page also where a keyboard writes something else with them", () => {
+  const key = (parts) => interpret({ ctrlKey: false, altKey: true, ...parts }, "keyframes");
+  assert.deepEqual([key({ key: "¡", code: "Digit1" })?.action, key({ key: "£", code: "Digit3" })?.index], ["page", 2]);
+  assert.equal(key({ key: "4", code: "Digit4" }).index, 3);
+  assert.equal(key({ key: "ß", code: "KeyS" }), null);
+});
+
+test("Space belongs to a checkbox that has the focus, and no other key does", () => {
+  const checkbox = { closest: (selector) => selector.includes("[type=checkbox]") || null };
+  assert.equal(belongsTo(checkbox, " "), true);
+  for (const key of ["Enter", "q", "ArrowLeft"]) assert.equal(belongsTo(checkbox, key), false);
 });
 
 test("before there are keyframes: a frame, its body, following, more bodies, the choice", () => {

@@ -128,7 +128,8 @@ const shiftMatters = (key) => key.startsWith("Arrow") || key.length > 1;
 
 // "Ctrl+Shift+z" of an event; Shift counts only where it does not change the character itself.
 function named(event) {
-  const letter = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const digit = event.altKey && event.code?.match(/^Digit(\d)$/)?.[1], // on a Mac, Alt and 1 write "¡"
+    letter = digit || (event.key.length === 1 ? event.key.toLowerCase() : event.key);
   const parts = [];
   if (event.ctrlKey || event.metaKey) parts.push("Ctrl");
   if (event.altKey) parts.push("Alt");
@@ -151,12 +152,13 @@ export function interpret(event, page) {
   return null;
 }
 
-// Keys that belong to the element that has the focus: text, lists, sliders, buttons.
+// Keys that belong to the element that has the focus: text, lists, sliders, checkboxes, buttons.
 export function belongsTo(element, key) {
   if (element.closest("input[type=text]:not(form *)") && key === "Enter") return false;
   if (element.closest("input[type=text], textarea, select")) return true;
   if (element.closest("input[type=range], [role=listbox], [data-turns]"))
     return key.startsWith("Arrow");
+  if (element.closest("input[type=checkbox]")) return key === " ";
   return Boolean(element.closest("button, a, summary")) && [" ", "Enter"].includes(key);
 }
 
