@@ -10,6 +10,7 @@ const URGENT_REQUESTS = 3;
 const MAX_URGENT = 16; // pictures that were to be drawn and are not here yet
 const RETRY = 1000; // milliseconds until a picture that did not come is asked for again
 const CHUNK = 250; // frames of the motion asked for at a time
+const AHEAD = 100; // frames before the next of them in which it is asked for
 
 // Exact frames as pictures, kept ready to draw while there is room. `ready` is called for each picture, and
 // where one did not come, so that it is asked for again if it is still to be drawn; `failed` with the reason
@@ -116,14 +117,17 @@ export function createMotionCache(project, arrived) {
   return {
     // {joint: point} of a frame, kind "points2d" or "points3d"; null while it is not known.
     points(frame, kind) {
-      const number = Math.floor(frame / CHUNK);
-      if (!chunks.has(number)) load(number);
+      const number = Math.floor(frame / CHUNK),
+        ahead = Math.floor(Math.min(project.n_frames - 1, frame + AHEAD) / CHUNK);
+      for (const wanted of new Set([number, ahead])) if (!chunks.has(wanted)) load(wanted);
       const row = chunks.get(number)?.[kind][frame - number * CHUNK];
       if (!row) return null;
       const named = row.map((point, joint) => [project.joints[joint], point]);
       const known = named.filter(([, point]) => point && point[0] !== null);
       return known.length ? Object.fromEntries(known) : null;
     },
+    // Whether what is known of a frame has arrived.
+    isHere: (frame) => Boolean(chunks.get(Math.floor(frame / CHUNK))),
     // {level, unit, units} of a frame: the height of the ground, that of the lower foot on average over
     // half a second, and the player's stature; null while it is not known.
     ground(frame) {

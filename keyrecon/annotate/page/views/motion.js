@@ -20,6 +20,12 @@ export function groundBelow(ground, body) {
   return { center: [mean(0), level - unit / 2, mean(2)], level, unit, ground: `ground, squares of ${square}` };
 }
 
+// What stands where there is no body in space.
+export function whyEmpty({ exists, isHere }) {
+  if (!exists) return "The motion in space appears here when it is made.";
+  return isHere ? "Nothing is known in this frame." : "The motion is on its way.";
+}
+
 export function createMotion(model, { frames, shell, actions, colors }) {
   const { project, sides } = model,
     last = project.n_frames - 1,
@@ -206,10 +212,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     drawSkeleton();
     const body = points("points3d");
     byId("motion-empty").hidden = body !== null;
-    setText(
-      byId("motion-empty"),
-      exists() ? "Nothing is known in this frame." : "The motion in space appears here when it is made.",
-    );
+    setText(byId("motion-empty"), whyEmpty({ exists: exists(), isHere: motion.isHere(frame) }));
     figure.show(body, null, body && groundBelow(motion.ground(frame), body));
   }
 
