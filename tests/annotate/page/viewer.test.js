@@ -1,6 +1,7 @@
 // What is drawn over a picture lies where the picture has it: pixel centres are at integers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { createStrip } from "../../../keyrecon/annotate/page/views/strip.js";
 import { createViewer } from "../../../keyrecon/annotate/page/draw/viewer.js";
 
 const PROJECT = { width: 64, height: 36, n_frames: 3 };
@@ -44,4 +45,26 @@ test("a mark on a pixel is drawn on its middle, and a click on its middle marks 
     ])
       got.forEach((value, axis) => assert.ok(Math.abs(value - expected[axis]) < 1e-9, `${got} ${expected}`));
   }
+});
+
+// An element that keeps its text, on which anything can be called.
+const element = () => ({ ...canvas([]), append() {}, setAttribute() {}, replaceChildren() {}, textContent: "" });
+
+test("how well the colours do is not told of clicks that were taken away", async () => {
+  fakeBrowser();
+  const byName = new Map(),
+    answers = [{ ok: true, json: async () => ({ frames: [], confidence: 0.9 }) }, { ok: false, status: 400, json: async () => ({}) }];
+  globalThis.document = {
+    createElement: element,
+    getElementById: (name) => byName.get(name) ?? byName.set(name, element()).get(name),
+  };
+  globalThis.fetch = async () => answers.shift();
+  const strip = createStrip({ project: PROJECT, redraw() {} }, { get: () => null }, () => {}),
+    told = async () => {
+      await strip.refresh();
+      strip.draw(0);
+      return byName.get("strip-note").textContent;
+    };
+  assert.match(await told(), /agree on 90 %/);
+  assert.equal(await told(), "");
 });

@@ -32,8 +32,12 @@ export function createStrip(model, frames, choose) {
       confidence = answer.confidence ?? null;
       model.redraw();
     },
-    () => detections.clear(),
-  ); // too few picks so far
+    () => {
+      detections.clear(); // too few picks so far
+      confidence = null;
+      model.redraw();
+    },
+  );
 
   function mark(pen, [x, y], style, size) {
     pen.beginPath();
