@@ -124,7 +124,7 @@ class ShotRequest(Struct, forbid_unknown_fields=True):
 class ImportRequest(Struct, forbid_unknown_fields=True):
     """A file of marks; without `accept` it is only compared."""
 
-    name: Name
+    name: Annotated[str, Meta(min_length=1, max_length=1000)]
     text: str
     accept: bool = False
     mode: Literal["keep", "replace"] = "keep"

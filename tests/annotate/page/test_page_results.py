@@ -209,6 +209,21 @@ def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
             assert person.page.is_disabled("#motion-primary")
 
 
+def test_a_file_of_marks_that_is_not_taken_in_says_so(folder, visit, tmp_path):
+    with serving(folder) as server:
+        person = visit(server)
+        person.press("Alt+4")
+        file = tmp_path / "marks.json"
+        file.write_text(json.dumps(server.ask("export/coco")))
+        person.page.set_input_files("#import-file", str(file))
+        taking = person.page.locator("#marks-files button >> text=Take it")
+        taking.wait_for()
+        refusal = {"status": 400, "json": {"error": "The disk is full."}}
+        person.page.context.route("**/api/import", lambda route: route.fulfill(**refusal))
+        taking.click()
+        person.await_text("#marks-files", "The disk is full")
+
+
 def test_every_format_and_view_there_is_can_be_chosen(folder, visit):
     with serving(folder) as server:
         person = visit(server)

@@ -62,6 +62,15 @@ def test_conflicts_are_shown_before_anything_changes_and_then_settled_as_told(op
     assert session.store.state.cells == before.cells
 
 
+def test_a_file_may_have_a_long_name(opened):
+    session = opened()
+    submit(session.store, mark(3, "neck", [10.25, 20.5, 2]))
+    text = ask(session, "GET", "/api/export/coco").content.decode()
+    name = "2026-11-24 second set, serves of the afternoon, seen from the stand, corrected.json"
+    answer = ask(session, "POST", "/api/import", {"name": name, "text": text})
+    assert answer.status == 200, answer.json()
+
+
 def test_a_file_of_another_kind_is_refused_under_its_own_name(opened):
     session = opened()
     for text in ("", "hello", "{", '{"images": 3}', "<annotations>", "scorer,a\n", "\u0000"):

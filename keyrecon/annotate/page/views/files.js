@@ -21,7 +21,7 @@ export function createFiles(model) {
     const answer = await api.send("import", { ...content, accept: false });
     const offer = (text, mode) => {
       const button = make("button", {}, text);
-      button.addEventListener("click", () => accept(content, mode));
+      button.addEventListener("click", failing(() => accept(content, mode)));
       return button;
     };
     const { conflicts, frames } = answer,
