@@ -70,6 +70,39 @@ def test_upright_things_are_marked_and_squares_lie_on_the_ground(folder, chromiu
             assert np.abs(np.subtract(mark.start, post.start)).max() < 2.5
 
 
+INK = """
+() => {
+  const canvas = document.querySelectorAll("#ground-picture canvas")[1];
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return data.some((value) => value > 0);
+}
+"""
+"""Whether anything is drawn over the picture."""
+
+
+def test_marks_stay_on_the_picture_they_were_made_on_until_another_is_here(folder, chromium):
+    Workspace(folder).change_ground_marks(GroundMarks((posts()[0],)))
+    with serving(folder, make_assistant(Workspace(folder))) as server:
+        context = chromium.new_context(viewport={"width": 1440, "height": 900})
+        person = Person(context, server.credentials.address)
+        held = []
+        context.route("**/api/frame/1?*", lambda route: held.append(route))
+        person.press("Alt+6")
+        person.page.wait_for_selector("#ground-picture[data-frame='0']")
+        person.await_text("#ground-marks", "frame 0")
+        assert person.page.evaluate(INK)
+        person.press("e")
+        person.page.wait_for_selector("#ground-picture.late")
+        person.await_drawn()
+        assert person.page.evaluate(INK)
+        for route in held:
+            route.continue_()
+        person.page.wait_for_selector("#ground-picture[data-frame='1']")
+        person.await_drawn()
+        assert not person.page.evaluate(INK)
+        context.close()
+
+
 def test_two_clicks_on_a_removal_take_one_mark_away(folder, chromium):
     marks = (*posts(), HORIZON)
     Workspace(folder).change_ground_marks(GroundMarks(marks))

@@ -25,7 +25,8 @@ export function createCourt(model, { frames, shell }) {
     searched = false, // whether the court was looked for since the page was opened
     working = false;
 
-  const here = () => court.clicks.filter(({ frame }) => frame === selection.frame);
+  const on = (number) => court.clicks.filter(({ frame }) => frame === number),
+    here = () => on(selection.frame);
   const failed = (fault) => model.notify(fault.message || "The server does not answer.");
 
   const loadView = api.latestOnly(async (frame) => {
@@ -85,7 +86,7 @@ export function createCourt(model, { frames, shell }) {
   }
 
   viewer.listen({
-    grab: (at) => (court ? nearestPlace(at, places(), GRAB_RADIUS) : null),
+    grab: (at) => (court && viewer.shown() === selection.frame ? nearestPlace(at, places(), GRAB_RADIUS) : null),
     drag(name, place) {
       selection.dragged = { name, place };
       model.redraw();
@@ -146,9 +147,10 @@ export function createCourt(model, { frames, shell }) {
 
   function drawPicture() {
     viewer.drawPicture(selection.frame, [undefined, SMALL_WIDTH]);
-    const [pen] = viewer.overlay();
-    byId("court-picture").dataset.lines = (view?.frame === viewer.shown() && view.source) || "";
-    if (view?.frame === viewer.shown()) {
+    const [pen] = viewer.overlay(),
+      shown = viewer.shown(); // a picture may come later than it is asked for
+    byId("court-picture").dataset.lines = (view?.frame === shown && view.source) || "";
+    if (view?.frame === shown) {
       pen.lineCap = "round";
       for (const [color, width] of [[CASING, 3.5], [view.source === "clicks" ? PREVIEW : LINE, 1.5]]) {
         pen.strokeStyle = color;
@@ -162,7 +164,7 @@ export function createCourt(model, { frames, shell }) {
       }
       for (const place of Object.values(view.points)) drawDot(pen, viewer.toScreen(place), LINE, 4);
     }
-    for (const { name, x, y } of here()) {
+    for (const { name, x, y } of on(shown)) {
       const moved = selection.dragged?.name === name ? selection.dragged.place : [x, y],
         at = viewer.toScreen(moved);
       drawCross(pen, at, name === selection.point ? CHOSEN : CLICKED);

@@ -28,7 +28,8 @@ export function createGround(model, { frames, shell }) {
   const metres = byId("ground-metres"),
     field = byId("ground-fov");
 
-  const here = () => ground.marks.filter(({ frame }) => frame === selection.frame);
+  const on = (number) => ground.marks.filter(({ frame }) => frame === number),
+    here = () => on(selection.frame);
   const failed = (fault) => model.notify(fault.message || "The server does not answer.");
 
   const loadView = api.latestOnly(async (frame) => {
@@ -159,7 +160,8 @@ export function createGround(model, { frames, shell }) {
       drawLines(pen, view.lines, GRID, 1);
       drawLines(pen, view.post, POST, 2.5);
     }
-    for (const { name, ends } of here()) {
+    // A picture may come later than it is asked for.
+    for (const { name, ends } of on(viewer.shown())) {
       drawLines(pen, [ends], MARKED, 1.5);
       for (const end of ends) drawCross(pen, viewer.toScreen(end), MARKED);
       const [x, y] = viewer.toScreen(ends[0]);
