@@ -14,9 +14,11 @@ from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress, silent
 from keyrecon.records import (
+    Annotations,
     CameraPath,
     Colors,
     Edges,
+    FlowTracks,
     Pick,
     Shots,
     Track,
@@ -29,10 +31,13 @@ from keyrecon.segmentation.contours import EdgeOptions, find_edges
 from keyrecon.timeline import (
     join_frames,
     part_of_anchors,
+    part_of_marks,
     part_of_path,
     part_of_picks,
+    put_back,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
+from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
 from keyrecon.tracking.shot_sorting import (
     ShotOptions,
     Sighting,
@@ -217,3 +222,31 @@ def _follow(
         shot.colors, progress=progress,
     )  # fmt: skip
     return track, edges, verification
+
+
+def follow_marks(
+    video: Video,
+    marks: Annotations,
+    shots: Shots,
+    options: FlowOptions,
+    keep: Keep,
+    progress: Progress,
+) -> FlowTracks:
+    """Marked joints followed by optical flow within the shots that have any."""
+    if len(shots.parts) == 1:
+        return keep("flow", track_marked_joints, video, marks, options=options, progress=progress)
+    inside = [np.arange(part.start, part.stop) for part in shots.parts]
+    shot_marks = [part_of_marks(marks, frames) for frames in inside]
+    marked = [n for n, own in enumerate(shot_marks) if np.isfinite(own.joints).any()]
+
+    def track(number: int) -> FlowTracks:
+        part = shots.parts[number]
+        return keep(
+            f"flow@{part.start}", track_marked_joints, video.part(part), shot_marks[number],
+            options=options, progress=silent,
+        )  # fmt: skip
+
+    followed = work_on_each(keep, track, marked)
+    flows = [*progress(followed, "Following marks in each shot", len(marked))]
+    frames = [inside[number] for number in marked]
+    return put_back(join_frames(flows), np.concatenate(frames), len(video))

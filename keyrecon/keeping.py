@@ -37,6 +37,11 @@ class KeepWithWorkers(Keep, Protocol):
     spread: Spread
     """Hands out pieces of one stage's work."""
 
+    @property
+    def has_workers(self) -> bool:
+        """Whether there is anybody to hand it to."""
+        ...
+
     def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """`work`, which calls stages, done for every item, maybe side by side; in order."""
         ...
@@ -49,9 +54,9 @@ def work_on_each(
     return keep.each(work, items) if isinstance(keep, KeepWithWorkers) else map(work, items)
 
 
-def spread_of(keep: Keep) -> Spread:
-    """Who does pieces of a stage's work."""
-    return keep.spread if isinstance(keep, KeepWithWorkers) else one_by_one
+def spread_of(keep: Keep, here: Spread = one_by_one) -> Spread:
+    """Who does pieces of a stage's work; `here` where there are no workers."""
+    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_workers else here
 
 
 def call_stage(

@@ -15,12 +15,13 @@ import numpy as np
 from jaxtyping import Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.following import FollowOptions, follow_player
+from keyrecon.following import FollowOptions, follow_marks, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
+from keyrecon.io.frame_reader import in_threads
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
-from keyrecon.keeping import Keep, call_stage, spread_of, work_on_each
+from keyrecon.keeping import Keep, call_stage, spread_of
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
@@ -33,7 +34,6 @@ from keyrecon.propagation.propagation import PropagateOptions
 from keyrecon.records import (
     SOURCES,
     Annotations,
-    FlowTracks,
     JointTracks,
     Motion,
     Pick,
@@ -49,7 +49,6 @@ from keyrecon.shot_groups import propagate_in_groups
 from keyrecon.timeline import (
     cut_motion,
     end_at_cuts,
-    join_frames,
     motion_in_file,
     part_of_marks,
     put_back,
@@ -58,7 +57,7 @@ from keyrecon.timeline import (
 from keyrecon.tracking.anchors import contradicted_frames, least_sure_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions
-from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
+from keyrecon.tracking.mark_flow import FlowOptions
 from keyrecon.tracking.shot_sorting import ShotOptions
 from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
@@ -121,14 +120,15 @@ def prepare(
     # a person waits minutes for the choice itself
     count_labels(options.keyframes, len(video), video.fps)
     camera = keep(
-        "camera", estimate_camera_motion, video, options=options.camera, progress=progress
-    )
+        "camera", estimate_camera_motion, video,
+        options=options.camera, progress=progress, spread=spread_of(keep, in_threads),
+    )  # fmt: skip
     video = with_exposure(video, camera.exposure)
     clicks, anchors = tuple(picks), TrackAnchors.none()
     if marks is not None:
         clicks += picks_from_bodies(marks, (video.width, video.height))
         shots = Shots.between(camera.cuts, len(video))
-        flow = follow_marks(video, marks, shots, options, keep, progress)
+        flow = follow_marks(video, marks, shots, options.flow, keep, progress)
         anchors = anchors_from_bodies(marks, flow)
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
     follow_options = FollowOptions(
@@ -289,42 +289,13 @@ def _carry_usable(
     """The usable shots end to end, the marks in them, and these in every frame of them."""
     flow, shots = None, preparation.shots
     if options.propagate.method == "fused":
-        flow = follow_marks(preparation.video, annotations, shots, options, keep, progress)
+        flow = follow_marks(preparation.video, annotations, shots, options.flow, keep, progress)
     if not all(shots.usable):
         flow = flow and take_frames(flow, shots.usable_frames)
         annotations = part_of_marks(annotations, shots.usable_frames)
     part = usable_part(preparation)
     tracks = propagate_in_groups(part, annotations, flow, options.propagate, keep, progress)
     return part, annotations, tracks
-
-
-def follow_marks(
-    video: Video,
-    marks: Annotations,
-    shots: Shots,
-    options: Options,
-    keep: Keep,
-    progress: Progress,
-) -> FlowTracks:
-    """Marked joints followed by optical flow within the shots that have any."""
-    if len(shots.parts) == 1:
-        return keep(
-            "flow", track_marked_joints, video, marks, options=options.flow, progress=progress
-        )
-    inside = [np.arange(part.start, part.stop) for part in shots.parts]
-    shot_marks = [part_of_marks(marks, frames) for frames in inside]
-    marked = [n for n, own in enumerate(shot_marks) if np.isfinite(own.joints).any()]
-
-    def track(number: int) -> FlowTracks:
-        part = shots.parts[number]
-        return keep(
-            f"flow@{part.start}", track_marked_joints, video.part(part), shot_marks[number],
-            options=options.flow, progress=progress,
-        )  # fmt: skip
-
-    flows = [*work_on_each(keep, track, marked)]
-    frames = [inside[number] for number in marked]
-    return put_back(join_frames(flows), np.concatenate(frames), len(video))
 
 
 def _with_annotated_keyframes(

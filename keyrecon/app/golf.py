@@ -37,6 +37,7 @@ from keyrecon.golf.records import (
 )
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.durable import make_folder, put_aside, write_durably
+from keyrecon.io.fingerprint import has_fingerprint
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.golf_marks import read_golf_marks
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
@@ -46,7 +47,7 @@ from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.project_videos import relative_path
 from keyrecon.io.provenance import golf_evidence, note_fitted
-from keyrecon.io.video import Video, has_fingerprint, open_video
+from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent

@@ -5,20 +5,20 @@ and others work on several frames at a time: decoders, OpenCV and NumPy let go o
 the cores share the load.
 """
 
-import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from queue import Full, Queue
 from threading import Event, Thread
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.io.video import Video
+from keyrecon.numerics.threads import core_count
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -58,7 +58,7 @@ def side_by_side(
     work: Callable[[Item], Result], items: Iterable[Item], threads: int | None = None
 ) -> Iterator[Result]:
     """`work` done on every item, in order, a few at a time; by default one thread per core."""
-    threads = threads or min(MOST_THREADS, os.cpu_count() or 1)
+    threads = threads or min(MOST_THREADS, core_count())
     pending: deque[Future[Result]] = deque()
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -71,6 +71,11 @@ def side_by_side(
         finally:
             for future in pending:
                 future.cancel()
+
+
+def in_threads(work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
+    """Pieces of a stage's work (`spreading.Spread`) that are done here, side by side."""
+    return side_by_side(lambda arguments: work(*arguments), inputs)
 
 
 def reduce_picture(picture: UInt8[np.ndarray, "h w *c"], width: int) -> UInt8[np.ndarray, "y x *c"]:

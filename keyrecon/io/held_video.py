@@ -81,6 +81,17 @@ def hold_if_small(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> Video
     return hold_frames(video, most_in_memory) if size < most_in_memory else video
 
 
+def shows_same(video: Video, other: Video) -> bool:
+    """Whether both have the same frames of the same files, whatever is done to these."""
+    return video.fingerprint == other.fingerprint and np.array_equal(video.stamps, other.stamps)
+
+
+def share_decoded(video: HeldVideo, other: HeldVideo) -> HeldVideo:
+    """A video with what another one, which shows the same, has decoded of it or will have."""
+    vars(video)["_held"] = other._held
+    return video
+
+
 def mirror_video(video: Video) -> Video:
     """The same video with left and right exchanged; what one has decoded the other has too."""
     other = replace(video, mirrored=not video.mirrored, turns=-video.turns % 4)

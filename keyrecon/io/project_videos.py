@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.fingerprint import has_fingerprint
 from keyrecon.io.joined_video import join_videos
-from keyrecon.io.video import Video, has_fingerprint, open_video
+from keyrecon.io.video import Video, open_video
 
 Table = dict[str, Any]
 """What project.toml tells of a video."""

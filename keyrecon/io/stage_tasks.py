@@ -14,11 +14,13 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.held_video import HeldVideo, share_decoded, shows_same
 from keyrecon.io.storage import load_record, save_record
 from keyrecon.numerics.threads import one_order_of_sums
 
@@ -40,6 +42,8 @@ PATIENCE = 60.0
 telling for so long that there is none (the attribute cache of NFS: acdirmax)."""
 _ONE_AT_A_TIME = Lock()
 """Of the stages in a process: the number of threads of linear algebra is the whole process's."""
+_AT_HAND: list[HeldVideo] = []
+"""The shot that this process had to do with last, with the frames that it has decoded of it."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +93,23 @@ def carry_out(task: StageTask) -> float:
     ]
     with _ONE_AT_A_TIME, one_order_of_sums():
         began = time.perf_counter()
+        inputs = _with_frames_at_hand(inputs)
         result = task.stage(*inputs, **dict(named))
         seconds = time.perf_counter() - began
     save_record(task.result, result)
     return seconds
+
+
+def _with_frames_at_hand(inputs: list[Any]) -> list[Any]:
+    """Inputs whose video need not be decoded again if the last task's was the same."""
+    known = [*_AT_HAND]
+    _AT_HAND.clear()  # one shot at a time is held
+    for number, value in enumerate(inputs):
+        if isinstance(value, HeldVideo):
+            same = (other for other in known if shows_same(value, other))
+            inputs[number] = next((share_decoded(value, other) for other in same), value)
+            _AT_HAND.append(inputs[number])
+    return inputs
 
 
 def read_when_there(path: Path) -> Any:
@@ -110,7 +127,12 @@ def read_when_there(path: Path) -> Any:
 
 def hash_code(stage: Callable[..., Any]) -> str:
     """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    stage_code = Path(inspect.getfile(sys.modules[stage.__module__])).parent.rglob("*.py")
+    return _hash_folder(Path(inspect.getfile(sys.modules[stage.__module__])).parent)
+
+
+@cache
+def _hash_folder(folder: Path) -> str:
+    """Of a folder of stages, with what all stages share, as this process has read it."""
     shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
-    sources = sorted({*stage_code, *shared})
+    sources = sorted({*folder.rglob("*.py"), *shared})
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()

@@ -96,9 +96,10 @@ class StageStore:
         key, path = self._place(name, stage, inputs, named)
         result = _NOTHING if self.force else _stored(path)
         if result is _NOTHING:
-            if self.workers is None or "spread" in named:  # which hands out its work by itself
+            workers = self.workers
+            if workers is None or "spread" in named or not workers.takes_stage():
                 result = self._make(name, path, stage, inputs, named)
-            else:
+            else:  # one with `spread` hands out its work by itself
                 result = self._make_elsewhere(name, path, stage, inputs, named)
             self._forget(name, path)
         self._note_kept(result, key, path)
@@ -167,6 +168,11 @@ class StageStore:
         do.
         """
         return map(work, items) if self.workers is None else self.workers.each(work, items)
+
+    @property
+    def has_workers(self) -> bool:
+        """Whether anybody makes stages elsewhere."""
+        return self.workers is not None
 
     def spread(
         self, work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]

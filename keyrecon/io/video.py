@@ -10,7 +10,6 @@ Slow-motion footage tells its factor, so that times are those of the world.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -23,6 +22,7 @@ from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError, counted
 from keyrecon.io.evening import LUMA_FIRST, black_of, even_exposure
+from keyrecon.io.fingerprint import fingerprint_file
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
@@ -30,13 +30,6 @@ if TYPE_CHECKING:
 
 VARIABLE_RATE = 0.25
 """Frame spacing that differs by more than this share from its median counts as variable."""
-
-
-MEGABYTE = 1 << 20
-SAMPLES = 64
-"""Megabytes of a file that its fingerprint reads: all of a small one."""
-SAMPLED = "64-"
-"""How fingerprints begin; those of former versions were of the first and last megabyte alone."""
 MAX_PIXELS = 1 << 26
 """Of a picture: twice those of 8K video."""
 MIN_FPS, MAX_FPS = 0.05, 100_000.0
@@ -209,30 +202,6 @@ class Video:
             return stored
         flipped = stored[:, ::-1] if self.mirrored else stored
         return np.ascontiguousarray(np.rot90(flipped, self.turns))
-
-
-def fingerprint_file(path: Path) -> str:
-    """Hash of a file's size and of what it holds, of a large file of samples throughout."""
-    megabytes = -(-path.stat().st_size // MEGABYTE)
-    return f"{SAMPLED}{_hash_samples(path, min(SAMPLES, max(1, megabytes)))}"
-
-
-def has_fingerprint(path: Path, fingerprint: str) -> bool:
-    """Whether a file is the one of a fingerprint, also of one that a former version took."""
-    if fingerprint.startswith(SAMPLED):
-        return fingerprint_file(path) == fingerprint
-    return _hash_samples(path, 2) == fingerprint
-
-
-def _hash_samples(path: Path, samples: int) -> str:
-    """Hash of a file's size and of some megabytes of it, evenly from the first to the last."""
-    size = path.stat().st_size
-    digest = hashlib.sha256(str(size).encode())
-    with path.open("rb") as file:
-        for start in np.linspace(0, max(0, size - MEGABYTE), samples).astype(int).tolist():
-            file.seek(start)
-            digest.update(file.read(MEGABYTE))
-    return digest.hexdigest()[:32]
 
 
 def open_video(

@@ -1,27 +1,22 @@
 """Where stages are run when not here: processes of this machine, or machines of a Dask cluster.
 
-Both are executors as `concurrent.futures` has them. Dask gives a task whose worker was lost to
-another one; of processes of this machine none is expected to be lost, and the command ends.
+A task whose worker was lost is given to another one by Dask; a process of this machine is begun
+again. Where nobody says otherwise, as many processes as there are cores work on shots side by side,
+and all else is done here.
 """
 
 import logging
-import multiprocessing
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import (
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-)
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from keyrecon.errors import KeyreconError, explain
+from keyrecon.io.local_workers import local_processes
 from keyrecon.io.stage_tasks import StageTask, carry_out
+from keyrecon.numerics.threads import core_count
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -29,25 +24,30 @@ Result = TypeVar("Result")
 CONNECT_SECONDS = 10.0
 """Until a scheduler must answer, and until it must have a worker."""
 IN_QUEUE = 2
-"""Shots per worker that are worked on: one runs while the next one is got ready."""
+"""Shots per worker of a cluster that are worked on: one runs while the next one is got ready."""
 MOST_AT_ONCE = 400
 """Shots that are worked on, each by a thread that waits."""
+IN_ORDER = 8
+"""Shots begun or done for each that is worked on, until the first of them is done: a short one does
+not wait for a long one before it."""
+MOST_PROCESSES = 8
+"""That are begun where nobody says how many: each may hold a shot of 1 GB."""
 
 
 @dataclass(frozen=True, eq=False)
 class Workers:
     """Those who carry out tasks."""
 
-    executor: Executor
-    count: int
-    """As many as there were at the beginning."""
+    do: Callable[[StageTask], float]
+    """Has a task done and waits for it."""
+    at_once: int
+    """Shots that are worked on at a time."""
     where: str
     """In messages."""
-
-    @property
-    def at_once(self) -> int:
-        """Shots that are worked on at a time."""
-        return min(MOST_AT_ONCE, IN_QUEUE * self.count)
+    turn: Callable[[], AbstractContextManager[None]] = nullcontext
+    """Within it a thread works on one shot."""
+    takes_stage: Callable[[], bool] = lambda: True
+    """Whether a stage that this thread calls is for them."""
 
     def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
@@ -55,16 +55,21 @@ class Workers:
         Raises KeyreconError as that does, and where the workers are gone.
         """
         with self._naming_loss():
-            return self.executor.submit(carry_out, task).result()
+            return self.do(task)
 
     def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """`work`, which calls stages, done for every item side by side; results in order."""
+
+        def work_in_turn(item: Item) -> Result:
+            with self.turn():
+                return work(item)
+
         pool = ThreadPoolExecutor(self.at_once)
         pending: deque[Future[Result]] = deque()
         try:
             for item in items:
-                pending.append(pool.submit(work, item))
-                if len(pending) > self.at_once:
+                pending.append(pool.submit(work_in_turn, item))
+                if len(pending) > IN_ORDER * self.at_once:
                     yield pending.popleft().result()
             while pending:
                 yield pending.popleft().result()
@@ -75,10 +80,10 @@ class Workers:
     def _naming_loss(self) -> Iterator[None]:
         try:
             yield
-        except (BrokenExecutor, CancelledError) as fault:
+        except CancelledError as fault:
             raise self._lost("no longer there") from fault
         except Exception as fault:
-            if type(fault).__name__ == "KilledWorker":
+            if isinstance(fault, BrokenExecutor) or type(fault).__name__ == "KilledWorker":
                 raise self._lost(
                     "lost again and again with the same stage, maybe for want of memory"
                 ) from fault
@@ -93,33 +98,32 @@ class Workers:
 
 @contextmanager
 def open_workers(where: str | None) -> Iterator[Workers | None]:
-    """The workers at the address of a Dask scheduler, or so many processes; None for nothing said.
+    """The workers at the address of a Dask scheduler, or so many processes.
 
-    Raises KeyreconError where there are none.
+    Where nothing is said they are as many as there are cores, and work on nothing but shots; on one
+    core there are none. Raises KeyreconError where there are none at the address.
     """
     if where is None:
-        yield None
+        count = min(MOST_PROCESSES, core_count())
+        if count == 1:
+            yield None
+            return
+        with local_processes(count) as processes:
+            yield Workers(
+                processes.carry_out,
+                count,
+                "this machine",
+                processes.turn,
+                lambda: processes.in_turn,
+            )
     elif where.isdecimal():
-        with _processes(int(where)) as workers:
-            yield workers
+        if (count := int(where)) == 0:
+            raise KeyreconError("--workers is a number of processes from 1 on, or an address.")
+        with local_processes(count) as processes:
+            yield Workers(processes.carry_out, count, "this machine", processes.turn)
     else:
         with _cluster(where) as workers:
             yield workers
-
-
-@contextmanager
-def _processes(count: int) -> Iterator[Workers]:
-    if count == 0:
-        raise KeyreconError("--workers is a number of processes from 1 on, or an address.")
-    others = multiprocessing.active_children()
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"))
-    try:
-        yield Workers(pool, count, "this machine")
-    finally:
-        for process in multiprocessing.active_children():
-            if process not in others:
-                process.terminate()  # what it does nobody waits for any more
-        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -147,7 +151,12 @@ def _cluster(address: str) -> Iterator[Workers]:
             "`dask scheduler` and give the address that it prints."
         ) from fault
     try:
-        yield Workers(client.get_executor(), _count_workers(client, address), address)
+        executor, count = client.get_executor(), _count_workers(client, address)
+        yield Workers(
+            lambda task: executor.submit(carry_out, task).result(),
+            min(MOST_AT_ONCE, IN_QUEUE * count),
+            address,
+        )
     finally:
         with dask.config.set({"distributed.comm.retry.count": 0}):
             client.close()

@@ -14,7 +14,6 @@ number of elements for M and with the square of the number of frames for the pro
 of more than `most` frames only exemplars are compared with one another (see exemplars.py).
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -34,6 +33,7 @@ from keyrecon.keyframes.descriptor_bins import (
 from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE
 from keyrecon.keyframes.exemplars import find_exemplars
 from keyrecon.numerics.ragged import ranges
+from keyrecon.numerics.threads import core_count
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Edges, HalfName, PoseDistances, Track
@@ -259,7 +259,7 @@ def _accumulate(
             matched[:, frames.start : frames.stop] = new @ near
 
     blocks = range(0, elements.n_frames, FRAMES_PER_BLOCK)
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(core_count()) as pool:
         for _ in progress(pool.map(measure, blocks), "Comparing frames", len(blocks)):
             pass
     count = np.bincount(elements.frame, minlength=elements.n_frames).astype(np.float32)

@@ -6,9 +6,34 @@ blocks instead (`io.frame_reader`, `TemplateFits.in_blocks`). The command line d
 in other programs every stage does.
 """
 
+import os
+from dataclasses import dataclass
+
+import cv2
 from threadpoolctl import threadpool_limits
 
 
 def one_order_of_sums() -> threadpool_limits:
     """A context in which linear algebra runs on one thread."""
     return threadpool_limits(limits=1, user_api="blas")
+
+
+@dataclass
+class _Sharing:
+    """How many processes that work side by side this one is of."""
+
+    processes: int = 1
+
+
+_SHARING = _Sharing()
+
+
+def core_count() -> int:
+    """Cores that this process has to itself; results do not hang on it."""
+    return max(1, (os.cpu_count() or 1) // _SHARING.processes)
+
+
+def share_cores(processes: int) -> None:
+    """Leave the others of so many processes their cores."""
+    _SHARING.processes = processes
+    cv2.setNumThreads(core_count())

@@ -21,7 +21,7 @@ from typing import Annotated
 import numpy as np
 from jaxtyping import Bool, Float
 
-from keyrecon.io.frame_reader import read_grey, shrinking, side_by_side
+from keyrecon.io.frame_reader import in_threads, read_grey, shrinking
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
@@ -29,6 +29,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import CameraPath, Shots
 from keyrecon.segmentation.static_overlay import StaticOverlay
+from keyrecon.spreading import Spread
 from keyrecon.tracking.exposure import ExposureMeter
 from keyrecon.tracking.key_pictures import Grey, KeyPicture, Match, find_corners, match_key
 from keyrecon.tracking.shots import CutDetector
@@ -146,30 +147,23 @@ def _to_start(key: KeyPicture, match: Match) -> Float[np.ndarray, "3 3"]:
 
 
 def estimate_camera_motion(
-    video: Video, options: CameraMotionOptions = CameraMotionOptions(), progress: Progress = silent
+    video: Video,
+    options: CameraMotionOptions = CameraMotionOptions(),
+    progress: Progress = silent,
+    spread: Spread = in_threads,
 ) -> CameraPath:
     """Homographies from every frame to the middle one of its shot, and their confidence.
 
     Exactly the identity where the camera is static. Where the video cuts to another shot is told
-    beside it (`CameraPath.cuts`).
+    beside it (`CameraPath.cuts`); `spread` estimates the motion in shots while the next are looked
+    for.
     """
     detector = CutDetector.at_rate(video.fps)
-    path = estimate_shot_motion(video, options, progress, detector)
-    cuts = tuple(sorted({*detector.cuts, *video.joints}))
-    if not cuts:  # what looked like a cut may have been the end
-        whole = len(path.confidence) == len(video)
-        return path if whole else estimate_shot_motion(video, options, progress)
-    shots = Shots.between(cuts, len(video))
-    parts = [video.part(part) for part in shots.parts]
-    moved = side_by_side(lambda part: estimate_shot_motion(part, options), parts)
-    paths = [*progress(moved, "Estimating the camera's motion in each shot", len(parts))]
-    return CameraPath(
-        np.concatenate([path.to_reference for path in paths]),
-        np.concatenate([path.confidence for path in paths]),
-        cuts,
-        tuple(detector.dissolves),
-        _join_exposures(paths),
-    )
+    watched = detector.watch(_read_reduced(video, options, progress))
+    path = _estimate_motion(video, options, progress, _first_shot(watched, detector), detector)
+    if not detector.cuts and not video.joints:
+        return path
+    return _estimate_shots(video, options, watched, detector, spread)
 
 
 def _join_exposures(paths: Sequence[CameraPath]) -> Float[np.ndarray, "T"] | None:
@@ -188,20 +182,35 @@ def estimate_shot_motion(
     video: Video,
     options: CameraMotionOptions = CameraMotionOptions(),
     progress: Progress = silent,
+) -> CameraPath:
+    """The same for a video that is known to be one shot, such as pictures far apart in time."""
+    return _estimate_motion(video, options, progress, _read_reduced(video, options, progress))
+
+
+def _reduced_width(video: Video, options: CameraMotionOptions) -> int:
+    return min(options.width, video.width)
+
+
+def _read_reduced(video: Video, options: CameraMotionOptions, progress: Progress) -> Iterator[Grey]:
+    """The pictures in which the background is tracked."""
+    pictures = read_grey(video, _reduced_width(video, options))
+    return progress(pictures, "Estimating the camera's motion", len(video))
+
+
+def _estimate_motion(
+    video: Video,
+    options: CameraMotionOptions,
+    progress: Progress,
+    watched: Iterator[Grey],
     detector: CutDetector | None = None,
 ) -> CameraPath:
-    """The same for a video that is known to be one shot, such as pictures far apart in time.
+    """As `estimate_shot_motion` with the pictures `watched`.
 
-    A `detector` looks at all frames; where it finds cuts, the path means nothing.
+    Where a `detector` has found cuts in these, the path means nothing.
     """
-    width = min(options.width, video.width)
+    width = _reduced_width(video, options)
     shape = (round(video.height * width / video.width), width)
-
-    def pictures(shown: Video) -> Iterator[Grey]:
-        return progress(read_grey(shown, width), "Estimating the camera's motion", len(shown))
-
     tracker = _FeatureTracker(options, light=ExposureMeter(video.black))
-    watched = pictures(video) if detector is None else _first_shot(pictures(video), detector)
     held: list[Grey] | None = [] if len(video) * shape[0] * shape[1] <= MOST_HELD else None
     path, confidence = _register_all(_holding(watched, held), tracker, max(1, len(video) // 64))
     exposure = tracker.light.exposure()
@@ -214,8 +223,12 @@ def estimate_shot_motion(
     overlaid = tracker.overlay.mask() if hidden else None
     for _ in range(MOST_REPEATS if hidden or exposure is not None else 0):
         tracker = _FeatureTracker(options, overlaid, light=ExposureMeter(video.black))
-        evened = None if exposure is None else pictures(with_exposure(video, exposure))
-        path, confidence = _register_all(evened or held or pictures(video), tracker)
+        again: Iterable[Grey]
+        if exposure is None:
+            again = held or _read_reduced(video, options, progress)
+        else:
+            again = _read_reduced(with_exposure(video, exposure), options, progress)
+        path, confidence = _register_all(again, tracker)
         if exposure is None:
             break
         exposure = exposure * tracker.light.factors()
@@ -236,11 +249,63 @@ def _still(
     return CameraPath(np.tile(np.eye(3), (len(confidence), 1, 1)), confidence, exposure=exposure)
 
 
-def _first_shot(pictures: Iterable[Grey], detector: CutDetector) -> Iterator[Grey]:
-    """Pictures up to the first cut, or a little beyond; the detector sees all of them."""
-    for grey in detector.watch(pictures):
-        if not detector.cuts:
-            yield grey
+def _first_shot(watched: Iterator[Grey], detector: CutDetector) -> Iterator[Grey]:
+    """Pictures up to the first cut, or a little beyond; the others are still to be watched."""
+    for grey in watched:
+        if detector.cuts:
+            return
+        yield grey
+
+
+def _estimate_shots(
+    video: Video,
+    options: CameraMotionOptions,
+    watched: Iterator[Grey],
+    detector: CutDetector,
+    spread: Spread,
+) -> CameraPath:
+    """The motion in each shot, while the next ones are looked for in what is to be watched yet."""
+    parts: list[slice] = []
+
+    def begun() -> Iterator[tuple[Video, CameraMotionOptions]]:
+        for part in _find_shots(watched, detector, video):
+            parts.append(part)
+            yield video.part(part), options
+
+    moved = [*spread(estimate_shot_motion, begun())]
+    known = {part.start: (part.stop, path) for part, path in zip(parts, moved, strict=True)}
+    cuts = tuple(sorted({*detector.cuts, *video.joints}))
+    paths = []
+    for part in Shots.between(cuts, len(video)).parts:
+        stop, path = known.get(part.start, (None, None))
+        if path is None or stop != part.stop:  # a dissolve that was found within another one
+            path = estimate_shot_motion(video.part(part), options)
+        paths.append(path)
+    return CameraPath(
+        np.concatenate([path.to_reference for path in paths]),
+        np.concatenate([path.confidence for path in paths]),
+        cuts,
+        tuple(detector.dissolves),
+        _join_exposures(paths),
+    )
+
+
+def _find_shots(watched: Iterator[Grey], detector: CutDetector, video: Video) -> Iterator[slice]:
+    """Shots of the video as soon as their ends are known, while the pictures are watched."""
+    start, cuts = 0, 0
+    for _ in watched:
+        if len(detector.cuts) == cuts or detector.cuts[-1] >= detector.count:
+            continue
+        cuts, last = len(detector.cuts), detector.cuts[-1]
+        joints = [joint for joint in video.joints if joint < last]
+        for end in sorted({*detector.cuts, *joints}):
+            if end > start:
+                yield slice(start, end)
+                start = end
+    for end in sorted({*detector.cuts, *video.joints, len(video)}):
+        if end > start:
+            yield slice(start, end)
+            start = end
 
 
 def _holding(pictures: Iterable[Grey], held: list[Grey] | None) -> Iterator[Grey]:

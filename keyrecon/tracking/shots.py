@@ -83,6 +83,11 @@ class CutDetector:
         """One for so many frames per second of real time."""
         return cls(blend_lengths(fps), max(FLASH_FRAMES, round(FLASH_SECONDS * fps)))
 
+    @property
+    def count(self) -> int:
+        """Frames that it has seen."""
+        return self._count
+
     def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:
         """Pass the frames on, and look at each."""
         for grey in pictures:

@@ -408,7 +408,7 @@ def test_a_video_whose_pictures_change_size_says_from_where_on(tmp_path):
 
 
 def test_a_video_changed_anywhere_is_another(tmp_path):
-    from keyrecon.io.video import fingerprint_file, has_fingerprint
+    from keyrecon.io.fingerprint import fingerprint_file, has_fingerprint
 
     data = bytearray(np.random.default_rng(0).bytes(5 << 20))
     (tmp_path / "a").write_bytes(data)

@@ -1,0 +1,113 @@
+"""Processes of this machine that carry out stages.
+
+Each is a pool of its own: whoever works on a shot has one of them to himself until the shot is
+done, and what that process has decoded of the shot serves all of its stages. One that is lost is
+begun again, and does what it was doing once more.
+"""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager
+from queue import LifoQueue
+from threading import Event, Thread, local
+
+from keyrecon.io.stage_tasks import StageTask, carry_out
+from keyrecon.numerics.threads import share_cores
+
+
+class LocalProcesses:
+    """Some processes, which begin when they are first needed."""
+
+    def __init__(self, count: int) -> None:
+        """So many at most."""
+        self.closed = Event()
+        self._count = count
+        self._idle: LifoQueue[_Process] = LifoQueue()  # the last one has its libraries read
+        for _ in range(count):
+            self._idle.put(_Process(count, self.closed))
+        self._own = local()
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """Within it, this thread has a process to itself; waits until one is free."""
+        process = self._idle.get()
+        self._own.process = process
+        try:
+            yield
+        finally:
+            del self._own.process
+            self._idle.put(process)
+
+    @property
+    def in_turn(self) -> bool:
+        """Whether this thread has a process to itself."""
+        return hasattr(self._own, "process")
+
+    def carry_out(self, task: StageTask) -> float:
+        """Have a task done by the process of this thread, or by any; BrokenExecutor without."""
+        if not self.in_turn:
+            with self.turn():
+                return self.carry_out(task)
+        process: _Process = self._own.process
+        return process.carry_out(task)
+
+
+class _Process:
+    """One process, or none yet."""
+
+    def __init__(self, count: int, closed: Event) -> None:
+        """One of so many; none is begun any more when they are closed."""
+        self._count, self._closed = count, closed
+        self._pool: ProcessPoolExecutor | None = None
+
+    def carry_out(self, task: StageTask) -> float:
+        """Have a task done, a second time where the process is lost on the way."""
+        try:
+            return self._begun().submit(carry_out, task).result()
+        except BrokenExecutor:
+            self._pool = None
+        try:
+            return self._begun().submit(carry_out, task).result()
+        except BrokenExecutor:
+            self._pool = None
+            raise
+
+    def _begun(self) -> ProcessPoolExecutor:
+        if self._closed.is_set():
+            raise BrokenExecutor("closed")
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                1, multiprocessing.get_context("spawn"), _begin, (self._count,)
+            )
+        return self._pool
+
+
+def _begin(count: int) -> None:
+    """What each of `count` processes does first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is told, and ends this one
+    share_cores(count)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@contextmanager
+def local_processes(count: int) -> Iterator[LocalProcesses]:
+    """So many processes, ended with the context whatever they do."""
+    others = multiprocessing.active_children()
+    processes = LocalProcesses(count)
+    try:
+        yield processes
+    finally:
+        processes.closed.set()
+        for process in multiprocessing.active_children():
+            if process not in others:
+                process.terminate()  # what it does nobody waits for any more
