@@ -14,7 +14,7 @@ number of elements for M and with the square of the number of frames for the pro
 of more than `most` frames only exemplars are compared with one another (see exemplars.py).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -136,13 +136,13 @@ def _compare_exemplars(
             (tuple(edges[t] for t in frames), take_frames(track, frames), coarse, len(known))
             for frames in together
         )
-        return spread(compare_halves, inputs)
+        return _compare_halves(inputs, spread)
 
     shown = np.array([[getattr(e, half).any() for half in HALVES] for e in edges])
     may_lead = np.asarray(shown.all(axis=1) if shown.all(axis=1).any() else shown.any(axis=1))
     found = find_exemplars(compare, may_lead, options.most, progress)
     kept, track_kept = tuple(edges[t] for t in found.frames), take_frames(track, found.frames)
-    halves = spread(measure_matrix, ((kept, track_kept, half, options) for half in HALVES))
+    halves = spread(compare_half, ((kept, track_kept, half, options, 0) for half in HALVES))
     upper, lower = progress(halves, "Comparing exemplars", len(HALVES))
     return PoseDistances(
         upper=upper,
@@ -168,15 +168,29 @@ def _measure_steps(
         slice(start, start + WINDOW_FRAMES + 1) for start in range(0, len(edges) - 1, WINDOW_FRAMES)
     ]
     inputs = ((edges[window], take_frames(track, window), options, 0) for window in windows)
-    squares = progress(spread(compare_halves, inputs), "Comparing neighbours", len(windows))
+    squares = progress(_compare_halves(inputs, spread), "Comparing neighbours", len(windows))
     return np.concatenate([np.diagonal(both, 1, axis1=1, axis2=2) for both in squares], axis=1)
 
 
-def compare_halves(
-    edges: Sequence[Edges], track: Track, options: CompareOptions, n_known: int
-) -> Float32[np.ndarray, "2 N T"]:
-    """C between new frames and all (`measure_matrix`), upper and lower body."""
-    return np.stack([measure_matrix(edges, track, h, options, n_known=n_known) for h in HALVES])
+def _compare_halves(
+    inputs: Iterable[tuple[tuple[Edges, ...], Track, CompareOptions, int]], spread: Spread
+) -> Iterator[Float32[np.ndarray, "2 N T"]]:
+    """C between new frames and all (`measure_matrix`), upper and lower body side by side."""
+    pieces = (
+        (edges, track, half, options, n_known)
+        for edges, track, options, n_known in inputs
+        for half in HALVES
+    )
+    compared = spread(compare_half, pieces)
+    for upper in compared:
+        yield np.stack([upper, next(compared)])
+
+
+def compare_half(
+    edges: tuple[Edges, ...], track: Track, half: HalfName, options: CompareOptions, n_known: int
+) -> Float32[np.ndarray, "N T"]:
+    """A piece of the work of `compare_frames`."""
+    return measure_matrix(edges, track, half, options, n_known=n_known)
 
 
 def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray, "T"]:

@@ -7,9 +7,8 @@ keeps the player's size; crops with the pose on them become a small video that p
 
 import base64
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -118,15 +117,13 @@ def cut_pictures(
 ) -> Pictures:
     """Read the video once and cut everything that the report shows of it."""
     windows = follow_player(track, motion)
-    count = len(motion.points2d)
     shown_motion = motion.known
     known = np.flatnonzero(shown_motion)
     even = known[np.linspace(0, len(known) - 1, min(strip, len(known))).round().astype(int)]
-    every = thinning(count)
+    every = thinning(len(shown_motion))
     side = clip_side(len(known) // every)
     nothing = np.full((side, side, 3), NOTHING, np.uint8)
-    stills: dict[int, str] = {}
-    marked: dict[int, str] = {}
+    stills, marked = dict[int, str](), dict[int, str]()
 
     def cut(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> UInt8[np.ndarray, "side side 3"]:
         frame, picture = entry
@@ -140,10 +137,13 @@ def cut_pictures(
         return _posed_crop(windows, frame, picture, motion, side)
 
     def crops() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
-        frames = islice(read_small(video, video.width), count)
-        shown = progress(frames, "Cutting pictures for the report", count)
-        pictures = side_by_side(cut, enumerate(shown))
-        yield from (crop for frame, crop in enumerate(pictures) if frame % every == 0)
+        chosen = known[known % every == 0], even, annotations.frames
+        wanted = sorted({*instants, *np.concatenate(chosen).tolist()})
+        pictures = read_small(video, video.width, {*wanted})
+        shown = progress(pictures, "Cutting pictures for the report", len(wanted))
+        cropped = zip(wanted, side_by_side(cut, zip(wanted, shown, strict=True)), strict=True)
+        of_clip = ((t, crop) for t, crop in cropped if t % every == 0)
+        yield from _with_gaps(of_clip, range(0, len(shown_motion), every), nothing)
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
@@ -151,6 +151,22 @@ def cut_pictures(
         clip = video_uri(path.read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
     return Pictures(shown[0], shown[1], dict(sorted(marked.items())), clip)
+
+
+def _with_gaps(
+    pictures: Iterable[tuple[int, UInt8[np.ndarray, "h w 3"]]],
+    frames: range,
+    nothing: UInt8[np.ndarray, "h w 3"],
+) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+    """A picture for every frame, `nothing` for those that have none."""
+    numbered = iter(pictures)
+    frame, picture = next(numbered, (-1, nothing))
+    for number in frames:
+        if number == frame:
+            yield picture
+            frame, picture = next(numbered, (-1, nothing))
+        else:
+            yield nothing
 
 
 def clip_side(frames: int) -> int:

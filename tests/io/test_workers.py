@@ -1,4 +1,10 @@
+import multiprocessing
+import os
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,17 +68,140 @@ def test_what_a_stage_refuses_elsewhere_is_told_here(tmp_path, processes):
         store.keep("labels", count_labels, KeyframeOptions(budget=2.0), 100, 25.0)
 
 
-def test_a_process_that_is_lost_ends_in_one_line_and_what_was_made_stays(tmp_path):
+def own_process(seed):
+    """The process that it is called in."""
+    return os.getpid()
+
+
+def test_stages_of_one_shot_are_done_by_one_process(tmp_path, processes):
+    store = StageStore(tmp_path, workers=processes)
+
+    def shot(number):
+        return {store.keep(f"p{stage}@{number}", own_process, stage) for stage in range(4)}
+
+    by = [*store.each(shot, range(8))]
+    assert {len(one) for one in by} == {1}
+    assert os.getpid() not in set.union(*by)
+
+
+def test_where_nothing_is_said_only_shots_are_given_away(tmp_path, monkeypatch):
+    monkeypatch.setattr(io_workers, "core_count", lambda: 2)
+    before = multiprocessing.active_children()
+    with open_workers(None) as workers:
+        store = StageStore(tmp_path, workers=workers)
+        assert store.keep("alone", own_process, 1) == os.getpid()
+        assert multiprocessing.active_children() == before
+        [of_shot] = store.each(lambda n: store.keep(f"p@{n}", own_process, n), [1])
+        assert of_shot != os.getpid()
+    assert not still_there([of_shot])
+
+
+def test_on_one_core_there_are_no_workers(monkeypatch):
+    monkeypatch.setattr(io_workers, "core_count", lambda: 1)
+    with open_workers(None) as workers:
+        assert workers is None
+
+
+def die_once(trace):
+    """Be killed the first time."""
+    if not os.path.exists(trace):
+        open(trace, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.getpid()
+
+
+def die(seed):
+    """Be killed each time."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_lost_does_its_stage_again_and_no_other_shot_suffers(tmp_path):
+    with open_workers("2") as workers:
+        store = StageStore(tmp_path / "cache", workers=workers)
+
+        def shot(number):
+            if number == 2:
+                store.keep("lost@2", die_once, str(tmp_path / "trace"))
+            return store.keep(f"p@{number}", own_process, number)
+
+        by = [*store.each(shot, range(5))]
+    assert len(by) == 5
+    assert (tmp_path / "trace").exists()
+
+
+def test_a_process_that_is_lost_again_ends_in_one_line_and_what_was_made_stays(tmp_path):
     with open_workers("1") as workers:
         store = StageStore(tmp_path, workers=workers)
         recipe(store)
-        for process in workers.executor._processes.values():
-            process.kill()
         with pytest.raises(KeyreconError, match=r"workers of this machine.*goes on from there"):
-            store.keep("third", frames_before, FRAMES, 20)
+            store.keep("third", die, 0)
     again = StageStore(tmp_path)
     recipe(again)
     assert again.seconds == {}
+
+
+WAITING = """
+import sys
+from pathlib import Path
+from keyrecon.io.stages import StageStore
+from keyrecon.io.workers import open_workers
+from test_workers import wait_here
+if __name__ == "__main__":
+    with open_workers("2") as workers:
+        store = StageStore(Path(sys.argv[1]), workers=workers)
+        list(store.each(lambda n: store.keep(f"w@{n}", wait_here, str(n), sys.argv[2]), range(2)))
+"""
+
+
+def wait_here(name, folder):
+    """Tell the process and wait."""
+    with open(os.path.join(folder, name), "w") as file:
+        file.write(str(os.getpid()))
+    time.sleep(60)
+
+
+def still_there(processes, seconds=5.0):
+    """Those of some processes that have not ended by then."""
+    end = time.monotonic() + seconds
+    while left := [pid for pid in processes if is_running(pid)]:
+        if time.monotonic() > end:
+            return left
+        time.sleep(0.05)
+    return []
+
+
+def is_running(pid):
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_processes_end_with_the_one_that_began_them(tmp_path, how):
+    told = tmp_path / "told"
+    told.mkdir()
+    script = tmp_path / "waiting.py"
+    script.write_text(WAITING)
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    command = [sys.executable, script, tmp_path / "cache", told]
+    with subprocess.Popen(
+        command, env={**os.environ, "PYTHONPATH": paths}, stderr=subprocess.PIPE,
+        start_new_session=True,
+    ) as asking:  # fmt: skip
+        end = time.monotonic() + 30
+        while len(files := [f for f in told.iterdir() if f.read_text()]) < 2:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        working = [int(file.read_text()) for file in files]
+        if how == signal.SIGINT:
+            os.killpg(asking.pid, how)  # as a terminal does
+        else:
+            asking.send_signal(how)
+        asking.wait(10)
+    assert not still_there(working)
 
 
 @pytest.mark.parametrize(
