@@ -35,11 +35,12 @@ from variant import cut
 from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.app.console import show
 from keyrecon.body import LSP14
+from keyrecon.following import follow_marks
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.metrics import read_truth
-from keyrecon.pipeline import Options, follow_marks, prepare
+from keyrecon.pipeline import Options, prepare
 from keyrecon.propagation import evidence, selection
 from keyrecon.propagation.appearance import regular_frames
 from keyrecon.propagation.body_frame import stabilise_shots
@@ -153,7 +154,7 @@ def real_draws(name: str, draws: int, work: Path) -> Iterator[Known]:
         clip, options, keep = prepared.clip, prepared.options, prepared.store.keep
         for seed in range(draws):
             made, marks = mark_draw(prepared, seed)
-            flow = follow_marks(clip.video, marks, made.shots, options, keep, show)
+            flow = follow_marks(clip.video, marks, made.shots, options.flow, keep, show)
             judged = held_out(clip.truth, marks) & clip.seen
             yield Known(name, made, marks, flow, clip.truth, judged, clip.action, clip.torso)
 

@@ -37,9 +37,10 @@ def keyframes(
     Writes keyframes.json and a picture of every keyframe to mark into keyframes/. The options of
     every stage are listed by `keyrecon keyframes --help-all`; few people ever need them.
 
-    With --workers, shots and parts of the comparison are made side by side, with the same results
-    to the last digit. Workers of a Dask cluster need the same version of keyrecon, and must see the
-    project's folder and the video under the same paths, on a drive that all machines share.
+    Shots and parts of the comparison are made side by side, by as many processes as there are cores
+    or by --workers, with the same results to the last digit. Workers of a Dask cluster need the
+    same version of keyrecon, and must see the project's folder and the video under the same paths,
+    on a drive that all machines share.
 
     Args:
         project: Project folder.
@@ -71,9 +72,10 @@ def run(
     Writes motion.npz and report.html. An interrupted run goes on where it stopped. The options of
     every stage are listed by `keyrecon run --help-all`; few people ever need them.
 
-    With --workers, shots and parts of the comparison are made side by side, with the same results
-    to the last digit. Workers of a Dask cluster need the same version of keyrecon, and must see the
-    project's folder and the video under the same paths, on a drive that all machines share.
+    Shots and parts of the comparison are made side by side, by as many processes as there are cores
+    or by --workers, with the same results to the last digit. Workers of a Dask cluster need the
+    same version of keyrecon, and must see the project's folder and the video under the same paths,
+    on a drive that all machines share.
 
     Args:
         project: Project folder.
