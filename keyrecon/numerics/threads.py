@@ -9,7 +9,6 @@ in other programs every stage does.
 import os
 from dataclasses import dataclass
 
-import cv2
 from threadpoolctl import threadpool_limits
 
 
@@ -35,5 +34,7 @@ def core_count() -> int:
 
 def share_cores(processes: int) -> None:
     """Leave the others of so many processes their cores."""
+    import cv2  # which most commands do without
+
     _SHARING.processes = processes
     cv2.setNumThreads(core_count())
