@@ -7,6 +7,7 @@ group is worked on in pieces that overlap. Each group is a stage result of its o
 run goes on with the next one.
 
 Memory: 125 kB per frame on looped videos of 1800 and 5400 frames of 640x360; a group takes 1.5 GB.
+That is why groups are worked on side by side only by workers that somebody has asked for.
 """
 
 from collections.abc import Iterator, Sequence
@@ -122,5 +123,5 @@ def propagate_in_groups(
         tracks = take_frames(tracks, slice(*span))
         return replace(tracks, keyframe=group.frames[tracks.keyframe])
 
-    carried = work_on_each(keep, carry, groups)
+    carried = work_on_each(keep, carry, groups, large=True)
     return join_frames([*progress(carried, "Propagating joints", len(groups))])

@@ -161,13 +161,17 @@ class StageStore:
         finally:
             task.inputs.unlink(missing_ok=True)
 
-    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    def each(
+        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
+    ) -> Iterator[Result]:
         """`work`, which calls stages by this store, done for every item, in order.
 
         With workers several items are worked on at a time, so that all of them have something to
-        do.
+        do; `large` ones only by workers that somebody has asked for, and so has the memory for.
         """
-        return map(work, items) if self.workers is None else self.workers.each(work, items)
+        if self.workers is None or (large and not self.workers.asked_for):
+            return map(work, items)
+        return self.workers.each(work, items)
 
     @property
     def has_workers(self) -> bool:

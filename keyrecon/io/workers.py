@@ -48,6 +48,8 @@ class Workers:
     """Within it a thread works on one shot."""
     takes_stage: Callable[[], bool] = lambda: True
     """Whether a stage that this thread calls is for them."""
+    asked_for: bool = True
+    """Whether somebody has said that there shall be so many."""
 
     def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
@@ -115,6 +117,7 @@ def open_workers(where: str | None) -> Iterator[Workers | None]:
                 "this machine",
                 processes.turn,
                 lambda: processes.in_turn,
+                asked_for=False,
             )
     elif where.isdecimal():
         if (count := int(where)) == 0:
