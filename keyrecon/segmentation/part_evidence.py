@@ -47,6 +47,8 @@ class Evidence:
     """Any part of the player."""
     inside: Float[np.ndarray, "h1 w1"]
     """Integral of `player`."""
+    trunk: Float[np.ndarray, "h1 w1"] | None = None
+    """The same of the trunk alone, where somebody told what it looks like."""
 
 
 def model_scene_by_colour(
@@ -75,11 +77,14 @@ def model_scene_by_colour(
 
 def evaluate_evidence(
     lab: UInt8[np.ndarray, "h w 3"],
-    tables: Float[np.ndarray, "3 bins"],
+    tables: Float[np.ndarray, "n bins"],
     foreground: Float[np.ndarray, "h w"],
     tall: float,
 ) -> Evidence:
-    """Back-projection weighted by foreground, low-passed at the size of each part."""
+    """Back-projection weighted by foreground, low-passed at the size of each part.
+
+    The tables are those of the head, the feet, the whole player and, where known, the trunk.
+    """
     bins = color_bins(lab)
     weight = (BACKGROUND_WEIGHT + (1 - BACKGROUND_WEIGHT) * foreground).astype(np.float32)
     head = tables[0][bins] * weight
@@ -90,20 +95,20 @@ def evaluate_evidence(
         foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
         player=any_part,
         inside=cv2.integral(any_part),
+        trunk=cv2.integral(tables[3][bins] * weight) if len(tables) > 3 else None,
     )
 
 
 def mean_inside(
-    evidence: Evidence,
+    total: Float[np.ndarray, "h1 w1"],
     places: Float[np.ndarray, "m 2"],
     window: tuple[float, float, float, float],
     tall: float,
 ) -> Float[np.ndarray, "m"]:
-    """Mean evidence for the player in a window (player heights) around each place."""
-    rows, columns = np.array(evidence.inside.shape) - 1
+    """Mean of a map in a window (player heights) around each place, from its integral `total`."""
+    rows, columns = np.array(total.shape) - 1
     x = np.rint(places[:, :1] + tall * np.array(window[0::2])).astype(int).clip(0, columns)
     y = np.rint(places[:, 1:] + tall * np.array(window[1::2])).astype(int).clip(0, rows)
-    total = evidence.inside
     inside = (
         total[y[:, 1], x[:, 1]] - total[y[:, 0], x[:, 1]]
         - total[y[:, 1], x[:, 0]] + total[y[:, 0], x[:, 0]]

@@ -42,6 +42,12 @@ others with it: at most 0.0 points, 0.1 mm on one clip."""
 MIN_BODY_SHARE = 0.05
 """Share of the player's colours beneath a head, at least; a trunk fills about a third. Halved,
 others with it: at most 0.0 points, 0.1 mm on one clip."""
+TRUNK_WINDOWS = tuple(
+    (aside - 0.1, below - 0.1, aside + 0.1, below + 0.1)
+    for aside, below in ((0.0, 0.27), (-0.19, 0.19), (0.19, 0.19), (-0.27, 0.0), (0.27, 0.0))
+)
+"""Where the middle of a trunk may be about a head: beneath, aslant or, of who bends or dives,
+beside it; player heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,9 @@ class PartCandidates:
     feet: Float[np.ndarray, "n 2"]
     foot_score: Float[np.ndarray, "n"]
     """NaN where there is the end of a leg and no shoe."""
+    trunk: Float[np.ndarray, "m"]
+    """How much of a place where the trunk of each head may be has its colours, 0-1; NaN where
+    nobody told them."""
 
 
 def search_frame(evidence: Evidence, tall: float) -> PartCandidates:
@@ -60,13 +69,17 @@ def search_frame(evidence: Evidence, tall: float) -> PartCandidates:
     radii = [max(1.0, r * HEAD_RADIUS * tall) for r in SEARCHED_SCALES]
     score = radial_symmetry(gradient_field(evidence.head), radii)
     heads, strength = find_peaks(score, HEAD_RADIUS * tall, 3 * MAX_HEADS)
-    body = mean_inside(evidence, heads, (-0.15, 0.12, 0.15, 0.65), tall)
+    body = mean_inside(evidence.inside, heads, (-0.15, 0.12, 0.15, 0.65), tall)
     strength = strength * (0.02 + body)
     order = np.argsort(-strength)[:MAX_HEADS]
     order = order[body[order] > MIN_BODY_SHARE]
     heads, strength = heads[order], strength[order]
     feet, foot_strength = _search_feet(evidence, heads[:4], tall)
-    return PartCandidates(heads, strength, feet, foot_strength)
+    trunk = np.full(len(heads), np.nan)
+    if evidence.trunk is not None:
+        windows = [mean_inside(evidence.trunk, heads, window, tall) for window in TRUNK_WINDOWS]
+        trunk = np.max(windows, axis=0)
+    return PartCandidates(heads, strength, feet, foot_strength, trunk)
 
 
 def _search_feet(
@@ -90,9 +103,9 @@ def _search_feet(
     ends = _leg_ends(np.where(below, evidence.player, 0)[window], tall)
     feet = np.concatenate([feet, ends]) + corner
     strength = np.concatenate([strength, np.full(len(ends), np.nan)])
-    leg = mean_inside(evidence, feet, (-0.08, -0.2, 0.08, 0.0), tall)
+    leg = mean_inside(evidence.inside, feet, (-0.08, -0.2, 0.08, 0.0), tall)
     leg *= _leg_between(evidence, heads[0], feet, tall) ** 2
-    under = mean_inside(evidence, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
+    under = mean_inside(evidence.inside, feet, (-0.05, 0.08, 0.05, 0.35), tall).clip(0, 1)
     strength = strength * (0.02 + leg) * (1.05 - under) ** 2
     shoes = np.argsort(-strength)[:MAX_FEET]
     shoes = shoes[np.isfinite(strength[shoes])]

@@ -13,7 +13,7 @@ The unit of length is the standing height from head to mid-feet. Players crouch,
 it is an upper envelope over time, divided by the camera's zoom, not the distance of the moment.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -60,6 +60,10 @@ points, 1.0 mm on one clip."""
 SCORE_SATURATION, SCORE_FLOOR = 0.15, 0.001
 """Shares of the best score: beyond the first, contrast says little; the second keeps costs finite.
 Halved: at most 0.9 points, 1.0 mm on one clip."""
+
+OTHER_TRUNK = 0.25
+"""Probability that little of the trunk shows where the head is: a limb, a racket, the net or the
+side of a shirt that nobody marked."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,9 @@ def find_player(
     pictures = _read_pictures(video, width, numbers, progress)
     scene = model_scene_by_colour(pictures, numbers, camera, shrink, parts.max(axis=0))
     tall = colors.height * shrink
-    head = parts[colors.names.index("head")]
-    tables = np.stack([head, foot_table(colors), parts.max(axis=0)]).astype(np.float32)
+    named = [parts[colors.names.index(name)] for name in ("head", "trunk") if name in colors.names]
+    rows = [named[0], foot_table(colors), parts.max(axis=0), *named[1:]]
+    tables = np.stack(rows).astype(np.float32)
     to_picture = np.linalg.inv(shrinking(shrink))
 
     def search(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> PartCandidates:
@@ -151,7 +156,7 @@ def _enlarge(candidates: PartCandidates, shrink: float) -> PartCandidates:
     """Candidates in pixels of the full picture."""
     back = (1 / shrink - 1) / 2
     heads, feet = (places / shrink + back for places in (candidates.heads, candidates.feet))
-    return PartCandidates(heads, candidates.head_score, feet, candidates.foot_score)
+    return replace(candidates, heads=heads, feet=feet)
 
 
 def _link(
@@ -169,7 +174,7 @@ def _link(
     apart = float(np.median(np.diff(numbers))) if len(numbers) > 1 else video.fps
     step, max_gap = height / video.fps * apart, round(MAX_GAP_SECONDS * video.fps / apart)
     marked_head, marked_feet = marked_places(anchors, numbers, camera)
-    head_cost = _costs([c.head_score for c in candidates])
+    head_cost = head_costs(candidates)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
     stable, head_cost = anchored_states(stable, head_cost, marked_head)
@@ -210,6 +215,16 @@ def _pair(
     return pairs, costs
 
 
+def head_costs(candidates: list[PartCandidates]) -> list[Float[np.ndarray, "_"]]:
+    """Costs of the heads of every frame by what they look like and what is beneath them, nats.
+
+    Others on the court have heads; the player's clothes they do not have.
+    """
+    round_and_coloured = _costs([c.head_score for c in candidates])
+    above_trunk = _trunk_costs([c.trunk for c in candidates])
+    return [head + trunk for head, trunk in zip(round_and_coloured, above_trunk, strict=True)]
+
+
 def _missed_head(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) -> KeyreconError:
     """The error that says where a head was missed."""
     detected = chosen >= 0
@@ -230,3 +245,12 @@ def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]
     low, high = SCORE_FLOOR * best_score, SCORE_SATURATION * best_score
     costs = [-np.log((s + low) / (s + high)) for s in scores]
     return [np.where(np.isnan(c), NO_SHOE_COST, c) for c in costs]
+
+
+def _trunk_costs(shares: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]:
+    """-log of the probability of so much trunk beneath the player's head; 0 where it is unknown."""
+    best = [float(s.max()) for s in shares if len(s) and np.isfinite(s).all()]
+    if not best:
+        return [np.zeros(len(s)) for s in shares]
+    usual = max(float(np.median(best)), 1e-12)
+    return [-np.log(OTHER_TRUNK + (1 - OTHER_TRUNK) * np.minimum(s / usual, 1)) for s in shares]
