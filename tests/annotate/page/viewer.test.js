@@ -19,14 +19,19 @@ function fakeBrowser() {
   globalThis.window = { devicePixelRatio: 1 };
 }
 
-// {viewer, drawn}: a viewer that has drawn frame 1, and how: left, top, width, height.
-function drawOne() {
+// {viewer, drawn}: a viewer that has drawn nothing yet, and all that it draws of a picture.
+function open() {
   fakeBrowser();
   const drawn = [],
     canvases = [canvas(drawn), canvas([])],
     root = { querySelectorAll: () => canvases, dataset: {}, classList: { toggle() {} } };
-  const frames = { get: () => ({ width: PROJECT.width }) },
-    viewer = createViewer({ root, project: PROJECT, frames, redraw() {} });
+  const frames = { get: () => ({ width: PROJECT.width }) };
+  return { viewer: createViewer({ root, project: PROJECT, frames, redraw() {} }), drawn };
+}
+
+// {viewer, placed}: a viewer that has drawn frame 1, and where: left, top, width, height.
+function drawOne() {
+  const { viewer, drawn } = open();
   viewer.drawPicture(1);
   const [, , ...placed] = drawn.find(([name]) => name === "drawImage");
   return { viewer, placed };
@@ -67,4 +72,13 @@ test("how well the colours do is not told of clicks that were taken away", async
     };
   assert.match(await told(), /agree on 90 %/);
   assert.equal(await told(), "");
+});
+
+test("keys that come before the picture is drawn do no harm", () => {
+  const { viewer } = open();
+  viewer.toggleZoom();
+  viewer.zoom(viewer.toScreen(viewer.middle()), 1.25);
+  assert.deepEqual(viewer.middle(), [31.5, 17.5]);
+  viewer.drawPicture(1);
+  viewer.middle().forEach((value, axis) => assert.ok(Math.abs(value - [31.5, 17.5][axis]) < 1e-9));
 });

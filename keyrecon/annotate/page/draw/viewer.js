@@ -57,7 +57,7 @@ export function createViewer({ root, project, frames, redraw }) {
   }
 
   function zoom(at, factor) {
-    setView(zoomAt(view, at, factor, [whole().scale * 0.8, MAX_SCALE]));
+    if (view) setView(zoomAt(view, at, factor, [whole().scale * 0.8, MAX_SCALE]));
   }
 
   above.addEventListener(
@@ -112,14 +112,17 @@ export function createViewer({ root, project, frames, redraw }) {
     drawPicture,
     zoom,
     overlay: () => prepareCanvas(above),
-    toScreen: (place) => toScreen(view, place),
+    toScreen: (place) => toScreen(view ?? whole(), place),
     toPicture: (at) => toPicture(view, at),
+    // What is in the middle of the canvas; before the first picture, the middle of that.
     middle: () =>
-      toPicture(
-        view,
-        size().map((extent) => extent / 2),
-      ),
-    scale: () => view.scale,
+      view
+        ? toPicture(
+            view,
+            size().map((extent) => extent / 2),
+          )
+        : picture.map((extent) => (extent - 1) / 2),
+    scale: () => (view ?? whole()).scale,
     // [left, top, width, height] of the whole picture, for what is laid over it.
     onScreen,
     // The frame whose picture is on the canvas, null before the first: what is drawn over it belongs to it.
@@ -131,7 +134,7 @@ export function createViewer({ root, project, frames, redraw }) {
       redraw();
     },
     toggleZoom() {
-      setView(Math.abs(view.scale - near().scale) < 1e-6 ? whole() : near());
+      if (view) setView(Math.abs(view.scale - near().scale) < 1e-6 ? whole() : near());
     },
     cursor(name) {
       if (above.style.cursor !== name) above.style.cursor = name;
