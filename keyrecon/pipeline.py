@@ -362,6 +362,7 @@ def as_printed(options: Options = Options()) -> Options:
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
         depths="none",
+        prior="none",
         lift=replace(options.lift, method="paper"),
     )
 

@@ -15,6 +15,7 @@ from keyrecon.commands.arguments import (
     Switch,
     typed_options,
 )
+from keyrecon.errors import KeyreconError
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
@@ -51,10 +52,11 @@ def keyframes(
         force: Make every stage again.
         workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
+    printed = _is_printed(method, options)
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
     with open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
-        printed, told = method == "paper", typed_options(sys.argv)
+        told = typed_options(sys.argv)
         print(keyframing.find_keyframes(workspace, options, chosen, show, printed, told))
 
 
@@ -85,7 +87,18 @@ def run(
         force: Make every stage again.
         workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
+    printed = _is_printed(method, options)
     with open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
         chosen = running.settings(workspace, options, height, typed_options(sys.argv))
-        print(running.run(workspace, chosen, show, partial, printed=method == "paper"))
+        print(running.run(workspace, chosen, show, partial, printed=printed))
+
+
+def _is_printed(method: Literal["best", "paper"], typed: Options) -> bool:
+    """Whether the forms of the paper are asked for; not together with what takes their place."""
+    if method == "paper" and typed.prior == "golf":
+        raise KeyreconError(
+            "--prior golf puts a model's swing where --method paper interpolates between keyframes "
+            "(Section 6.1); leave out one of the two."
+        )
+    return method == "paper"

@@ -8,7 +8,7 @@ import pytest
 
 from keyrecon import cli
 from keyrecon.paper.sliding_windows import WindowOptions
-from keyrecon.pipeline import as_printed
+from keyrecon.pipeline import Options, as_printed
 
 TEXT = files("keyrecon.paper").joinpath("choices.md").read_text()
 ROWS = [re.split(r"(?<!\\)\|", line)[1:-1] for line in TEXT.splitlines() if line.startswith("|")]
@@ -36,6 +36,23 @@ def test_flags_that_the_table_names_exist(verb, monkeypatch, capsys):
     known = set(re.findall(r"--[a-z][a-z.-]+", capsys.readouterr().out))
     named = set(re.findall(r"`(--keyframes[a-z.-]+)", TEXT)) if verb == ("keyframes",) else set()
     assert {*named, "--method"} <= known
+
+
+def test_printed_key_poses_are_slerped_whatever_prior_a_project_has():
+    assert as_printed(Options(prior="golf")).prior == "none"
+
+
+@pytest.mark.parametrize("verb", ["keyframes", "run"])
+def test_the_printed_form_and_the_golf_prior_are_not_had_together(
+    verb, tmp_path, monkeypatch, capsys
+):
+    words = ["keyrecon", verb, str(tmp_path), "--method", "paper", "--prior", "golf"]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    said = capsys.readouterr().err
+    assert stop.value.code == 1 and said.count("\n") == 1
+    assert "--prior golf" in said and "--method paper" in said
 
 
 @pytest.mark.parametrize(
