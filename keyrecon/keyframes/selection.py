@@ -24,7 +24,7 @@ to 95.2, but a serve fell from 92.5 to 88.0 (a loss that grows with the square: 
 before the serve, where little is lost, and coverage spreads its keyframes over the stroke.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -156,10 +156,9 @@ class HalfDistances:
             self.distances(beta), self.pose_distances, self.exemplar_distance, beta
         )
         visibility_score = self.pose_distances.visibility_score[self.pose_distances.frames]
-        goal = CoverageGoal(hoods, self.reach, self.uncovered, visibility_score)
-        if self.options.method == "paper":  # which knows of neither
-            return goal
-        return replace(goal, elapsed=self.elapsed, shot=shot_numbers(self.pose_distances))
+        elapsed = None if self.options.method == "paper" else self.elapsed
+        shot = shot_numbers(self.pose_distances)
+        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score, elapsed, shot)
 
 
 def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
@@ -287,7 +286,7 @@ def _fewest(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
 def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list[int]:
     """Keyframes by the selected method, at most `max_keyframes`; the goal may be left unreached."""
     if half.options.method == "paper":
-        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, max_keyframes)
+        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, max_keyframes, goal.shot)
     # What the greedy choice takes too many can often be dropped again.
     chosen = choose_greedily(
         goal.hoods,
@@ -380,7 +379,8 @@ def record_half(
     represented = represent_frames(
         goal.hoods, comparison, exemplar_distance[keyframes] < beta, keyframes
     )
-    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, len(comparison.frames))
+    most = len(comparison.frames)
+    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, most, goal.shot)
     enough, of_enough = beta, goal
     if half.options.method == "coverage":
         enough, of_enough = half.options.sufficient_beta, half.sufficient_goal

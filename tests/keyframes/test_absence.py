@@ -54,6 +54,23 @@ def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
     assert whole.upper.beta == pytest.approx(alone.upper.beta, rel=0.1)
 
 
+@pytest.mark.parametrize("method", ["coverage", "paper"])
+@pytest.mark.parametrize("between", ["a cut", "an absence"])
+def test_nothing_is_interpolated_over_a_cut_or_an_absence(method, between):
+    """Nine odd poses around it are a gap that T would bridge, were they of one shot."""
+    odd = np.zeros((260, 1))
+    odd[[*range(26, 30), *range(230, 235)]] = 0.1
+    away = np.zeros(260, dtype=bool)
+    away[30:230] = between == "an absence"
+    comparison = comparison_of(odd, visibility_score=1.0 - away)
+    if between == "a cut":
+        comparison = select_frames(comparison, np.r_[:30, 230:260])
+    options = KeyframeOptions(0.1, coverage=1.0, method=method, beta_upper=0.03, beta_lower=0.03)
+    half = choose_keyframes(comparison, 50.0, options).upper
+    assert half.coverage == 1.0
+    assert half.represented.sum() == 60
+
+
 def test_some_of_some_frames_are_those_frames(poses):
     """As in long videos: the usable shots of a file, and of these a group of shots."""
     whole = comparison_of(*poses)

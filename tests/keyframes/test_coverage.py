@@ -55,6 +55,19 @@ def test_squared_gaps_are_equation_2():
             assert total_cost(represented, cost) + constant == literal_eq2(represented)
 
 
+def test_equation_2_of_several_shots_is_the_sum_of_those_of_each():
+    rng = np.random.default_rng(3)
+    lengths = np.array([13, 1, 4, 40, 1, 1, 20])
+    shot, ends = np.repeat(np.arange(7), lengths), np.cumsum(lengths)[:-1]
+    cost = printed_cost(80, shot)
+    constants = set()
+    for share in (0, 0.05, 0.1, 0.4, 0.8, 1):
+        represented = rng.random(80) < share
+        alone = sum(literal_eq2(part) for part in np.split(represented, ends))
+        constants.add(alone - total_cost(represented, cost))
+    assert len(constants) == 1
+
+
 def test_gaps_count_uncovered_frames_as_equation_1_does():
     rng = np.random.default_rng(1)
     for n, reach in ((1, 3), (50, 4), (80, 10)):
@@ -84,6 +97,7 @@ def test_no_gap_is_bridged_from_one_shot_to_the_next():
         printed_cost,
         lambda n: uncovered_cost(n, 6),
         lambda n: uncovered_cost(n, 6, shot=np.arange(n) // 17),
+        lambda n: printed_cost(n, np.arange(n) // 17),
     ],
 )
 def test_gains_of_all_candidates_are_differences_of_the_total(make_cost):
@@ -109,6 +123,30 @@ def test_lazy_choice_is_the_exhaustive_one():
             chosen.append(int(np.argmin(totals)))
             represented |= near[chosen[-1]]
         assert choose_as_printed(Neighborhoods.of_members(near), reach, int(0.05 * n), n) == chosen
+
+
+def test_the_printed_choice_takes_every_shot_for_a_sequence_of_its_own():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        n, reach = 150, 5
+        lengths = np.array([30, 1, 49, 60, 10])
+        shot, ends = np.repeat(np.arange(5), lengths), np.cumsum(lengths)[:-1]
+        near = random_near(rng, n)
+        np.fill_diagonal(near, True)
+        near[30] = near[:, 30] = np.arange(n) == 30
+        chosen, represented = [], np.zeros(n, dtype=bool)
+        while literal_uncovered(represented, reach, shot) > 0:
+            totals = [
+                sum(literal_eq2(part) for part in np.split(represented | near[k], ends))
+                for k in range(n)
+            ]
+            best = int(np.argmin(totals))
+            if represented[near[best]].all():  # a shot of one frame has no distances in Eq. 2
+                best = 30
+            chosen.append(best)
+            represented |= near[best]
+        hoods = Neighborhoods.of_members(near)
+        assert choose_as_printed(hoods, reach, 0, n, shot) == chosen
 
 
 def test_equation_2_only_ever_gains_less_as_keyframes_are_added():
