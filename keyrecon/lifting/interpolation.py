@@ -68,7 +68,11 @@ def interpolate_poses(
 def reprojection_residual(
     poses: Float[np.ndarray, "T J 2"], joints: Float[np.ndarray, "T J 2"]
 ) -> Float[np.ndarray, "T"]:
-    """Median distance of joints from a pose shifted and scaled onto them; infinite without any."""
+    """Median distance of joints from a pose shifted and scaled onto them.
+
+    Infinite with fewer than half of the pose's joints: on few of them any pose fits, and on one
+    exactly. The scale is not negative: a pose upside down is another one.
+    """
     known = np.isfinite(joints[..., :1]) & np.isfinite(poses[..., :1])
     count = np.maximum(known.sum(axis=1), 1)
     first = np.where(known, poses, 0.0)
@@ -76,10 +80,12 @@ def reprojection_residual(
     first = np.where(known, first - (first.sum(axis=1) / count)[:, None], 0.0)
     second = np.where(known, second - (second.sum(axis=1) / count)[:, None], 0.0)
     size = np.maximum((first**2).sum(axis=(1, 2)), 1e-12)
-    scale = (first * second).sum(axis=(1, 2)) / size
+    scale = np.maximum((first * second).sum(axis=(1, 2)), 0.0) / size
     apart = np.linalg.norm(scale[:, None, None] * first - second, axis=-1)
     apart = np.where(known[..., 0], apart, np.nan)
-    apart[~known.any(axis=(1, 2))] = np.inf
+    of_pose = np.isfinite(poses[..., 0]).sum(axis=1)
+    few = ~known.any(axis=(1, 2)) | (2 * known.sum(axis=(1, 2)) < of_pose)
+    apart[few] = np.inf
     return np.nanmedian(apart, axis=1)
 
 
