@@ -128,17 +128,23 @@ def _stand_still(root: SwingState, number: int) -> SwingState:
 def predict_window(
     estimate: SwingState, window: slice, guess: Float[np.ndarray, "T"]
 ) -> SwingState:
-    """mu^, G^ and alpha^ of a window: each frame goes on at the speed of the two before it."""
+    """mu^, G^ and alpha^ of a window: each frame goes on at the speed of the two before it.
+
+    Frame 1, which has but one before it, at the speed from that one to itself.
+    """
     phase, rotation, position = (
         values[window].copy() for values in (guess, estimate.rotation, estimate.position)
     )
     if window.start:
         for row, t in enumerate(range(window.start, window.stop)):
-            last, before = t - 1, max(t - 2, 0)
-            now, then = (Rotation.from_matrix(estimate.rotation[k]) for k in (last, before))
-            rotation[row] = (now * then.inv() * now).as_matrix()
-            position[row] = 2 * estimate.position[last] - estimate.position[before]
-            phase[row] = 2 * estimate.phase[last] - estimate.phase[before]
+            last, end = t - 1, max(t - 1, 1)
+            now, then = (Rotation.from_matrix(estimate.rotation[k]) for k in (end, end - 1))
+            start = Rotation.from_matrix(estimate.rotation[last])
+            rotation[row] = (now * then.inv() * start).as_matrix()
+            position[row], phase[row] = (
+                values[last] + values[end] - values[end - 1]
+                for values in (estimate.position, estimate.phase)
+            )
     return SwingState(estimate.coefficients, phase, rotation, position)
 
 

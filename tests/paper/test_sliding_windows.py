@@ -48,17 +48,24 @@ def test_windows_of_three_frames_find_a_swing_of_the_model(played):
     assert 1000 * pa_mpjpe(*joints) < 50
 
 
-def test_a_new_frame_is_expected_to_go_on_at_the_last_speed():
+def moving_evenly():
+    """Phase, root and place that go on at one speed."""
     time = np.arange(6.0)
     angle = 0.1 * time
     turn = np.zeros((6, 3, 3))
     turn[:, 0, 0] = turn[:, 2, 2] = np.cos(angle)
     turn[:, 0, 2], turn[:, 2, 0], turn[:, 1, 1] = np.sin(angle), -np.sin(angle), 1
-    moving = SwingState(np.zeros(4), 0.02 * time, turn, np.outer(time, [0.1, -0.2, 0.3]))
-    expected = predict_window(moving, slice(2, 5), np.zeros(6))
-    np.testing.assert_allclose(expected.phase, moving.phase[2:5])
-    np.testing.assert_allclose(expected.position, moving.position[2:5])
-    np.testing.assert_allclose(expected.rotation, turn[2:5], atol=1e-12)
+    return SwingState(np.zeros(4), 0.02 * time, turn, np.outer(time, [0.1, -0.2, 0.3]))
+
+
+@pytest.mark.parametrize("first", [1, 2, 3])
+def test_every_frame_is_expected_to_go_on_at_the_speed_before_it(first):
+    moving = moving_evenly()
+    window = slice(first, first + 3)
+    expected = predict_window(moving, window, np.zeros(6))
+    np.testing.assert_allclose(expected.phase, moving.phase[window])
+    np.testing.assert_allclose(expected.position, moving.position[window])
+    np.testing.assert_allclose(expected.rotation, moving.rotation[window], atol=1e-12)
 
 
 def test_residuals_of_joints_and_hands_are_distances_in_pixels(played):
