@@ -146,7 +146,7 @@ def lift_motion(
     if options.method == "paper":
         rotated = _align_rotation(initial.directions, clean, size)
         initial = _align_translation(rotated, clean, size, shots)
-        state = descend_motion(initial, clean, size, shots, options.refine)
+        state = descend_motion(initial, clean, size, shots, fps, options.refine)
     else:
         state = fit_motion(
             initial, clean, player, shots, fps, options.depth_signs, options.refine, progress

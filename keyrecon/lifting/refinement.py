@@ -28,7 +28,7 @@ from keyrecon.lifting.priors.anatomy import TILT, anatomy_of, sideways_spread, t
 from keyrecon.lifting.priors.depth_model import depth_spread
 from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.numerics.geometry import unit_vectors
-from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
+from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass, sigma_at
 from keyrecon.ranges import within
 from keyrecon.records import Shots
 
@@ -136,9 +136,9 @@ class RefineOptions:
     Of Fig. 9.
     """
     sigma: Annotated[float, within(0.01, 50)] = 0.5
-    """With method 'paper': how strongly the motion is smoothed, frames.
+    """With method 'paper': how strongly the motion is smoothed, frames at 50 frames per second.
 
-    Standard deviation of the low-pass of Fig. 9.
+    Standard deviation of the low-pass of Fig. 9; at other rates it cuts off at the same frequency.
     """
 
 
@@ -175,16 +175,18 @@ def descend_motion(
     observed: PreparedTracks,
     size: BodySize,
     shots: Shots,
+    fps: float,
     options: RefineOptions = RefineOptions(),
 ) -> MotionState:
     """Projected gradient descent from the slerped key poses (Fig. 9), each shot by itself."""
+    smooth = low_pass(sigma_at(options.sigma, fps / RATE, options.step))
     skeleton = size.skeleton
     root = skeleton.root
     points = start.points(size.lengths, skeleton)
     lengths = keep_lengths(size.lengths, skeleton)
     fitted = shots.in_each(
         lambda start, wanted: descend(
-            start, wanted, (lengths, low_pass(options.sigma)), options.step, options.descents
+            start, wanted, (lengths, smooth), options.step, options.descents
         ),
         points,
         observed.joints,

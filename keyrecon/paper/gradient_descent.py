@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import brentq
 
 from keyrecon.body import Skeleton
 
@@ -26,6 +27,11 @@ logger = logging.getLogger(__name__)
 
 CONVERGED = 1e-5
 """Rms change of all coordinates in one iteration, body heights: a fiftieth of a millimetre."""
+
+HIGHEST = 0.5
+"""The highest frequency that a video has, cycles per frame."""
+NO_LOW_PASS = 0.1
+"""Standard deviation of a low-pass, frames, whose kernel is a single frame."""
 
 Projection = Callable[[Float[np.ndarray, "T J 3"]], Float[np.ndarray, "T J 3"]]
 
@@ -55,6 +61,40 @@ def low_pass(sigma: float) -> Projection:
         return gaussian_filter1d(points, sigma, axis=0, mode="nearest")
 
     return project
+
+
+def sigma_at(sigma: float, frame_rate: float, step: float) -> float:
+    """Standard deviation of a low-pass that cuts off at the same frequency at another frame rate.
+
+    In frames at that rate; `frame_rate` in that for which `sigma` is given. The cut-off is that of
+    the descent when it has converged with the `step`, -3 dB, found from the gain of the sampled
+    kernel: at one frame and less that is not the gain of a Gaussian. A `sigma` that takes less
+    than 3 dB of everything keeps its gain at the highest frequency. Where a video is too slow to
+    have the cut-off frequency nothing is filtered.
+    """
+    if frame_rate == 1:
+        return sigma
+    least = np.sqrt(0.5) / (step + np.sqrt(0.5) * (1 - step))
+    gain = max(least, _gain(sigma, HIGHEST))
+    cut_off = HIGHEST if gain > least else brentq(lambda f: _gain(sigma, f) - gain, 0.0, HIGHEST)
+    if cut_off >= HIGHEST * frame_rate:
+        return NO_LOW_PASS
+    return float(
+        brentq(
+            lambda width: _gain(width, cut_off / frame_rate) - gain,
+            NO_LOW_PASS,
+            2 * sigma * frame_rate + 1,
+        )
+    )
+
+
+def _gain(sigma: float, frequency: float) -> float:
+    """What one pass of the low-pass leaves of a frequency, cycles per frame."""
+    reach = int(4 * sigma + 0.5) + 1
+    impulse = np.zeros(2 * reach + 1)
+    impulse[reach] = 1.0
+    kernel = gaussian_filter1d(impulse, sigma, mode="constant")
+    return float(kernel @ np.cos(2 * np.pi * frequency * np.arange(-reach, reach + 1)))
 
 
 def descend(
