@@ -44,7 +44,7 @@ _SPIKE_SECONDS = 0.08
 """Half of the window of the median that spikes are held against: a spike is over within this."""
 _SPIKE_LIMIT = 4.0
 """Robust deviations from the median beyond which a joint is an outlier."""
-_MIN_SPIKE_DEVIATION = 1.4
+MIN_SPIKE_DEVIATION = 1.4
 """A deviation is at least this many times the noise of a sure track: about the length of an error
 in both directions of the image, sqrt 2."""
 
@@ -191,7 +191,7 @@ def _find_outliers(
     """Tracked joints that leap away from where the initial motion puts them."""
     residual = observed.joints - initial.points(size.lengths, size.skeleton)[..., :2]
     window = 2 * round(_SPIKE_SECONDS * fps) + 1
-    least = _MIN_SPIKE_DEVIATION * track_noise
+    least = MIN_SPIKE_DEVIATION * track_noise
     return reject_spikes(residual, window, _SPIKE_LIMIT, least, shots)
 
 

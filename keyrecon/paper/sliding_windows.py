@@ -54,9 +54,9 @@ class WindowOptions:
     """Sliding windows; standard deviations stand for the weights w_G, w_mu and w_alpha.
 
     Their values are not printed. Tried on a rendered swing of benchmarks/golf.py, b-faceon-30:
-    those below gave a PA-MPJPE of 73 mm; twice as much for the root, 75; three times as much for
-    the coefficients and half as much for joints, 85; half as much for phase and joints, 99; half
-    for root and phase with three times for the coefficients and twice for joints, 344: there the
+    those below gave a PA-MPJPE of 66 mm; twice as much for the root, 59; three times as much for
+    the coefficients and half as much for joints, 90; half as much for phase and joints, 79; half
+    for root and phase with three times for the coefficients and twice for joints, 334: there the
     predictions outweigh the picture, and errors of the speeds add up until the windows run away.
     """
 

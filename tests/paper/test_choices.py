@@ -7,8 +7,13 @@ from importlib.resources import files
 import pytest
 
 from keyrecon import cli
+from keyrecon.lifting.lifting import MIN_SPIKE_DEVIATION
+from keyrecon.paper.joint_transfer import POSITION_SPREAD
 from keyrecon.paper.sliding_windows import WindowOptions
 from keyrecon.pipeline import Options, as_printed
+from keyrecon.segmentation.part_labels import GROWTH, MAX_GAP
+from keyrecon.tracking.exposure import EVEN
+from keyrecon.tracking.linking import MAX_GAP_SECONDS
 
 TEXT = files("keyrecon.paper").joinpath("choices.md").read_text()
 ROWS = [re.split(r"(?<!\\)\|", line)[1:-1] for line in TEXT.splitlines() if line.startswith("|")]
@@ -61,6 +66,14 @@ def test_the_printed_form_and_the_golf_prior_are_not_had_together(
         ("size of the picture that is searched", f"{PRINTED.find.player:g} px"),
         ("most temporally consistent path", f"{PRINTED.find.head_speed:g} (head)"),
         ("most temporally consistent path", f"{PRINTED.find.foot_speed:g} (feet)"),
+        ("frames without a candidate", f"up to {MAX_GAP_SECONDS:g} s for head and feet"),
+        ("pixels of the player of none", f"{GROWTH:g}"[1:] + " heights into what differs"),
+        ("pixels of the player of none", f"{MAX_GAP:g}"[1:] + " heights from the body"),
+        ("light that changes", f"{EVEN:.0%}".replace("%", " %")),
+        (
+            "what of a video of several shots",
+            f"shorter than {PRINTED.shots.shortest:g} s".replace("0.", "."),
+        ),
         ("the standing height", f"over {PRINTED.find.envelope:g} s"),
         ("sampled at regular intervals", f"{PRINTED.edges.step:g}"[1:] + " heights"),
         ("sampled at regular intervals", f"{PRINTED.edges.most} elements"),
@@ -68,6 +81,9 @@ def test_the_printed_form_and_the_golf_prior_are_not_had_together(
         ("matching all pairs", f"1/{1 / PRINTED.compare.cell:g} height"),
         ("matching all pairs", f"{PRINTED.compare.directions} directions"),
         ("max B", f"{PRINTED.compare.most} frames"),
+        ("more than 4000 frames", f"{PRINTED.compare.most} at most"),
+        ("how far appearance may move", " to ".join(f"{s:g}"[1:] for s in POSITION_SPREAD)),
+        ("discontinuities", f"{MIN_SPIKE_DEVIATION * LENGTHS.track_noise:g}"[1:] + " body heights"),
         ("T at other frame rates", f"T = {PRINTED.keyframes.reach} at 50"),
         ("lengths of limbs", f"({LENGTHS.spread:.0%})".replace("%", " %")),
         ("the scale s", f"({LENGTHS.scale_spread:.0%})".replace("%", " %")),
