@@ -7,7 +7,9 @@ monotone table of factors; the expected error, in player heights, is their produ
 
     E|error| = mean * f(correction) * g(part's correction) * h(part's confidence) * k(speed),
 
-cut at `MAX_ERROR`: a joint that is farther off is lost, by how much does not matter.
+cut at `MAX_ERROR`: a joint that is farther off is lost, by how much does not matter. Where nothing
+of a part was seen there was nothing to correct, and what moved is a guess: its joints are at least
+as far off as straight lines in time from the nearest marks are (`UNSEEN_ERRORS`).
 
 The tables were fitted to joints marked by eye on real clips. `python benchmarks/expected_error.py`
 makes them and prints what they are worth, every clip predicted from the others alone.
@@ -20,7 +22,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.records import HalfName, Motion, Shots, Track
+from keyrecon.records import SOURCES, HalfName, Motion, Shots, Track
 
 MEAN_ERROR = 0.0205
 """Player heights. Fitted, as the tables, to 2613 joints of nine clips. With every clip predicted
@@ -54,6 +56,17 @@ ERROR_TABLES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
 """By predictor the lower ends of its bins, and their factors."""
 MAX_ERROR = 0.25
 """Expected error of a joint that is lost, player heights: the length of a thigh."""
+NOTHING_SEEN = 0.02
+"""Mean confidence of a part's joints below which nothing of it was seen."""
+UNSEEN_SECONDS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2)
+"""Lower ends of the bins of time to the nearest mark of a joint."""
+UNSEEN_ERRORS: dict[str, tuple[float, ...]] = {
+    "arms": (0.063, 0.094, 0.131, 0.194, 0.206, 0.220, 0.269, 0.338),
+    "legs": (0.019, 0.034, 0.053, 0.090, 0.110, 0.152, 0.198, 0.249),
+    "head": (0.020, 0.039, 0.061, 0.095, 0.122, 0.155, 0.206, 0.271),
+}
+"""How far straight lines in time between two marks are off, player heights: marks by eye on six
+clips, three frames at a time, the clips' means."""
 UNCERTAIN = 0.055
 """Expected error of the worst joint of arms, legs or head from which the part is uncertain, player
 heights. Chosen so that as many parts are called uncertain as have a joint off by more than a fifth
@@ -141,7 +154,33 @@ def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
 
 def expected_error(motion: Motion) -> Float[np.ndarray, "T J"]:
     """Expected distance of `points2d` from where a person would mark the joints, px."""
-    return predict_error(error_predictors(motion)) * player_height(motion)[:, None]
+    predicted = predict_error(error_predictors(motion))
+    return np.maximum(predicted, unseen_error(motion)) * player_height(motion)[:, None]
+
+
+def unseen_error(motion: Motion) -> Float[np.ndarray, "T J"]:
+    """Least error of joints of parts of which nothing was seen, player heights; 0 of all others."""
+    since_mark = _seconds_to_marks(motion)
+    error = np.zeros_like(motion.confidence)
+    for name, members in body_parts(motion.skeleton).items():
+        unseen = motion.confidence[:, members].mean(axis=1, keepdims=True) < NOTHING_SEEN
+        table = np.array(UNSEEN_ERRORS[name])[find_bins(since_mark[:, members], UNSEEN_SECONDS)]
+        error[:, members] = np.where(unseen & (since_mark[:, members] > 0), table, 0.0)
+    return np.minimum(error, MAX_ERROR)
+
+
+def _seconds_to_marks(motion: Motion) -> Float[np.ndarray, "T J"]:
+    """From each frame to the nearest one in which each joint is marked; infinite without any."""
+    apart = np.full(motion.source.shape, np.inf)
+    for joint, marked in enumerate((motion.source == SOURCES.index("annotated")).T):
+        if marked.any():
+            times = motion.time[marked]
+            after = np.searchsorted(times, motion.time).clip(0, len(times) - 1)
+            nearest = np.minimum(
+                np.abs(times[after] - motion.time), np.abs(times[after - 1] - motion.time)
+            )
+            apart[:, joint] = nearest
+    return apart
 
 
 def predict_error(predictors: Mapping[str, Float[np.ndarray, "*n"]]) -> Float[np.ndarray, "*n"]:

@@ -7,7 +7,7 @@ import pytest
 
 from keyrecon import uncertainty
 from keyrecon.body import LSP14
-from keyrecon.records import Motion, Shots, Track
+from keyrecon.records import SOURCES, Motion, Shots, Track
 from keyrecon.uncertainty import (
     describe_uncertainty,
     expected_error,
@@ -212,3 +212,24 @@ def swinging(fps):
 def test_the_same_motion_is_as_sure_at_any_frame_rate():
     expected = [expected_error(swinging(fps)).mean() for fps in (25.0, 50.0, 200.0)]
     assert expected == pytest.approx([expected[0]] * 3, rel=0.03)
+
+
+def with_unseen_arms():
+    """Arms at rest that nobody saw, marked on the first frame and the last: nothing to correct."""
+    confidence, source = np.full((FRAMES, 14), 0.9), np.ones((FRAMES, 14), int)
+    confidence[1:-1, ARMS], source[[0, -1]] = 0.0, SOURCES.index("annotated")
+    motion = replace(make_motion(confidence), source=source)
+    return replace(motion, expected_error=expected_error(motion))
+
+
+def test_arms_of_which_nothing_was_seen_are_the_less_sure_the_farther_a_mark_is():
+    error = with_unseen_arms().expected_error[:, ARMS] / PIXELS
+    assert (error[[0, -1]] < 0.02).all()
+    assert (error[5:-5] > 0.15).all()
+    assert (np.diff(error[1 : FRAMES // 2], axis=0) >= 0).all()
+
+
+def test_arms_that_rest_unseen_are_told_and_legs_that_are_seen_are_not():
+    motion = with_unseen_arms()
+    assert uncertain_share(motion) > 0.9
+    assert {stretch.what for stretch in uncertain_stretches(motion)} == {"arms"}
