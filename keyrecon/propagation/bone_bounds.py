@@ -4,9 +4,11 @@ The longest that a bone was ever marked, relative to the player's height in that
 for it was never longer than it is and was seen at length at some time. What the bound leaves out is
 how much more a further frame may show: nearer limbs look longer, heights of the player are
 estimated, and marks spread. The video tells this too: by how much the longest mark of a bone
-exceeds the longest in all other frames. The largest of these excesses over all bones of the body
-is allowed to each, and the spread of marks is added. A bone that was marked foreshortened only may
-at least be as long as bodies have it beside their other bones.
+exceeds the longest in all other frames, where that is no shorter than bodies have the bone: hips
+seen from the side in all frames but one say nothing of how marks spread. The largest of these
+excesses over all bones of the body is allowed to each, and the spread of marks is added. A bone
+that was marked foreshortened only may at least be as long as bodies have it beside their other
+bones.
 
 On eight real clips .04 % of the bones marked by eye in other frames are longer than that, by 6 % at
 most.
@@ -33,22 +35,20 @@ def bound_bones(marks: PlayerMarks) -> Float[np.ndarray, "J J"]:
     skeleton = marks.skeleton
     pairs = np.concatenate([skeleton.bones, _across(skeleton)])
     groups = [_alike(skeleton, pair) for pair in pairs.tolist()]
-    longest = np.full(len(pairs), np.nan)
-    excess = [1.0]
+    longest, second = np.full((2, len(pairs)), np.nan)
     for row, group in enumerate(groups):
-        lengths = _longest_of_frames(marks.joints, group)
-        if len(lengths):
-            longest[row] = lengths[0]
-        if len(lengths) >= MIN_FRAMES and lengths[1] > 0:
-            excess.append(float(lengths[0] / lengths[1]))
+        lengths = np.append(_longest_of_frames(marks.joints, group), [np.nan, np.nan])
+        longest[row], second[row] = lengths[:2]
     bounds = np.full((len(skeleton.names),) * 2, np.inf)
     if len(marks.frames) < MIN_FRAMES or np.isnan(longest).any():
         return bounds
     bones = len(skeleton.bones)
     size = float(np.median(longest[:bones] / skeleton.lengths))
-    longest[:bones] = np.maximum(longest[:bones], size * skeleton.lengths)
+    usual = size * np.append(skeleton.lengths, _usual_breadths(skeleton, pairs[bones:]))
+    excess = longest / np.fmax(second, usual)
+    longest[:bones] = np.maximum(longest[:bones], usual[:bones])
     one, other = pairs.T
-    bounds[one, other] = bounds[other, one] = max(excess) * longest + MARK_SPREAD
+    bounds[one, other] = bounds[other, one] = excess.max(initial=1.0) * longest + MARK_SPREAD
     return bounds
 
 
@@ -80,6 +80,14 @@ def _across(skeleton: Skeleton) -> Int[np.ndarray, "n 2"]:
     """Mirrored joints that hang from the same one: the breadths of shoulders and hips."""
     pairs = [p for p in skeleton.mirrored if skeleton.parents[p[0]] == skeleton.parents[p[1]]]
     return np.array(pairs, int).reshape(-1, 2)
+
+
+def _usual_breadths(skeleton: Skeleton, pairs: Int[np.ndarray, "n 2"]) -> list[float]:
+    """Of shoulders and hips, in statures; 0 where no table has them."""
+    known = {
+        frozenset((breadth.left, breadth.right)): breadth.length for breadth in skeleton.breadths
+    }
+    return [known.get(frozenset(pair), 0.0) for pair in pairs.tolist()]
 
 
 def _alike(skeleton: Skeleton, pair: list[int]) -> Int[np.ndarray, "n 2"]:

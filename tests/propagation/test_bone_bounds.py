@@ -52,6 +52,16 @@ def test_marks_that_spread_leave_more_room():
     assert bounds_of(preparation, annotations)[KNEE, ANKLE] > 1.05 * before
 
 
+def test_a_forearm_seen_at_length_in_one_frame_of_many_gives_no_room_to_the_legs():
+    shank = np.linalg.norm(standing()[KNEE] - standing()[ANKLE])
+    poses = [standing(), *[foreshortened(0.2)] * 6]
+    for pose in poses[1:]:
+        left = LSP14.index("left_elbow"), LSP14.index("left_wrist")
+        pose[left[1]] = pose[left[0]] + 0.2 * (pose[left[1]] - pose[left[0]])
+    preparation, truth = scene(poses, tuple(range(7)))
+    assert bounds_of(preparation, marks(truth, tuple(range(7))))[KNEE, ANKLE] < 1.1 * shank
+
+
 def test_a_forearm_that_was_marked_foreshortened_only_may_be_as_long_as_bodies_have_it():
     preparation, truth = scene([foreshortened(0.4)] * 3, (0, 2))
     annotations = marks(truth, (0, 2))
