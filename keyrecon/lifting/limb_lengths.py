@@ -210,7 +210,9 @@ def _observe_lengths(
     propagated = joint_noise(tracks.confidence[passing], options)
     sigma = np.concatenate([clicked, propagated])[:, ends]
     length = np.linalg.norm(joints[:, ends[:, 1]] - joints[:, ends[:, 0]], axis=-1)
-    known = length > 0
+    # what nobody saw, and what is too long to be, tells nothing of a length
+    seen = np.concatenate([np.full(clicked.shape, True), tracks.confidence[passing] > 0])
+    known = (length > 0) & seen[:, ends].all(axis=-1)
     row, column = np.nonzero(known)
     noise = np.linalg.norm(sigma, axis=-1) * height_px[frames, None]
     return _ObservedLengths(np.log(length[known]), noise[known], group_of[column], frames[row])

@@ -34,3 +34,20 @@ def test_a_short_bone_that_points_at_the_camera_is_not_taken_for_a_long_one(seed
     found = estimate_lengths(tracks, marks, np.full(frames, SCALE), 25.0).lengths
     ratio = found[ARMS[0]] / found[LEG] / (true[ARMS[0]] / true[LEG])
     assert 0.75 < ratio < 1.1  # nobody can tell that eight tenths were not all
+
+
+def test_elbows_of_no_confidence_that_lie_beyond_the_arm_make_no_arm_longer():
+    rng, frames = np.random.default_rng(0), 600
+    directions = unit_vectors(rng.normal(size=(frames, 13, 3)))
+    joints = SCALE * pose_from_directions(directions, LSP14.lengths, LSP14)[..., :2]
+    marked = np.arange(0, frames, 60)
+    nobody = np.zeros((len(marked), len(LSP14.bones)), dtype=np.int64)
+    marks = Annotations(LSP14, marked, joints[marked], np.ones((len(marked), 14), bool), nobody)
+    elbows = [LSP14.index("left_elbow"), LSP14.index("right_elbow")]
+    lost = np.setdiff1d(np.arange(240), marked)[:, None]
+    confidence = np.ones((frames, 14))
+    confidence[lost, elbows] = 0.0
+    joints[lost, elbows] += [0.0, 1.6 * LSP14.lengths[ARMS[0]] * SCALE]
+    tracks = JointTracks(joints, confidence, np.zeros((frames, 14), dtype=np.int64))
+    found = estimate_lengths(tracks, marks, np.full(frames, SCALE), 25.0).lengths
+    assert found[ARMS[0]] / found[LEG] < 1.05 * LSP14.lengths[ARMS[0]] / LSP14.lengths[LEG]
