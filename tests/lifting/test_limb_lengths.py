@@ -44,7 +44,7 @@ def test_elbows_of_no_confidence_that_lie_beyond_the_arm_make_no_arm_longer():
     nobody = np.zeros((len(marked), len(LSP14.bones)), dtype=np.int64)
     marks = Annotations(LSP14, marked, joints[marked], np.ones((len(marked), 14), bool), nobody)
     elbows = [LSP14.index("left_elbow"), LSP14.index("right_elbow")]
-    lost = np.setdiff1d(np.arange(240), marked)[:, None]
+    lost = np.setdiff1d(np.arange(420), marked)[:, None]
     confidence = np.ones((frames, 14))
     confidence[lost, elbows] = 0.0
     joints[lost, elbows] += [0.0, 1.6 * LSP14.lengths[ARMS[0]] * SCALE]
