@@ -5,7 +5,8 @@ whole:
 
     colour back-projection x foreground -> Gaussian low-pass -> radial symmetry -> candidates,
 
-round for the head, elliptical for the shoes. The cheapest path through the candidates (see
+round for the head, elliptical for the shoes; where somebody told what the trunk looks like, a head
+has it beneath it or aslant. The cheapest path through the candidates (see
 `viterbi`) gives the head, then the feet given the head; between the searched frames both are
 interpolated. Searched in every frame (`EVERY_FRAME`), this is the tracker that the paper prints.
 
