@@ -23,6 +23,7 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.errors import KeyreconError, counted
 from keyrecon.io.evening import LUMA_FIRST, black_of, even_exposure
 from keyrecon.io.fingerprint import fingerprint_file
+from keyrecon.io.frame_times import even_out
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Video:
     stamps: Int[np.ndarray, "T"]
     """Presentation times of the frames, in ticks of the stream."""
     time: Float[np.ndarray, "T"]
-    """Seconds in the world since frame 0."""
+    """Seconds in the world since frame 0; of an even rate without the rounding of its container."""
     fps: float
     """Frames per second of the world (median spacing)."""
     turns: int
@@ -253,7 +254,7 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
             f"--end {len(stamps)}."
         )
     stamps = stamps[start:end]
-    time = (stamps - stamps[0]) * seconds_per_tick / slow_motion
+    time = even_out(stamps) * seconds_per_tick / slow_motion
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
     if not MIN_FPS <= fps <= MAX_FPS or not time[-1] < len(time) / MIN_FPS:
         raise ValueError(f"{len(time)} frames in {time[-1]:g} s")
