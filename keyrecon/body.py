@@ -223,12 +223,13 @@ LSP14 = _skeleton_from_rows(
 """The default skeleton."""
 
 
-def read_skeleton(path: Path) -> Skeleton:
+def read_skeleton(path: Path | str) -> Skeleton:
     """Read a skeleton from JSON: {"joints": [{"name", "parent", "length"}...], "lower": [names]}.
 
     `parent` is null at the root, `length` is in statures, mirrored pairs are the names that
     differ only in left_ and right_. Raises KeyreconError when the tree is not one.
     """
+    path = Path(path)
     remedy = "it needs 'joints' with name, parent and length, and 'lower' with joint names"
     with reading(path, "a skeleton file", remedy):
         data = parse_json(read_text(path))

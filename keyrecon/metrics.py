@@ -186,11 +186,12 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
     )
 
 
-def read_truth(path: Path) -> dict[str, np.ndarray]:
+def read_truth(path: Path | str) -> dict[str, np.ndarray]:
     """Arrays of a truth.npz: points3d (metres), points2d (px), joint_names, fps, and any more.
 
     Raises KeyreconError for a file of another kind, or arrays that do not fit each other.
     """
+    path = Path(path)
     with reading(path, "a truth.npz", "it holds points3d, points2d, joint_names and fps"):
         truth = read_arrays(path)
     if missing := {"points3d", "points2d", "joint_names", "fps"} - truth.keys():

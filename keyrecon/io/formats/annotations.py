@@ -17,13 +17,14 @@ from keyrecon.records import Annotations
 
 
 def read_annotations(
-    path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+    path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
 ) -> Annotations:
     """Read COCO keypoints JSON, a DeepLabCut CSV or CVAT XML 1.1 and check it against the video.
 
     `size` is the width and height of the video's pictures, px. Raises KeyreconError for files of
     another kind and for marks that do not fit the video or the skeleton.
     """
+    path = Path(path)
     with reading(path, "a file that can be read", "check the path"), path.open("rb") as file:
         start = file.read(4096)
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()

@@ -47,8 +47,9 @@ def write_camera(path: Path, camera: WorldCamera) -> None:
     write_durably(path, buffer.getvalue())
 
 
-def read_camera(path: Path) -> WorldCamera:
+def read_camera(path: Path | str) -> WorldCamera:
     """Read what `write_camera` wrote; raises KeyreconError for any other file."""
+    path = Path(path)
     with reading(path, "a camera", "make it with keyrecon court or keyrecon ground"):
         data = read_arrays(path)
         frames = len(data["found"])

@@ -39,13 +39,16 @@ Lines = tuple[str, str]
 INFO = {"description": "2D joints for keyrecon; frame = 0-based frame of the video"}
 
 
-def read_coco(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
+def read_coco(
+    path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+) -> Annotations:
     """Read and check marks; `size` is the width and height of the video's pictures, px.
 
     Joints are matched by name, and only joints that are marked need to be in the skeleton.
     Raises KeyreconError for a file that does not parse or does not fit the video, naming the
     frame and the joint.
     """
+    path = Path(path)
     sheet = MarkSheet(path, skeleton, n_frames, size)
     remedy = "it needs images, annotations with keypoints, and categories with the joints' names"
     with reading(path, "a COCO keypoints file", remedy):

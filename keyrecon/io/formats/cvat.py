@@ -24,8 +24,11 @@ from keyrecon.reading import reading
 from keyrecon.records import Annotations
 
 
-def read_cvat(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
+def read_cvat(
+    path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+) -> Annotations:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
+    path = Path(path)
     sheet = MarkSheet(path, skeleton, n_frames, size)
     remedy = "export the task as 'CVAT for video' or 'CVAT for images' 1.1"
     with reading(path, "a CVAT XML 1.1 file", remedy):

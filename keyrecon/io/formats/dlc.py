@@ -32,8 +32,11 @@ Columns = dict[str, dict[str, int]]
 """Column of every coordinate of every body part."""
 
 
-def read_dlc(path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]) -> Annotations:
+def read_dlc(
+    path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+) -> Annotations:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
+    path = Path(path)
     sheet = MarkSheet(path, skeleton, n_frames, size)
     remedy = (
         "its heading has the rows scorer, bodyparts and coords, and every row a picture and numbers"

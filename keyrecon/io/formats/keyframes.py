@@ -69,8 +69,9 @@ def _gains_to_json(gains: MarkGains) -> dict[str, Any]:
     }
 
 
-def read_keyframes(path: Path) -> Keyframes:
+def read_keyframes(path: Path | str) -> Keyframes:
     """Read a file that `keyframes_to_json` wrote; raises KeyreconError that says what is wrong."""
+    path = Path(path)
     with reading(path, "a choice of keyframes", "make it again with keyrecon keyframes"):
         return keyframes_from_json(read_text(path))
 

@@ -100,8 +100,9 @@ def _known(motion: Motion) -> list[str]:
     return [name for name in OPTIONAL if getattr(motion, name) is not None]
 
 
-def read_motion(path: Path) -> Motion:
+def read_motion(path: Path | str) -> Motion:
     """Read what `write_motion` wrote; raises KeyreconError for any other file."""
+    path = Path(path)
     with reading(path, "a motion", "make it with keyrecon run"):
         data = read_arrays(path)
         _check_shapes(data)
@@ -119,8 +120,9 @@ def read_motion(path: Path) -> Motion:
         )
 
 
-def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
+def read_further_arrays(path: Path | str) -> dict[str, np.ndarray]:
     """What a file holds besides a `Motion`: the motion on the court, a swing's club and keys."""
+    path = Path(path)
     with reading(path, "a motion", "make it with keyrecon run"):
         data = read_arrays(path)
         known = (*ARRAYS, *OPTIONAL, *ABOUT)
@@ -136,11 +138,12 @@ def read_further_arrays(path: Path) -> dict[str, np.ndarray]:
         return further
 
 
-def read_on_court(path: Path) -> tuple[WorldMotion, WorldCamera] | None:
+def read_on_court(path: Path | str) -> tuple[WorldMotion, WorldCamera] | None:
     """The motion on the court and the camera, as `write_motion` wrote them; None without them.
 
     How sure the camera is, and the size by the court, are not in the file: they are NaN.
     """
+    path = Path(path)
     data = read_further_arrays(path)
     if "points3d_world" not in data:
         return None

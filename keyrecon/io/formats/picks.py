@@ -10,8 +10,9 @@ from keyrecon.reading import parse_json, read_text, reading, real, whole
 from keyrecon.records import Pick
 
 
-def read_picks(path: Path) -> tuple[Pick, ...]:
+def read_picks(path: Path | str) -> tuple[Pick, ...]:
     """Read clicks; raises KeyreconError for a file that does not hold them."""
+    path = Path(path)
     with reading(path, "a file of picks", "mend it or move it away and pick again"):
         return tuple(_pick(row) for row in parse_json(read_text(path))["picks"])
 

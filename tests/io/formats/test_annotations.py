@@ -394,3 +394,10 @@ def test_joints_outside_the_picture_are_named():
 def test_the_reader_of_the_projects_own_file_is_the_same(tmp_path, marked):
     write_coco(tmp_path / "annotations.json", marked, SIZE)
     assert_same(read_coco(tmp_path / "annotations.json", LSP14, FRAMES, SIZE), marked)
+
+
+@pytest.mark.parametrize("read_file", [read_coco, read_annotations])
+def test_a_file_may_be_named_by_a_text(tmp_path, marked, read_file):
+    write_coco(tmp_path / "marks.json", marked, SIZE)
+    found = read_file(str(tmp_path / "marks.json"), LSP14, FRAMES, SIZE)
+    assert (found.frames == marked.frames).all()
