@@ -104,9 +104,11 @@ def follow_player(
 ) -> FollowedPlayer:
     """Sort the shots, and follow the player through the usable ones.
 
-    Raises KeyreconError where the player is not found.
+    Raises KeyreconError where the player is not found, or a shot is named that there is not.
     """
     shots = Shots.between(camera.cuts, len(video))
+    asked = numbered_shots(options.shots.use, len(shots.parts))
+    numbered_shots(options.shots.skip, len(shots.parts))
     if not camera.cuts:
         only = _Shot("", 0, video, camera, colors, anchors, True)
         detected = keep(
@@ -115,7 +117,6 @@ def follow_player(
         )  # fmt: skip
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
-    asked = numbered_shots(options.shots.use, len(each))
     sightings = _sight_each(each, asked, options.find, keep, progress)
     picked = np.array([shot.picked for shot in each])
     shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)

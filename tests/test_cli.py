@@ -182,8 +182,8 @@ def test_run_before_keyframes(keyrecon, project):
 
 
 def test_an_impossible_height(keyrecon, project):
-    code, _, err = keyrecon("run", project, "--height", "183")
-    assert one_line(code, err, "metres", "183")
+    code, _, err = keyrecon("run", project, "--height", "18.3")
+    assert one_line(code, err, "metres", "18.3")
 
 
 def coco(frame, name="neck", x=10.0):

@@ -14,7 +14,7 @@ import numpy as np
 from keyrecon.app.court import export_calibration
 from keyrecon.app.project import load_motion
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.export import check_suffix, export_motion
+from keyrecon.io.formats.export import check_packages, check_suffix, export_motion
 from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     read_further_arrays,
@@ -46,6 +46,7 @@ def export(
         raise KeyreconError("No file was named; give one or more, such as motion.bvh motion.trc.")
     for file in files:
         check_suffix(file, (OVERLAY, CALIBRATION))
+        check_packages(file)
         _check_place(file, workspace)
     check_overlay(overlay)
     if overlay != OverlayOptions() and not any(f.suffix.lower() == OVERLAY for f in files):

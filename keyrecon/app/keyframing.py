@@ -38,10 +38,14 @@ class KeyframeSettings:
     def over(self, options: KeyframeOptions) -> KeyframeOptions:
         """Options with those that are given here in their place.
 
-        Raises KeyreconError for a budget that is no share.
+        Raises KeyreconError for what cannot be, named as it is typed.
         """
         if self.budget is not None:
             check_budget(self.budget)
+        usual = KeyframeOptions()
+        coverage = usual.coverage if self.coverage is None else self.coverage
+        reach = usual.reach if self.reach is None else self.reach
+        check_options(replace(usual, coverage=coverage, reach=reach), "--")
         return replace(
             options,
             budget=options.budget if self.budget is None else self.budget,
@@ -64,6 +68,7 @@ def find_keyframes(
     `printed` takes the forms that the paper prints. The project remembers its options without
     them, so that a run by the same forms finds the same stages, and one by ours is not bound.
     """
+    workspace.check_writable()
     choices = workspace.shot_choices()
     options = with_chosen_shots(workspace.options(options, Options(), told=told), choices)
     options = replace(options, keyframes=chosen.over(options.keyframes))

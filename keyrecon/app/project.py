@@ -15,7 +15,7 @@ from keyrecon.app.pick_checks import implausible_picks, missing_parts
 from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.durable import put_aside, write_durably
-from keyrecon.io.formats.annotation_checks import implausible_bones, joints_outside
+from keyrecon.io.formats.annotation_checks import far_outside, implausible_bones, joints_outside
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import read_keyframes
@@ -163,16 +163,23 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
         [
             f"{workspace.annotations_file}: marks on {counted(len(merged.frames), 'frame')}.",
             *(f"Warning: {text}" for text in warnings),
-            f"Next: keyrecon {_after_marks(workspace)} {quoted(workspace.folder)}",
+            _after_marks(workspace, far_outside(merged, size)),
         ]
     )
 
 
-def _after_marks(workspace: Workspace) -> str:
-    """The command that uses marks first."""
+def _after_marks(workspace: Workspace, spoilt: Sequence[int]) -> str:
+    """To mend what would spoil the rest, or the command that uses marks first."""
+    if spoilt:
+        return (
+            f"Next: mend the marks far outside the picture (frame "
+            f"{', '.join(map(str, spoilt[:8]))}), then import them again with --replace."
+        )
     if workspace.keyframes_file.is_file():
-        return "run"
-    return "golf fit" if workspace.is_golf else "keyframes"
+        verb = "run"
+    else:
+        verb = "golf fit" if workspace.is_golf else "keyframes"
+    return f"Next: keyrecon {verb} {quoted(workspace.folder)}"
 
 
 def _conflict_error(conflicts: list[str]) -> KeyreconError:
@@ -186,8 +193,21 @@ def _conflict_error(conflicts: list[str]) -> KeyreconError:
 
 def load_annotations(workspace: Workspace, video: Video) -> Annotations:
     """The project's annotations, checked."""
-    size = (video.width, video.height)
-    return read_coco(workspace.annotations_file, workspace.skeleton, len(video), size)
+    file, size = workspace.annotations_file, (video.width, video.height)
+    try:
+        return read_coco(file, workspace.skeleton, len(video), size)
+    except KeyreconError as fault:
+        if fault.__cause__ is None:  # a whole file with marks that do not fit
+            raise
+        raise KeyreconError(f"{fault} {_remedy(workspace)}") from fault
+
+
+def _remedy(workspace: Workspace) -> str:
+    """What restores annotations.json."""
+    file, folder = workspace.annotations_file, quoted(workspace.folder)
+    older = sorted(file.parent.glob(f"{file.stem}.old-*.json"), key=lambda f: f.stat().st_mtime)
+    copy = f"copy {quoted(older[-1])} over it, or " if older else ""
+    return f"To restore it, {copy}delete it and take the marks anew: keyrecon import {folder} FILE"
 
 
 def asked_for(workspace: Workspace) -> Keyframes:

@@ -14,7 +14,7 @@ from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
-from keyrecon.library import reconstruct
+from keyrecon.library import read_models, reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation
@@ -53,6 +53,8 @@ def run(
     that the paper prints. The project remembers its options, without those forms, when all is
     done: what is refused on the way leaves no trace.
     """
+    workspace.check_writable()
+    read_models(options)  # a file that is none is told of before any stage
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
     evidence = marks_evidence(workspace)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
+from keyrecon.errors import KeyreconError
+
 Project = Positional[Annotated[Path, arg(metavar="PROJECT")]]
 VideoFile = Positional[Annotated[Path, arg(metavar="VIDEO")]]
 Files = Positional[Annotated[tuple[Path, ...], arg(metavar="FILE ...", help_behavior_hint="")]]
@@ -17,6 +19,25 @@ MaybeNumber = Annotated[float | None, arg(metavar="FLOAT", help_behavior_hint=""
 MaybeFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 """Left out unless they are typed; what counts then stands in the help."""
 MaybeWorkers = Annotated[str | None, arg(metavar="N|ADDRESS", help_behavior_hint="")]
+
+MaybeHeight = Annotated[str | None, arg(metavar="METRES", help_behavior_hint="")]
+HEIGHTS = (0.5, 2.6)
+"""Of people, metres."""
+
+
+def body_height(text: str) -> float:
+    """A height in metres from 1.88, 188, 1.88m or 188cm; KeyreconError for what nobody has."""
+    told = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|cm)?", text.strip())
+    if told:
+        height = float(told[1].replace(",", "."))
+        if told[2] == "cm" or (told[2] is None and height >= 100 * HEIGHTS[0]):
+            height /= 100
+        if HEIGHTS[0] <= height <= HEIGHTS[1]:
+            return height
+    raise KeyreconError(
+        f"--height cannot be '{text}'; it is 0.5 to 2.6 metres, or 50 to 260 centimetres, such as "
+        "1.88 or 188."
+    )
 
 
 def typed_options(words: Sequence[str]) -> frozenset[str]:

@@ -76,7 +76,8 @@ def pick(
     Adds to the picks there are; several frames make the colours surer. Give both feet and each
     part of the clothing, for example:
 
-        keyrecon pick rally --frame 0 --head 640,210 --foot 610,540 --region shirt:640,290
+        keyrecon pick rally --frame 0 --head 640,210 --foot 610,540 \\
+            --foot 668,538 --region shirt:640,290
 
     Args:
         project: Project folder.

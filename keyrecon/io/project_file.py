@@ -25,7 +25,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.option_tables import flat_options, former_names, nested_tables, with_current_names
 from keyrecon.reading import read_text, reading
 
@@ -230,3 +230,17 @@ def _proven(
             "hand, or under one [options] heading."
         )
     return text
+
+
+def no_project(folder: Path) -> KeyreconError:
+    """What to do where there is no project.toml."""
+    if folder.is_file():
+        place = folder.with_suffix("") if folder.suffix else folder.with_name(f"{folder.name}-1")
+        return KeyreconError(
+            f"{folder} is a file, not a project folder; a project for a video is made with: "
+            f"keyrecon new {quoted(folder)} --project {quoted(place)}"
+        )
+    return KeyreconError(
+        f"{folder} is not a keyrecon project (no project.toml); "
+        f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
+    )

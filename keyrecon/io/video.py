@@ -214,7 +214,9 @@ def open_video(
     """
     path = Path(path)
     if not path.is_file():
-        raise KeyreconError(f"There is no video at {path}.")
+        if path.is_dir():
+            raise KeyreconError(f"{path} is a folder; name the video file itself.")
+        raise KeyreconError(f"There is no video at {path}; check the path and the file's name.")
     if path.stat().st_size == 0:
         raise KeyreconError(f"{path} is empty (0 bytes).")
     if not LEAST_SLOW_MOTION <= slow_motion <= MOST_SLOW_MOTION:  # which NaN is not either

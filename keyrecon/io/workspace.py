@@ -54,6 +54,7 @@ from keyrecon.io.option_tables import (
 )
 from keyrecon.io.project_file import (
     new_project,
+    no_project,
     read_project,
     with_added_video,
     with_kind,
@@ -100,10 +101,7 @@ class Workspace:
         self.folder = folder if workers is None else folder.absolute()
         self.stages = StageStore(self.folder / "cache", force, workers)
         if not self.project_file.is_file():
-            raise KeyreconError(
-                f"{folder} is not a keyrecon project (no project.toml); "
-                f"make one with: keyrecon new VIDEO --project {quoted(folder)}"
-            )
+            raise no_project(folder)
         self.project = read_project(self.project_file)
         for place in (folder, self.stages.folder, self.pictures):
             clear_leftovers(place)
@@ -261,10 +259,9 @@ class Workspace:
             folder = quoted(self.folder)
             raise KeyreconError(
                 f"{self.folder} has no picks yet, and no marked body; click the player's head, "
-                f"feet and clothes on the page of keyrecon annotate {folder}, or with: "
-                f"keyrecon pick {folder} --frame N --head X,Y --foot X,Y --region shirt:X,Y; or "
-                "mark the joints of one whole body and import them: "
-                f"keyrecon import {folder} FILE"
+                f"feet and clothes on the page of keyrecon annotate {folder}, or with: keyrecon "
+                f"pick {folder} --frame N --head X,Y --foot X,Y --foot X,Y --region shirt:X,Y; or "
+                f"mark the joints of one whole body and import them: keyrecon import {folder} FILE"
             )
         picks = read_picks(self.picks_file)
         return tuple(sorted(picks, key=lambda p: (p.frame, p.part, p.x, p.y)))
@@ -344,6 +341,11 @@ class Workspace:
             yield
         finally:
             lock.release()
+
+    def check_writable(self) -> None:
+        """Raise KeyreconError where the project takes no files."""
+        with self.exclusive():
+            pass
 
     def kept_files(self) -> list[Path]:
         """Files there are that hold a person's work, or from which the rest is made."""

@@ -190,10 +190,24 @@ def joints_outside(
     annotations: Annotations, size: tuple[int, int], margin: float = 0.02
 ) -> list[str]:
     """Joints outside the picture by more than `margin` of its width."""
-    edge = np.array(size) - 1
-    beyond = np.maximum(-annotations.joints, annotations.joints - edge).max(axis=2)
+    beyond = _beyond(annotations, size)
     return [
         f"frame {annotations.frames[row]}: {annotations.skeleton.names[joint]} is "
         f"{beyond[row, joint]:.0f} px outside the picture."
         for row, joint in np.argwhere(beyond > margin * size[0])
     ]
+
+
+def far_outside(annotations: Annotations, size: tuple[int, int]) -> list[int]:
+    """Frames with a joint more than a body height outside the picture: no player is half there."""
+    skeleton = annotations.skeleton
+    parent, child = skeleton.bones.T
+    lengths = np.linalg.norm(annotations.joints[:, child] - annotations.joints[:, parent], axis=2)
+    far = _beyond(annotations, size) > _scale_nearby(lengths / skeleton.lengths)[:, None]
+    return annotations.frames[far.any(axis=1)].tolist()
+
+
+def _beyond(annotations: Annotations, size: tuple[int, int]) -> Float[np.ndarray, "K J"]:
+    """How far joints lie outside the picture, px; negative within."""
+    edge = np.array(size) - 1
+    return np.maximum(-annotations.joints, annotations.joints - edge).max(axis=2)

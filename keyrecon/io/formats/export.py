@@ -1,6 +1,7 @@
 """A motion in other programs' formats, told by suffix. The overlay video is the report's work."""
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,26 @@ ELSEWHERE = {
     ".avi": "write .mp4",
 }
 """Formats that people ask for, and the way to them."""
+
+
+PACKAGES = {
+    ".c3d": ("c3d", ("c3d",)),
+    ".nc": ("netcdf", ("xarray", "h5netcdf", "h5py")),
+}
+"""Formats that need more than keyrecon itself does: its extra, and the packages of that."""
+
+
+def check_packages(path: Path) -> None:
+    """Raise KeyreconError where what a file's format needs is not installed."""
+    extra, packages = PACKAGES.get(path.suffix.lower(), ("", ()))
+    try:
+        for package in packages:
+            import_module(package)
+    except ImportError as fault:
+        raise KeyreconError(
+            f"Writing {path.suffix} needs {', '.join(packages)}; install with: "
+            f"pip install 'keyrecon[{extra}]'"
+        ) from fault
 
 
 def check_suffix(path: Path, more: tuple[str, ...] = ()) -> None:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.errors import quoted
 from keyrecon.golf.records import RecordedSwing
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.reading import check_numbers, read_arrays, reading
@@ -46,7 +45,7 @@ def read_swing(path: Path) -> RecordedSwing:
     """Read what `write_swing` wrote; raises KeyreconError for a motion that is no swing."""
     motion = read_motion(path)
     frames = len(motion.time)
-    remedy = f"make it with: keyrecon golf fit VIDEO --clicks FILE --out {quoted(path.parent)}"
+    remedy = "make it with: keyrecon golf fit VIDEO --clicks FILE --out FOLDER"
     with reading(path, "the motion of a golf fit", remedy):
         data = read_arrays(path)
         for name in ("club3d", "club2d", "key_postures", "vertical"):
