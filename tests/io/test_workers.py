@@ -202,7 +202,7 @@ def test_processes_end_with_the_one_that_began_them(tmp_path, how):
             os.killpg(asking.pid, how)  # as a terminal does
         else:
             asking.send_signal(how)
-        asking.wait(10)
+        asking.wait(30)  # the processes would wait for 60
     assert not still_there(working)
 
 
