@@ -12,5 +12,8 @@ def within(least: int | float, most: int | float) -> Meta:
     return Meta(ge=least, le=most)
 
 
+SHORTEST, TALLEST = 0.5, 2.6
+"""Of people, metres."""
+BODY_HEIGHTS = within(SHORTEST, TALLEST)
 SEEDS = within(0, 2**32 - 1)
 """What NumPy's generators take."""

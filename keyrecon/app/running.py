@@ -17,6 +17,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.library import read_models, reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
 from keyrecon.progress import Progress
+from keyrecon.ranges import SHORTEST, TALLEST
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
@@ -33,7 +34,7 @@ def settings(
 
     Options `told` by dotted names count also where they are as usual.
     """
-    if height is not None and not 0.5 < height < 2.6:
+    if height is not None and not SHORTEST <= height <= TALLEST:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
     options = workspace.options(given, Options(), told=told)
     return options if height is None else with_height(options, height)

@@ -8,6 +8,7 @@ from typing import Annotated
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 from keyrecon.errors import KeyreconError
+from keyrecon.ranges import SHORTEST, TALLEST
 
 Project = Positional[Annotated[Path, arg(metavar="PROJECT")]]
 VideoFile = Positional[Annotated[Path, arg(metavar="VIDEO")]]
@@ -21,8 +22,6 @@ MaybeFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 MaybeWorkers = Annotated[str | None, arg(metavar="N|ADDRESS", help_behavior_hint="")]
 
 MaybeHeight = Annotated[str | None, arg(metavar="METRES", help_behavior_hint="")]
-HEIGHTS = (0.5, 2.6)
-"""Of people, metres."""
 
 
 def body_height(text: str) -> float:
@@ -30,9 +29,9 @@ def body_height(text: str) -> float:
     told = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|cm)?", text.strip())
     if told:
         height = float(told[1].replace(",", "."))
-        if told[2] == "cm" or (told[2] is None and height >= 100 * HEIGHTS[0]):
+        if told[2] == "cm" or (told[2] is None and height >= 100 * SHORTEST):
             height /= 100
-        if HEIGHTS[0] <= height <= HEIGHTS[1]:
+        if SHORTEST <= height <= TALLEST:
             return height
     raise KeyreconError(
         f"--height cannot be '{text}'; it is 0.5 to 2.6 metres, or 50 to 260 centimetres, such as "

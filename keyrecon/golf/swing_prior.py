@@ -32,7 +32,7 @@ from keyrecon.golf.records import (
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
-from keyrecon.ranges import within
+from keyrecon.ranges import BODY_HEIGHTS, within
 from keyrecon.records import Annotations, JointTracks
 
 
@@ -42,7 +42,7 @@ class SwingPriorOptions:
 
     left_handed: bool = False
     """The player swings left-handed."""
-    stature: Annotated[float, within(0.5, 2.6)] = 1.75
+    stature: Annotated[float, BODY_HEIGHTS] = 1.75
     """Height of the player, metres; only for the perspective of a camera close by."""
     focal: Annotated[float, within(0.2, 20)] = 1.2
     """Focal length in picture widths, where nobody knows it."""

@@ -37,7 +37,7 @@ from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import lift_keyframes
 from keyrecon.numerics.geometry import project_orthographic, unit_vectors
 from keyrecon.progress import Progress, silent
-from keyrecon.ranges import within
+from keyrecon.ranges import BODY_HEIGHTS
 from keyrecon.records import Annotations, JointTracks, Keyframes, Shots
 
 _SPIKE_SECONDS = 0.08
@@ -53,7 +53,7 @@ in both directions of the image, sqrt 2."""
 class LiftOptions:
     """From the picture to space."""
 
-    height: Annotated[float, within(0.5, 2.6)] | None = None
+    height: Annotated[float, BODY_HEIGHTS] | None = None
     """The same as --height.
 
     Stature of the player, metres; None gives a motion in body heights.

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from keyrecon.body import LSP14
-from keyrecon.ranges import SEEDS, within
+from keyrecon.ranges import BODY_HEIGHTS, SEEDS, within
 from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, unit
 from keyrecon.synthetic.rally import CHANNELS, PointPlan, ease, plan_points
 
@@ -30,7 +30,7 @@ class MotionOptions:
 
     seconds: Annotated[float, within(0.5, 3600)] = 36.0
     fps: Annotated[float, within(5, 1000)] = 50.0
-    stature: Annotated[float, within(0.5, 2.6)] = 1.78
+    stature: Annotated[float, BODY_HEIGHTS] = 1.78
     """Metres."""
     left_handed: bool = False
     seed: Annotated[int, SEEDS] = 0

@@ -62,10 +62,6 @@ SCORE_SATURATION, SCORE_FLOOR = 0.15, 0.001
 """Shares of the best score: beyond the first, contrast says little; the second keeps costs finite.
 Halved: at most 0.9 points, 1.0 mm on one clip."""
 
-OTHER_TRUNK = 0.25
-"""Probability that little of the trunk shows where the head is: a limb, a racket, the net or the
-side of a shirt that nobody marked."""
-
 
 @dataclass(frozen=True)
 class FindOptions:
@@ -101,6 +97,10 @@ class FindOptions:
     detected: Annotated[float, within(0, 1)] = 0.4
     """Share of the searched frames in which a head must be found for a track to be believed; lower
     it for a player who is out of the picture most of the time."""
+    other_trunk: Annotated[float, within(0.01, 1)] = 0.25
+    """Probability that little of the marked trunk shows beneath the player's head: a limb, a
+    racket, the net or the side of a shirt that nobody marked hides it; 1 does not ask for it, as
+    the paper."""
 
 
 def find_player(
@@ -175,7 +175,7 @@ def _link(
     apart = float(np.median(np.diff(numbers))) if len(numbers) > 1 else video.fps
     step, max_gap = height / video.fps * apart, round(MAX_GAP_SECONDS * video.fps / apart)
     marked_head, marked_feet = marked_places(anchors, numbers, camera)
-    head_cost = head_costs(candidates)
+    head_cost = head_costs(candidates, options.other_trunk)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
     stable, head_cost = anchored_states(stable, head_cost, marked_head)
@@ -216,13 +216,16 @@ def _pair(
     return pairs, costs
 
 
-def head_costs(candidates: list[PartCandidates]) -> list[Float[np.ndarray, "_"]]:
+def head_costs(
+    candidates: list[PartCandidates], other_trunk: float = FindOptions.other_trunk
+) -> list[Float[np.ndarray, "_"]]:
     """Costs of the heads of every frame by what they look like and what is beneath them, nats.
 
-    Others on the court have heads; the player's clothes they do not have.
+    Others on the court have heads; the player's clothes they do not have, unless, with a
+    probability of `other_trunk`, something hides them.
     """
     round_and_coloured = _costs([c.head_score for c in candidates])
-    above_trunk = _trunk_costs([c.trunk for c in candidates])
+    above_trunk = _trunk_costs([c.trunk for c in candidates], other_trunk)
     return [head + trunk for head, trunk in zip(round_and_coloured, above_trunk, strict=True)]
 
 
@@ -248,10 +251,12 @@ def _costs(scores: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]
     return [np.where(np.isnan(c), NO_SHOE_COST, c) for c in costs]
 
 
-def _trunk_costs(shares: list[Float[np.ndarray, "_"]]) -> list[Float[np.ndarray, "_"]]:
+def _trunk_costs(
+    shares: list[Float[np.ndarray, "_"]], other: float
+) -> list[Float[np.ndarray, "_"]]:
     """-log of the probability of so much trunk beneath the player's head; 0 where it is unknown."""
     best = [float(s.max()) for s in shares if len(s) and np.isfinite(s).all()]
     if not best:
         return [np.zeros(len(s)) for s in shares]
     usual = max(float(np.median(best)), 1e-12)
-    return [-np.log(OTHER_TRUNK + (1 - OTHER_TRUNK) * np.minimum(s / usual, 1)) for s in shares]
+    return [-np.log(other + (1 - other) * np.minimum(s / usual, 1)) for s in shares]

@@ -143,12 +143,14 @@ def test_a_process_that_is_lost_again_ends_in_one_line_and_what_was_made_stays(t
 
 
 WAITING = """
+import signal
 import sys
 from pathlib import Path
 from keyrecon.io.stages import StageStore
 from keyrecon.io.workers import open_workers
 from test_workers import wait_here
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells take it from what is behind
     with open_workers("2") as workers:
         store = StageStore(Path(sys.argv[1]), workers=workers)
         list(store.each(lambda n: store.keep(f"w@{n}", wait_here, str(n), sys.argv[2]), range(2)))
@@ -202,7 +204,7 @@ def test_processes_end_with_the_one_that_began_them(tmp_path, how):
             os.killpg(asking.pid, how)  # as a terminal does
         else:
             asking.send_signal(how)
-        asking.wait(30)  # the processes would wait for 60
+        asking.wait(10)
     assert not still_there(working)
 
 

@@ -151,8 +151,9 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
 
 
 def test_the_athletes_height_is_remembered(project):
-    project.remember(settings(project, Options(), 1.7), Options())
-    assert settings(Workspace(project.folder), Options()).lift.height == 1.7
+    for height in (1.7, 0.5, 2.6):
+        project.remember(settings(project, Options(), height), Options())
+        assert settings(Workspace(project.folder), Options()).lift.height == height
 
 
 @pytest.mark.parametrize("height", [0.2, 170.0])

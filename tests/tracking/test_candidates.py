@@ -3,9 +3,10 @@ import numpy as np
 import pytest
 
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
+from keyrecon.pipeline import as_printed
 from keyrecon.segmentation.part_evidence import Evidence
 from keyrecon.tracking.candidates import PartCandidates, search_frame
-from keyrecon.tracking.detection import head_costs
+from keyrecon.tracking.detection import FindOptions, head_costs
 
 TALL = 96.0
 
@@ -44,10 +45,12 @@ def test_who_stands_in_other_clothes_is_not_taken_for_the_player_who_runs_past()
         shares = np.array([trunk, 0.0])
         return [PartCandidates(h, np.array([0.05, 0.07]), *feet, shares) for h in heads]
 
-    def taken(candidates: list[PartCandidates]) -> np.ndarray:
+    def taken(candidates: list[PartCandidates], options: FindOptions = FindOptions()) -> np.ndarray:
         states = [h[:, None] for h in heads]
-        return find_cheapest_track(head_costs(candidates), states, TransitionModel(12.0, 30))
+        costs = head_costs(candidates, options.other_trunk)
+        return find_cheapest_track(costs, states, TransitionModel(12.0, 30))
 
     assert (taken(seen(0.0)) == 1).mean() > 0.9
     assert (taken(seen(0.6)) == 0).all()
     assert (taken(seen(np.nan)) == 1).mean() > 0.9
+    assert (taken(seen(0.6), as_printed().find) == 1).mean() > 0.9  # the paper has no such test

@@ -129,7 +129,7 @@ export function heightIn(text) {
   if (!text.trim()) return { metres: null, said: "left empty: lengths in body heights", wrong: false };
   const centimetres = unit ? unit.toLowerCase() === "cm" : typed > 10,
     metres = Math.round(centimetres ? typed * 10 : typed * 1000) / 1000;
-  if (metres > HEIGHTS[0] && metres < HEIGHTS[1])
+  if (metres >= HEIGHTS[0] && metres <= HEIGHTS[1])
     return { metres, said: centimetres ? `taken as ${metres.toFixed(2)} m` : "metres", wrong: false };
   return { metres: null, said: "metres or centimetres: 1.80, 180", wrong: true };
 }
