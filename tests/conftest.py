@@ -30,11 +30,13 @@ def _shapes_are_checked_anew():
 def write_numbered(tmp_path_factory):
     """Write a video of numbered pictures with the given times (ticks of 1/600 s)."""
 
-    def write(name, ticks, options=None, codec="libx264"):
+    def write(name, ticks, options=None, codec="libx264", aspect=None):
         path = tmp_path_factory.mktemp("video") / name
         with av.open(str(path), "w") as container:
             stream = container.add_stream(codec, rate=50, options=options or {})
             stream.width, stream.height, stream.pix_fmt = 128, 64, "yuv420p"
+            if aspect is not None:
+                stream.codec_context.sample_aspect_ratio = aspect
             stream.time_base = stream.codec_context.time_base = Fraction(1, 600)
             for number, tick in enumerate(ticks):
                 frame = av.VideoFrame.from_ndarray(numbered_picture(number), format="rgb24")

@@ -123,7 +123,8 @@ def fit_file(
     """
     model = read_prior(told.over(options, folder), folder)
     factor = 1.0 if slow_motion is None else slow_motion
-    video = open_video(video_file, slow_motion=factor)
+    is_new = not (folder / "project.toml").is_file()
+    video = open_video(video_file, slow_motion=factor, square_only=is_new)
     if clicks_file is not None:
         check_evidence(read_clicks(clicks_file), video, model, factor, str(clicks_file))
     else:

@@ -71,7 +71,8 @@ def _open(folder: Path, table: Table) -> Video:
             f"{path} has changed since the project was made (its fingerprint differs); "
             "bring the old file back, or start a new project for the new one."
         )
-    return open_video(path, table.get("start", 0), table.get("end"), table.get("slow_motion", 1.0))
+    start, end, slow_motion = table.get("start", 0), table.get("end"), table.get("slow_motion", 1.0)
+    return open_video(path, start, end, slow_motion, square_only=False)  # what is marked stays
 
 
 def _find(folder: Path, table: Table) -> Path:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, fields
+from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +25,7 @@ from keyrecon.errors import KeyreconError, counted
 from keyrecon.io.evening import LUMA_FIRST, black_of, even_exposure
 from keyrecon.io.fingerprint import fingerprint_file
 from keyrecon.io.frame_times import even_out
+from keyrecon.io.pixel_aspect import check_pixels
 from keyrecon.reading import reading
 
 if TYPE_CHECKING:
@@ -206,11 +208,17 @@ class Video:
 
 
 def open_video(
-    path: str | Path, start: int = 0, end: int | None = None, slow_motion: float = 1.0
+    path: str | Path,
+    start: int = 0,
+    end: int | None = None,
+    slow_motion: float = 1.0,
+    square_only: bool = True,
 ) -> Video:
     """Index a video file; frames start..end-1, filmed `slow_motion` times faster than shown.
 
-    Raises KeyreconError for a file that is missing, empty, without pictures or damaged.
+    Pixels are taken as square, which one scale for both directions of the picture needs. Raises
+    KeyreconError for a file that is missing, empty, without pictures or damaged, and for one whose
+    pixels are not square; without `square_only` that is a warning.
     """
     path = Path(path)
     if not path.is_file():
@@ -225,11 +233,15 @@ def open_video(
             f"and {MOST_SLOW_MOTION:g}: 240 frames a second shown at 30 are 8."
         )
     with reading(path, "a video that can be read", "repair or re-encode it"):
-        return _index(path, start, end, slow_motion)
+        video, aspect = _index(path, start, end, slow_motion)
+    check_pixels(path, aspect, square_only)
+    return video
 
 
-def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video:
-    """Find the times of the frames and how the pictures stand."""
+def _index(
+    path: Path, start: int, end: int | None, slow_motion: float
+) -> tuple[Video, Fraction | None]:
+    """Find the times of the frames and how the pictures stand; how wide to high a pixel is."""
     with _open(path) as container:
         stream = container.streams.video[0]
         if stream.width * stream.height > MAX_PIXELS:
@@ -243,6 +255,7 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
             stamps = stamps[stamps >= first.pts]
         seconds_per_tick = _seconds_per_tick(stream)
         turns, mirrored = _find_orientation(first, stream)
+        aspect = stream.sample_aspect_ratio
     width, height = (first.width, first.height)[:: -1 if turns % 2 else 1]
     if not 0 <= start < (len(stamps) if end is None else end) <= len(stamps):
         raise KeyreconError(
@@ -260,7 +273,7 @@ def _index(path: Path, start: int, end: int | None, slow_motion: float) -> Video
     fps = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 25.0
     if not MIN_FPS <= fps <= MAX_FPS or not time[-1] < len(time) / MIN_FPS:
         raise ValueError(f"{len(time)} frames in {time[-1]:g} s")
-    return Video(path, width, height, stamps, time, fps, turns, mirrored, None)
+    return Video(path, width, height, stamps, time, fps, turns, mirrored, None), aspect
 
 
 def _distinct(stamps: Int[np.ndarray, "N"]) -> Int[np.ndarray, "T"]:
