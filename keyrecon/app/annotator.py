@@ -34,6 +34,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
+from keyrecon.io.work_lock import at_work
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, with_height
 from keyrecon.progress import Progress
@@ -113,15 +114,27 @@ class _Server(uvicorn.Server):
 
 def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress], str]]:
     """What the page can have done, by name."""
-    return {
-        "follow": partial(_follow_player, folder),
-        "keyframes": partial(_find_keyframes, folder),
-        "run": partial(_run, folder),
-        "golf": partial(_fit_swing, folder),
-        "export": partial(_export, folder),
-        "court": partial(_find_court, folder),
-        "ground": partial(_find_ground, folder),
+    working = {
+        "follow": _follow_player,
+        "keyframes": _find_keyframes,
+        "run": _run,
+        "golf": _fit_swing,
+        "court": _find_court,
+        "ground": _find_ground,
     }
+    jobs = {name: partial(_alone, job, folder) for name, job in working.items()}
+    return {**jobs, "export": partial(_export, folder)}
+
+
+def _alone(
+    job: Callable[[Path, dict[str, Any], Progress], str],
+    folder: Path,
+    options: dict[str, Any],
+    progress: Progress,
+) -> str:
+    """A job during which no command works on the project."""
+    with at_work(folder, "The page of keyrecon annotate"):
+        return job(folder, options, progress)
 
 
 def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:

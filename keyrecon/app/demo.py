@@ -20,6 +20,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.work_lock import at_work
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
@@ -45,11 +46,12 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     rendered = time.perf_counter() - began
     truth = read_truth(sequence / "truth.npz")
     workspace = _project(sequence / "video.mp4", out / "project")
-    workspace.add_picks(read_picks(KEPT / f"demo_{name}.picks.json"))
-    say(find_keyframes(workspace, Options(), KeyframeSettings(), progress).split("\nNext")[0])
-    say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
-    options = settings(workspace, Options(), round(float(truth["height_m"]), 2))
-    say(run(workspace, options, progress, truth=truth))
+    with at_work(workspace.folder, "keyrecon demo"):
+        workspace.add_picks(read_picks(KEPT / f"demo_{name}.picks.json"))
+        say(find_keyframes(workspace, Options(), KeyframeSettings(), progress).split("\nNext")[0])
+        say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
+        options = settings(workspace, Options(), round(float(truth["height_m"]), 2))
+        say(run(workspace, options, progress, truth=truth))
     say("\nAccuracy against the truth")
     say(evaluate(workspace.folder, sequence / "truth.npz"))
     spent = {"rendering": rendered, **workspace.stages.seconds}

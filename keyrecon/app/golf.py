@@ -48,6 +48,7 @@ from keyrecon.io.option_tables import check_options
 from keyrecon.io.project_videos import relative_path
 from keyrecon.io.provenance import golf_evidence, note_fitted
 from keyrecon.io.video import Video, open_video
+from keyrecon.io.work_lock import hold_folder
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
@@ -130,8 +131,9 @@ def fit_file(
     else:
         check_length(video, factor)
     check_options(told.over(options, folder))
-    workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
-    return fit_project(workspace, options, progress, told)
+    with hold_folder(folder, "keyrecon golf fit"):
+        workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
+        return fit_project(workspace, options, progress, told)
 
 
 def read_prior(options: GolfOptions, folder: Path) -> MotionModel:

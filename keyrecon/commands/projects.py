@@ -26,15 +26,17 @@ def demo(
         out: Folder for the video, the project and the report.
     """
     from keyrecon.app.console import show
+    from keyrecon.io.work_lock import hold_folder
 
-    if name == "golf":
-        from keyrecon.app.golf_demo import run_golf_demo
+    with hold_folder(out, "keyrecon demo"):
+        if name == "golf":
+            from keyrecon.app.golf_demo import run_golf_demo
 
-        run_golf_demo(out, show, print)
-    else:
-        from keyrecon.app.demo import run_demo
+            run_golf_demo(out, show, print)
+        else:
+            from keyrecon.app.demo import run_demo
 
-        run_demo(name, out, show, print)
+            run_demo(name, out, show, print)
 
 
 def new(
@@ -87,13 +89,15 @@ def pick(
         region: A point on a region of one colour, with the region's name.
     """
     from keyrecon.app import project as work
+    from keyrecon.io.work_lock import at_work
     from keyrecon.io.workspace import Workspace
     from keyrecon.records import Pick
 
     picks = [Pick(frame, "head", *work.point(p, "--head")) for p in head]
     picks += [Pick(frame, "foot", *work.point(p, "--foot")) for p in foot]
     picks += [work.region_pick(frame, text) for text in region]
-    print(work.add_picks(Workspace(project), picks))
+    with at_work(project, "keyrecon pick"):
+        print(work.add_picks(Workspace(project), picks))
 
 
 def annotate(
@@ -138,9 +142,11 @@ def import_(
         replace: Let marks from the file replace different ones in the project.
     """
     from keyrecon.app.project import import_annotations
+    from keyrecon.io.work_lock import at_work
     from keyrecon.io.workspace import Workspace
 
-    print(import_annotations(Workspace(project), file, replace))
+    with at_work(project, "keyrecon import"):
+        print(import_annotations(Workspace(project), file, replace))
 
 
 def evaluate(
@@ -179,9 +185,11 @@ def add(
         slowmo: How many times slower than life the video plays.
     """
     from keyrecon.app.project import add_video
+    from keyrecon.io.work_lock import at_work
     from keyrecon.io.workspace import Workspace
 
-    print(add_video(Workspace(project), video, (start, end), slowmo))
+    with at_work(project, "keyrecon add"):
+        print(add_video(Workspace(project), video, (start, end), slowmo))
 
 
 def relink(project: Project, video: VideoFile) -> None:
@@ -191,7 +199,9 @@ def relink(project: Project, video: VideoFile) -> None:
         project: Project folder.
         video: The same video in its new place.
     """
+    from keyrecon.io.work_lock import at_work
     from keyrecon.io.workspace import Workspace
 
-    Workspace(project).relink(video)
+    with at_work(project, "keyrecon relink"):
+        Workspace(project).relink(video)
     print(f"{project} now uses {video}.")

@@ -18,6 +18,7 @@ from keyrecon.commands.arguments import (
     typed_options,
 )
 from keyrecon.errors import KeyreconError
+from keyrecon.io.work_lock import at_work
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
@@ -57,7 +58,7 @@ def keyframes(
     """
     printed = _is_printed(method, options)
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
-    with open_workers(workers) as made_by:
+    with at_work(project, "keyrecon keyframes"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
         told = typed_options(sys.argv)
         print(keyframing.find_keyframes(workspace, options, chosen, show, printed, told))
@@ -91,7 +92,7 @@ def run(
         workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
     printed = _is_printed(method, options)
-    with open_workers(workers) as made_by:
+    with at_work(project, "keyrecon run"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
         metres = None if height is None else body_height(height)
         chosen = running.settings(workspace, options, metres, typed_options(sys.argv))

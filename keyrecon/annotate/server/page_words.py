@@ -11,6 +11,8 @@ from functools import partial
 _NAME = r"(?:'[^']*'|[^\s',;]+?)(?=[\s,;.)]|$)"
 PHRASES = (
     (r"the terminal that runs keyrecon annotate", "the terminal that this page was started in"),
+    (r"keyrecon [\w ]+(?= \(process )", "A command in a terminal"),
+    (rf"is working on {_NAME}(?=;)", "is working on this project"),
     (r"or stop that keyrecon annotate first", "or stop the program that serves it"),
     (r"mark (more )?joints with `keyrecon annotate`", r"mark \1joints (2 Keyframes)"),
     (rf"Mark them on the page of keyrecon annotate {_NAME}.*--partial", "Mark them (2 Keyframes)."),

@@ -1,0 +1,78 @@
+"""One command at a time works on a project.
+
+Commands that write hold a lock from the first file that they read to the last that they write, so
+that no result is made of half of one command's files and half of another's. The system lets go of
+the lock when the process ends, however it ends. A person's marks need no such lock: they are kept
+under `Workspace.exclusive`, while a command works, too.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+
+from filelock import Timeout
+
+from keyrecon.errors import KeyreconError
+from keyrecon.io.durable import hold_lock, make_folder, write_quickly
+from keyrecon.io.project_file import no_project
+
+WAIT_SECONDS = 1.0
+"""How long a command waits for another before it is refused: one that keeps a click is gone by
+then, and one that stays has told who it is."""
+
+
+@contextmanager
+def at_work(folder: Path, command: str) -> Iterator[None]:
+    """Have a project to oneself; others are told that this `command` is working on it.
+
+    Raises KeyreconError where another command has it, where there is no project, or where the
+    folder takes no files.
+    """
+    if not (folder / "project.toml").is_file():
+        raise no_project(folder)
+    with hold_folder(folder, command):
+        yield
+
+
+@contextmanager
+def hold_folder(folder: Path, command: str) -> Iterator[None]:
+    """The same for a folder in which a project may only be begun; it is made if need be."""
+    make_folder(folder)
+    note = folder / ".work.note"
+    try:
+        lock = hold_lock(folder / ".work.lock", WAIT_SECONDS)
+    except Timeout as fault:
+        raise KeyreconError(
+            f"{_describe_holder(note)} is working on {folder}; wait until it has ended, or stop it "
+            "where it was begun."
+        ) from fault
+    try:
+        write_quickly(note, json.dumps(_describe_self(command)).encode())
+        yield
+    finally:
+        note.unlink(missing_ok=True)
+        lock.release()
+
+
+def _describe_self(command: str) -> dict[str, str | int]:
+    return {
+        "command": command,
+        "process": os.getpid(),
+        "machine": platform.node(),
+        "since": f"{datetime.now().astimezone():%Y-%m-%d %H:%M}",
+    }
+
+
+def _describe_holder(note: Path) -> str:
+    """Who has the project, as far as that is known."""
+    try:
+        told = json.loads(note.read_bytes())
+        here = told["machine"] == platform.node()
+        place = "" if here else f" on {told['machine']}"
+        return f"{told['command']} (process {told['process']}{place}, since {told['since']})"
+    except (OSError, ValueError, KeyError, TypeError):  # it is gone, or torn
+        return "Another command"
