@@ -326,7 +326,7 @@ def assemble_motion(
     shots: Shots | None = None,
 ) -> Motion:
     """The result with the evidence behind each joint, in metres where a height was given."""
-    propagated = np.isfinite(tracks.joints).all(axis=2)
+    propagated = np.isfinite(tracks.joints).all(axis=2) & (tracks.confidence > 0)
     source = np.where(propagated, SOURCES.index("propagated"), SOURCES.index("interpolated"))
     source[propagated & lifted.rejected] = SOURCES.index("refined")
     marked = np.isfinite(annotations.joints).all(axis=2)

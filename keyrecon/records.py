@@ -329,7 +329,7 @@ class Annotations:
     """1 where the child end of a bone is nearer the camera, -1 farther, 0 unknown."""
     absent: tuple[tuple[int, str], ...] = ()
     """Sorted frames and names of joints of which the person said that they cannot be seen or
-    placed: nothing is missing there. Such a frame needs no row."""
+    placed: nothing is missing there, and nothing is carried there. Such a frame needs no row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,8 +358,8 @@ class FlowTracks:
 
 SOURCES = ("annotated", "propagated", "interpolated", "refined")
 """Legend of `Motion.source`, the evidence behind each joint: marked by a person in this frame;
-carried from a keyframe; no evidence, filled by the motion before and after; carried, but taken
-for a slip and replaced by the refinement."""
+carried from a keyframe; no evidence (of confidence 0, or said to be absent), filled by the motion
+before and after; carried, but taken for a slip and replaced by the refinement."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,7 +139,7 @@ def _stand_in(joints: Float[np.ndarray, "T 14 2"], height: float) -> Club:
         joints[:, [LSP14.index(f"{side}_{name}") for side in ("right", "left")]]
         for name in ("wrist", "elbow")
     )
-    hands, middle = np.nanmean(wrists, axis=1), np.nanmean(elbows, axis=1)
+    hands, middle = _mean_known(wrists), _mean_known(elbows)
     ends = np.stack(
         [hands, hands + STAND_IN_LENGTH * height * unit_vectors(hands - middle, 1e-9)], axis=1
     )
@@ -147,3 +147,11 @@ def _stand_in(joints: Float[np.ndarray, "T 14 2"], height: float) -> Club:
     frames = np.arange(len(ends))
     filled = [np.interp(frames, frames[known], c[known]) for c in ends.reshape(len(ends), 4).T]
     return Club(np.stack(filled, axis=1).reshape(-1, 2, 2), known, known)
+
+
+def _mean_known(joints: Float[np.ndarray, "T n 2"]) -> Float[np.ndarray, "T 2"]:
+    """Mean of the joints that are known; NaN where none is."""
+    known = np.isfinite(joints)
+    count = known.sum(axis=1)
+    total = np.where(known, joints, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

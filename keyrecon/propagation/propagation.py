@@ -163,8 +163,8 @@ def propagate_joints(
     """Joints in px, confidence and source keyframe of every joint in every frame.
 
     Where `flow` between two marks is surer of a joint than edges are, flow has it.
-    Annotated joints come back as they were marked, with confidence 1. Raises KeyreconError when
-    a joint is marked nowhere.
+    Annotated joints come back as they were marked, with confidence 1; those said to be absent are
+    missing there. Raises KeyreconError when a joint is marked nowhere.
     """
     marked = np.isfinite(annotations.joints).all(axis=2)
     _require_marks(annotations.skeleton, marked)
@@ -306,12 +306,15 @@ def propagate_half(
 def _with_marks(
     annotations: Annotations, kept: Bool[np.ndarray, "K J"], tracks: JointTracks
 ) -> JointTracks:
-    """Annotated joints exactly as they were marked."""
+    """Annotated joints exactly as they were marked, absent ones nowhere."""
     row, joint = np.nonzero(kept)
     frame = annotations.frames[row]
     joints, confidence, source = (
         values.copy() for values in (tracks.joints, tracks.confidence, tracks.keyframe)
     )
+    for at, name in annotations.absent:
+        joints[at, annotations.skeleton.index(name)] = np.nan
+        confidence[at, annotations.skeleton.index(name)] = 0
     joints[frame, joint] = annotations.joints[row, joint]
     confidence[frame, joint] = 1
     source[frame, joint] = frame

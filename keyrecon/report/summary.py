@@ -115,12 +115,8 @@ def source_shares(motion: Motion) -> Float[np.ndarray, "J S"]:
 
 
 def missing_shares(motion: Motion) -> Float[np.ndarray, "J"]:
-    """Share of frames in which each joint was not found in the picture before refinement."""
-    return _missing(motion)[motion.known].mean(axis=0)
-
-
-def _missing(motion: Motion) -> Bool[np.ndarray, "T J"]:
-    return ~np.isfinite(motion.points2d_propagated).all(axis=-1)
+    """Share of frames in which nothing in the picture told of each joint."""
+    return source_shares(motion)[:, SOURCES.index("interpolated")]
 
 
 def correction(motion: Motion, track: Track) -> Float[np.ndarray, "J"]:

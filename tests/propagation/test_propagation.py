@@ -1,5 +1,7 @@
 """Joints carried from annotated frames to all others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from capsule_player import hide, marks, scene, standing, turned
@@ -81,6 +83,21 @@ def test_a_hidden_joint_is_missing_the_papers_way_only():
     assert np.isnan(as_printed.joints[:, wrist]).all()
     assert (as_printed.confidence[:, wrist] == 0).all()
     assert np.isfinite(carry(preparation, annotations).joints).all()
+
+
+@pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])
+def test_a_joint_that_cannot_be_seen_in_a_frame_is_not_carried_there(options):
+    preparation, truth = scene(bending(), (2, 9))
+    annotations = marks(truth, (2, 9))
+    wrist, elbow = (LSP14.index(f"left_{name}") for name in ("wrist", "elbow"))
+    annotations.joints[1, wrist], annotations.visible[1, wrist] = np.nan, False
+    absent = ((2, "left_elbow"), (5, "left_wrist"), (9, "left_wrist"))
+    found = carry(preparation, replace(annotations, absent=absent), options)
+    assert np.isnan(found.joints[[5, 9], wrist]).all()
+    assert (found.confidence[[5, 9], wrist] == 0).all()
+    # what is placed is there, whatever is said
+    assert (found.joints[2, elbow] == truth[2, elbow]).all()
+    assert np.isfinite(found.joints[4, wrist]).all()
 
 
 @pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])

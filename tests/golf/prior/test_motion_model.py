@@ -65,6 +65,17 @@ def test_a_swing_is_found_behind_propagated_joints(filmed):
     assert 1000 * pa_mpjpe(fitted, joints) < 40
 
 
+def test_a_swing_is_found_though_no_wrist_is_known_in_some_frames(filmed):
+    joints, pixels = filmed
+    hands = [LSP14.index(f"{side}_wrist") for side in ("left", "right")]
+    gaps = pixels.copy()
+    gaps[20:23, hands] = np.nan
+    fitted = fit_swing_prior(
+        propagated(gaps), marked(pixels, [6, 34]), read_motion_model(), HEIGHTS, VIDEO
+    )
+    assert 1000 * pa_mpjpe(fitted, joints) < 40
+
+
 def test_a_player_who_stands_still_does_not_swing(filmed):
     still = np.repeat(filmed[1][:1], FRAMES, axis=0)
     with pytest.raises(KeyreconError, match="no swing"):
