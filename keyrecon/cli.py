@@ -1,6 +1,6 @@
 """The command line: finds the command that was typed, and turns faults into one line.
 
-Exit codes: 0 success, 1 with one line on stderr for what a user can mend, 2 for bad usage,
+Exit codes: 0 success, 1 with one line on stderr for what a user can mend, 2 with one for bad usage,
 130 when interrupted (finished stages are kept, the same command goes on from there), 141 when
 whoever read the output has gone.
 
@@ -14,18 +14,23 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from functools import partial, wraps
 from importlib import import_module
 from importlib.resources import files
+from io import StringIO
 from types import FrameType
 from typing import Any, NamedTuple, NoReturn
 
 from tyro.extras import SubcommandApp
 
+from keyrecon import __version__
 from keyrecon.errors import KeyreconError
 from keyrecon.option_help import described_options
+from keyrecon.usage import explain_refusal, no_such_command
 
 DESCRIPTION = "3D motion of an athlete from one ordinary camera and a few keyframes."
-INTERRUPTED, READER_GONE = 130, 141
+BAD_USAGE, INTERRUPTED, READER_GONE = 2, 130, 141
 
 
 class Command(NamedTuple):
@@ -62,7 +67,7 @@ COMMANDS: dict[str, Command | dict[str, Command]] = {
 """In the order of the help; a table of commands has a name in front of theirs."""
 SUMMARIES = {"golf": "A model of whole golf swings: fit it to a video, compare, train it."}
 """Of tables of commands."""
-HELP, HELP_ALL = ("-h", "--help"), "--help-all"
+HELP, HELP_ALL, VERSION = ("-h", "--help"), "--help-all", "--version"
 
 
 def main() -> None:
@@ -94,10 +99,53 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _run(words: Sequence[str]) -> None:
+    if [*words] == [VERSION]:
+        sys.stdout.write(f"keyrecon {__version__}\n")
+    elif fault := no_such_command(words, COMMANDS):
+        _refuse(fault)
+    else:
+        _parse(words)()
+
+
+def _parse(words: Sequence[str]) -> Callable[[], None]:
+    """The command that was typed, with its arguments; ends the program where it cannot be."""
     all_options = HELP_ALL in words or not {*HELP} & {*words}
     words = ["--help" if word == HELP_ALL else word for word in words]
-    app = _app(COMMANDS, words)
-    app.cli(
+    refusal = StringIO()
+    try:
+        with redirect_stderr(refusal):
+            typed: Callable[[], None] = _read(words, all_options)
+    except SystemExit as stop:
+        if stop.code == BAD_USAGE:
+            name = _name(words)
+            whole_help = _whole_help(name)
+            command = " ".join(["keyrecon", *name])
+            _refuse(explain_refusal(command, words[len(name) :], refusal.getvalue(), whole_help))
+        raise
+    return typed
+
+
+def _refuse(fault: str) -> NoReturn:
+    sys.stderr.write(f"keyrecon: {fault}\n")
+    sys.exit(BAD_USAGE)
+
+
+def _name(words: Sequence[str]) -> list[str]:
+    """The words of a command's name."""
+    names = [*words[: 2 if words and isinstance(COMMANDS.get(words[0]), dict) else 1]]
+    return [name for name in names if not name.startswith("-")]
+
+
+def _whole_help(name: Sequence[str]) -> str:
+    shown = StringIO()
+    with redirect_stdout(shown), suppress(SystemExit):
+        _read([*name, "--help"], all_options=True)
+    return shown.getvalue()
+
+
+def _read(words: Sequence[str], all_options: bool) -> Any:
+    """What words mean; prints a help, or why there is no meaning, and raises SystemExit."""
+    return _app(COMMANDS, words).cli(
         prog="keyrecon",
         description=DESCRIPTION,
         args=words,
@@ -113,7 +161,9 @@ def _app(commands: Mapping[str, Any], words: Sequence[str]) -> SubcommandApp:
     for name, command in commands.items():
         named = whole or name == typed
         if isinstance(command, Command):
-            registered = _function(command) if named else _stand_in(_first_line(command))
+            registered = (
+                _kept_for_later(_function(command)) if named else _stand_in(_first_line(command))
+            )
             app.command(name=name)(registered)
         elif named:
             below = words if whole else words[1:]
@@ -128,6 +178,16 @@ def _function(command: Command) -> Callable[..., None]:
         import_module(f"{command.package}.{command.module}"), command.name
     )
     return found
+
+
+def _kept_for_later(function: Callable[..., None]) -> Callable[..., Callable[[], None]]:
+    """The same arguments, but a call that is still to be made."""
+
+    @wraps(function)
+    def keep(*arguments: Any, **named: Any) -> Callable[[], None]:
+        return partial(function, *arguments, **named)
+
+    return keep
 
 
 def _stand_in(summary: str) -> Callable[[], None]:
