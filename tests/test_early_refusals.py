@@ -165,3 +165,17 @@ def test_a_share_that_is_none_is_told_by_the_option_that_was_typed(keyrecon, pro
     assert one_line(told, "--coverage cannot be 95", "from 0.01 to 1")
     told = keyrecon("keyframes", project, "--reach", "0")
     assert one_line(told, "--reach cannot be 0")
+
+
+@pytest.mark.parametrize("verb", ["run", "keyframes"])
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("depths", "mine.npz"), ("depths", "built-in"), ("track.method", "filters")],
+)
+def test_an_option_that_the_printed_forms_replace_is_refused_beside_them(
+    keyrecon, project, verb, option, value
+):
+    told = keyrecon(verb, project, "--method", "paper", f"--{option}", value)
+    assert one_line(told, f"--{option} {value}", "--method paper", "leave out one of the two")
+    told = keyrecon(verb, project, "--method", "paper", "--depths", "none")
+    assert one_line(told, "no picks yet" if verb == "keyframes" else "keyrecon pick")

@@ -18,10 +18,11 @@ from keyrecon.commands.arguments import (
     typed_options,
 )
 from keyrecon.errors import KeyreconError
+from keyrecon.io.option_tables import changed_options
 from keyrecon.io.work_lock import at_work
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, as_printed
 
 Advanced = Annotated[Options, arg(name="")]
 
@@ -100,10 +101,20 @@ def run(
 
 
 def _is_printed(method: Literal["best", "paper"], typed: Options) -> bool:
-    """Whether the forms of the paper are asked for; not together with what takes their place."""
-    if method == "paper" and typed.prior == "golf":
+    """Whether the forms of the paper are asked for; not together with what they replace."""
+    if method != "paper":
+        return False
+    if typed.prior == "golf":
         raise KeyreconError(
             "--prior golf puts a model's swing where --method paper interpolates between keyframes "
             "(Section 6.1); leave out one of the two."
         )
-    return method == "paper"
+    told = typed_options(sys.argv)
+    for name, value in changed_options(typed, as_printed(typed)).items():
+        if name in told:
+            flag = name.replace("_", "-")
+            raise KeyreconError(
+                f"--{flag} {value} is not what --method paper takes (the printed form has another "
+                "in its place); leave out one of the two."
+            )
+    return True
