@@ -13,7 +13,7 @@ channel; Kiani Galoogahi, Sim and Lucey, ICCV 2013, for several):
 The surroundings of a part count as far as they tend to come with it: a shoe has a leg above and the
 court beneath. A rough track takes a racket, a line or the other leg for a shoe now and then, so the
 filters are trained on frames that show both feet clearly: apart, and as far below the head as those
-of a standing player.
+of a standing player. Frames in which nothing was seen, where the track is bridged, teach nothing.
 """
 
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ MIN_FEET_DISTANCE = 0.09
 """Feet nearer to one another may be one foot taken twice, or one that hides the other, player
 heights. Halved, others with it: at most 0.4 points, 0.6 mm on one clip."""
 MIN_EXAMPLES = 12
-"""Fewer clear frames are not enough to train on; then all count. Halved, others with it: at most
-0.4 points, 0.6 mm on one clip."""
+"""Fewer clear frames are not enough to train on; then all in which the player was seen count.
+Halved, others with it: at most 0.4 points, 0.6 mm on one clip."""
 PEAK_SPREAD = 0.027
 """Standard deviation of the peak that a filter should respond with, player heights. Halved, others
 with it: at most 0.4 points, 0.6 mm on one clip."""
@@ -152,12 +152,12 @@ def clear_frames(track: Track) -> Int[np.ndarray, "n"]:
     """Frames in which a track has two feet, and both where a standing player has them."""
     below = (track.feet[..., 1] - track.head[:, None, 1]) / track.height[:, None]
     upright = ((below > STANDING_MIN) & (below < STANDING_MAX)).all(axis=1)
-    return _enough(np.flatnonzero(upright & _apart(track)), len(below))
+    return _enough(upright & _apart(track), track)
 
 
 def sound_frames(track: Track) -> Int[np.ndarray, "n"]:
     """Frames in which a track has two feet."""
-    return _enough(np.flatnonzero(_apart(track)), len(track.head))
+    return _enough(_apart(track), track)
 
 
 def _apart(track: Track) -> Bool[np.ndarray, "T"]:
@@ -166,6 +166,13 @@ def _apart(track: Track) -> Bool[np.ndarray, "T"]:
     return apart > MIN_FEET_DISTANCE * track.height
 
 
-def _enough(frames: Int[np.ndarray, "n"], count: int) -> Int[np.ndarray, "m"]:
-    """The frames, or all where these are too few."""
-    return frames if len(frames) >= MIN_EXAMPLES else np.arange(count)
+def _enough(good: Bool[np.ndarray, "T"], track: Track) -> Int[np.ndarray, "m"]:
+    """The good frames in which the player was seen; where these are too few all seen ones, or all.
+
+    Where nothing was seen the track lies between what was, and would teach whatever is there.
+    """
+    seen = track.confidence > 0
+    for frames in (good & seen, seen):
+        if frames.sum() >= MIN_EXAMPLES:
+            return np.flatnonzero(frames)
+    return np.arange(len(seen))

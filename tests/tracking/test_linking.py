@@ -5,7 +5,7 @@ import pytest
 
 from keyrecon.records import CameraPath, Track
 from keyrecon.segmentation.player_crops import Cropping
-from keyrecon.tracking.correlation_filters import clear_frames
+from keyrecon.tracking.correlation_filters import clear_frames, sound_frames
 from keyrecon.tracking.linking import Detections, FootMotionModel, link_feet
 from keyrecon.tracking.smoothing import fill_gaps
 from keyrecon.tracking.tracker import detect_in_crop
@@ -66,6 +66,18 @@ def test_frames_with_a_racket_or_one_shoe_for_both_feet_are_not_trained_on():
     rough.feet[10:20, 1] = (220, 136)
     rough.feet[30:40, 0] = (206, 158)
     assert set(clear_frames(rough)) == set(range(COUNT)) - set(range(10, 20)) - set(range(30, 40))
+
+
+@pytest.mark.parametrize("choose", [clear_frames, sound_frames])
+def test_frames_in_which_the_player_was_not_seen_are_not_trained_on(choose):
+    rough = track()
+    rough.confidence[GONE] = 0
+    seen = set(range(COUNT)) - set(range(COUNT)[GONE])
+    assert set(choose(rough)) == seen
+    rough.feet[:, 1] = rough.feet[:, 0]  # none is clear: all that was seen counts
+    assert set(choose(rough)) == seen
+    rough.confidence[:] = 0
+    assert set(choose(rough)) == set(range(COUNT))
 
 
 def test_a_place_with_the_leg_beneath_it_is_less_a_foot_than_one_with_the_floor():
