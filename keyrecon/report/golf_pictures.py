@@ -155,8 +155,8 @@ def path_picture(video: Video, fitted: FittedSwing, observations: Observations) 
 
 
 def _around_swing(video: Video, fitted: FittedSwing) -> tuple[slice, slice]:
-    """The part of the picture, rows and columns, that the player is in at any time."""
-    points = fitted.motion.points2d.reshape(-1, 2)
+    """The part of the picture, rows and columns, that the player is in at any time of the fit."""
+    points = fitted.motion.points2d[fitted_frames(fitted.motion)].reshape(-1, 2)
     room = ROOM * np.ptp(points[:, 1])
     low = np.maximum(points.min(axis=0) - room, 0).astype(int)
     high = np.minimum(points.max(axis=0) + room, (video.width, video.height)).astype(int)

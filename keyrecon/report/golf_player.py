@@ -64,11 +64,11 @@ class SwingWindow:
 
 
 def find_window(video: Video, swing: RecordedSwing) -> SwingWindow:
-    """Where player and club are at any time."""
-    body = swing.motion.points2d.reshape(-1, 2)
+    """Where player and club are at any time to which the swing was fitted."""
+    body = swing.motion.points2d[swing.fitted].reshape(-1, 2)
     room = ROOM * np.ptp(body[:, 1])
     size = np.array([video.width, video.height])
-    club = np.clip(swing.club2d.reshape(-1, 2), 0, size)
+    club = np.clip(swing.club2d[swing.fitted].reshape(-1, 2), 0, size)
     low = np.maximum(np.minimum(body.min(axis=0) - room, club.min(axis=0) - room / 4), 0)
     high = np.minimum(np.maximum(body.max(axis=0) + room, club.max(axis=0) + room / 4), size)
     (left, top), (right, bottom) = low.astype(int).tolist(), high.astype(int).tolist()

@@ -22,7 +22,8 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import Motion
 from keyrecon.report.golf_charts import align_frames, curve_charts
 from keyrecon.report.golf_measures import KEY_ERRORS, measure_swing, record_swing
-from keyrecon.report.golf_player import cut_clip
+from keyrecon.report.golf_pictures import _around_swing
+from keyrecon.report.golf_player import cut_clip, find_window
 from keyrecon.report.golf_table import write_golf_table
 
 FRAMES = 31
@@ -286,3 +287,23 @@ def test_the_second_swing_is_shown_in_the_posture_of_the_first():
     np.testing.assert_allclose(at[[4, 10, 16, 28]], first.keys)
     np.testing.assert_allclose(at[7], 9)
     assert (np.diff(at) > 0).all()
+
+
+def test_frames_that_were_not_fitted_do_not_widen_the_part_of_the_picture_that_is_shown(tmp_path):
+    write_video(tmp_path / "v.mp4", [np.zeros((480, 640, 3), np.uint8)] * FRAMES, 30.0)
+    video, unfitted = open_video(tmp_path / "v.mp4"), slice(20, None)
+    swing = still()
+    flat = 100 * swing.motion.points2d + [320.0, 200.0]
+    club = np.tile([[300.0, 240.0], [340.0, 280.0]], (FRAMES, 1, 1))
+    flat[unfitted] += [-250.0, 130.0]  # the first posture, held while the camera turns away
+    club[unfitted] += [-250.0, 130.0]
+    confidence = np.ones((FRAMES, 14))
+    confidence[unfitted] = 0
+    motion = replace(swing.motion, points2d=flat, confidence=confidence)
+    swing = replace(swing, motion=motion, club2d=club)
+    rows, columns = find_window(video, record_swing(swing, seen())).part
+    body = flat[: unfitted.start].reshape(-1, 2)
+    room = 0.12 * np.ptp(body[:, 1])
+    assert rows.stop <= body[:, 1].max() + room and columns.start >= body[:, 0].min() - room - 1
+    rows, columns = _around_swing(video, swing)
+    assert rows.stop <= body[:, 1].max() + room and columns.start >= body[:, 0].min() - room - 1
