@@ -35,6 +35,7 @@ from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.video import Video
 from keyrecon.io.work_lock import at_work
+from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, with_height
 from keyrecon.progress import Progress
@@ -114,32 +115,32 @@ class _Server(uvicorn.Server):
 
 def job_commands(folder: Path) -> dict[str, Callable[[dict[str, Any], Progress], str]]:
     """What the page can have done, by name."""
-    working = {
-        "follow": _follow_player,
-        "keyframes": _find_keyframes,
-        "run": _run,
-        "golf": _fit_swing,
-        "court": _find_court,
-        "ground": _find_ground,
+    side_by_side = {"follow": _follow_player, "keyframes": _find_keyframes, "run": _run}
+    jobs = {"golf": _fit_swing, "court": _find_court, "ground": _find_ground}
+    return {
+        **{name: partial(_work_side_by_side, job, folder) for name, job in side_by_side.items()},
+        **{name: partial(_work_alone, job, folder) for name, job in jobs.items()},
+        "export": partial(_export, folder),
     }
-    jobs = {name: partial(_alone, job, folder) for name, job in working.items()}
-    return {**jobs, "export": partial(_export, folder)}
 
 
-def _alone(
-    job: Callable[[Path, dict[str, Any], Progress], str],
-    folder: Path,
-    options: dict[str, Any],
-    progress: Progress,
-) -> str:
+_Job = Callable[[Workspace, dict[str, Any], Progress], str]
+
+
+def _work_alone(job: _Job, folder: Path, options: dict[str, Any], progress: Progress) -> str:
     """A job during which no command works on the project."""
     with at_work(folder, "The page of keyrecon annotate"):
-        return job(folder, options, progress)
+        return job(Workspace(folder), options, progress)
 
 
-def _follow_player(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+def _work_side_by_side(job: _Job, folder: Path, options: dict[str, Any], progress: Progress) -> str:
+    """The same with shots worked on side by side, as the command line does."""
+    with at_work(folder, "The page of keyrecon annotate"), open_workers(None) as made_by:
+        return job(Workspace(folder, workers=made_by), options, progress)
+
+
+def _follow_player(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
     """The automatic part with the bodies marked so far, before keyframes are chosen."""
-    workspace = Workspace(folder)
     video = workspace.video()
     _prepare_with_bodies(workspace, video)
     marks = project.load_annotations(workspace, video)
@@ -160,27 +161,24 @@ def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
         write_coco(workspace.prepared_marks_file, marks, (video.width, video.height))
 
 
-def _find_keyframes(folder: Path, options: dict[str, Any], progress: Progress) -> str:
+def _find_keyframes(workspace: Workspace, options: dict[str, Any], progress: Progress) -> str:
     reach = options.get("reach")
     chosen = keyframing.KeyframeSettings(
         options.get("budget"), options.get("coverage"), None if reach is None else round(reach)
     )
-    workspace = Workspace(folder)
     _prepare_with_bodies(workspace, workspace.video())
     return _contradictions(keyframing.find_keyframes(workspace, Options(), chosen, progress))
 
 
-def _run(folder: Path, options: dict[str, Any], progress: Progress) -> str:
-    workspace = Workspace(folder)
+def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> str:
     settings = running.settings(workspace, Options(), options.get("height"))
     if options.get("height", settings.lift.height) is None:  # its field was cleared
         settings = with_height(settings, None)
     return _contradictions(running.run(workspace, settings, progress, partial=True))
 
 
-def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
     """The court from its lines and the points clicked so far; why it tells no way is returned."""
-    workspace = Workspace(folder)
     try:
         text = calibrate(workspace, (), CalibrationOptions(), progress)
     except KeyreconError as fault:
@@ -191,15 +189,15 @@ def _find_court(folder: Path, _: dict[str, Any], progress: Progress) -> str:
     return _contradictions(text)
 
 
-def _find_ground(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+def _find_ground(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
     """The camera from all that was marked; what is still open is returned."""
-    lines = find_ground(Workspace(folder), GroundMarks(), progress).splitlines()
+    lines = find_ground(workspace, GroundMarks(), progress).splitlines()
     return "\n".join(line for line in lines if line.startswith(OPEN_GROUND))
 
 
-def _fit_swing(folder: Path, _: dict[str, Any], progress: Progress) -> str:
+def _fit_swing(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
     """A golf fit; what the page shows in no other place is returned."""
-    summary = golf.fit_project(Workspace(folder), progress=progress)
+    summary = golf.fit_project(workspace, progress=progress)
     return "\n".join(line for line in summary.splitlines() if line.startswith("Note: "))
 
 

@@ -87,8 +87,13 @@ class _Process:
 
 def _begin(count: int) -> None:
     """What each of `count` processes does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is told, and ends this one
+    belong_to_parent()
     share_cores(count)
+
+
+def belong_to_parent() -> None:
+    """Let this process end when the one that began it does, and not by a key."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is told, and ends this one
     Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -35,6 +35,8 @@ def at_work(folder: Path, command: str) -> Iterator[None]:
     if not (folder / "project.toml").is_file():
         raise no_project(folder)
     with hold_folder(folder, command):
+        for file in (folder / "cache").glob("inputs-*.npz"):  # workers that were killed had them
+            file.unlink(missing_ok=True)
         yield
 
 

@@ -16,6 +16,7 @@ from keyrecon import KeyreconError
 from keyrecon.annotate.server import address
 from keyrecon.app import annotator
 from keyrecon.app.annotator import announce, job_commands
+from keyrecon.io import workers as io_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, with_height
 from keyrecon.progress import silent
@@ -109,6 +110,31 @@ def test_a_height_that_was_cleared_is_none_and_one_that_is_not_told_stays(bare, 
     for told in ({}, {"height": 1.7}, {"height": None}):
         run(told, silent)
     assert heights == [1.8, 1.7, None]
+
+
+@pytest.mark.parametrize(
+    ("job", "module", "name", "side_by_side"),
+    [
+        ("run", "running", "run", True),
+        ("keyframes", "keyframing", "find_keyframes", True),
+        ("golf", "golf", "fit_project", False),
+    ],
+)
+def test_the_page_has_shots_worked_on_side_by_side_where_the_command_line_does(
+    bare, monkeypatch, job, module, name, side_by_side
+):
+    monkeypatch.setattr(io_workers, "core_count", lambda: 2)
+    seen = []
+
+    def look(workspace, *_, **named):
+        seen.append(workspace.stages.has_workers)
+        return ""
+
+    monkeypatch.setattr(getattr(annotator, module), name, look)
+    monkeypatch.setattr(annotator, "_prepare_with_bodies", lambda *_: None)
+    monkeypatch.setattr(Workspace, "video", lambda _: None)
+    job_commands(bare)[job]({}, silent)
+    assert seen == [side_by_side]
 
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 9999, '{"port": 80, "session": "guess"}', "null"])

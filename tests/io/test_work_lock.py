@@ -98,6 +98,14 @@ def test_a_process_that_is_killed_leaves_the_project_free(project, holder):
         pass
 
 
+def test_what_workers_that_were_killed_were_given_is_cleared(project):
+    left = project / "cache" / "inputs-track@3-0123.npz"
+    left.parent.mkdir()
+    left.write_bytes(b"")
+    with at_work(project, "keyrecon run"):
+        assert not left.exists()
+
+
 def test_the_pages_work_is_refused_too_and_what_it_reads_is_not(project, holder):
     jobs = job_commands(project)
     for name in set(jobs) - {"export"}:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import keyrecon
+from processes import is_running, needs_proc
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io import workers as io_workers
@@ -174,15 +175,7 @@ def still_there(processes, seconds=5.0):
     return []
 
 
-def is_running(pid):
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != "Z"
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
+@needs_proc
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_processes_end_with_the_one_that_began_them(tmp_path, how):
     told = tmp_path / "told"

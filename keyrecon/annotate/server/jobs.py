@@ -2,7 +2,7 @@
 
 A process of its own leaves the page quick while all cores are busy, and can be ended at any
 moment: the results of finished stages are kept in the cache, so the same job goes on from there.
-A process whose server is gone ends at its next report of progress.
+It may have others work for it. All end with it, and it ends with the server.
 """
 
 import itertools
@@ -16,6 +16,7 @@ from threading import Lock, Thread
 from typing import Any, TypeVar
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.local_workers import belong_to_parent
 from keyrecon.progress import Progress
 
 Item = TypeVar("Item")
@@ -67,7 +68,7 @@ class Jobs:
             self._jobs[job.id] = job
             ours, theirs = _spawning.Pipe(duplex=False)
             self._process = _spawning.Process(
-                target=_work, args=(self._commands[kind], options, theirs), daemon=True
+                target=_work, args=(self._commands[kind], options, theirs)
             )
             self._process.start()
         theirs.close()
@@ -115,6 +116,7 @@ _spawning = multiprocessing.get_context("spawn")
 
 def _work(command: Command, options: dict[str, Any], reports: Connection) -> None:
     """What the process does."""
+    belong_to_parent()
 
     def progress(
         items: Iterable[Item], description: str, total: int | None = None

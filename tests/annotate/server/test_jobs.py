@@ -1,9 +1,14 @@
 """Long work for the page: reported, cancelled, begun again."""
 
+import os
+import signal
+import subprocess
+import sys
 import time
 
 import pytest
-from annotator_jobs import counting, crashing
+from annotator_jobs import counting, crashing, working_side_by_side
+from processes import is_running, needs_proc
 
 from keyrecon import KeyreconError
 from keyrecon.annotate.server.jobs import Jobs
@@ -20,7 +25,8 @@ def until(fact, seconds=20.0):
 @pytest.fixture
 def jobs():
     heard = []
-    jobs = Jobs({"count": counting, "crash": crashing}, heard.append)
+    commands = {"count": counting, "crash": crashing, "work": working_side_by_side}
+    jobs = Jobs(commands, heard.append)
     yield jobs, heard
     jobs.close()
 
@@ -46,6 +52,44 @@ def test_a_job_can_be_cancelled_and_begun_again(jobs):
         (second.id, "done"),
         (first.id, "cancelled"),
     ]
+
+
+SERVER = """
+import sys
+import time
+from annotator_jobs import working_side_by_side
+from keyrecon.annotate.server.jobs import Jobs
+if __name__ == "__main__":
+    Jobs({"work": working_side_by_side}, print).start("work", {"folder": sys.argv[1]})
+    time.sleep(60)
+"""
+
+
+def told_processes(folder):
+    """A job and the two processes that work for it, once they have told who they are."""
+    files = [folder / name for name in ("job", "0", "1")]
+    until(lambda: all(file.is_file() and file.read_text() for file in files), 40)
+    return [int(file.read_text()) for file in files]
+
+
+@needs_proc
+def test_a_job_that_is_cancelled_takes_those_that_work_for_it_along(jobs, tmp_path):
+    jobs, _ = jobs
+    job = jobs.start("work", {"folder": str(tmp_path)})
+    processes = told_processes(tmp_path)
+    jobs.cancel(job.id)
+    until(lambda: not any(map(is_running, processes)))
+
+
+@needs_proc
+def test_nothing_works_on_when_the_server_is_killed(tmp_path):
+    script = tmp_path / "server.py"
+    script.write_text(SERVER)
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen([sys.executable, script, tmp_path], env=paths) as server:
+        processes = told_processes(tmp_path)
+        server.send_signal(signal.SIGKILL)
+    until(lambda: not any(map(is_running, processes)))
 
 
 def test_a_job_that_fails_or_breaks_off_says_so(jobs):
