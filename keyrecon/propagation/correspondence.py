@@ -1,15 +1,6 @@
 """Which edge element of a frame corresponds to which of a posed template, and how well they fit.
 
-The nearest one of the same colour in place and direction together: the chord between two unit
-tangents, times `TANGENT_SCALE`, counts like a distance. Elements that differ by 45 degrees are so
-far apart already that they only match when they lie close, and opposite ones never do, which is
-the paper's rule (Section 4.1) with a soft edge. Colour is a further axis on which different values
-are out of range. A frame has a few hundred elements at most, so the distances of all pairs of
-descriptors,
-
-    |a - b|^2 = |a|^2 + (-2 a, 1) . (b, |b|^2),
-
-come from one small matrix product in single precision, and no tree is as quick.
+The nearest one of the same colour in place and direction together (`nearest_elements`).
 
 Scores tell how well a posed template and a frame's edges explain one another. From the template's
 side: do a bone's elements find counterparts? From the frame's: which of its elements does each part
@@ -29,17 +20,15 @@ from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.edge_template import EdgeTemplates
 from keyrecon.propagation.half_body import BodyHalf
+from keyrecon.propagation.nearest_elements import (
+    PADDING_DISTANCE,
+    describe_elements,
+    find_nearest,
+    find_nearest_in_parts,
+    with_norms,
+)
 from keyrecon.records import Edges
 
-TANGENT_SCALE = 0.08
-"""Player heights that a chord of length one between tangents counts for. A quarter more or less: at
-most 0.1 points, 0.3 mm on one clip."""
-COLOR_SPACING = 0.25
-"""Spacing of colours on their axis: more than any search radius, and little, for precision."""
-PADDING_DISTANCE = 1e3
-"""Squared distance of what only fills up an array."""
-CACHED_DISTANCES = 1 << 18
-"""Distances in work at a time: they stay in the processor's cache."""
 SCORE_RADIUS = 0.06
 """Distance at which an element counts as wrong, player heights. A quarter more or less: at most 1.0
 mm on three of four clips, 4.1 on one, which other clicks on the same joints change as much."""
@@ -79,46 +68,8 @@ def index_elements(edges: tuple[Edges, ...], body_frame: BodyFrame) -> ElementIn
     descriptors = np.zeros((len(edges), 6, max(1, count.max(initial=0))), np.float32)
     descriptors[:, 5] = PADDING_DISTANCE
     place = np.arange(len(frame)) - first[frame]
-    descriptors[frame, :, place] = _with_norms(_describe(points, tangent, color))
+    descriptors[frame, :, place] = with_norms(describe_elements(points, tangent, color)).T
     return ElementIndex(points, tangent, color, first, descriptors)
-
-
-def _describe(
-    points: Complex[np.ndarray, "*n"],
-    tangent: Complex[np.ndarray, "*n"],
-    color: Int[np.ndarray, "*n"],
-) -> Float32[np.ndarray, "*n 5"]:
-    """Coordinates in which distance tells how well elements correspond."""
-    descriptor = np.empty((*points.shape, 5), np.float32)
-    descriptor[..., 0], descriptor[..., 1] = points.real, points.imag
-    descriptor[..., 2] = TANGENT_SCALE * tangent.real
-    descriptor[..., 3] = TANGENT_SCALE * tangent.imag
-    descriptor[..., 4] = COLOR_SPACING * color
-    return descriptor
-
-
-def _with_norms(descriptor: Float32[np.ndarray, "*n 5"]) -> Float32[np.ndarray, "*n 6"]:
-    """(b, |b|^2)"""
-    return np.concatenate([descriptor, np.square(descriptor).sum(axis=-1, keepdims=True)], axis=-1)
-
-
-def _find_nearest(
-    queries: Float32[np.ndarray, "P Q 5"], descriptors: Float32[np.ndarray, "P 6 F"], radius: float
-) -> tuple[Int[np.ndarray, "P Q"], Bool[np.ndarray, "P Q"]]:
-    """(position of the nearest descriptor, whether it lies within `radius`)."""
-    factors = np.empty((*queries.shape[:2], 6), np.float32)
-    factors[..., :5], factors[..., 5] = -2 * queries, 1
-    nearest, least = np.empty(factors.shape[:2], int), np.empty(factors.shape[:2], np.float32)
-    step = max(1, CACHED_DISTANCES // (queries.shape[1] * descriptors.shape[2]))
-    distance = np.empty((step, queries.shape[1], descriptors.shape[2]), np.float32)
-    row, element = np.ogrid[:step, : queries.shape[1]]
-    for at in range(0, len(queries), step):
-        part = slice(at, at + step)
-        count = len(factors[part])
-        np.matmul(factors[part], descriptors[part], out=distance[:count])
-        distance[:count].argmin(axis=2, out=nearest[part])
-        least[part] = distance[row[:count], element, nearest[part]]
-    return nearest, least + np.square(queries).sum(axis=2) < radius**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,8 +158,8 @@ def match_elements(
     index: ElementIndex, frames: Int[np.ndarray, "P"], placed: PlacedElements, radius: float
 ) -> tuple[Int[np.ndarray, "P E"], Bool[np.ndarray, "P E"]]:
     """(row of the index, whether there is one within `radius` player heights)."""
-    queries = _describe(placed.points, placed.tangent, placed.color)
-    place, matched = _find_nearest(queries, index.descriptors[frames], radius)
+    queries = describe_elements(placed.points, placed.tangent, placed.color)
+    place, matched = find_nearest(queries, index.descriptors[frames], radius)
     return np.where(matched, index.first[frames][:, None] + place, 0), matched
 
 
@@ -252,7 +203,7 @@ def match_both_ways(
         np.take_along_axis(values, nearest, axis=1)
         for values in (posed.points, posed.offset, posed.weight)
     )
-    joint_weights = np.take_along_axis(posed.joint_weights, nearest[..., None], axis=1)
+    joint_weights = posed.joint_weights[np.arange(len(nearest))[:, None], nearest]
     return forward, MatchedElements(listed, joint_weights, offset, points, matched * weight)
 
 
@@ -265,17 +216,11 @@ def match_frame_to_parts(
     radius: float,
 ) -> tuple[Int[np.ndarray, "P N F"], Bool[np.ndarray, "P N F"]]:
     """For each of the frame's elements, its counterpart in each part of the body."""
-    queries = _describe(
+    queries = describe_elements(
         index.points[frame_elements], index.tangent[frame_elements], index.color[frame_elements]
     )
-    descriptors = _with_norms(_describe(placed.points, placed.tangent, placed.color))
-    descriptors = descriptors.transpose(0, 2, 1)
-    nearest = np.zeros((len(frame_elements), parts, frame_elements.shape[1]), int)
-    matched = np.zeros(nearest.shape, bool)
-    for number in range(parts):
-        of_part = descriptors.copy()
-        of_part[:, 5] += PADDING_DISTANCE * (part != number)
-        nearest[:, number], matched[:, number] = _find_nearest(queries, of_part, radius)
+    descriptors = with_norms(describe_elements(placed.points, placed.tangent, placed.color))
+    nearest, matched = find_nearest_in_parts(queries, descriptors, part, parts, radius)
     matched &= (frame_elements >= 0)[:, None]
     return np.where(matched, nearest, 0), matched
 

@@ -60,10 +60,9 @@ def exchange_price(
 
     `spread` is the standard deviation of each joint's second difference.
     """
-    ahead, ahead_spread = _filter_motion(pair, spread)
-    back, back_spread = _filter_motion(pair[::-1], spread)
-    back = back[::-1] * REVERSE[:, None, None]
-    back_spread = back_spread[::-1] * np.outer(REVERSE, REVERSE)
+    both, ahead_spread = filter_motion(np.concatenate([pair, pair[::-1]], axis=1), spread)
+    ahead, back = both[:, :, :2], both[::-1, :, 2:] * REVERSE[:, None, None]
+    back_spread = ahead_spread[::-1] * np.outer(REVERSE, REVERSE)
     predicted = np.einsum("ab,tbpj->tapj", STEP, ahead[:-1])
     total = STEP @ ahead_spread[:-1] @ STEP.T + _process_noise(spread) + back_spread[1:]
     precision = np.linalg.inv(total)
@@ -86,26 +85,27 @@ def _process_noise(spread: Float[np.ndarray, "j"]) -> Float[np.ndarray, "j 2 2"]
     return spread[:, None, None] ** 2 * np.array([[0.25, 0.5], [0.5, 1.0]])
 
 
-def _filter_motion(
-    places: Complex[np.ndarray, "T 2 j"], spread: Float[np.ndarray, "j"]
-) -> tuple[Complex[np.ndarray, "T 2 2 j"], Float[np.ndarray, "T j 2 2"]]:
-    """Place and velocity of every joint from all frames up to each, and their covariance."""
+def filter_motion(
+    places: Complex[np.ndarray, "T n j"], spread: Float[np.ndarray, "j"]
+) -> tuple[Complex[np.ndarray, "T 2 n j"], Float[np.ndarray, "T j 2 2"]]:
+    """Place and velocity of every joint from all frames up to each, and their covariance, which is
+    that of any places."""
     noise = _process_noise(spread)
-    state = np.zeros((2, *places.shape[1:]), dtype=complex)
-    state[0] = places[0]
+    states = np.zeros((len(places), 2, *places.shape[1:]), dtype=complex)
+    covariances = np.zeros((len(places), len(spread), 2, 2))
+    place, velocity = places[0], np.zeros(places.shape[1:], dtype=complex)
     covariance = np.zeros((len(spread), 2, 2))
     covariance[:, 0, 0], covariance[:, 1, 1] = PLACE_SPREAD**2, (6 * spread) ** 2
-    states, covariances = [], []
-    for t, place in enumerate(places):
+    for t, seen in enumerate(places):
         if t:
-            state = np.stack([state[0] + state[1], state[1]])
+            place = place + velocity
             covariance = STEP @ covariance @ STEP.T + noise
         gain = covariance[:, :, 0] / (covariance[:, :1, 0] + PLACE_SPREAD**2)
-        state = state + gain.T[:, None] * (place - state[0])
+        gap = seen - place
+        place, velocity = place + gain[:, 0] * gap, velocity + gain[:, 1] * gap
         covariance = covariance - gain[:, :, None] * covariance[:, :1]
-        states.append(state)
-        covariances.append(covariance)
-    return np.stack(states), np.stack(covariances)
+        states[t, 0], states[t, 1], covariances[t] = place, velocity, covariance
+    return states, covariances
 
 
 @dataclass(frozen=True, eq=False)

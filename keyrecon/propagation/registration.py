@@ -120,10 +120,12 @@ def point_equations(
     xx = along * cosine**2 + across * sine**2
     yy = along * sine**2 + across * cosine**2
     xy = (along - across) * cosine * sine
-    transposed = joint_weights.transpose(0, 2, 1)
-    block_xx = transposed @ (xx[..., None] * joint_weights)
-    block_xy = transposed @ (xy[..., None] * joint_weights)
-    block_yy = transposed @ (yy[..., None] * joint_weights)
+    weights, transposed = joint_weights, joint_weights.transpose(0, 2, 1)
+    if weights.dtype != float:  # every product would convert them anew
+        weights, transposed = weights.astype(float), transposed.astype(float, order="C")
+    block_xx = transposed @ (xx[..., None] * weights)
+    block_xy = transposed @ (xy[..., None] * weights)
+    block_yy = transposed @ (yy[..., None] * weights)
     matrix = np.block([[block_xx, block_xy], [block_xy, block_yy]])
     right_x = (transposed @ (xx * target.real + xy * target.imag)[..., None])[..., 0]
     right_y = (transposed @ (xy * target.real + yy * target.imag)[..., None])[..., 0]

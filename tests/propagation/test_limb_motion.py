@@ -6,7 +6,12 @@ import pytest
 from keyrecon.body import LSP14
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import identify_limbs
-from keyrecon.propagation.limb_motion import exchange_price, foot_exchange_price
+from keyrecon.propagation.limb_motion import (
+    PLACE_SPREAD,
+    exchange_price,
+    filter_motion,
+    foot_exchange_price,
+)
 
 LEGS = split_body(LSP14)[0]
 ONE, OTHER = map(list, LEGS.sides)
@@ -102,3 +107,29 @@ def test_a_runner_whose_steps_were_taken_for_bounces_gets_his_legs_back(seed):
     found = identify_limbs(LEGS, wrong, np.zeros(60), np.array([0, 59]), FPS, ground)
     clear = np.abs(apart) > 0.25
     np.testing.assert_array_equal(found.exchanged[clear], (apart < 0)[clear])
+
+
+def filtered_one_by_one(places, spread):
+    """Place and velocity of one coordinate by the textbook's Kalman filter, and covariances."""
+    change, seen = np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    noise = spread**2 * np.outer([0.5, 1.0], [0.5, 1.0])
+    state, covariance = np.array([places[0], 0]), np.diag([PLACE_SPREAD**2, (6 * spread) ** 2])
+    for t, place in enumerate(places):
+        if t:
+            state, covariance = change @ state, change @ covariance @ change.T + noise
+        gain = covariance @ seen.T / (seen @ covariance @ seen.T + PLACE_SPREAD**2)
+        state = state + gain @ (place - seen @ state)
+        covariance = covariance - gain @ seen @ covariance
+        yield state, covariance
+
+
+def test_all_joints_are_filtered_at_once_as_one_by_one():
+    random = np.random.default_rng(0)
+    places = random.standard_normal((20, 2, 3)) + 1j * random.standard_normal((20, 2, 3))
+    spread = np.array([0.016, 0.032, 0.064])
+    states, covariances = filter_motion(places, spread)
+    for limb, joint in np.ndindex(2, 3):
+        one = filtered_one_by_one(places[:, limb, joint], spread[joint])
+        for t, (state, covariance) in enumerate(one):
+            np.testing.assert_allclose(states[t, :, limb, joint], state, atol=1e-12)
+            np.testing.assert_allclose(covariances[t, joint], covariance, atol=1e-12)
