@@ -4,6 +4,7 @@ import { enclosing } from "./draw/geometry.js";
 import { createViewer } from "./draw/viewer.js";
 import { createActions } from "./state/actions.js";
 import { createFrameCache } from "./state/caches.js";
+import { describeFault } from "./state/faults.js";
 import { createModel } from "./state/model.js";
 import { createBodies } from "./views/bodies.js";
 import { createCourt } from "./views/court.js";
@@ -149,11 +150,23 @@ const commands = {
   ground: ground.commands,
 };
 
-function execute(command, key) {
-  Promise.resolve(command(key)).catch((fault) =>
-    model.notify(fault.message || "The server does not answer."),
-  );
+// Told once: a view that fails is drawn again with the notice.
+function tell(fault) {
+  const text = describeFault(fault);
+  if (model.notice?.text !== text) model.notify(text);
 }
+
+async function execute(command, key) {
+  try {
+    await command(key);
+  } catch (fault) {
+    tell(fault);
+  }
+}
+
+addEventListener("error", ({ error }) => error && tell(error));
+addEventListener("unhandledrejection", ({ reason }) => tell(reason));
+
 
 document.addEventListener("keydown", (event) => {
   if (document.body.inert || (document.querySelector("dialog[open]") && event.key !== "?")) return;

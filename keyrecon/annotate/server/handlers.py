@@ -16,6 +16,7 @@ from starlette.responses import FileResponse, Response
 from keyrecon.annotate.server.descriptions import (
     describe_changes,
     describe_job,
+    describe_run,
     describe_stacks,
     describe_state,
 )
@@ -206,6 +207,11 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
     """Where the result is least sure of itself."""
     find = session.assistant.stretches
     return find(session.store.annotations()) if find else []
+
+
+def run(session: Session, request: ApiRequest) -> Json:
+    """Whether the motion was made from the marks as they are."""
+    return describe_run(session.workspace, session.store.state.revision)
 
 
 def swing(session: Session, request: ApiRequest) -> Json:

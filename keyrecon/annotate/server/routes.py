@@ -61,6 +61,7 @@ ROUTES = (
     ApiRoute("GET", "/api/checks", handlers.checks, alone=True),
     ApiRoute("GET", "/api/next_frames", handlers.next_frames, alone=True),
     ApiRoute("GET", "/api/stretches", handlers.stretches, alone=True),
+    ApiRoute("GET", "/api/run", handlers.run),
     ApiRoute("GET", "/api/swing", handlers.swing, alone=True),
     ApiRoute("POST", "/api/picks/preview", handlers.preview, handlers.PreviewRequest, alone=True),
     ApiRoute("GET", "/api/backprojection/{frame:int}", handlers.backprojection, alone=True),

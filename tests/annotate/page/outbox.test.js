@@ -7,7 +7,7 @@ import { createOutbox, pendingEdits } from "../../../keyrecon/annotate/page/stat
 // What a browser keeps, as far as it is used; its keys are properties, as in a browser.
 function createStorage() {
   const storage = {};
-  const hidden = (value) => ({ value, enumerable: false });
+  const hidden = (value) => ({ value, enumerable: false, configurable: true });
   Object.defineProperties(storage, {
     setItem: hidden((key, text) => {
       storage[key] = text;
@@ -22,8 +22,8 @@ function createStorage() {
 const rest = () => new Promise((done) => setTimeout(done));
 
 // An outbox whose server answers as `answer(edits)` does; retries wait until `retry()`.
-function createTrial(answer, storage = createStorage()) {
-  const trial = { storage, sent: [], statuses: [], rejected: [], timers: [] };
+function createTrial(answer, storage = createStorage(), delivered = () => {}) {
+  const trial = { storage, sent: [], statuses: [], rejected: [], faults: [], timers: [] };
   trial.outbox = createOutbox({
     async send(edits) {
       trial.sent.push(edits.map(({ id }) => id));
@@ -31,8 +31,9 @@ function createTrial(answer, storage = createStorage()) {
     },
     pending: pendingEdits(storage, "p"),
     status: (...status) => trial.statuses.push(status),
-    delivered() {},
+    delivered,
     rejected: (edit, why) => trial.rejected.push([edit.id, why]),
+    stumbled: (fault) => trial.faults.push(fault.message),
     wait: (work) => trial.timers.push(work),
   });
   trial.retry = async () => {
@@ -51,6 +52,31 @@ test("edits reach the server in order and are then forgotten", async () => {
   assert.deepEqual(trial.sent.flat(), ["a", "b", "c"]);
   assert.deepEqual(Object.keys(trial.storage), []);
   assert.deepEqual(trial.statuses.at(-1).slice(0, 2), ["saved", 0]);
+});
+
+test("an edit that the browser has no room to keep is sent all the same, and the fault is told", async () => {
+  const trial = createTrial(() => ({}));
+  const full = () => {
+    throw new RangeError("full");
+  };
+  Object.defineProperty(trial.storage, "setItem", { value: full });
+  assert.throws(() => trial.outbox.add(edit("a")), /full/);
+  await rest();
+  assert.deepEqual(trial.sent, [["a"]]);
+  assert.deepEqual(trial.outbox.waiting(), []);
+});
+
+test("a fault of the page with an answer neither loses what waits nor takes back what is saved", async () => {
+  const trial = createTrial(() => ({}), createStorage(), () => {
+    if (trial.sent.length === 1) throw new TypeError("a fault");
+  });
+  trial.outbox.add(edit("a"));
+  trial.outbox.add(edit("b"));
+  const turn = trial.outbox.inTurn(async () => trial.sent.flat());
+  assert.deepEqual(await turn, ["a", "b"]);
+  await rest();
+  assert.deepEqual([trial.rejected, trial.faults], [[], ["a fault"]]);
+  assert.deepEqual(Object.keys(trial.storage), []);
 });
 
 test("while the server is gone edits are kept and tried again", async () => {

@@ -136,6 +136,42 @@ def test_marks_that_came_after_the_motion_are_told_when_the_page_is_opened_again
             person.await_text("#motion-text", text)
 
 
+def test_marks_that_are_again_what_the_motion_was_made_from_are_in_it(folder, visit):
+    with serving(folder, commands={"run": partial(run_and_tell, folder, "Made.")}) as server:
+        person = visit(server)
+        mark_and_run(person)
+        person.press("Alt+2")
+        person.open(40)
+        wrist = POINTS2D[40, LSP14.index("right_wrist")]
+        person.drag(wrist, wrist + 6)
+        person.await_saved()
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Not yet in the motion")
+        person.page.reload()  # even where the page has not seen what it was made from
+        person.page.wait_for_selector("body[data-view]:not([inert])")
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Not yet in the motion")
+        person.press("Control+z")
+        person.await_text("#motion-text", "The motion is made")
+        person.press("Control+y")
+        person.await_text("#motion-text", "Not yet in the motion")
+
+
+def test_what_goes_wrong_on_the_page_itself_is_told_in_one_line_and_costs_no_mark(folder, visit):
+    with serving(folder) as server:
+        person = visit(server)
+        person.open(40)
+        person.click(POINTS2D[40, LSP14.index(person.asked())])
+        person.await_saved()
+        person.page.evaluate("() => { HTMLDialogElement.prototype.showModal = () => ({}).x.y; }")
+        person.press("?")
+        person.await_text("#notice-text", r"That went wrong on the page \(.*undefined.*\)")
+        assert "\n" not in person.text("#notice-text")
+        person.click(POINTS2D[40, LSP14.index(person.asked())])
+        person.await_saved()
+        assert len(server.ask("state")["marks"]["40"]) == 2
+
+
 def wait_for_ever(options, progress):
     for _ in progress(range(600), "Waiting"):
         time.sleep(0.1)

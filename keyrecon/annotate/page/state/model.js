@@ -15,6 +15,7 @@ import {
   same,
   together,
 } from "./edits.js";
+import { describeFault } from "./faults.js";
 import { createOutbox, pendingEdits } from "./outbox.js";
 import { createPoses } from "./poses.js";
 import { allKeyframes, isDone, sidesOf } from "./workflow.js";
@@ -78,6 +79,7 @@ export async function createModel() {
     },
     delivered,
     rejected: (edit, error) => yieldTo([{ edit, error }]),
+    stumbled: (fault) => model.notify(describeFault(fault)),
   });
 
   // An answer that edits or news have overtaken is read again.
@@ -92,6 +94,18 @@ export async function createModel() {
     model.state = outbox.waiting().reduce(apply, { ...emptyState(), ...fresh });
     model.redraw();
   };
+
+  // Whether the motion was made from the marks as they are, when edits have come to rest: what was
+  // taken back may be what it was made from.
+  const readRun = api.latestOnly(
+    async () => {
+      const run = await api.read("run");
+      model.project = { ...model.project, run };
+      model.redraw();
+    },
+    (fault) => model.notify(fault.message),
+  );
+  model.onIdle(() => model.project.has.motion && readRun());
 
   // What the server says of a golf swing, when edits have come to rest and after a fit.
   const readSwing = api.latestOnly(

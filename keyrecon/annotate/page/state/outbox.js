@@ -30,8 +30,8 @@ export function pendingEdits(storage, project) {
 
 // `send` takes edits and resolves to the server's answer. Callbacks: `status` ("saved" |
 // "saving" | "unsaved", how many wait, and why), `delivered` (the answer and the edits that were sent),
-// `rejected` (an edit that the server will never take, and why).
-export function createOutbox({ send, pending, status, delivered, rejected, wait = setTimeout }) {
+// `rejected` (an edit that the server will never take, and why), `stumbled` (what `delivered` threw).
+export function createOutbox({ send, pending, status, delivered, rejected, stumbled, wait = setTimeout }) {
   const turns = []; // what waits for edits made before it: {ahead: how many, work, giveUp}
   let waiting = pending.all(),
     sending = false,
@@ -71,20 +71,29 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
   async function sendBatch() {
     sending = true;
     const batch = waiting.slice(0, Math.min(batchSize, turns[0]?.ahead ?? batchSize));
+    let answer = null;
     try {
-      const answer = await send(batch);
-      failures = 0;
-      offline = false;
-      batchSize = BATCH;
-      forget(batch);
-      delivered(answer, batch);
+      answer = await send(batch);
     } catch (fault) {
       if (fault instanceof Gone) retry(fault);
       else reject(batch, fault);
+    }
+    try {
+      if (answer) take(answer, batch);
+    } catch (fault) {
+      stumbled(fault); // the edits are on the disk; those behind them go on
     } finally {
       sending = false;
       report();
     }
+  }
+
+  function take(answer, batch) {
+    failures = 0;
+    offline = false;
+    batchSize = BATCH;
+    forget(batch);
+    delivered(answer, batch);
   }
 
   function retry(fault) {
@@ -105,10 +114,13 @@ export function createOutbox({ send, pending, status, delivered, rejected, wait 
 
   return {
     add(edit) {
-      pending.keep(edit);
-      waiting.push(edit);
-      report();
-      if (!failures) flush();
+      try {
+        pending.keep(edit); // a browser that is full throws
+      } finally {
+        waiting.push(edit);
+        report();
+        if (!failures) flush();
+      }
     },
     disconnected(fault) {
       offline = true;

@@ -48,12 +48,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   const exists = () => model.project.has.motion;
   // The state of the marks which the motion shows.
   const shownMarks = ({ has, run }) => (has.motion && run.is_current ? run.revision : null);
-  let made = shownMarks(project);
   const points = (kind, at = frame) => (exists() ? motion.points(at, kind) : null);
-  model.onProject(() => {
-    motion.forget(); // a new run makes new motion
-    made = shownMarks(model.project);
-  });
+  model.onProject(motion.forget); // a new run makes new motion
 
   function show(number) {
     const next = Math.max(0, Math.min(last, number));
@@ -82,7 +78,10 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   }
 
   // Whether the motion was made from the marks as they are.
-  const showsMarks = () => exists() && made !== null && model.marksAreOf(made);
+  function showsMarks() {
+    const made = shownMarks(model.project);
+    return made !== null && model.marksAreOf(made);
+  }
 
   // Whether there is nothing to make anew: neither marks nor the height changed.
   function isMade() {
