@@ -36,21 +36,20 @@ PerFrame = TypeVar("PerFrame", Track, FlowTracks, JointTracks, TrackVerification
 
 def take_frames(record: PerFrame, frames: slice | Int[np.ndarray, "n"]) -> PerFrame:
     """A record of some frames only."""
-    return type(record)(
-        **{field.name: getattr(record, field.name)[frames] for field in fields(record)}
-    )
+    own: dict[str, Any] = {field.name: getattr(record, field.name) for field in fields(record)}
+    taken: dict[str, Any] = {n: None if v is None else v[frames] for n, v in own.items()}
+    return type(record)(**taken)
 
 
 def join_frames(records: Sequence[PerFrame]) -> PerFrame:
     """The frames of several records one after the other; of one, that itself."""
     if len(records) == 1:
         return records[0]
-    return type(records[0])(
-        **{
-            field.name: np.concatenate([getattr(record, field.name) for record in records])
-            for field in fields(records[0])
-        }
-    )
+    joined: dict[str, Any] = {}
+    for field in fields(records[0]):
+        each = [getattr(record, field.name) for record in records]
+        joined[field.name] = None if any(v is None for v in each) else np.concatenate(each)
+    return type(records[0])(**joined)
 
 
 def part_of_path(camera: CameraPath, frames: slice | Int[np.ndarray, "n"]) -> CameraPath:
@@ -92,13 +91,24 @@ def part_of_picks(picks: Sequence[Pick], part: slice) -> tuple[Pick, ...]:
 
 def put_back(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerFrame:
     """A record of `frames` as one of `count` frames: those between have NaN, or 0."""
-    values: dict[str, np.ndarray] = {}
+    values: dict[str, Any] = {}
     for field in fields(record):
-        own: np.ndarray = getattr(record, field.name)
-        unknown = np.nan if own.dtype.kind == "f" and "confidence" not in field.name else 0
-        values[field.name] = np.full((count, *own.shape[1:]), unknown, own.dtype)
-        values[field.name][frames] = own
+        own: np.ndarray | None = getattr(record, field.name)
+        values[field.name] = None if own is None else _spread(field.name, own, frames, count)
     return type(record)(**values)
+
+
+SAYING_NOTHING = {"confidence": 0.0, "sides_exchanged": 0.0}
+SAYING_NOTHING |= {"source": float(SOURCES.index("interpolated"))}
+"""What some values are in frames of which nothing is known; others are NaN, or 0."""
+
+
+def _spread(name: str, values: np.ndarray, frames: Int[np.ndarray, "n"], count: int) -> np.ndarray:
+    """Values of `frames` among `count`: NaN between them, or what says nothing."""
+    unknown = np.nan if values.dtype.kind == "f" else 0
+    whole = np.full((count, *values.shape[1:]), SAYING_NOTHING.get(name, unknown), values.dtype)
+    whole[frames] = values
+    return whole
 
 
 def frames_before(frames: Int[np.ndarray, "n"], count: int) -> Int[np.ndarray, "T"]:
@@ -184,16 +194,17 @@ def part_of_keyframes(keyframes: Keyframes, frames: Int[np.ndarray, "n"]) -> Key
 
 PER_FRAME = ("points3d", "points2d", "points2d_propagated", "confidence", "source", "scale", "time")
 """Values of a motion that have one entry per frame."""
+TOLD_PER_FRAME = ("expected_error", "sides_exchanged")
+"""Further ones, that some motions lack."""
 
 
 def cut_motion(motion: Motion, part: slice) -> Motion:
     """Some frames of a motion; times stay those of the video, frames count from the new start."""
-    own: dict[str, Any] = {name: getattr(motion, name)[part] for name in PER_FRAME}
-    errors = motion.expected_error
+    told = [name for name in TOLD_PER_FRAME if getattr(motion, name) is not None]
+    own: dict[str, Any] = {name: getattr(motion, name)[part] for name in (*PER_FRAME, *told)}
     return replace(
         motion,
         **own,
-        expected_error=None if errors is None else errors[part],
         keyframes=_within(motion.keyframes, part),
         cuts=None if motion.cuts is None else _within(motion.cuts, part, beside=1),
     )
@@ -208,18 +219,13 @@ def motion_in_file(motion: Motion, shots: Shots, time: Float[np.ndarray, "T"]) -
     """The motion of the usable shots, over the frames of the file; unknown in the others."""
     frames, count = shots.usable_frames, shots.n_frames
 
-    def spread(values: np.ndarray, unknown: float) -> np.ndarray:
-        whole = np.full((count, *values.shape[1:]), unknown, values.dtype)
-        whole[frames] = values
-        return whole
-
-    nothing = {"confidence": 0.0, "source": float(SOURCES.index("interpolated"))}
-    own: dict[str, Any] = {n: spread(getattr(motion, n), nothing.get(n, np.nan)) for n in PER_FRAME}
-    errors = motion.expected_error
+    told = [name for name in TOLD_PER_FRAME if getattr(motion, name) is not None]
+    own: dict[str, Any] = {
+        name: _spread(name, getattr(motion, name), frames, count) for name in (*PER_FRAME, *told)
+    }
     return replace(
         motion,
         **(own | {"time": time}),
-        expected_error=None if errors is None else spread(errors, np.nan),
         keyframes=frames[motion.keyframes],
         cuts=np.array(shots.first[1:]),
     )

@@ -1,5 +1,7 @@
 """Records of usable shots, put end to end and back over the frames of the file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_motion import make_motion
@@ -36,7 +38,10 @@ def test_work_in_each_shot_does_not_reach_into_the_next():
 def make_tracks(count, seed=0):
     rng = np.random.default_rng(seed)
     return JointTracks(
-        rng.random((count, 4, 2)), rng.random((count, 4)), rng.integers(0, 9, (count, 4))
+        rng.random((count, 4, 2)),
+        rng.random((count, 4)),
+        rng.integers(0, 9, (count, 4)),
+        rng.random((count, 2)),
     )
 
 
@@ -47,6 +52,15 @@ def test_frames_that_are_taken_and_put_back_are_where_they_were_and_nothing_is_b
     between = np.setdiff1d(np.arange(60), USED)
     assert np.isnan(back.joints[between]).all()
     assert (back.confidence[between] == 0).all()
+    np.testing.assert_array_equal(back.sides_exchanged[USED], tracks.sides_exchanged[USED])
+    assert (back.sides_exchanged[between] == 0).all()
+
+
+def test_what_nobody_looked_at_stays_untold():
+    tracks = replace(make_tracks(60), sides_exchanged=None)
+    parts = [take_frames(tracks, part) for part in SHOTS.parts]
+    assert join_frames(parts).sides_exchanged is None
+    assert put_back(take_frames(tracks, USED), USED, 60).sides_exchanged is None
 
 
 def test_parts_that_are_joined_are_the_whole():

@@ -21,7 +21,7 @@ from keyrecon.ranges import SHORTEST, TALLEST
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
-from keyrecon.uncertainty import describe_uncertainty
+from keyrecon.uncertainty import describe_exchanged_marks, describe_uncertainty
 
 
 def settings(
@@ -65,7 +65,8 @@ def run(
     preparation = replace(automatic.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
-    doubts, shots = automatic.contradictions(), describe_shots(preparation.shots)
+    doubts = [*automatic.contradictions(), *describe_exchanged_marks(motion)]
+    shots = describe_shots(preparation.shots)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
         track=preparation.track,

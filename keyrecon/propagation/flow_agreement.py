@@ -44,8 +44,8 @@ def with_flow(
     replaced = elsewhere & flow.joined & (doubted | (flow.confidence > SURE_FLOW))
     places = np.where(replaced[..., None], flow.joints, tracks.joints)
     replaced &= ~stretched_ends(places, height, bounds, tracks.joints)
-    return JointTracks(
-        np.where(replaced[..., None], flow.joints, tracks.joints),
-        np.where(replaced, flow.confidence, tracks.confidence),
-        tracks.keyframe,
+    return replace(
+        tracks,
+        joints=np.where(replaced[..., None], flow.joints, tracks.joints),
+        confidence=np.where(replaced, flow.confidence, tracks.confidence),
     )

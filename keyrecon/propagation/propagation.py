@@ -151,6 +151,8 @@ class PropagatedHalf:
     confidence: Float[np.ndarray, "T J"]
     template: Int[np.ndarray, "T J"]
     """Row of the annotated frame that each joint comes from."""
+    sides_exchanged: Float[np.ndarray, "T"]
+    """Confidence, 0-1, that marks have left and right exchanged."""
 
 
 def propagate_joints(
@@ -198,6 +200,7 @@ def _propagate_fused(
     frames = np.arange(len(preparation.edges))
     joints = np.full((len(frames), annotations.joints.shape[1]), np.nan + 0j)
     confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
+    exchanged: list[Float[np.ndarray, "T"]] = []
     halves = split_body(annotations.skeleton)
     for half in progress(halves, "Propagating joints", len(halves)):
         fixed = joints[:, half.joints[half.fixed]]
@@ -209,8 +212,9 @@ def _propagate_fused(
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
+        exchanged.append(result.sides_exchanged)
     places = player.body_frame.to_pixels(joints, frames[:, None])
-    tracks = JointTracks(places, confidence, source)
+    tracks = JointTracks(places, confidence, source, np.stack(exchanged, axis=1))
     return with_flow(tracks, flow, preparation.track.height, player.bounds)
 
 
@@ -300,7 +304,8 @@ def propagate_half(
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
-    return PropagatedHalf(joints, confidence, identity.apply(half, limbs_chosen.template))
+    template = identity.apply(half, limbs_chosen.template)
+    return PropagatedHalf(joints, confidence, template, identity.marks_exchanged)
 
 
 def _with_marks(
@@ -318,4 +323,4 @@ def _with_marks(
     joints[frame, joint] = annotations.joints[row, joint]
     confidence[frame, joint] = 1
     source[frame, joint] = frame
-    return JointTracks(joints, confidence, source)
+    return replace(tracks, joints=joints, confidence=confidence, keyframe=source)

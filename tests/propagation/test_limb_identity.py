@@ -105,3 +105,17 @@ def test_what_belongs_to_joints_follows_them_to_the_other_side():
     wrong = list(range(22, 33))
     found = identify(exchange(CROSSING, wrong), [0, 40])
     np.testing.assert_allclose(found.apply(LEGS, exchange(CROSSING, wrong)), CROSSING)
+
+
+def test_a_mark_with_left_and_right_exchanged_is_named():
+    apart = legs(0.25 + 0.1 * np.sin(6 * TIME), -0.25 - 0.1 * np.cos(5 * TIME))
+    marked = [0, 10, 20, 30, 40]
+    assert not identify(apart, marked).marks_exchanged.any()
+    # joints near the mark come from its own pose, so they are exchanged too
+    wrong = identify(exchange(apart, list(range(17, 24))), marked)
+    assert np.flatnonzero(wrong.marks_exchanged > 0.5).tolist() == [20]
+
+
+def test_a_mark_amid_limbs_that_have_met_before_and_after_is_not_named():
+    found = identify(exchange(CROSSING, list(range(21, 41))), [0, 40])
+    assert not found.marks_exchanged.any()

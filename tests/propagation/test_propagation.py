@@ -75,6 +75,19 @@ def test_a_crossing_limb_keeps_its_side():
     assert (away < 0.06).mean() > 0.95
 
 
+@pytest.mark.parametrize(("half", "limbs"), [(LSP14.is_lower, 0), (~LSP14.is_lower, 1)])
+def test_a_mark_with_left_and_right_exchanged_is_told_and_kept(half, limbs):
+    marked = (2, 8, 14, 20, 26)
+    preparation, truth = scene(bending(0.3 * np.sin(np.linspace(0, 6, 29))), marked)
+    right = marks(truth, marked)
+    assert not carry(preparation, right).sides_exchanged.any()
+    joints = right.joints.copy()
+    joints[2, half] = right.joints[2, LSP14.mirror][half]
+    found = carry(preparation, replace(right, joints=joints))
+    assert np.argwhere(found.sides_exchanged > 0.5).tolist() == [[14, limbs]]
+    np.testing.assert_array_equal(found.joints[14], joints[2])
+
+
 def test_a_hidden_joint_is_missing_the_papers_way_only():
     preparation, truth = scene(bending(), (2, 9))
     annotations = hide(marks(truth, (2, 9)), "left_wrist")

@@ -1,0 +1,60 @@
+"""Marks whose left and right are exchanged, by the motion between them.
+
+A person who marks a figure seen from behind, or two dark legs that pass, exchanges the sides
+without noticing, and the limbs jump there and back again. Between two marks the limbs can only be
+exchanged where they meet (`limb_motion`), at the lowest price on the way. A mark that costs its
+neighbours a price that the exchanged mark would not is named; nothing is changed.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+RIGHT_FOR_EACH_EXCHANGED = 20.0
+"""Marks with the right sides for each that is exchanged, as far as is known before any is looked
+at: 3 nats. Of 170 right marks of legs or arms of four real clips and a rendered one none lies above
+.5. With one mark of four real clips exchanged at a time, 13 of 15 legs lie above (at 10 in the
+median; others are amid a crossing) and 10 of 13 arms, and the mark is above those next to it in all
+but one."""
+
+
+def exchange_confidence(
+    crossed: Bool[np.ndarray, "T"],
+    price: Float[np.ndarray, "S"],
+    marked: Int[np.ndarray, "K"],
+) -> Float[np.ndarray, "T"]:
+    """Confidence, 0-1, that left and right of a pair of limbs are exchanged on a marked frame; 0
+    elsewhere.
+
+    Two threads without a name are followed through all frames; where they are `crossed` the marks
+    call the one by the other's name. `price` is what motion says against a change of names between
+    two frames, nats, none below zero; S is T - 1. The worst mark is judged first, and those that
+    are left beside its exchanged twin, so that one mark does not bring those next to it into doubt.
+    """
+    confidence = np.zeros(len(crossed))
+    name, between = crossed[marked].copy(), _lowest_between(price, marked)
+    for _ in range(len(marked)):
+        gain = _exchange_gains(name, between)
+        gain[confidence[marked] > 0] = -np.inf
+        worst = int(gain.argmax())
+        odds = float(gain[worst]) - np.log(RIGHT_FOR_EACH_EXCHANGED)
+        if odds <= 0:
+            break
+        confidence[marked[worst]] = 1 / (1 + np.exp(-odds))
+        name[worst] ^= True
+    return confidence
+
+
+def _lowest_between(
+    price: Float[np.ndarray, "S"], marked: Int[np.ndarray, "K"]
+) -> Float[np.ndarray, "gaps"]:
+    """The cheapest place to change names between each mark and the next."""
+    pairs = zip(marked[:-1].tolist(), marked[1:].tolist(), strict=True)
+    return np.array([price[first:last].min() for first, last in pairs])
+
+
+def _exchange_gains(
+    name: Bool[np.ndarray, "K"], between: Float[np.ndarray, "gaps"]
+) -> Float[np.ndarray, "K"]:
+    """What exchanging each mark alone would save, nats."""
+    saved = np.where(name[1:] == name[:-1], -between, between)
+    return np.append(saved, 0.0) + np.append(0.0, saved)
