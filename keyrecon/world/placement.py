@@ -3,10 +3,11 @@
 A lifted pose lives in scaled orthography about the line of sight to the player, so it is first
 turned from that line into the camera's axes and then into the world. Where it stands is told by the
 feet: a foot whose picture does not move against the ground, and which is the lower one of the pose,
-stands, and the line of sight through its ankle meets the ground's plane at the ankle's height. One
-least squares over all frames then places the root: on its own line of sight, standing feet in one
-place on the ground, at the distance that the player's size says where no foot stands, and without
-accelerations that no player has. From there `refinement` changes root and pose together.
+stands, and the line of sight through its ankle meets the ground's plane at the ankle's height; of a
+foot that nothing in the picture told of that is not known. One least squares over all frames then
+places the root: on its own line of sight, standing feet in one place on the ground, at the distance
+that the player's size says where no foot stands, and without accelerations that no player has. From
+there `refinement` changes root and pose together.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +27,7 @@ from keyrecon.world.refinement import (
     refine_placed,
     without_moments,
 )
-from keyrecon.world.sight import sight_axes, sight_lines
+from keyrecon.world.sight import sight_axes, sight_lines, unseen_joints
 
 ANKLE_SHARE = 0.0486
 """Height of the ankle joint above the sole, in statures (8.5 cm of 1.75 m; Drillis and Contini
@@ -91,18 +92,18 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     seen &= inside
     at_root = motion.points2d[:, hips].mean(axis=1)
     pose = _turned_pose(motion, camera, at_root, hips)
-    feet = motion.points2d[:, ankles]
+    feet, told = motion.points2d[:, ankles], seen[:, None] & ~unseen_joints(motion)[:, ankles]
     ratio, still = 1.0 if motion.units == "m" else 1.75, np.zeros((len(seen), 2), dtype=bool)
     for _ in range(2):  # the ankle's height hangs on the player's size
         height = ratio * pose[:, ankles, 2]
         ground = _on_ground(camera, feet, ANKLE_SHARE * ratio * stature_in_units(motion))
         speed = _speed_across(motion, camera, ground, shots)
-        still = _slow_and_low(speed, height, HELD_SPEED) & seen[:, None]
+        still = _slow_and_low(speed, height, HELD_SPEED) & told
         still = _long_enough(still, motion.fps, shots)
         if not still.any():
             return None
         ratio = _size(motion, camera, ground, still)
-    slow = _slow_and_low(speed, height, CONTACT_SPEED) & seen[:, None]
+    slow = _slow_and_low(speed, height, CONTACT_SPEED) & told
     slow = _long_enough(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)

@@ -10,8 +10,9 @@ unknowns of `motion_solver`, holds together
 - feet that stand: they stay where they are, and their ankles are at one height. Both are let go
   where the evidence is against them (weights of Geman and McClure 1987, and of Cauchy with a scale
   that shrinks from round to round: what slides is found before it is held);
-- the centre of mass: free fall while no foot is on the ground, else no acceleration that players do
-  not have, and over the feet along the line of sight, where the picture does not show a lean;
+- the centre of mass: free fall while both feet were seen and neither is on the ground, else no
+  acceleration that players do not have, and over the feet along the line of sight, where the
+  picture does not show a lean;
 - the breadths of hips and shoulders, and one length of each bone for all frames, near the lifted
   one: legs are as long as standing feet and hips show them, a trunk that is put upright as its
   picture.
@@ -33,7 +34,7 @@ from keyrecon.world import world_terms as terms
 from keyrecon.world.lean import facing, put_upright, sight_on_ground
 from keyrecon.world.motion_solver import DirectionPrior, Figure, Term, WorldState, solve
 from keyrecon.world.records import WorldCamera
-from keyrecon.world.sight import sight_axes
+from keyrecon.world.sight import sight_axes, unseen_joints
 
 DEPTH_ERROR = {"hip": 0.05, "shoulder": 0.165, "head": 0.155, "knee": 0.16, "ankle": 0.23}
 DEPTH_ERROR |= {"elbow": 0.23, "wrist": 0.285}
@@ -310,13 +311,14 @@ def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list
         made.append(terms.breadth(pair.left, pair.right, float(length), spread, joints))
     masses = terms.joint_masses(skeleton.names)
     grounded = standing.still[:, 0] | standing.still[:, 1]
-    flying = without_moments(~grounded[:, None], max(3, round(SHORTEST_FLIGHT * fps)))
+    feet = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
+    told = placed.seen & ~unseen_joints(motion)[:, feet].any(axis=1)
+    flying = without_moments((told & ~grounded)[:, None], max(3, round(SHORTEST_FLIGHT * fps)))
     expected = np.where(flying, [0.0, 0.0, -GRAVITY], np.zeros(3))
     weight = np.where(flying, 1 / FALL_ERROR, np.full(3, 1 / ACCELERATION))
     made.append(terms.body_acceleration(masses, expected, weight, fps))
     along, _ = sight_on_ground(body.figure.axes)
     ahead = FOOT_AHEAD * facing(body.directions, body.figure)
-    feet = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
     support = np.zeros((len(along), joints))
     support[:, feet] = 0.5
     spread = BALANCE_ERROR * np.sqrt(_lasting(BALANCE_MEMORY, fps))

@@ -1,8 +1,9 @@
-"""Lines of sight, and the axes about them in which a lifted pose lives."""
+"""Lines of sight, the axes about them in which a lifted pose lives, and what of it was seen."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from keyrecon.records import SOURCES, Motion
 from keyrecon.world.records import WorldCamera
 
 
@@ -26,3 +27,8 @@ def sight_axes(camera: WorldCamera, pixels: Float[np.ndarray, "T 2"]) -> Float[n
     right = np.cross(np.array([0.0, 1.0, 0.0]), ray)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
     return np.einsum("tji,tjk->tik", camera.R, np.stack([right, np.cross(ray, right), ray], axis=2))
+
+
+def unseen_joints(motion: Motion) -> Bool[np.ndarray, "T J"]:
+    """Joints that nothing in the picture told of: where they are says nothing of the ground."""
+    return (motion.confidence == 0) & (motion.source == SOURCES.index("interpolated"))

@@ -1,7 +1,8 @@
 """Moments in which the player stands, told from the picture and the lifted motion alone.
 
-A foot stands whose ankle does not move against the background and is not the upper one. The
-stillest frame of every half second is taken: neighbouring frames would say the same again.
+A foot stands whose ankle does not move against the background and is not the upper one; of one that
+was not seen nothing is known. The stillest frame of every half second is taken: neighbouring frames
+would say the same again.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import Motion
 from keyrecon.world.ground_evidence import Stances
 from keyrecon.world.placement import HELD_SPEED, REACH, stature_in_units
+from keyrecon.world.sight import unseen_joints
 from keyrecon.world.world_terms import joint_masses
 
 APART = 0.5
@@ -50,7 +52,7 @@ def find_stances(
         feet[..., 1].max(axis=1, keepdims=True) - feet[..., 1] < UPPER * (scale * stature)[:, None]
     )
     with np.errstate(invalid="ignore"):
-        still = (speed < HELD_SPEED) & lower & seen[:, None]
+        still = (speed < HELD_SPEED) & lower & seen[:, None] & ~unseen_joints(motion)[:, ankles]
     speed = np.where(still, speed, np.inf)
     frames = _stillest(speed.min(axis=1), motion)
     foot = speed[frames].argmin(axis=1)

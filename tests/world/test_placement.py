@@ -9,8 +9,10 @@ from painted_court import camera_at
 
 from keyrecon.body import LSP14
 from keyrecon.io.formats.motion_file import read_motion, write_motion
+from keyrecon.records import SOURCES
 from keyrecon.world.placement import place_motion
 from keyrecon.world.run_measures import measure_run
+from keyrecon.world.stances import find_stances
 
 PINHOLE = camera_at((2, -20, 3), (0, -9, 0.8), 1.6)
 FEET = [LSP14.index("right_ankle"), LSP14.index("left_ankle")]
@@ -65,16 +67,58 @@ def test_the_way_is_as_long_as_it_was(walked):
 
 def test_frames_without_the_court_have_no_place(walked):
     _, _, motion, _ = walked
-    camera = court_camera(PINHOLE, len(motion.time))
-    lost = camera.found.copy()
-    lost[40:60] = False
-    blank = {n: getattr(camera, n).copy() for n in ("K", "R", "t")}
-    for values in blank.values():
-        values[40:60] = np.nan
-    world = place_motion(motion, replace(camera, found=lost, **blank))
-    assert np.isnan(world.points[40:60]).all()
-    assert np.isfinite(world.points[~np.isin(np.arange(len(lost)), np.arange(40, 60))]).all()
+    gap = slice(40, 60)
+    world = place_motion(motion, without_camera(len(motion.time), gap))
+    assert np.isnan(world.points[gap]).all()
+    assert np.isfinite(np.delete(world.points, np.r_[gap], axis=0)).all()
     assert not world.contact[40:60].any()
+
+
+def without_camera(frames, gap):
+    """The camera, which was not found in the gap."""
+    camera = court_camera(PINHOLE, frames)
+    values = {n: getattr(camera, n).copy() for n in ("K", "R", "t", "found")}
+    for name in ("K", "R", "t"):
+        values[name][gap] = np.nan
+    values["found"][gap] = False
+    return replace(camera, **values)
+
+
+def test_a_player_does_not_fall_while_the_court_is_lost(walked):
+    points, _, motion, _ = walked
+    world = place_motion(motion, without_camera(len(points), slice(50, 100)))
+    hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    off = np.linalg.norm(world.root - hips, axis=1)
+    assert off[np.r_[42:50, 100:108]].max() < 0.03
+
+
+def test_feet_that_nothing_told_of_do_not_stand(walked):
+    points, contact, motion, _ = walked
+    unseen = slice(50, 100)
+    flat, space, confidence, source = (
+        getattr(motion, name).copy() for name in ("points2d", "points3d", "confidence", "source")
+    )
+    flat[unseen, FEET] = flat[50, FEET]  # held where they were last
+    space[unseen, FEET, 2] = np.linspace(space[49, FEET, 2], space[100, FEET, 2], 50)
+    confidence[unseen, FEET], source[unseen, FEET] = 0, SOURCES.index("interpolated")
+    motion = replace(motion, points2d=flat, points3d=space, confidence=confidence, source=source)
+    world = place_motion(motion, court_camera(PINHOLE, len(points)))
+    assert not world.contact[unseen].any()
+    assert (world.contact & contact)[100:].sum() > 0.85 * contact[100:].sum()
+    hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    off = np.linalg.norm(world.root - hips, axis=1)
+    assert np.delete(off, np.r_[unseen]).mean() < 0.02
+
+
+def test_feet_that_nothing_told_of_say_nothing_of_the_ground(walked):
+    points, _, motion, _ = walked
+    confidence, source = motion.confidence.copy(), motion.source.copy()
+    confidence[50:, FEET], source[50:, FEET] = 0, SOURCES.index("interpolated")
+    count = len(points)
+    everywhere = np.ones(count, dtype=bool), np.tile(np.eye(3), (count, 1, 1)), np.ones(count)
+    assert find_stances(motion, *everywhere).frame.max() > 100
+    motion = replace(motion, confidence=confidence, source=source)
+    assert find_stances(motion, *everywhere).frame.max() < 50
 
 
 def test_a_motion_on_the_court_is_the_same_without_it(walked, tmp_path):
