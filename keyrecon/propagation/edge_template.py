@@ -208,8 +208,14 @@ class FootEvidence:
     """Positions of the joints in their half of the body."""
     points: Complex[np.ndarray, "T 2"]
     """Player coordinates."""
+    seen: Bool[np.ndarray, "T"]
+    """False where the feet were not seen and lie between places where they were."""
     spread: float
     """Median error, player heights."""
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> "FootEvidence":
+        """That of some frames."""
+        return replace(self, points=self.points[frames], seen=self.seen[frames])
 
 
 def learn_foot_offsets(
@@ -217,13 +223,15 @@ def learn_foot_offsets(
     frames: Int[np.ndarray, "K"],
     joints: Complex[np.ndarray, "K J"],
     tracked: Complex[np.ndarray, "T 2"],
+    seen: Bool[np.ndarray, "T"],
 ) -> FootEvidence:
-    """Tracked feet, moved to where the ankles are on annotated frames."""
+    """Tracked feet, moved to where the ankles are on annotated frames in which they were seen."""
     ends = np.array([max(side, key=lambda j: half.depth[j]) for side in half.sides])
     gap = joints[:, ends] - order_feet(tracked[frames], joints[:, ends])
+    gap = gap[seen[frames]] if seen[frames].any() else gap
     shift = np.median(gap.real) + 1j * np.median(gap.imag)
     spread = float(np.median(np.abs(gap - shift)))
-    return FootEvidence(ends, tracked + shift, max(spread, MIN_FOOT_SPREAD))
+    return FootEvidence(ends, tracked + shift, seen, max(spread, MIN_FOOT_SPREAD))
 
 
 def order_feet(

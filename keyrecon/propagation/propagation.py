@@ -243,11 +243,11 @@ def _half_templates(player: PlayerEvidence, poses: AnnotatedPoses, most: int) ->
     templates = make_edge_templates(edges, body_frame, poses, most)
     if poses.half.name != "lower":
         return templates
-    feet = player.preparation.track.feet
-    tracked = body_frame.from_pixels(feet, np.arange(len(feet))[:, None])
-    return replace(
-        templates, feet=learn_foot_offsets(poses.half, poses.frames, poses.joints, tracked)
-    )
+    track = player.preparation.track
+    tracked = body_frame.from_pixels(track.feet, np.arange(len(track.feet))[:, None])
+    seen = track.confidence > 0
+    feet = learn_foot_offsets(poses.half, poses.frames, poses.joints, tracked, seen)
+    return replace(templates, feet=feet)
 
 
 def _start_half(

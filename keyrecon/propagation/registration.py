@@ -214,11 +214,16 @@ def edge_equations_of_all(
 def foot_equations(
     feet: FootEvidence, frames: Int[np.ndarray, "P"], joints: Complex[np.ndarray, "P J"]
 ) -> NormalEquations:
-    """Observations of the ends of the legs."""
+    """Observations of the ends of the legs, where the feet were seen.
+
+    Weighed by the track's confidence, four rendered clips of 12 s came out .3 points of PCK worse
+    to .3 better and .6 mm worse to .8 better: it tells no more.
+    """
     target, weight = np.zeros(joints.shape, complex), np.zeros(joints.shape)
     target[:, feet.ends] = order_feet(feet.points[frames], joints[:, feet.ends])
     distance = np.abs(target[:, feet.ends] - joints[:, feet.ends])
-    weight[:, feet.ends] = 1 / (feet.spread * (1 + (distance / FOOT_MATCH_DISTANCE) ** 2)) ** 2
+    pull = 1 / (feet.spread * (1 + (distance / FOOT_MATCH_DISTANCE) ** 2)) ** 2
+    weight[:, feet.ends] = feet.seen[frames, None] * pull
     return joint_equations(target, weight)
 
 

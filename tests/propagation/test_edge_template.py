@@ -183,7 +183,7 @@ def test_each_foot_counts_for_the_leg_it_fits():
     ends = np.array([max(side, key=lambda j: LOWER.depth[j]) for side in LOWER.sides])
     joints[:, ends] = ankles
     tracked = np.array([[0.23 + 1.02j, -0.17 + 1.02j], [0.13 + 1.02j, -0.07 + 1.02j]])
-    feet = learn_foot_offsets(LOWER, np.arange(2), joints, tracked)
+    feet = learn_foot_offsets(LOWER, np.arange(2), joints, tracked, np.ones(2, bool))
     seen = foot_equations(feet, np.arange(2), joints + 0.02).solve()[:, ends]
     np.testing.assert_allclose(seen, ankles, atol=1e-6)
     far = foot_equations(feet, np.arange(2), joints + 0.5j).matrix

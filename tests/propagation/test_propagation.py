@@ -113,6 +113,19 @@ def test_a_joint_that_cannot_be_seen_in_a_frame_is_not_carried_there(options):
     assert np.isfinite(found.joints[4, wrist]).all()
 
 
+def test_feet_that_were_not_seen_do_not_pull_the_ankles():
+    legs = "right_hip", ("right_knee", "right_ankle")
+    poses = [turned(standing(), *legs, angle) for angle in np.linspace(-0.3, 0.3, 21)]
+    preparation, truth = scene(poses, (0, 20))
+    track, unseen = preparation.track, slice(6, 15)
+    track.feet[unseen, :, 0] += 0.12 * track.height[unseen, None]
+    track.confidence[unseen] = 0
+    found = carry(preparation, marks(truth, (0, 20)))
+    ankles = [LSP14.index(f"{side}_ankle") for side in ("right", "left")]
+    away = np.linalg.norm(found.joints - truth, axis=-1)[:, ankles] / track.height[:, None]
+    assert away.max() < 0.003
+
+
 @pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])
 def test_confidence_falls_with_pose_distance(options):
     preparation, truth = scene(bending(np.linspace(0, 1.2, 13)), (0,))

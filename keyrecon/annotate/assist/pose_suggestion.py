@@ -143,9 +143,10 @@ def _make_templates(
     )
     if half.name == "upper":
         return templates
-    tracked = body_frame.from_pixels(scene.preparation.track.feet, np.arange(len(edges))[:, None])
-    feet = learn_foot_offsets(half, poses.frames, poses.joints, tracked)
-    return replace(templates, feet=replace(feet, points=feet.points[frames]))
+    track = scene.preparation.track
+    tracked = body_frame.from_pixels(track.feet, np.arange(len(edges))[:, None])
+    feet = learn_foot_offsets(half, poses.frames, poses.joints, tracked, track.confidence > 0)
+    return replace(templates, feet=feet.part(frames))
 
 
 def template_frames(annotations: Annotations, half: BodyHalf) -> Int[np.ndarray, "K"]:
@@ -285,7 +286,7 @@ def _choose_each(
         one = PoseHypotheses(
             *(getattr(hypotheses, f.name)[n : n + 1] for f in fields(PoseHypotheses))
         )
-        feet = templates.feet and replace(templates.feet, points=templates.feet.points[n : n + 1])
+        feet = templates.feet and templates.feet.part(slice(n, n + 1))
         single = replace(
             templates,
             poses=no_poses,
