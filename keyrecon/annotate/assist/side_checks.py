@@ -65,13 +65,15 @@ def find_exchanges(
     appearance: MarkAppearance | None,
 ) -> Iterator[Check]:
     """The most suspicious first."""
+    if not len(annotations.frames):
+        return
     facing = measure_facing(annotations, size)
     exchanged = np.zeros((2, len(annotations.frames)), dtype=bool)
     while True:
         evidence = _weigh(annotations, neighbours, appearance, facing, exchanged)
         total = np.where(exchanged, -np.inf, evidence.total)
         limb, row = np.unravel_index(int(total.argmax()), total.shape)
-        doubt = suspicion(float(total[limb, row])) if total.size else 0.0
+        doubt = suspicion(float(total[limb, row]))
         if doubt < LEAST_EVIDENCE:
             return
         exchanged[limb, row] = True

@@ -10,6 +10,7 @@ from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.checks import find_checks
 from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.body import LSP14
+from keyrecon.timeline import part_of_marks
 
 ROW = 5
 LEGS = ("hip", "knee", "ankle")
@@ -50,6 +51,15 @@ def place(annotations, name):
 def test_true_marks_raise_no_suspicion(careful):
     preparation, annotations = careful
     assert [c for c in checked(preparation, annotations) if c.suspicion > 0.5] == []
+
+
+def test_where_nothing_is_marked_nothing_looks_wrong(careful):
+    preparation, annotations = careful
+    body = estimate_body(annotations, {}, preparation.track.height, 50.0)
+    nothing = part_of_marks(annotations, np.arange(0))
+    assert len(nothing.frames) == 0
+    neighbours = find_neighbours(preparation, nothing)
+    assert find_checks(nothing, body.size, neighbours, preparation.track) == []
 
 
 def test_swapped_legs_come_first_and_only_once(careful):
