@@ -294,5 +294,5 @@ class RecordedSwing:
 
 
 def fitted_frames(motion: Motion) -> Bool[np.ndarray, "T"]:
-    """Frames to which a swing was fitted: in the others no joint has any confidence."""
-    return motion.confidence.max(axis=1) > 0
+    """Frames to which a swing was fitted: in the others joints have no confidence if not marked."""
+    return motion.confidence.min(axis=1) > 0

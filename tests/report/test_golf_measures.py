@@ -13,8 +13,16 @@ from scipy.spatial.transform import Rotation
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.fit.residuals import build_capsules
+from keyrecon.golf.marks import hold_joints
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, FittedSwing, RootPose, SwingState
+from keyrecon.golf.records import (
+    Camera,
+    FittedSwing,
+    RootPose,
+    SwingMarks,
+    SwingState,
+    fitted_frames,
+)
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.formats.swing_file import read_swing, write_swing
 from keyrecon.io.video import open_video
@@ -307,3 +315,14 @@ def test_frames_that_were_not_fitted_do_not_widen_the_part_of_the_picture_that_i
     assert rows.stop <= body[:, 1].max() + room and columns.start >= body[:, 0].min() - room - 1
     rows, columns = _around_swing(video, swing)
     assert rows.stop <= body[:, 1].max() + room and columns.start >= body[:, 0].min() - room - 1
+
+
+def test_a_joint_that_is_marked_where_nothing_was_fitted_makes_no_fit_of_its_frame():
+    swing, confidence = still(), np.ones((FRAMES, 14))
+    confidence[20:] = 0
+    swing = replace(swing, motion=replace(swing.motion, confidence=confidence))
+    joints = np.full((1, 14, 2), np.nan)
+    joints[0, LSP14.index("right_wrist")] = 0.3, -0.2
+    marked = hold_joints(swing, SwingMarks.of_joints(np.array([26]), joints), 800.0)
+    assert marked.motion.confidence[26].max() == 1
+    assert np.flatnonzero(fitted_frames(marked.motion)).tolist() == list(range(20))
