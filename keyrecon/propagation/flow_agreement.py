@@ -19,6 +19,8 @@ edges took the arm in front for the one behind it, with a confidence of .7, for 
 flow joins to within a pixel: +2.8 points of PCK on that clip, +.5 to -.6 on four others, 0 to -.1
 on three rendered sequences."""
 MIN_FLOW_CONFIDENCE = 0.1
+"""Flow that is less sure says nothing. A quarter more or less, others with it: at most 1.5 points,
+2.1 mm on nine clips."""
 
 
 def with_flow(

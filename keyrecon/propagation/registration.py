@@ -48,7 +48,7 @@ doubled, others with it: at most 0.1 points, 0.2 mm on one clip."""
 
 BOUND_SPREAD = 0.002
 """How firmly a bone that is too long comes to its bound, player heights: more than anything else
-but marks."""
+but marks. A quarter more or less, others with it: at most 1.5 points, 2.1 mm on nine clips."""
 
 
 @dataclass(frozen=True)

