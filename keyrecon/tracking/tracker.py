@@ -233,13 +233,15 @@ def _marked_examples(
 
 
 def _through_marks(track: Track, anchors: TrackAnchors) -> Track:
-    """The track with head and feet where they were marked, and sure of them."""
+    """The track with head and feet where they were marked, and sure where both were."""
     head, feet, confidence = track.head.copy(), track.feet.copy(), track.confidence.copy()
-    for row, frame in enumerate(anchors.frames.tolist()):
-        if np.isfinite(anchors.head[row]).all():
-            head[frame], confidence[frame] = anchors.head[row], 1.0
-        if np.isfinite(anchors.feet[row]).all():
-            feet[frame], confidence[frame] = anchors.feet[row], 1.0
+    with_head, with_feet = (
+        np.isfinite(part).all(axis=tuple(range(1, part.ndim)))
+        for part in (anchors.head, anchors.feet)
+    )
+    head[anchors.frames[with_head]] = anchors.head[with_head]
+    feet[anchors.frames[with_feet]] = anchors.feet[with_feet]
+    confidence[anchors.frames[with_head & with_feet]] = 1.0
     return replace(track, head=head, feet=feet, confidence=confidence)
 
 

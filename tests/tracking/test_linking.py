@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from keyrecon.records import CameraPath, Track
+from keyrecon.records import CameraPath, Track, TrackAnchors
 from keyrecon.segmentation.player_crops import Cropping
 from keyrecon.tracking.correlation_filters import clear_frames, sound_frames
 from keyrecon.tracking.linking import Detections, FootMotionModel, link_feet
 from keyrecon.tracking.smoothing import fill_gaps
-from keyrecon.tracking.tracker import detect_in_crop
+from keyrecon.tracking.tracker import _through_marks, detect_in_crop
 
 COUNT, TALL = 60, 56.0
 HEAD, LEFT, RIGHT = (np.array(spot) for spot in ((200.0, 100.0), (195.0, 150.0), (205.0, 158.0)))
@@ -78,6 +78,17 @@ def test_frames_in_which_the_player_was_not_seen_are_not_trained_on(choose):
     assert set(choose(rough)) == seen
     rough.confidence[:] = 0
     assert set(choose(rough)) == set(range(COUNT))
+
+
+def test_a_marked_head_does_not_make_the_track_sure_of_feet_that_were_not_seen():
+    unsure = track()
+    unsure.confidence[:] = 0
+    head = np.array([HEAD, HEAD + 1, (np.nan, np.nan)])
+    feet = np.array([(LEFT, RIGHT), np.full((2, 2), np.nan), (LEFT, RIGHT)])
+    anchors = TrackAnchors(np.array([5, 10, 15]), head, feet, np.ones(3, bool))
+    marked = _through_marks(unsure, anchors)
+    assert np.flatnonzero(marked.confidence).tolist() == [5]
+    assert marked.head[10].tolist() == (HEAD + 1).tolist()
 
 
 def test_a_place_with_the_leg_beneath_it_is_less_a_foot_than_one_with_the_floor():
