@@ -3,7 +3,11 @@
 import pytest
 from overlaps import OVERLAPS, PARTS
 from page_driver import BROWSER, Person, serving
-from page_project import make_project, write_numbered_video
+from page_project import make_project, truth, write_numbered_video, write_true_motion
+
+from keyrecon.body import LSP14
+from keyrecon.io.provenance import RunNotes, note_run
+from keyrecon.io.workspace import Workspace
 
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
@@ -42,3 +46,24 @@ def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, s
         assert wide <= size[0], page
     context.close()
     assert found == {"bodies": [], "pick": [], "keyframes": [], "motion": [], "files": []}
+
+
+@pytest.mark.parametrize("width", [1920, 1366, 1100])
+def test_what_is_said_of_a_motion_is_not_cut_off(chromium, tmp_path, server, width):
+    folder = make_project(tmp_path / "rally", server.folder.parent / "numbered.mp4")
+    write_true_motion(folder)
+    (folder / "cache").mkdir(exist_ok=True)
+    note_run(Workspace(folder), RunNotes("of other marks", ()))
+    with serving(folder) as served:
+        context = chromium.new_context(viewport={"width": width, "height": 768})
+        person = Person(context, served.credentials.address)
+        person.open(40)
+        person.mark_joints(lambda joint: truth()[1][40, LSP14.index(joint)])
+        person.await_saved()
+        person.press("Alt+3")
+        person.await_text("#motion-text", "Not yet in the motion")
+        person.await_drawn()
+        prompt = person.page.locator("#motion .prompt")
+        room, text = prompt.evaluate("e => [e.clientHeight, e.scrollHeight]")
+        context.close()
+    assert text <= room

@@ -126,7 +126,7 @@ const HEIGHTS = [0.5, 2.6]; // of a player, metres
 export function heightIn(text) {
   const [, number, unit] = text.trim().replace(",", ".").match(/^([\d.]+)\s*(cm|m)?$/i) ?? [],
     typed = Number(number);
-  if (!text.trim()) return { metres: null, said: "left empty: lengths in body heights", wrong: false };
+  if (!text.trim()) return { metres: null, said: "empty: in body heights", wrong: false };
   const centimetres = unit ? unit.toLowerCase() === "cm" : typed > 10,
     metres = Math.round(centimetres ? typed * 10 : typed * 1000) / 1000;
   if (metres >= HEIGHTS[0] && metres <= HEIGHTS[1])
