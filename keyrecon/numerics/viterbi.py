@@ -43,15 +43,16 @@ def find_cheapest_path(
     if order > 1 and max_gap > 1:
         raise ValueError("only a first-order path can skip frames")
     path = np.full(frames + order - 1, -1)
-    recent: deque[np.ndarray] = deque(maxlen=max_gap)
+    recent: deque[tuple[np.ndarray, float]] = deque(maxlen=max_gap)
     back: list[_Predecessors] = []
     cheapest, end = _times(frames, skip_cost), None
     for t, cost in enumerate(unary):
         arrival, predecessors = _arrive(cost.shape, recent, transition, t, skip_cost)
         total = arrival + cost
-        recent.appendleft(total)
+        least = float(total.min(initial=np.inf))
+        recent.appendleft((total, least))
         back.append(predecessors)
-        ended = total.min(initial=np.inf) + _times(frames - 1 - t, skip_cost)
+        ended = least + _times(frames - 1 - t, skip_cost)
         if ended < cheapest:
             cheapest, end = ended, (t, np.unravel_index(total.argmin(), total.shape))
     while end is not None:
@@ -78,18 +79,20 @@ class _Predecessors:
 
 def _arrive(
     shape: tuple[int, ...],
-    recent: Sequence[np.ndarray],
+    recent: Sequence[tuple[np.ndarray, float]],
     transition: Transition,
     t: int,
     skip_cost: float,
 ) -> tuple[Float[np.ndarray, "*S"], _Predecessors]:
-    """Cheapest way to each state of frame t; `recent` has the totals of the frames before it."""
+    """Cheapest way to each state of frame t; `recent` has the totals of the frames before it, and
+    the least of each."""
     best = np.full(shape, _times(t, skip_cost))
     step = np.zeros(shape, np.min_scalar_type(len(recent)))
-    oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r in recent), default=0)))
-    for gap, before in zip(count(1), recent):
+    oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r, _ in recent), default=0)))
+    dearest = best.max(initial=-np.inf)
+    for gap, (before, least) in zip(count(1), recent):
         skipped = _times(gap - 1, skip_cost)
-        if not best.size or not before.size or before.min() + skipped >= best.max():
+        if least + skipped >= dearest:
             continue  # no gap this long can be cheaper
         through = before[..., None] + transition(t - gap, t)
         if skipped:
@@ -98,6 +101,7 @@ def _arrive(
         cost = through.min(axis=0)
         better = cost < best
         best = np.where(better, cost, best)
+        dearest = best.max()
         step[better] = gap
         oldest[better] = last[better]
     return best, _Predecessors(step, oldest)
