@@ -109,7 +109,7 @@ def _look_over(video: Video) -> tuple[bool, float]:
     """Whether a shot shows nothing at all, and the share of its frames that are repeated."""
     contrast, change, before = [], [0.0], None
     for grey in read_grey(video, min(COMPARED_WIDTH, video.width)):
-        contrast.append(float(thumbnail(grey).std()))
+        contrast.append(thumbnail(grey).contrast)
         now = grey.astype(np.int16)
         if before is not None:
             change.append(picture_change(before, now))

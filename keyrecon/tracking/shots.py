@@ -12,13 +12,13 @@ those before and after it, which have nothing in common: no motion of a camera g
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
 Grey = UInt8[np.ndarray, "y x"]
-Thumbnail = Float[np.ndarray, "h w"]
 
 WIDTH = 64
 """Of a thumbnail, px. A quarter more or less, others with it: at most 1.9 points, 2.4 mm on four
@@ -63,6 +63,23 @@ def blend_lengths(fps: float) -> tuple[int, ...]:
     """Frames that a dissolve may take, to be tried in turn."""
     doubled = max(0, int(np.log2(LONGEST_BLEND * fps / SHORTEST_BLEND)))
     return tuple(SHORTEST_BLEND << k for k in range(doubled + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Thumbnail:
+    """A small picture without its coarse brightness."""
+
+    pixels: Float[np.ndarray, "h w"]
+
+    @cached_property
+    def contrast(self) -> float:
+        """Standard deviation of the brightness."""
+        return float(self.pixels.std())
+
+    @cached_property
+    def centred(self) -> Float[np.ndarray, "n"]:
+        """All pixels in a row, with a mean of 0."""
+        return self.pixels.ravel() - self.pixels.mean()
 
 
 @dataclass(eq=False)
@@ -170,9 +187,9 @@ def find_blend(recent: Sequence[Thumbnail], lengths: Sequence[int]) -> tuple[int
         if length >= len(recent):
             return None
         before, middle, after = recent[-1 - length], recent[-1 - length // 2], recent[-1]
-        if min(float(one.std()) for one in (before, middle, after)) < PLAIN:
+        if min(one.contrast for one in (before, middle, after)) < PLAIN:
             continue
-        a, m, b = (one.ravel() - one.mean() for one in (before, middle, after))
+        a, m, b = (one.centred for one in (before, middle, after))
         aa, bb, ab = float(a @ a), float(b @ b), float(a @ b)
         if ab > STRANGERS * np.sqrt(aa * bb):
             continue
@@ -187,16 +204,18 @@ def find_blend(recent: Sequence[Thumbnail], lengths: Sequence[int]) -> tuple[int
 
 
 def thumbnail(grey: Grey) -> Thumbnail:
-    """A small picture without its coarse brightness."""
+    """Of a picture."""
     height = max(8, round(grey.shape[0] * WIDTH / grey.shape[1]))
     small = cv2.resize(grey, (WIDTH, height), interpolation=cv2.INTER_AREA).astype(np.float32)
-    return small - cv2.GaussianBlur(small, (0, 0), COARSE)
+    return Thumbnail(small - cv2.GaussianBlur(small, (0, 0), COARSE))
 
 
 def correlation(first: Thumbnail, second: Thumbnail) -> float:
     """How alike two pictures are, -1 to 1, wherever the middle of the second fits best."""
-    down, right = (round(SHIFT * side) for side in second.shape)
-    middle = second[down : second.shape[0] - down, right : second.shape[1] - right]
-    if min(float(first.std()), float(middle.std())) < PLAIN:
-        return float(max(float(first.std()), float(middle.std())) < PLAIN)
-    return float(cv2.matchTemplate(first, middle, cv2.TM_CCOEFF_NORMED).max())
+    pixels = second.pixels
+    down, right = (round(SHIFT * side) for side in pixels.shape)
+    middle = pixels[down : pixels.shape[0] - down, right : pixels.shape[1] - right]
+    contrasts = first.contrast, float(middle.std())
+    if min(contrasts) < PLAIN:
+        return float(max(contrasts) < PLAIN)
+    return float(cv2.matchTemplate(first.pixels, middle, cv2.TM_CCOEFF_NORMED).max())
