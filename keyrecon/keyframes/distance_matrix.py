@@ -17,6 +17,7 @@ of more than `most` frames only exemplars are compared with one another (see exe
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -261,12 +262,10 @@ def _accumulate(
     there = np.empty((n_new, elements.n_frames), dtype=np.float32)
     back = np.empty((n_known, n_new), dtype=np.float32)
     matched = np.empty_like(there) if options.largest == "observed" else None
-    start = np.searchsorted(elements.frame, np.arange(elements.n_frames + 1))
 
     def measure(first: int) -> None:
         frames = range(first, min(first + FRAMES_PER_BLOCK, elements.n_frames))
-        part = slice(start[frames.start], start[frames.stop])
-        offered = offer_distances(elements, cells, part, frames, reach)
+        offered = offer_distances(elements, cells, frames, reach)
         there[:, frames.start : frames.stop] = new @ offered
         if n_known and frames.stop > n_known:
             since = max(frames.start, n_known)
@@ -301,20 +300,26 @@ def _take_means(
 
 
 def offer_distances(
-    elements: BinnedElements, cells: DescriptorBins, part: slice, frames: range, reach: float
+    elements: BinnedElements, cells: DescriptorBins, frames: range, reach: float
 ) -> Float32[np.ndarray, "G B"]:
-    """M for some frames, whose elements are `part`: distance of each cell to each frame."""
-    cell = cells.of_element[part]
-    count = cells.first[cell + 1] - cells.first[cell]
-    target = cells.neighbor[ranges(cells.first[cell], count)]
-    away = cells.center[target]
-    away -= np.repeat(elements.points[part].view(np.complex64)[:, 0], count)
-    squared = np.square(away.real) + np.square(away.imag)
-    slot = target.astype(np.int64) * len(frames)
-    slot += np.repeat(elements.frame[part] - frames.start, count)
-    nearest = np.full(len(cells.center) * len(frames), reach * reach, dtype=np.float32)
-    np.minimum.at(nearest, slot, squared)
-    return np.minimum(np.sqrt(nearest), np.float32(reach)).reshape(-1, len(frames))
+    """M for some frames: distance of each cell to each frame.
+
+    Pairs of an element and a cell are many, so those of one frame at a time stay in the cache.
+    """
+    nearest = np.full((len(frames), len(cells.center)), reach * reach, dtype=np.float32)
+    points = elements.points.view(np.complex64)[:, 0]
+    starts = np.searchsorted(elements.frame, np.arange(frames.start, frames.stop + 1)).tolist()
+    for row, span in enumerate(pairwise(starts)):
+        part = slice(*span)
+        cell = cells.of_element[part]
+        count = cells.first[cell + 1] - cells.first[cell]
+        target = cells.neighbor[ranges(cells.first[cell], count)]
+        away = cells.center[target]
+        away -= np.repeat(points[part], count)
+        squared = np.square(away.real) + np.square(away.imag)
+        np.minimum.at(nearest[row], target, squared)
+    np.sqrt(nearest, out=nearest)
+    return np.ascontiguousarray(np.minimum(nearest, np.float32(reach)).T)
 
 
 def _with_observed_largest(

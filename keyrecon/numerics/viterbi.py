@@ -89,7 +89,7 @@ def _arrive(
     best = np.full(shape, _times(t, skip_cost))
     step = np.zeros(shape, np.min_scalar_type(len(recent)))
     oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r, _ in recent), default=0)))
-    dearest = best.max(initial=-np.inf)
+    dearest = _times(t, skip_cost) if best.size else -np.inf
     for gap, (before, least) in zip(count(1), recent):
         skipped = _times(gap - 1, skip_cost)
         if least + skipped >= dearest:
