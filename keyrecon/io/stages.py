@@ -263,7 +263,7 @@ class StageStore:
             digest.update(value.time.tobytes() + bytes((value.turns, value.mirrored)))
             if value.exposure is not None:
                 digest.update(value.exposure.tobytes())
-        elif isinstance(value, np.ndarray):
+        elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
             digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
         elif is_dataclass(value):
             digest.update(type(value).__name__.encode())
@@ -277,7 +277,8 @@ class StageStore:
         elif isinstance(value, Enum) or type(value) in PLAIN_TYPES:
             digest.update(repr(value).encode())
         else:
-            raise TypeError(f"a stage was given a {type(value).__name__}, which has no digest")
+            kind = f"{type(value).__name__}{' of objects' if isinstance(value, np.ndarray) else ''}"
+            raise TypeError(f"a stage was given a {kind}, which has no digest")
 
 
 _NOTHING: Any = object()

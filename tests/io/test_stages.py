@@ -84,6 +84,16 @@ def test_a_result_is_recalled_without_ever_being_made(tmp_path):
     assert CALLS == [2, "add"]
 
 
+@pytest.mark.parametrize(
+    "unknown", [{"a": 1}, [1.0], np.array([None, 1.0]), np.array(["a", [1]], object)]
+)
+def test_an_input_whose_content_cannot_be_told_apart_is_refused(tmp_path, unknown):
+    """An array of objects holds where they lie in memory, which is elsewhere in the next run."""
+    with pytest.raises(TypeError, match="has no digest"):
+        StageStore(tmp_path).keep("add", add_one, unknown)
+    assert CALLS == []
+
+
 def test_a_result_that_nobody_has_any_more_is_let_go(tmp_path):
     store = StageStore(tmp_path)
     held = ref(store.keep("power", raise_to, np.arange(3.0)))
