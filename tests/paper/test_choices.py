@@ -7,13 +7,17 @@ from importlib.resources import files
 import pytest
 
 from keyrecon import cli
+from keyrecon.annotation_budget import LONG_SHARE, SHORT_SHARE
+from keyrecon.golf.observe.film import MOST_FPS
 from keyrecon.lifting.lifting import MIN_SPIKE_DEVIATION
 from keyrecon.paper.joint_transfer import POSITION_SPREAD
 from keyrecon.paper.sliding_windows import WindowOptions
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.segmentation.part_labels import GROWTH, MAX_GAP
+from keyrecon.tracking.camera_motion import MAX_OVERLAY_SHARE
 from keyrecon.tracking.exposure import EVEN
 from keyrecon.tracking.linking import MAX_GAP_SECONDS
+from keyrecon.tracking.shots import SAME_SCENE
 
 TEXT = files("keyrecon.paper").joinpath("choices.md").read_text()
 ROWS = [re.split(r"(?<!\\)\|", line)[1:-1] for line in TEXT.splitlines() if line.startswith("|")]
@@ -47,6 +51,10 @@ def test_printed_key_poses_are_slerped_whatever_prior_a_project_has():
     assert as_printed(Options(prior="golf")).prior == "none"
 
 
+def test_the_printed_tracker_does_not_ask_what_is_beneath_a_head():
+    assert PRINTED.find.other_trunk == 1
+
+
 @pytest.mark.parametrize("verb", ["keyframes", "run"])
 def test_the_printed_form_and_the_golf_prior_are_not_had_together(
     verb, tmp_path, monkeypatch, capsys
@@ -66,6 +74,16 @@ def test_the_printed_form_and_the_golf_prior_are_not_had_together(
         ("size of the picture that is searched", f"{PRINTED.find.player:g} px"),
         ("most temporally consistent path", f"{PRINTED.find.head_speed:g} (head)"),
         ("most temporally consistent path", f"{PRINTED.find.foot_speed:g} (feet)"),
+        (
+            "head that is hardly ever found",
+            f"less than {PRINTED.find.detected:.0%}".replace("%", " %"),
+        ),
+        ("without the player", f"median of {PRINTED.background.samples} frames"),
+        ("laid over the picture", f"more than {MAX_OVERLAY_SHARE:.0%}".replace("%", " %")),
+        ("where one shot ends", f"less than {SAME_SCENE:g}".replace("0.", ".")),
+        ("budget, where none", f"{LONG_SHARE:.1%} of".replace("%", " %")),
+        ("budget, where none", f"{SHORT_SHARE:.0%} at most".replace("%", " %")),
+        ("which frames of the video", f"more than {MOST_FPS:g} frames per second"),
         ("frames without a candidate", f"up to {MAX_GAP_SECONDS:g} s for head and feet"),
         ("pixels of the player of none", f"{GROWTH:g}"[1:] + " heights into what differs"),
         ("pixels of the player of none", f"{MAX_GAP:g}"[1:] + " heights from the body"),
