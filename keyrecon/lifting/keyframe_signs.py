@@ -31,7 +31,8 @@ _SMOOTHED_NOISE = 0.02
 less, others with it: at most 2.8 mm on eight clips."""
 _CHUNK_FRAMES, _MARGIN_FRAMES, _MARGIN_SECONDS = 2000, 100, 2.0
 """Frames decided together, and further frames and seconds at least on both sides of them that are
-tracked with them. A quarter more or less, others with them: at most 2.8 mm on eight clips."""
+tracked with them. Frames a quarter more or less, others with them: at most 2.8 mm on eight
+clips."""
 
 
 def infer_keyframe_signs(

@@ -30,8 +30,8 @@ WINDOW_FRAMES = 2000
 """Frames solved together. A quarter more or less, others with it: at most 2.8 mm on eight clips."""
 OVERLAP_FRAMES, OVERLAP_SECONDS = 100, 2.0
 """Frames and seconds that neighbouring windows share at least: the depth model is shown .4 s to
-both sides of a frame, and at a window's end nothing of one side. A quarter more or less, others
-with it: at most 2.8 mm on eight clips."""
+both sides of a frame, and at a window's end nothing of one side. Frames a quarter more or less,
+others with them: at most 2.8 mm on eight clips."""
 _SMOOTHING_SECONDS = 0.03
 """Smoothing of the tracks from which signs are inferred; half of the fastest stroke's rise. A
 quarter more or less, others with it: at most 2.8 mm on eight clips."""

@@ -36,8 +36,8 @@ PLAIN = 1.0
 """Contrast of a thumbnail below which it shows nothing, such as black, grey values. A quarter more
 or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
 FLASH_FRAMES, FLASH_SECONDS = 3, 0.05
-"""What is over within so many frames or seconds, a flash or a torn picture, is no cut. A quarter
-more or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
+"""What is over within so many frames or seconds, a flash or a torn picture, is no cut. Frames a
+quarter more or less, others with them: at most 1.9 points, 2.4 mm on four clips."""
 SHORTEST_BLEND, LONGEST_BLEND = 8, 2.7
 """Frames that a dissolve takes, the doubles of which are tried in turn, and seconds at most."""
 STRANGERS = 0.4
