@@ -170,9 +170,10 @@ def match_frame_elements(
     radius: float,
 ) -> tuple[Int[np.ndarray, "P F"], Bool[np.ndarray, "P F"]]:
     """For each of the frame's elements, the template's element it corresponds to, likewise."""
-    one_part = np.zeros(placed.color.shape, int)
-    nearest, matched = match_frame_to_parts(index, frame_elements, placed, one_part, 1, radius)
-    return nearest[:, 0], matched[:, 0]
+    queries, descriptors = _describe_both(index, frame_elements, placed)
+    nearest, matched = find_nearest(queries, descriptors, radius)
+    matched &= frame_elements >= 0
+    return np.where(matched, nearest, 0), matched
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,13 +217,20 @@ def match_frame_to_parts(
     radius: float,
 ) -> tuple[Int[np.ndarray, "P N F"], Bool[np.ndarray, "P N F"]]:
     """For each of the frame's elements, its counterpart in each part of the body."""
-    queries = describe_elements(
-        index.points[frame_elements], index.tangent[frame_elements], index.color[frame_elements]
-    )
-    descriptors = with_norms(describe_elements(placed.points, placed.tangent, placed.color))
+    queries, descriptors = _describe_both(index, frame_elements, placed)
     nearest, matched = find_nearest_in_parts(queries, descriptors, part, parts, radius)
     matched &= (frame_elements >= 0)[:, None]
     return np.where(matched, nearest, 0), matched
+
+
+def _describe_both(
+    index: ElementIndex, frame_elements: Int[np.ndarray, "P F"], placed: PlacedElements
+) -> tuple[Float32[np.ndarray, "P 5 F"], Float32[np.ndarray, "P 6 E"]]:
+    """The frame's elements, and those that are looked for among the template's."""
+    queries = describe_elements(
+        index.points[frame_elements], index.tangent[frame_elements], index.color[frame_elements]
+    )
+    return queries, with_norms(describe_elements(placed.points, placed.tangent, placed.color))
 
 
 @dataclass(frozen=True, eq=False)
