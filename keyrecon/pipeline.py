@@ -345,7 +345,7 @@ def assemble_motion(
         time=video.time,
         units="body heights" if height is None else "m",
         keyframes=annotations.frames,
-        sides_exchanged=tracks.sides_exchanged,
+        exchange_evidence=tracks.exchange_evidence,
     )
     if shots is None:
         shots = Shots.between((), len(video))

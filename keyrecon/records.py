@@ -342,9 +342,9 @@ class JointTracks:
     """0-1; 0 where missing."""
     keyframe: Int[np.ndarray, "T J"]
     """Frame number of the keyframe that each joint comes from."""
-    sides_exchanged: Float[np.ndarray, "T 2"] | None = None
-    """Confidence, 0-1, that the marks of the lower body, and of the upper, have left and right
-    exchanged; 0 in frames without marks, None where nobody looked."""
+    exchange_evidence: Float[np.ndarray, "T 2"] | None = None
+    """What motion says for left and right being exchanged in the marks of the lower body, and of
+    the upper, nats; 0 in frames without marks, None where nobody looked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,7 +390,7 @@ class Motion:
     """Annotated frames."""
     expected_error: Float[np.ndarray, "T J"] | None = None
     """Expected distance of `points2d` from the joints, px; None where it is not known."""
-    sides_exchanged: Float[np.ndarray, "T 2"] | None = None
+    exchange_evidence: Float[np.ndarray, "T 2"] | None = None
     """As in `JointTracks`."""
     cuts: Int[np.ndarray, "C"] | None = None
     """Frames with which another shot begins; None where there is one shot. In shots that do not

@@ -81,8 +81,6 @@ MAX_LISTED = 12
 """Stretches that are named in one line after the worst. Of 53 frames of nine real clips that have a
 joint off by more than a fifth of the trunk 35 lie in the three worst stretches of their clips, 43
 in any (benchmarks/expected_error.py)."""
-EXCHANGED = 0.5
-"""Confidence from which marks are named whose left and right seem exchanged: likelier than not."""
 TAUGHT_SECONDS = 0.5
 """A mark teaches the frames within this time most."""
 MIN_CONFIDENCE = 0.3
@@ -253,22 +251,6 @@ def describe_uncertainty(motion: Motion) -> list[str]:
     if others:
         more = f" and {len(others) - MAX_LISTED} more" if len(others) > MAX_LISTED else ""
         lines.append(f"Also uncertain: frames {', '.join(others[:MAX_LISTED])}{more}.")
-    return lines
-
-
-def describe_exchanged_marks(motion: Motion) -> list[str]:
-    """A line for every frame on which left and right seem exchanged in the marks."""
-    if motion.sides_exchanged is None:
-        return []
-    lines = []
-    for frame in np.flatnonzero((motion.sides_exchanged > EXCHANGED).any(axis=1)).tolist():
-        sure = dict(zip(("legs", "arms"), motion.sides_exchanged[frame].tolist(), strict=True))
-        limbs = " and ".join(name for name, share in sure.items() if share > EXCHANGED)
-        lines.append(
-            f"The {limbs} marked in frame {frame} seem to have left and right exchanged "
-            f"({max(sure.values()):.0%} sure): otherwise they had to pass through one another on "
-            "the way from the marks before to those after. Look at that frame."
-        )
     return lines
 
 

@@ -52,15 +52,15 @@ def test_frames_that_are_taken_and_put_back_are_where_they_were_and_nothing_is_b
     between = np.setdiff1d(np.arange(60), USED)
     assert np.isnan(back.joints[between]).all()
     assert (back.confidence[between] == 0).all()
-    np.testing.assert_array_equal(back.sides_exchanged[USED], tracks.sides_exchanged[USED])
-    assert (back.sides_exchanged[between] == 0).all()
+    np.testing.assert_array_equal(back.exchange_evidence[USED], tracks.exchange_evidence[USED])
+    assert (back.exchange_evidence[between] == 0).all()
 
 
 def test_what_nobody_looked_at_stays_untold():
-    tracks = replace(make_tracks(60), sides_exchanged=None)
+    tracks = replace(make_tracks(60), exchange_evidence=None)
     parts = [take_frames(tracks, part) for part in SHOTS.parts]
-    assert join_frames(parts).sides_exchanged is None
-    assert put_back(take_frames(tracks, USED), USED, 60).sides_exchanged is None
+    assert join_frames(parts).exchange_evidence is None
+    assert put_back(take_frames(tracks, USED), USED, 60).exchange_evidence is None
 
 
 def test_parts_that_are_joined_are_the_whole():

@@ -9,7 +9,6 @@ from keyrecon import uncertainty
 from keyrecon.body import LSP14
 from keyrecon.records import SOURCES, Motion, Shots, Track
 from keyrecon.uncertainty import (
-    describe_exchanged_marks,
     describe_uncertainty,
     expected_error,
     measure_correction,
@@ -234,12 +233,3 @@ def test_arms_that_rest_unseen_are_told_and_legs_that_are_seen_are_not():
     motion = with_unseen_arms()
     assert uncertain_share(motion) > 0.9
     assert {stretch.what for stretch in uncertain_stretches(motion)} == {"arms"}
-
-
-def test_marks_whose_sides_seem_exchanged_are_named_with_frame_and_limbs():
-    sides = np.zeros((FRAMES, 2))
-    sides[7], sides[20], sides[31] = (0.98, 0.2), (0.9, 0.7), (0.4, 0.4)
-    legs, both = describe_exchanged_marks(replace(make_motion(), sides_exchanged=sides))
-    assert legs.startswith("The legs marked in frame 7 seem to have left and right exchanged (98%")
-    assert both.startswith("The legs and arms marked in frame 20 ")
-    assert describe_exchanged_marks(make_motion()) == []

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from keyrecon.app.mark_checks import describe_doubtful_marks
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
@@ -21,7 +22,7 @@ from keyrecon.ranges import SHORTEST, TALLEST
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
-from keyrecon.uncertainty import describe_exchanged_marks, describe_uncertainty
+from keyrecon.uncertainty import describe_uncertainty
 
 
 def settings(
@@ -65,7 +66,8 @@ def run(
     preparation = replace(automatic.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
-    doubts = [*automatic.contradictions(), *describe_exchanged_marks(motion)]
+    doubts = automatic.contradictions()
+    wrong = describe_doubtful_marks(preparation, annotations, motion)
     shots = describe_shots(preparation.shots)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
@@ -77,7 +79,7 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=[*doubts, *placed.doubts],
+        contradictions=[*doubts, *wrong, *placed.doubts],
         court=placed.court,
         shots=shots,
     )
@@ -85,7 +87,7 @@ def run(
     note_run(workspace, RunNotes(evidence, tuple(doubts)))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    lines = [*placed.lines, *shots, *doubts, *describe_uncertainty(motion)]
+    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion)]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])

@@ -27,7 +27,7 @@ from jaxtyping import Bool, Complex, Float, Int, Shaped
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.limb_motion import exchange_price, foot_exchange_price
-from keyrecon.propagation.mark_sides import exchange_confidence
+from keyrecon.propagation.mark_sides import exchange_evidence
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
 from keyrecon.records import Shots
 
@@ -92,8 +92,9 @@ class LimbIdentity:
     """Where what was taken for the one limb is the other."""
     probability: Float[np.ndarray, "T"]
     """Of these sides, 0-1."""
-    marks_exchanged: Float[np.ndarray, "T"]
-    """Confidence, 0-1, that the marks of a frame have left and right exchanged; 0 without marks."""
+    exchange_evidence: Float[np.ndarray, "T"]
+    """What motion says for left and right being exchanged in the marks of a frame, nats; 0 without
+    marks."""
 
     def apply(self, half: BodyHalf, values: Shaped[np.ndarray, "T J"]) -> Shaped[np.ndarray, "T J"]:
         """Values of joints, those of the sides exchanged where the sides are."""
@@ -120,7 +121,7 @@ def identify_in_shots(
     return LimbIdentity(
         np.concatenate([one.exchanged for one in identities]),
         np.concatenate([one.probability for one in identities]),
-        np.concatenate([one.marks_exchanged for one in identities]),
+        np.concatenate([one.exchange_evidence for one in identities]),
     )
 
 
@@ -158,7 +159,7 @@ def identify_limbs(
     return LimbIdentity(
         state.astype(bool) ^ crossed,
         probability[frames, state],
-        exchange_confidence(crossed, price, marked),
+        exchange_evidence(crossed, price, marked),
     )
 
 

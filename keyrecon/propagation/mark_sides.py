@@ -3,7 +3,7 @@
 A person who marks a figure seen from behind, or two dark legs that pass, exchanges the sides
 without noticing, and the limbs jump there and back again. Between two marks the limbs can only be
 exchanged where they meet (`limb_motion`), at the lowest price on the way. A mark that costs its
-neighbours a price that the exchanged mark would not is named; nothing is changed.
+neighbours a price that the exchanged mark would not is in doubt; nothing is changed.
 """
 
 import numpy as np
@@ -17,31 +17,31 @@ median; others are amid a crossing) and 10 of 13 arms, and the mark is above tho
 but one."""
 
 
-def exchange_confidence(
+def exchange_evidence(
     crossed: Bool[np.ndarray, "T"],
     price: Float[np.ndarray, "S"],
     marked: Int[np.ndarray, "K"],
 ) -> Float[np.ndarray, "T"]:
-    """Confidence, 0-1, that left and right of a pair of limbs are exchanged on a marked frame; 0
-    elsewhere.
+    """What motion says for left and right of a pair of limbs being exchanged on a marked frame, and
+    against it where negative, nats; 0 elsewhere.
 
     Two threads without a name are followed through all frames; where they are `crossed` the marks
     call the one by the other's name. `price` is what motion says against a change of names between
     two frames, nats, none below zero; S is T - 1. The worst mark is judged first, and those that
     are left beside its exchanged twin, so that one mark does not bring those next to it into doubt.
     """
-    confidence = np.zeros(len(crossed))
+    evidence = np.zeros(len(crossed))
     name, between = crossed[marked].copy(), _lowest_between(price, marked)
-    for _ in range(len(marked)):
+    judged = np.zeros(len(marked), dtype=bool)
+    while not judged.all():
         gain = _exchange_gains(name, between)
-        gain[confidence[marked] > 0] = -np.inf
-        worst = int(gain.argmax())
-        odds = float(gain[worst]) - np.log(RIGHT_FOR_EACH_EXCHANGED)
-        if odds <= 0:
+        evidence[marked[~judged]] = gain[~judged]
+        worst = int(np.where(judged, -np.inf, gain).argmax())
+        if gain[worst] <= np.log(RIGHT_FOR_EACH_EXCHANGED):
             break
-        confidence[marked[worst]] = 1 / (1 + np.exp(-odds))
+        judged[worst] = True
         name[worst] ^= True
-    return confidence
+    return evidence
 
 
 def _lowest_between(

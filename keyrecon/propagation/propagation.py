@@ -151,8 +151,8 @@ class PropagatedHalf:
     confidence: Float[np.ndarray, "T J"]
     template: Int[np.ndarray, "T J"]
     """Row of the annotated frame that each joint comes from."""
-    sides_exchanged: Float[np.ndarray, "T"]
-    """Confidence, 0-1, that marks have left and right exchanged."""
+    exchange_evidence: Float[np.ndarray, "T"]
+    """What motion says for left and right being exchanged in the marks, nats."""
 
 
 def propagate_joints(
@@ -212,7 +212,7 @@ def _propagate_fused(
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
-        exchanged.append(result.sides_exchanged)
+        exchanged.append(result.exchange_evidence)
     places = player.body_frame.to_pixels(joints, frames[:, None])
     tracks = JointTracks(places, confidence, source, np.stack(exchanged, axis=1))
     return with_flow(tracks, flow, preparation.track.height, player.bounds)
@@ -305,7 +305,7 @@ def propagate_half(
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     template = identity.apply(half, limbs_chosen.template)
-    return PropagatedHalf(joints, confidence, template, identity.marks_exchanged)
+    return PropagatedHalf(joints, confidence, template, identity.exchange_evidence)
 
 
 def _with_marks(

@@ -6,7 +6,7 @@ import pytest
 from keyrecon.propagation.mark_sides import (
     RIGHT_FOR_EACH_EXCHANGED,
     _exchange_gains,
-    exchange_confidence,
+    exchange_evidence,
 )
 
 MARKED = np.array([3, 10, 17, 29, 36])
@@ -34,35 +34,40 @@ def test_what_an_exchange_saves_is_the_difference_of_two_paths(rng=np.random.def
 
 
 @pytest.mark.parametrize("wrong", [3, 17, 36])
-def test_the_one_mark_that_limbs_would_have_to_jump_for_is_named(wrong):
-    found = exchange_confidence(crossed_on(wrong), APART, MARKED)
-    assert np.flatnonzero(found).tolist() == [wrong]
-    assert found[wrong] > 0.99
+def test_the_one_mark_that_limbs_would_have_to_jump_for_is_in_doubt(wrong):
+    found = exchange_evidence(crossed_on(wrong), APART, MARKED)
+    assert np.flatnonzero(found > 0).tolist() == [wrong]
+    jumps = 1 if wrong in MARKED[[0, -1]] else 2
+    assert found[wrong] == pytest.approx(20.0 * jumps)
+    assert np.flatnonzero(found).tolist() == MARKED.tolist()
 
 
-def test_two_wrong_marks_are_both_named_and_those_between_them_are_not():
-    found = exchange_confidence(crossed_on(10, 29), APART, MARKED)
-    assert np.flatnonzero(found).tolist() == [10, 29]
+def test_two_wrong_marks_are_both_in_doubt_and_those_between_them_are_not():
+    found = exchange_evidence(crossed_on(10, 29), APART, MARKED)
+    assert np.flatnonzero(found > 0).tolist() == [10, 29]
 
 
-def test_right_marks_are_not_named():
-    assert not exchange_confidence(crossed_on(), APART, MARKED).any()
-    everywhere = exchange_confidence(crossed_on(*MARKED), APART, MARKED)
-    assert not everywhere.any()  # only threads without a name are told
+def test_right_marks_are_confirmed():
+    for crossed in (crossed_on(), crossed_on(*MARKED)):  # which thread is which is not known
+        found = exchange_evidence(crossed, APART, MARKED)
+        np.testing.assert_allclose(found[MARKED], [-20, -40, -40, -40, -20])
 
 
-def test_where_limbs_meet_on_both_sides_of_a_mark_nothing_is_said_of_it():
+def test_where_limbs_meet_on_both_sides_of_a_mark_little_is_said_of_it():
     price = APART.copy()
     price[[12, 20]] = 0.5
-    assert not exchange_confidence(crossed_on(17), price, MARKED).any()
+    assert exchange_evidence(crossed_on(17), price, MARKED)[17] == pytest.approx(1.0)
+    assert exchange_evidence(crossed_on(), price, MARKED)[17] == pytest.approx(-1.0)
 
 
-def test_odds_have_to_outweigh_that_most_marks_are_right():
-    for nats, named in ((0.9, False), (1.1, True)):
+def test_a_mark_in_little_doubt_leaves_those_beside_it_in_theirs():
+    for nats in (0.9, 1.1):
         price = np.full(40, np.log(RIGHT_FOR_EACH_EXCHANGED) * nats / 2)
-        assert exchange_confidence(crossed_on(17), price, MARKED).any() == named
+        found = exchange_evidence(crossed_on(17), price, MARKED)
+        beside = found[[10, 29]]
+        np.testing.assert_allclose(beside, 0 if nats < 1 else -2 * price[0], atol=1e-12)
 
 
-def test_few_marks_tell_nothing_or_which_of_two():
-    assert not exchange_confidence(crossed_on(), APART, np.array([], dtype=int)).any()
-    assert not exchange_confidence(crossed_on(3), APART, MARKED[:1]).any()
+def test_few_marks_tell_nothing():
+    assert not exchange_evidence(crossed_on(), APART, np.array([], dtype=int)).any()
+    assert not exchange_evidence(crossed_on(3), APART, MARKED[:1]).any()

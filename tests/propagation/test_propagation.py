@@ -80,11 +80,11 @@ def test_a_mark_with_left_and_right_exchanged_is_told_and_kept(half, limbs):
     marked = (2, 8, 14, 20, 26)
     preparation, truth = scene(bending(0.3 * np.sin(np.linspace(0, 6, 29))), marked)
     right = marks(truth, marked)
-    assert not carry(preparation, right).sides_exchanged.any()
+    assert carry(preparation, right).exchange_evidence.max() <= 0
     joints = right.joints.copy()
     joints[2, half] = right.joints[2, LSP14.mirror][half]
     found = carry(preparation, replace(right, joints=joints))
-    assert np.argwhere(found.sides_exchanged > 0.5).tolist() == [[14, limbs]]
+    assert np.argwhere(found.exchange_evidence > 3).tolist() == [[14, limbs]]
     np.testing.assert_array_equal(found.joints[14], joints[2])
 
 

@@ -5,7 +5,7 @@ is left out, and points in space have the camera's axes in body heights.
 """
 
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,12 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.annotate.assist.body_estimate import BodyEstimate
-from keyrecon.annotate.assist.checks import EVEN_EXCESS, find_checks, measure_excess
+from keyrecon.annotate.assist.checks import (
+    EVEN_EXCESS,
+    completed_halves,
+    find_checks,
+    measure_excess,
+)
 from keyrecon.annotate.assist.court_views import (
     describe_court,
     describe_court_view,
@@ -36,6 +41,7 @@ from keyrecon.annotate.assist.pose_estimate import (
 from keyrecon.annotate.assist.preview import find_player, tint_part
 from keyrecon.annotate.assist.project_cache import ProjectCache
 from keyrecon.annotate.assist.shot_strip import choose_shot, describe_shots
+from keyrecon.annotate.assist.side_checks import evidence_of_motion
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.io.workspace import Workspace
@@ -244,8 +250,10 @@ def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]
     preparation, body = cache.preparation(), cache.body(annotations, wait=True)
     if preparation is None or body is None:
         return []
-    completed = _completed_halves(annotations)
+    completed = completed_halves(annotations)
     neighbours, appearance = cache.neighbours(completed), cache.appearance(completed)
+    evidence = evidence_of_motion(annotations, cache.motion())
+    found = find_checks(annotations, body.size, neighbours, preparation.track, appearance, evidence)
     return [
         {
             "frame": check.frame,
@@ -254,22 +262,8 @@ def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]
             "suspicion": round(float(check.suspicion), 3),
             "text": check.text,
         }
-        for check in find_checks(annotations, body.size, neighbours, preparation.track, appearance)
+        for check in found
     ]
-
-
-def _completed_halves(annotations: Annotations) -> Annotations:
-    """Halves of the body of which every joint is marked or said to be absent.
-
-    A frame in the middle of being marked is not compared with others yet.
-    """
-    skeleton, joints = annotations.skeleton, annotations.joints.copy()
-    open_, absent = np.isnan(joints[:, :, 0]), {*annotations.absent}
-    for row, joint in np.argwhere(open_):
-        open_[row, joint] = (annotations.frames[row], skeleton.names[joint]) not in absent
-    for half in (skeleton.is_lower, ~skeleton.is_lower):
-        joints[np.ix_(open_[:, half].any(axis=1), half)] = np.nan
-    return replace(annotations, joints=joints)
 
 
 def describe_next_frames(

@@ -82,11 +82,16 @@ def find_checks(
     neighbours: tuple[Neighbours, ...],
     track: Track | None = None,
     appearance: MarkAppearance | None = None,
+    motion: Float[np.ndarray, "K 2"] | None = None,
 ) -> list[Check]:
-    """All marks that look wrong, evidence about the same joints put together."""
+    """All marks that look wrong, evidence about the same joints put together.
+
+    `motion` is what it says for exchanged sides (`JointTracks.exchange_evidence`), where there is
+    one of these marks.
+    """
     residuals = measure_residuals(annotations, size, neighbours, appearance)
     evidence = [
-        *find_exchanges(annotations, size, neighbours, appearance),
+        *find_exchanges(annotations, size, neighbours, appearance, motion),
         *_displaced(annotations, residuals),
         *_other_frame(annotations, track, appearance),
         *_left_out(annotations),
@@ -102,6 +107,20 @@ def find_checks(
             checks.append(check)
     checks = [check for check in checks if check.suspicion >= MIN_SUSPICION]
     return sorted(checks, key=lambda check: (-check.suspicion, check.frame))
+
+
+def completed_halves(annotations: Annotations) -> Annotations:
+    """Halves of the body of which every joint is marked or said to be absent.
+
+    A frame in the middle of being marked is not compared with others yet.
+    """
+    skeleton, joints = annotations.skeleton, annotations.joints.copy()
+    open_, absent = np.isnan(joints[:, :, 0]), {*annotations.absent}
+    for row, joint in np.argwhere(open_):
+        open_[row, joint] = (annotations.frames[row], skeleton.names[joint]) not in absent
+    for half in (skeleton.is_lower, ~skeleton.is_lower):
+        joints[np.ix_(open_[:, half].any(axis=1), half)] = np.nan
+    return replace(annotations, joints=joints)
 
 
 def _about_the_same(one: Check, other: Check) -> bool:

@@ -9,7 +9,9 @@ from capsule_player import marks, scene, standing, turned
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.checks import find_checks
 from keyrecon.annotate.assist.neighbours import find_neighbours
+from keyrecon.annotate.assist.side_checks import BY_CHANCE, evidence_of_motion
 from keyrecon.body import LSP14
+from keyrecon.records import Motion
 from keyrecon.timeline import part_of_marks
 
 ROW = 5
@@ -137,3 +139,41 @@ def test_marks_of_another_frame_are_where_the_player_is_not(careful):
     found = find_checks(elsewhere, body.size, (), preparation.track)
     assert [(c.kind, c.frame) for c in found if c.kind == "off"] == [("off", ROW)]
     assert "another frame" in found[0].text
+
+
+def test_a_motion_confirms_an_exchange_or_refutes_it(careful):
+    preparation, annotations = careful
+    sides = [(f"left_{part}", f"right_{part}") for part in LEGS]
+    swapped = {a: place(annotations, b) for pair in sides for a, b in (pair, pair[::-1])}
+    wrong = changed(annotations, **swapped)
+    body = estimate_body(wrong, {}, preparation.track.height, 50.0)
+
+    def suspicion(marked, legs):
+        said = np.zeros((12, 2))
+        said[ROW, 0] = legs
+        found = find_checks(
+            marked, body.size, find_neighbours(preparation, marked), preparation.track, None, said
+        )
+        return max([c.suspicion for c in found if (c.kind, c.frame) == ("crossed", ROW)], default=0)
+
+    assert suspicion(wrong, 6.0) > suspicion(wrong, 0.0) > 0.5
+    assert suspicion(wrong, -30.0) == 0
+    assert suspicion(annotations, 12.0) > 0.9  # though nothing else speaks for it
+
+
+def test_a_motion_speaks_of_the_marks_that_it_was_made_from_alone(careful):
+    _, annotations = careful
+    carried = np.zeros((14, 14, 2))
+    carried[annotations.frames] = annotations.joints
+    said = np.full((14, 2), 8.0)
+    motion = Motion(
+        LSP14, np.zeros((14, 14, 3)), carried, carried, np.ones((14, 14)),
+        np.ones((14, 14), int), np.ones(14), 25.0, np.arange(14) / 25, "body heights",
+        annotations.frames, exchange_evidence=said,
+    )  # fmt: skip
+    assert (evidence_of_motion(annotations, motion) == 8.0 - BY_CHANCE).all()
+    moved = changed(annotations, left_knee=place(annotations, "left_knee") + 5)
+    expected = np.full((12, 2), 8.0 - BY_CHANCE)
+    expected[ROW, 0] = 0
+    np.testing.assert_array_equal(evidence_of_motion(moved, motion), expected)
+    assert evidence_of_motion(annotations, None) is None

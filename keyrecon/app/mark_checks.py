@@ -1,0 +1,42 @@
+"""Marks that the rest of the marks, the pictures and the motion speak against, told after a run."""
+
+from keyrecon.annotate.assist.body_estimate import estimate_body
+from keyrecon.annotate.assist.checks import completed_halves, find_checks
+from keyrecon.annotate.assist.mark_appearance import compare_appearance, describe_frames
+from keyrecon.annotate.assist.neighbours import find_neighbours
+from keyrecon.annotate.assist.pose_suggestion import scene_of
+from keyrecon.annotate.assist.side_checks import evidence_of_motion
+from keyrecon.records import Annotations, Motion, Preparation
+
+TOLD = 0.8
+"""Suspicion from which a mark is told of where nobody asked; the page's list of checks has all from
+one half on, and joints that were left out."""
+MOST_TOLD = 8
+"""Lines at most."""
+
+
+def describe_doubtful_marks(
+    preparation: Preparation, annotations: Annotations, motion: Motion
+) -> list[str]:
+    """A line for each marked joint or limb that looks wrong, the most suspicious first."""
+    scene, completed = scene_of(preparation, annotations), completed_halves(annotations)
+    described = describe_frames(preparation, scene.body_frame, completed.frames)
+    checks = find_checks(
+        annotations,
+        estimate_body(annotations, {}, preparation.track.height, preparation.video.fps).size,
+        find_neighbours(preparation, completed),
+        preparation.track,
+        compare_appearance(preparation, scene.body_frame, completed, described),
+        evidence_of_motion(annotations, motion),
+    )
+    told = [check for check in checks if check.suspicion >= TOLD and check.kind != "missing"]
+    lines = [
+        f"Marks of frame {check.frame} look wrong: {check.text[0].lower()}{check.text[1:]}"
+        for check in told[:MOST_TOLD]
+    ]
+    if len(told) > MOST_TOLD:
+        lines.append(
+            f"{len(told) - MOST_TOLD} more marks look wrong; the page of keyrecon annotate lists "
+            "all under Checks."
+        )
+    return lines
