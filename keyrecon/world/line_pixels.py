@@ -84,7 +84,8 @@ def find_line_pixels(grey: UInt8[np.ndarray, "h w"]) -> LinePixels:
     bright = contrast > max(MIN_CONTRAST, NOISE_FACTOR * noise)
     angle, coherent = _directions(soft)
     y, x = np.nonzero(_without_specks(bright & coherent))
-    points, normals = np.column_stack([x, y]).astype(float), angle[y, x].astype(float)
+    # A turn a hair below 0 is pi in single precision, which is more than pi.
+    points, normals = np.column_stack([x, y]).astype(float), angle[y, x].astype(float) % np.pi
     return LinePixels(points, normals, _near(points, normals, grey.shape))
 
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from keyrecon.numerics.geometry import look_at
-from keyrecon.world.court import CourtModel, CourtOptions, tennis_court
+from keyrecon.world.court import CourtOptions, tennis_court
 from keyrecon.world.pinhole import Pinhole
 
 PAINTED = CourtOptions()
@@ -15,17 +15,6 @@ def camera_at(centre, target=(0.0, 0.0, 0.0), focal=1.5, size=(640, 360)):
     centre, target = np.array(centre, float), np.array(target, float)
     rotation = look_at(centre, target, np.array([0.0, 0.0, 1.0]))
     return Pinhole(focal * size[0], (np.array(size) - 1) / 2, rotation, centre)
-
-
-def badminton_court():
-    """Laws of Badminton 2023, 1: 13.40 m by 6.10 m, lines 40 mm, the net 1.524 m high."""
-    sides = [((x, -6.7), (x, 6.7)) for x in (-3.05, -2.59, 2.59, 3.05)]
-    across = [((-3.05, y), (3.05, y)) for y in (-6.7, -5.94, -1.98, 1.98, 5.94, 6.7)]
-    middle = [((0, s * 1.98), (0, s * 6.7)) for s in (-1, 1)]
-    ends = [[(*a, 0.0), (*b, 0.0)] for a, b in (*sides, *across, *middle)]
-    ends.append([(-3.05, 0, 1.52), (3.05, 0, 1.52)])
-    names = tuple(str(number) for number in range(len(ends)))
-    return CourtModel(names, np.array(ends), np.full(len(ends), 0.04), np.zeros((0, 2, 3)))
 
 
 def paint(camera, size=(640, 360), seed=0, court=tennis_court(PAINTED)):
