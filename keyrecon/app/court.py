@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
 
 from keyrecon.app.placing import old_report, place_again
 from keyrecon.errors import KeyreconError, quoted
@@ -13,6 +14,7 @@ from keyrecon.io.video import Video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
+from keyrecon.records import Shots
 from keyrecon.report.court_drawing import draw_court, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
@@ -72,7 +74,7 @@ def calibrate(
     placed = place_again(workspace)
     return "\n".join(
         [
-            *describe_camera(camera),
+            *describe_camera(camera, cuts),
             *_describe_cuts(cuts),
             f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
@@ -136,8 +138,8 @@ def export_calibration(workspace: Workspace, file: Path) -> str:
     return f"Wrote {file}{write_calibration(file, camera, (video.width, video.height), file.stem)}."
 
 
-def describe_camera(camera: WorldCamera) -> list[str]:
-    """Where the camera stands, how surely, and in which frames it was found."""
+def describe_camera(camera: WorldCamera, cuts: Sequence[int] = ()) -> list[str]:
+    """Where the camera stands, how surely, and in which frames; other shots begin at `cuts`."""
     seen = np.flatnonzero(camera.found)
     x, y, z = camera.centre[seen].mean(axis=0)
     sd = np.nanmax(camera.sd_centre, axis=0)
@@ -150,12 +152,28 @@ def describe_camera(camera: WorldCamera) -> list[str]:
         f"high (standard deviations {sd[1]:.2f}, {sd[0]:.2f} and {sd[2]:.2f} m); focal length "
         f"{lengths} px within {share:.1%}."
     ]
-    if not camera.found.all():
-        lost = np.flatnonzero(np.diff(np.concatenate([[True], camera.found, [True]]).astype(int)))
-        ends = zip(lost[::2], lost[1::2] - 1, strict=True)
-        stretches = [f"{a}-{b}" if b > a else f"{a}" for a, b in ends]
-        lines.append(f"No court seen in frames {_first_few(stretches)}.")
+    lost, shots = ~camera.found, Shots.between(tuple(cuts), len(camera.found)).parts
+    aside = [k for k, shot in enumerate(shots) if shot.start in camera.elsewhere]
+    for k in aside:
+        lost[shots[k]] = False
+    if lost.any():
+        lines.append(f"No court seen in frames {_first_few(_stretches(lost))}.")
+    if aside:
+        named = [f"{k + 1} (frames {shots[k].start}-{shots[k].stop - 1})" for k in aside]
+        one = len(named) == 1
+        lines.append(
+            f"Shot{'' if one else 's'} {_first_few(named)} show{'s' if one else ''} the court from "
+            "another place than that camera's, and a project holds one place; points clicked in "
+            "such a shot (--point) make that the place."
+        )
     return lines
+
+
+def _stretches(frames: Bool[np.ndarray, "T"]) -> list[str]:
+    """First and last frames of unbroken stretches."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], frames, [False]]).astype(int)))
+    ends = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return [f"{a}-{b}" if b > a else f"{a}" for a, b in ends]
 
 
 def _describe_cuts(cuts: Sequence[int]) -> list[str]:

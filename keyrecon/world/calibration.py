@@ -137,6 +137,7 @@ def _calibrate_shots(
     )
     cameras: dict[int, WorldCamera] = {}
     faults: list[KeyreconError] = []
+    elsewhere: list[int] = []
     for k in order:
         part, first = parts[k], parts[k].start
         own = [replace(click, frame=click.frame - first) for click in inside[k]]
@@ -151,9 +152,12 @@ def _calibrate_shots(
             continue
         if all(_same_place(camera, other) for other in cameras.values()):
             cameras[k] = camera
+        else:
+            elsewhere.append(first)
     if not cameras:
         raise faults[0]
-    return _joined([cameras.get(k) for k in range(len(parts))], parts)
+    joined = _joined([cameras.get(k) for k in range(len(parts))], parts)
+    return replace(joined, elsewhere=tuple(sorted(elsewhere)))
 
 
 def _same_place(one: WorldCamera, other: WorldCamera) -> bool:

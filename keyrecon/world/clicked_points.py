@@ -109,8 +109,10 @@ def _contradiction(
     mirrored = [_other_side(name) for name in names]
     camera, error = _fit(mirrored, pixels, shape)
     if camera is not None and error.max() <= limit:
+        # A court looks alike from both ends: seen from its far half, its ends are exchanged.
+        which = "near and far" if camera.centre[1] > 0 else "left and right"
         return (
-            "The clicks show a court whose left and right are exchanged; name its points as seen "
+            f"The clicks show a court whose {which} are exchanged; name its points as seen "
             "from the camera's half, looking at the net."
         )
     if len(names) > FEWEST:

@@ -38,7 +38,7 @@ MIN_OF_LINE, FEWEST_OF_LINE = 0.25, 12
 which on that is asked: .47 to 1 on five real clips, whole and cut to a part, and on painted views;
 0 to .11 (one of .24) of lines that courts of other sports lack where they pass for tennis courts.
 """
-BESIDE = 10
+BESIDE = 10.0
 """px to both sides in which such a line is looked for: lines of a picture that was cut out of a
 wider one, or bent by a lens, lie beside the model's."""
 MAX_RIVAL = 0.75
@@ -173,7 +173,7 @@ def _share_in_line(
 ) -> float:
     """Largest share of a line's samples whose stripes lie on one straight line in the picture."""
     along = np.linspace(-1, 1, line.sum())[seen[line]]
-    shift = np.arange(-BESIDE, BESIDE + 1.0)
+    shift = np.arange(-BESIDE, BESIDE + 1)
     tried = shift[:, None, None] + shift[None, :, None] * along
     on_it = (np.abs(tried - offset[line & seen]) < 1).sum(axis=2)
     return float(on_it.max()) / float(line.sum())

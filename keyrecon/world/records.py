@@ -37,6 +37,8 @@ class WorldCamera:
     sd_tilt: Float[np.ndarray, "T"]
     """Standard deviation of the direction of the vertical, radians; NaN where nobody told."""
     origin: Origin = COURT
+    elsewhere: tuple[int, ...] = ()
+    """First frames of shots that show the court from another place: they have no camera."""
 
     @property
     def centre(self) -> Float[np.ndarray, "T 3"]:
@@ -49,8 +51,10 @@ class WorldCamera:
         return self.K[:, 0, 0]
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> "WorldCamera":
-        """Some of its frames."""
-        return replace(self, **{name: getattr(self, name)[frames] for name in OF_CAMERA})
+        """Some of its frames, which are no shots any more."""
+        return replace(
+            self, elsewhere=(), **{name: getattr(self, name)[frames] for name in OF_CAMERA}
+        )
 
     def project(self, frame: int, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
         """Pixels of points in the world in one frame; NaN behind the camera."""

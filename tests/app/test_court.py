@@ -87,6 +87,15 @@ def test_frames_without_the_court_are_listed():
     assert lines[1] == "No court seen in frames 5-7."
 
 
+def test_a_shot_of_the_court_from_another_place_is_not_said_to_show_none():
+    camera = court_camera(PINHOLE, 20)
+    found = camera.found.copy()
+    found[5:15] = False
+    told = describe_camera(replace(camera, found=found, elsewhere=(8,)), (8, 15))
+    assert told[1] == "No court seen in frames 5-7."
+    assert "Shot 2 (frames 8-14) shows the court from another place" in told[2]
+
+
 def test_a_point_is_named_framed_and_placed():
     click = court_click("near-left:12:40.5,300")
     assert (click.name, click.frame, click.x, click.y) == ("near-left", 12, 40.5, 300.0)

@@ -93,6 +93,7 @@ def test_each_shot_of_a_cut_video_is_looked_at_by_itself(tmp_path):
     np.testing.assert_array_equal(np.flatnonzero(found.found), [*range(12, 20), *range(26, 34)])
     assert np.median(court_error(pinhole(found, 30), here, SIZE)) < 0.5
     assert np.isnan(found.K[:12]).all() and np.isnan(found.sd_centre[20:26]).all()
+    assert found.elsewhere == (20,)
 
 
 def test_a_cut_is_not_followed(tmp_path):

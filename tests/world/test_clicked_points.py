@@ -38,6 +38,13 @@ def test_left_and_right_exchanged_are_told_of():
         camera_from_points(mirrored, clicked(NAMES), SHAPE)
 
 
+def test_near_and_far_exchanged_are_told_of():
+    turned = [name.replace("near", "N").replace("far", "near").replace("N", "far")
+              for name in NAMES]  # fmt: skip
+    with pytest.raises(KeyreconError, match="near and far are exchanged"):
+        camera_from_points(turned, clicked(NAMES), SHAPE)
+
+
 def test_points_on_one_line_leave_the_camera_open():
     names = ("near-left", "near-left-singles", "near-mark", "near-right")
     for more in ((), ("near-service",)):

@@ -65,7 +65,8 @@ def read_camera(path: Path | str) -> WorldCamera:
         if tilt.shape != (frames,):
             raise ValueError(f"{TILT} has shape {tilt.shape}")
         check_numbers(TILT, tilt[found], gaps=origin == COURT)
-        return WorldCamera(found=found, sd_tilt=tilt, origin=origin, **numbers)
+        inner, turn, shift, centre, focal = (numbers[name] for name in ARRAYS if name != "found")
+        return WorldCamera(inner, turn, shift, found, centre, focal, tilt, origin)
 
 
 def read_origin(data: Mapping[str, np.ndarray]) -> Origin:
