@@ -242,7 +242,7 @@ def write_c3d(path: Path, motion: Motion, world: World = None) -> str:
         raise KeyreconError(
             "Writing C3D needs the c3d package; install it with: pip install 'keyrecon[c3d]'"
         ) from fault
-    standing = stand_on_floor(motion, world=world)
+    standing = stand_on_floor(motion, world=world, gaps=True)
     millimetres = standing.units == "m"
     # The column behind x, y, z is the residual: 0, measured by one camera group; -1, not seen.
     rows = np.zeros((*standing.points.shape[:2], 5), dtype=np.float32)

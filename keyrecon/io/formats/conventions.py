@@ -15,8 +15,10 @@ is nor where the ground lies, so three things are estimated, and every file or t
 
 Where a camera that is known has told where the player stands in every frame (`points3d_world` of
 motion.npz), nothing is estimated here: the origin is at the middle of the net of a court, elsewhere
-under the player's first stance, x to the right. Where it has not in some frames, all frames are
-estimated, since both in one file would be two origins, and the file says so.
+under the player's first stance, x to the right. Where it has not for a moment (`BRIDGED_SECONDS`),
+the joints there go straight on from before to after, or are missing where a format can say so;
+where it has not for longer, all frames are estimated, since both in one file would be two origins.
+The file says which.
 
 Where the floor is estimated every shot of a video stands by itself. Where shots do not show the
 player there is no figure: markers are missing there, and formats that hold a figure in every frame
@@ -46,6 +48,9 @@ strokes; cameras that look down by 6 to 32 degrees) the lower ankle's height ove
 wrong by 1.3-2.7 cm with .5 s, 2.3-3.8 with 1, 3.0-6.3 with 2 and 4.1-13.2 with one floor for all
 (root mean square about the mean); with .5 s jumps lose 5 to 10 cm of their height, with 1 s 0 to
 4. `benchmarks/floor.py` measures it."""
+BRIDGED_SECONDS = 0.3
+"""Time without a place in the world over which the joints go straight on: a runner who brakes with
+5 m/s^2 is then off by 5.6 cm in the middle of it, no more than where a foot stands is off."""
 LEAN = np.radians(10)
 """Median lean of the legs up to which the camera is taken to be level. Rendered, cameras that look
 down by 3 to 10 degrees gave 1 to 7, one by 32 degrees 21 (the lifting has flattened the rest);
@@ -125,25 +130,76 @@ def is_uneven(motion: Motion) -> bool:
     return bool(np.abs(motion.time - even).max() > UNEVEN / motion.fps)
 
 
-def stand_on_floor(motion: Motion, even_times: bool = True, world: World = None) -> StandingMotion:
+def stand_on_floor(
+    motion: Motion, even_times: bool = True, world: World = None, gaps: bool = False
+) -> StandingMotion:
     """The motion with Y up, feet on the floor, and the first frame over the origin.
 
     With `even_times`, frames that are unevenly spaced are replaced by as many at even times.
-    Joints in the `world` are taken as they are if all frames of the motion have a place there.
+    Joints in the `world` are taken as they are if all frames of the motion have a place there, or
+    lack it for a moment only, which is bridged or, with `gaps`, left without a figure.
     Raises KeyreconError where joints are missing.
     """
     parts, known = motion.stretches, motion.known
-    lost = 0 if world is None else int(np.isnan(world.points[known]).any(axis=(1, 2)).sum())
-    if world is not None and lost:
-        standing = stand_on_floor(motion, even_times)
-        instead = (
-            f"; not on the {world.origin}, since the place there is unknown in {lost} of "
-            f"{known.sum()} frames (the others can be exported by themselves)"
-        )
-        return replace(standing, placing=standing.placing + instead)
+    if world is not None:
+        lost = known & np.isnan(world.points).any(axis=(1, 2))
+        if lost.any() and _is_brief(lost, motion):
+            bridged = replace(world, points=_bridge(world.points, lost, motion))
+            standing = stand_on_floor(motion, even_times, bridged)
+            return _with_gaps(standing, lost, motion) if gaps else _told(standing, lost)
+        if lost.any():
+            standing = stand_on_floor(motion, even_times)
+            instead = (
+                f"; not on the {world.origin}, since the place there is unknown in {lost.sum()} of "
+                f"{known.sum()} frames (the others can be exported by themselves)"
+            )
+            return replace(standing, placing=standing.placing + instead)
     if len(parts) > 1 or not known.all():
         return _stand_in_shots(motion, parts, even_times, world)
     return _stand(motion, even_times, world)
+
+
+def _is_brief(lost: Bool[np.ndarray, "T"], motion: Motion) -> bool:
+    """Whether no stretch of a shot that is lost is long, or at its beginning or end."""
+    for part in motion.stretches:
+        edges = np.flatnonzero(np.diff(lost[part].astype(int)))
+        if lost[part][[0, -1]].any():
+            return False
+        first, last = part.start + edges[::2], part.start + edges[1::2]
+        seconds = motion.time[last] - motion.time[first]
+        if (seconds > BRIDGED_SECONDS * (1 + 1e-9)).any():
+            return False
+    return True
+
+
+def _bridge(
+    points: Float[np.ndarray, "T J 3"], lost: Bool[np.ndarray, "T"], motion: Motion
+) -> Float[np.ndarray, "T J 3"]:
+    """Joints everywhere: where they are lost they go straight on within their shot."""
+    whole = points.copy()
+    for part in motion.stretches:
+        gone, time = lost[part], motion.time[part]
+        if gone.any():
+            here, skeleton = whole[part], motion.skeleton
+            here[gone] = _resample(here[~gone], time[~gone], time[gone], skeleton)
+    return whole
+
+
+def _told(standing: StandingMotion, lost: Bool[np.ndarray, "T"]) -> StandingMotion:
+    """The same, with what was bridged."""
+    told = f"; the place there is unknown in {lost.sum()} of {len(lost)} frames, which are bridged"
+    return replace(standing, placing=standing.placing + told)
+
+
+def _with_gaps(
+    standing: StandingMotion, lost: Bool[np.ndarray, "T"], motion: Motion
+) -> StandingMotion:
+    """Without a figure where what was bridged is nearest in time."""
+    frames = np.arange(len(lost))
+    nearest = np.rint(np.interp(standing.time, motion.time - motion.time[0], frames)).astype(int)
+    points = np.where(lost[nearest, None, None], np.nan, standing.points)
+    told = f"; left out are {lost.sum()} of {len(lost)} frames, in which the place there is unknown"
+    return replace(standing, points=points, placing=standing.placing + told)
 
 
 def _stand_in_shots(

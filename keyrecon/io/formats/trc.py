@@ -17,7 +17,7 @@ def write_trc(path: Path, motion: Motion, world: World = None, first_frame: int 
     name in the first line, which readers take as a whole. `first_frame` is the video's frame that
     comes first.
     """
-    standing = stand_on_floor(motion, world=world)
+    standing = stand_on_floor(motion, world=world, gaps=True)
     frames, joints = standing.points.shape[:2]
     rate, units = f"{standing.fps:.10g}", standing.units.replace(" ", "_")
     numbers = range(1, joints + 1)

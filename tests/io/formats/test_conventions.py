@@ -154,15 +154,43 @@ def test_two_shots_on_the_court_stand_where_the_court_is():
 
 
 @pytest.mark.parametrize("shots", [1, 2])
-def test_all_frames_have_one_origin_where_one_of_them_has_no_place_on_the_court(shots):
+def test_all_frames_have_one_origin_where_the_camera_was_lost_for_long(shots):
     motion = make_motion()
     motion = motion if shots == 1 else in_two_shots(motion)
     world = on_the_court(motion)
-    world.points[7] = np.nan  # the camera was lost for a frame
+    world.points[4:24] = np.nan
     standing = stand_on_floor(motion, world=world)
     assert np.array_equal(standing.points, stand_on_floor(motion).points)
     assert standing.placing.startswith("feet on the floor at 0")
-    assert "not on the court, since the place there is unknown in 1 of 60" in standing.placing
+    assert "not on the court, since the place there is unknown in 20 of 60" in standing.placing
+
+
+def test_a_moment_without_a_place_on_the_court_is_bridged_and_said():
+    motion = make_motion()
+    whole, world = on_the_court(motion), on_the_court(motion)
+    world.points[7:9] = np.nan  # the camera was lost for two frames
+    standing = stand_on_floor(motion, world=world)
+    off = np.linalg.norm(standing.points - stand_on_floor(motion, world=whole).points, axis=2)
+    assert off[[*range(7), *range(9, 60)]].max() < 1e-9
+    assert off[7:9].max() < 0.05
+    assert standing.placing.startswith("on the court")
+    assert "unknown in 2 of 60 frames, which are bridged" in standing.placing
+
+
+def test_a_moment_without_a_place_on_the_court_stays_a_gap_where_a_format_can_have_one():
+    motion = make_motion()
+    world = on_the_court(motion)
+    world.points[7:9] = np.nan
+    standing = stand_on_floor(motion, world=world, gaps=True)
+    assert np.array_equal(np.flatnonzero(~standing.known), [7, 8])
+    assert "left out are 2 of 60 frames" in standing.placing
+
+
+def test_what_is_unknown_up_to_a_cut_is_not_bridged():
+    motion = in_two_shots(make_motion())
+    world = on_the_court(motion)
+    world.points[28:32] = np.nan
+    assert "not on the court" in stand_on_floor(motion, world=world).placing
 
 
 def test_frames_without_a_figure_need_no_place_on_the_court():
