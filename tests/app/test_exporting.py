@@ -162,7 +162,11 @@ def test_a_motion_on_the_court_is_exported_where_it_stands(project):
     assert [float(n) for n in row[neck : neck + 3]] == pytest.approx([x, z, -y], abs=1e-5)
     court[7] = np.nan  # the camera was lost for a frame
     np.savez(project.motion_file, **data, points3d_world=court)
-    assert "feet on the floor at 0" in export(project, [folder / "a.trc"], silent, "5-9")[0]
+    told = export(project, [folder / "a.trc", folder / "a.bvh"], silent, "5-9")
+    assert "left out are 1 of 5 frames" in told[0] and "1 of 5 frames, which are bridged" in told[1]
+    rows = [line.split("\t") for line in (folder / "a.trc").read_text().splitlines()[6:]]
+    assert ["" in row for row in rows] == [False, False, True, False, False]
+    assert "feet on the floor at 0" in export(project, [folder / "a.trc"], silent, "7-9")[0]
     assert "on the court" in export(project, [folder / "a.trc"], silent, "10-19")[0]
 
 
