@@ -22,6 +22,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.mocap import read_mocap
 from keyrecon.io.formats.picks import write_picks
+from keyrecon.io.local_workers import belong_to_parent
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
@@ -174,6 +175,7 @@ _stage: Stage | None = None
 
 def _enter(stage: Stage) -> None:
     """Keep the stage in a worker process, so that it travels once."""
+    belong_to_parent()
     global _stage
     _stage = stage
     cv2.setNumThreads(1)
