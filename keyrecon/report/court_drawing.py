@@ -20,7 +20,9 @@ RECENT, FAINT = 2.0, 0.4
 """Seconds of the way that are drawn in full, and how much of the rest is seen."""
 SURFACE, SURROUND = (52, 84, 138), (64, 106, 88)
 PER_METRE, BESIDE = 28, 4.5
-"""px per metre of the court from above, and metres shown beside it."""
+"""px per metre of the court from above, and metres shown beside it at least."""
+AROUND, WORDS = 1.0, 76
+"""Metres shown about the way, and px that the words take above it."""
 GRID, ABOUT, LEAST_PICTURE = (128, 160, 146), 3, 640
 """Colour of squares of a metre, how many there are about the way, and px of the longer side."""
 SUBPIXEL = 4
@@ -89,7 +91,7 @@ def draw_way(
     on_court, root = origin == COURT, world.root
     lines = tennis_court().ends if on_court else metre_grid(root[:, :2])
     half = np.array([HALF_DOUBLES, HALF_LENGTH])
-    low, high = (-half - BESIDE, half + BESIDE)
+    low, high = _shown(root[:, :2], half)
     if not on_court:
         low, high = lines[..., :2].min(axis=(0, 1)), lines[..., :2].max(axis=(0, 1))
     scale = max(PER_METRE, LEAST_PICTURE / float((high - low).max()))
@@ -122,6 +124,18 @@ def draw_way(
     words = f"from dark (0) to yellow ({top:.1f} m/s)"
     cv2.putText(picture, words, (16, 62), font, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
     return picture
+
+
+def _shown(
+    places: Float[np.ndarray, "T 2"], half: Float[np.ndarray, "2"]
+) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+    """Corners of what is shown: the court with room, and all of the way, clear of the words."""
+    known = places[np.isfinite(places).all(axis=1)]
+    low, high = (-half - BESIDE, half + BESIDE)
+    if len(known):
+        low = np.minimum(low, known.min(axis=0) - AROUND)
+        high = np.maximum(high, known.max(axis=0) + np.array((AROUND, AROUND + WORDS / PER_METRE)))
+    return low, high
 
 
 def draw_ground(

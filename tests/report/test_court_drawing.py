@@ -8,7 +8,8 @@ from court_walker import court_camera
 from painted_court import camera_at
 from small_motion import make_motion
 
-from keyrecon.report.court_drawing import draw_ground, draw_way
+from keyrecon.report.court_drawing import PER_METRE, WORDS, draw_ground, draw_way
+from keyrecon.world.court import HALF_LENGTH
 from keyrecon.world.records import WorldMotion
 
 FRAMES, CUT, SIZE = 40, 20, (360, 640)
@@ -53,3 +54,19 @@ def test_from_above_the_way_does_not_jump_from_shot_to_shot(cuts, joined):
     assert (drawn != bare).any(axis=2)[60:].sum() > 0
     columns = np.flatnonzero((drawn != bare).any(axis=2)[60:].any(axis=0))
     assert (np.diff(columns).max() == 1) == joined
+
+
+@pytest.mark.parametrize("behind", [3.0, 9.0])
+def test_from_above_the_way_of_who_stands_far_behind_the_far_baseline_is_whole_and_below_the_words(
+    behind,
+):
+    world, motion = standing_left_then_right(None)
+    root = np.linspace(LEFT, RIGHT, FRAMES)
+    root[:, 1] = HALF_LENGTH + behind
+    speed = np.linspace(0, 4.0, FRAMES)
+    one, other = (
+        draw_way(replace(world, root=root), motion, s, "way") for s in (speed, speed[::-1])
+    )
+    rows, columns = np.nonzero((one != other).any(axis=2))
+    assert rows.min() > WORDS
+    assert np.ptp(columns) > 0.95 * (RIGHT - LEFT)[0] * PER_METRE
