@@ -74,6 +74,16 @@ def draw_background(move: CameraMove, look: Look, seed: int, beyond: float) -> C
     return CourtPicture(picture, rotation, focal, lo)
 
 
+def on_court(
+    points: Float[np.ndarray, "*n 3"], centre: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "*n 3"]:
+    """Points in the axes of `keyrecon.world.court`, whose near half is that of a camera's centre:
+    metres, origin at the middle of the net, y away from the camera, z up."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    side = -1.0 if centre[2] < NET_Z else 1.0
+    return np.stack([side * x, side * (NET_Z - z), y], axis=-1)
+
+
 def cast_rays(move: CameraMove) -> tuple[Rays, np.ndarray, float, Float[np.ndarray, "2"]]:
     """Rays of the picture that holds all frames; its rotation, focal length and corner."""
     rotation = move.rotation[len(move.rotation) // 2]

@@ -174,6 +174,7 @@ def _add_truth(path: Path, stage: Stage, played: Played) -> None:
     """Write the club and the key postures beside the joints."""
     with np.load(path) as stored:
         truth = dict(stored)
+    del truth["points3d_world"]  # a range has no court
     truth["club3d"] = stage.move.to_camera(played.club)
     truth["club2d"] = stage.move.project(played.club)
     truth["keys"] = played.keys

@@ -31,7 +31,7 @@ from keyrecon.records import Pick
 from keyrecon.synthetic.cameras import CameraMove, CameraPlanOptions, plan_camera
 from keyrecon.synthetic.clips import JOINTS, JoinOptions, join_with_toes
 from keyrecon.synthetic.contacts import find_contacts
-from keyrecon.synthetic.court import CourtPicture, draw_background
+from keyrecon.synthetic.court import CourtPicture, draw_background, on_court
 from keyrecon.synthetic.figure import FOOT_LENGTH, PARTS, STATURE, point_figure
 from keyrecon.synthetic.looks import Look, choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
@@ -212,7 +212,8 @@ def _draw_all(stage: Stage, workers: int, labelled: set[int]) -> Iterator[Frame]
 
 
 def write_truth(path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np.ndarray]) -> None:
-    """Joints in each frame's camera axes (metres) and pixels, and the camera they are seen by.
+    """Joints in each frame's camera axes, on the court (metres) and in pixels, and the camera they
+    are seen by.
 
     `seen` tells in every frame which joints are visible, and how much of the racket or club.
     """
@@ -222,6 +223,7 @@ def write_truth(path: Path, stage: Stage, fps: float, seen: tuple[np.ndarray, np
         path,
         points3d=move.to_camera(stage.points),
         points2d=move.project(stage.points),
+        points3d_world=on_court(stage.points, move.center),
         joint_names=np.array(LSP14.names),
         fps=fps,
         toes3d=move.to_camera(toes),

@@ -10,6 +10,7 @@ from keyrecon.io.video import open_video
 from keyrecon.numerics.geometry import project_perspective
 from keyrecon.synthetic.cameras import CameraPlanOptions, View, plan_camera
 from keyrecon.synthetic.clips import JoinOptions
+from keyrecon.synthetic.court import on_court
 from keyrecon.synthetic.figure import FOOT_LENGTH, PARTS, STATURE
 from keyrecon.synthetic.looks import choose_look
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
@@ -88,6 +89,13 @@ def test_a_nearer_solid_hides_a_farther_one():
     both = Solids(*[np.concatenate([getattr(s, f) for s in pair]) for f in Solids.__annotations__])
     surface = draw_solids(both, 1000.0, np.array([100.0, 100.0]), (200, 200))
     assert set(np.unique(surface.solid)) == {-1, 0}
+
+
+@pytest.mark.parametrize(("behind", "side"), [(8.0, 1), (-30.0, -1)])
+def test_the_truth_on_the_court_is_in_the_axes_of_its_nearer_half(behind, side):
+    corner_of_baseline = np.array([5.485, 0.9, 0.0])
+    expected = [side * 5.485, side * -11.885, 0.9]
+    np.testing.assert_allclose(on_court(corner_of_baseline, np.array([0, 2, behind])), expected)
 
 
 def test_the_truth_is_seen_at_its_own_pixels_by_the_stated_camera(points):
@@ -180,6 +188,9 @@ def test_a_written_sequence_holds_together(tmp_path):
     assert len(video) == 20 == len(truth["points3d"]) == len(truth["points2d"])
     assert (video.width, video.height, round(video.fps)) == (480, 270, 50)
     assert tuple(truth["joint_names"]) == LSP14.names
+    camera = on_court(truth["center"], truth["center"])
+    away = np.linalg.norm(truth["points3d_world"] - camera, axis=2)
+    np.testing.assert_allclose(away, np.linalg.norm(truth["points3d"], axis=2))
     depth = truth["points3d"][..., 2:]
     seen = truth["points3d"][..., :2] / depth * truth["focal"][:, None, None] + truth["principal"]
     np.testing.assert_allclose(seen, truth["points2d"], atol=1e-6)

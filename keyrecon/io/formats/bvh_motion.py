@@ -29,15 +29,20 @@ LOCK = np.radians(75)
 
 
 def write_bvh(path: Path, motion: Motion, world: World = None) -> str:
-    """Write the motion at a constant rate; returns what was done, for which BVH has no place.
+    """Write the motion at a constant rate; returns what was done.
 
+    A BVH has no place for it (its readers take every word for a joint or a number, and find joints
+    by their names), so it stands in a text beside the file, NAME.bvh.txt.
     Raises KeyreconError for a skeleton without the limbs, hips and neck of a person.
     """
     standing = stand_on_floor(motion, world=world).standing_still()
     figure = make_humanoid(standing)
     write_durably(path, _format(figure, standing.fps))
-    placed = f"Y up; {standing.placing}; {standing.timing}"
-    return placed + figure.differences(standing.units)
+    placed = f"Y up, x to the right of the picture, z towards the camera; {standing.placing}; "
+    done = placed + standing.timing + figure.differences(standing.units)
+    beside = f"{path.name}, written by keyrecon, in {standing.units}: {done}\n"
+    write_durably(path.with_name(path.name + ".txt"), beside)
+    return done
 
 
 def _format(figure: Humanoid, fps: float) -> str:

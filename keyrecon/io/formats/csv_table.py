@@ -29,6 +29,7 @@ def write_csv(path: Path, motion: Motion, first_frame: int = 0, world: World = N
     columns = ["x", "y", "z", "u", "v", "confidence"]
     known = [motion.points3d, motion.points2d, motion.confidence[..., None]]
     if world is not None:
+        head[0] += " (x, y, z) and in the world (world_x, world_y, world_z)"
         columns += ["world_x", "world_y", "world_z"]
         known.append(world.points)
         head.insert(2, f"# world_x, world_y, world_z: m, {WORLDS[world.origin]}")

@@ -61,6 +61,12 @@ def test_joints_come_back_from_bvh(tmp_path, wildness, breadth):
     assert figure.fps == FPS
 
 
+def test_a_text_beside_a_bvh_tells_its_axes_and_unit(tmp_path):
+    done = write_bvh(tmp_path / "a.bvh", make_motion())
+    assert (tmp_path / "a.bvh.txt").read_text() == f"a.bvh, written by keyrecon, in m: {done}\n"
+    assert done.startswith("Y up, x to the right of the picture, z towards the camera; feet on")
+
+
 def test_our_bvh_is_a_person_to_the_motion_capture_reader(tmp_path):
     motion = make_motion(wildness=0.2)
     write_bvh(tmp_path / "a.bvh", motion)

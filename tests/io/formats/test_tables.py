@@ -42,6 +42,9 @@ def test_joints_have_a_source_in_the_table_where_there_is_a_motion(
     lines = [row for row in (tmp_path / "a.csv").read_text().splitlines() if row[0] != "#"]
     rows = list(csv.DictReader(lines))
     assert ("neck_world_x" in rows[0]) == in_world
+    first = (tmp_path / "a.csv").read_text().splitlines()[0]
+    assert "relative to the camera" in first
+    assert ("in the world (world_x, world_y, world_z)" in first) == in_world
     for name in motion.skeleton.names:
         told = np.array([row[f"{name}_source"] != "" for row in rows])
         np.testing.assert_array_equal(told, motion.known)
