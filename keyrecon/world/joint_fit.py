@@ -2,7 +2,8 @@
 
 A low camera's single frames leave focal length and distance open to each other; many views of
 one centre, and the net's height, do not. Distances across the lines of all views are minimised by
-`scipy.optimize.least_squares` with Cauchy's loss, measured anew once in between.
+Levenberg-Marquardt with Cauchy's loss, measured anew once in between. A view's rows tell of the
+centre and of its own turn and zoom alone, so the normal equations are summed view by view.
 
 What is known afterwards is told by the normal equations, where a line is not as many independent
 measurements as it has pixels: neighbouring samples share the picture's blur, and a whole line is
@@ -13,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from scipy.optimize import least_squares
 
+from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 from keyrecon.world.court import CourtModel
 from keyrecon.world.line_fit import LineFit, evaluate
 from keyrecon.world.pinhole import Pinhole, image_motion
@@ -26,10 +27,15 @@ SHARED = 2.0
 """Neighbouring samples that count as one: they lie 6 px apart, blur reaches twice that."""
 MIN_NOISE = 0.25
 """px: distances across a line are not known better than this."""
+LOSS_SCALE = 2 * MIN_NOISE
+"""px at which Cauchy's loss bends."""
 ROUNDS = 2
 """Times that the lines are measured."""
 MOST_SAMPLES = 160
 """Samples of each view."""
+DAMPING = Damping(start=1e-3, increase=8.0, decrease=10.0, largest=1e8)
+STEPS, LEAST_FALL = 60, 1e-9
+"""Steps at most, and the share of the cost by which the last one lowers it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +47,15 @@ class JointFit:
     """Metres."""
     sd_log_focal: float
     """Of the focal length, as a share of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """Cauchy's cost at a step, and its normal equations there."""
+
+    cost: float
+    normal: Float[np.ndarray, "n n"]
+    gradient: Float[np.ndarray, "n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +97,43 @@ class _Residuals:
             start += len(rows)
         return jacobian
 
+    def linearise(self, x: Float[np.ndarray, "n"]) -> _Linearised:
+        """Cost and normal equations; every row is weighed by the loss at its own residual."""
+        residual = self.values(x) / LOSS_SCALE
+        weight = 1 / (1 + residual**2)
+        normal, gradient = np.zeros((len(x), len(x))), np.zeros(len(x))
+        start = 0
+        views = zip(self.moved(x), self.fits, self.chosen, strict=True)
+        for k, (camera, fit, rows) in enumerate(views):
+            here = slice(start, start + len(rows))
+            part = image_motion(camera, fit.samples.points[rows], fit.samples.normals[rows])
+            part = part / LOSS_SCALE
+            weighted = part.T * weight[here]
+            own = np.r_[0:3, 3 + 4 * k : 7 + 4 * k]
+            normal[np.ix_(own, own)] += weighted @ part
+            gradient[own] += weighted @ residual[here]
+            start += len(rows)
+        return _Linearised(float(np.log1p(residual**2).sum()), normal, gradient)
+
+    def step(
+        self, x: Float[np.ndarray, "n"], here: _Linearised, damping: float
+    ) -> Float[np.ndarray, "n"]:
+        """Where a damped step leads."""
+        damped = here.normal + damping * np.diag(np.diag(here.normal) + 1e-12)
+        return x - np.linalg.solve(damped, here.gradient)
+
+    def solve(self) -> Float[np.ndarray, "n"]:
+        """The step of least cost."""
+        return minimise(
+            np.zeros(3 + 4 * len(self.cameras)),
+            self.linearise,
+            self.step,
+            lambda before, after: after <= before,
+            lambda before, after: before - after <= LEAST_FALL * after,
+            DAMPING,
+            STEPS,
+        )
+
 
 def fit_views(
     greys: list[UInt8[np.ndarray, "h w"]], cameras: list[Pinhole], court: CourtModel
@@ -100,17 +152,9 @@ def fit_views(
             evaluate(grey, camera, court) for grey, camera in zip(greys, views, strict=True)
         )
         problem = _Residuals(views, fits, tuple(_choose(fit) for fit in fits))
-        solved = least_squares(
-            problem.values,
-            np.zeros(3 + 4 * len(views)),
-            problem.jacobian,
-            loss="cauchy",
-            f_scale=2 * MIN_NOISE,
-            x_scale="jac",
-            max_nfev=30,
-        )
-        views = problem.moved(solved.x)
-    sd_centre, sd_log_focal = _spread(problem, solved.x, court)
+        solved = problem.solve()
+        views = problem.moved(solved)
+    sd_centre, sd_log_focal = _spread(problem, solved, court)
     return JointFit(views, sd_centre, sd_log_focal)
 
 
