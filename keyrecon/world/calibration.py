@@ -8,6 +8,7 @@ with one centre, and then it is followed through all frames.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -90,11 +91,14 @@ class _Pictures:
 
     def at(self, frame: int) -> UInt8[np.ndarray, "h w"]:
         """A frame that was read; of a still camera the median of them, without players."""
-        if self.still:
-            chosen = np.linspace(0, len(self.greys) - 1, min(MEDIAN_OF, len(self.greys)))
-            stack = np.stack([self.greys[round(k)] for k in chosen])
-            return np.median(stack, axis=0).astype(np.uint8)
-        return self.greys[self.frames.index(frame)]
+        return self._median if self.still else self.greys[self.frames.index(frame)]
+
+    @cached_property
+    def _median(self) -> UInt8[np.ndarray, "h w"]:
+        """Of a few frames from all over the clip."""
+        chosen = np.linspace(0, len(self.greys) - 1, min(MEDIAN_OF, len(self.greys)))
+        stack = np.stack([self.greys[round(k)] for k in chosen])
+        return np.median(stack, axis=0).astype(np.uint8)
 
 
 def calibrate_court(
