@@ -50,7 +50,7 @@ class JointFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Linearised:
+class _CauchyEquations:
     """Cauchy's cost at a step, and its normal equations there."""
 
     cost: float
@@ -97,7 +97,7 @@ class _Residuals:
             start += len(rows)
         return jacobian
 
-    def linearise(self, x: Float[np.ndarray, "n"]) -> _Linearised:
+    def linearise(self, x: Float[np.ndarray, "n"]) -> _CauchyEquations:
         """Cost and normal equations; every row is weighed by the loss at its own residual."""
         residual = self.values(x) / LOSS_SCALE
         weight = 1 / (1 + residual**2)
@@ -113,10 +113,10 @@ class _Residuals:
             normal[np.ix_(own, own)] += weighted @ part
             gradient[own] += weighted @ residual[here]
             start += len(rows)
-        return _Linearised(float(np.log1p(residual**2).sum()), normal, gradient)
+        return _CauchyEquations(float(np.log1p(residual**2).sum()), normal, gradient)
 
     def step(
-        self, x: Float[np.ndarray, "n"], here: _Linearised, damping: float
+        self, x: Float[np.ndarray, "n"], here: _CauchyEquations, damping: float
     ) -> Float[np.ndarray, "n"]:
         """Where a damped step leads."""
         damped = here.normal + damping * np.diag(np.diag(here.normal) + 1e-12)
