@@ -1,5 +1,6 @@
 """Court or ground drawn on a frame, so that a wrong camera is seen at a glance."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -25,6 +26,9 @@ AROUND, WORDS = 1.0, 76
 """Metres shown about the way, and px that the words take above it."""
 GRID, ABOUT, LEAST_PICTURE = (128, 160, 146), 3, 640
 """Colour of squares of a metre, how many there are about the way, and px of the longer side."""
+PAINT, PIECE = (245, 245, 245), 0.25
+"""Colour of lines from aside, and metres of them that are drawn, or left out, as a whole."""
+Projection = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n 2"]]
 SUBPIXEL = 4
 QUALITY = 92
 
@@ -152,22 +156,54 @@ def draw_ground(
     drawn = draw_court(picture, camera, frame) if camera.origin == COURT else picture.copy()
     if frame >= len(camera.found) or not camera.found[frame]:
         return drawn
-    thick = max(1, round(picture.shape[1] / 640))
+    _draw_way_so_far(drawn, lambda points: camera.project(frame, points), world, motion, frame)
+    return drawn
+
+
+def draw_ground_beside(
+    pane: UInt8[np.ndarray, "h w 3"],
+    project: Projection,
+    court: tuple[WorldMotion, WorldCamera],
+    motion: Motion,
+    frame: int,
+) -> None:
+    """Draw the court's lines, or squares of a metre, way and standing feet into a view from aside.
+
+    `project` takes points in the world to the view's px.
+    """
+    world, camera = court
+    on_court = camera.origin == COURT
+    lines = tennis_court().ends if on_court else metre_grid(world.root[:, :2])
+    for start, end in lines:
+        count = 2 + int(np.linalg.norm(end - start) / PIECE)
+        color = NET if start[2] else PAINT if on_court else GRID
+        _draw_line(pane, project(np.linspace(start, end, count)), color, 2 if on_court else 1)
+    _draw_way_so_far(pane, project, world, motion, frame)
+
+
+def _draw_way_so_far(
+    drawn: UInt8[np.ndarray, "h w 3"],
+    project: Projection,
+    world: WorldMotion,
+    motion: Motion,
+    frame: int,
+) -> None:
+    """Draw the way up to a frame, and rings about the feet that stand there."""
+    thick = max(1, round(drawn.shape[1] / 640))
     ground, recent = world.root * [1, 1, 0], motion.time > motion.time[frame] - RECENT
     so_far = [slice(part.start, min(part.stop, frame + 1)) for part in motion.stretches]
     faint = drawn.copy()
     for part in so_far:
-        _draw_line(faint, camera.project(frame, ground[part]), WAY, thick)
+        _draw_line(faint, project(ground[part]), WAY, thick)
     cv2.addWeighted(faint, FAINT, drawn, 1 - FAINT, 0, dst=drawn)
     for part in so_far:
-        _draw_line(drawn, camera.project(frame, ground[part][recent[part]]), WAY, thick)
+        _draw_line(drawn, project(ground[part][recent[part]]), WAY, thick)
     turn = np.linspace(0, 2 * np.pi, 25)
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(25)]) * STANCE
     for foot, (side, color) in enumerate((("right", RIGHT), ("left", LEFT))):
         ankle = world.points[frame, motion.skeleton.index(f"{side}_ankle")] * [1, 1, 0]
         if world.contact[frame, foot]:
-            _draw_line(drawn, camera.project(frame, ankle + ring), color, thick + 1)
-    return drawn
+            _draw_line(drawn, project(ankle + ring), color, thick + 1)
 
 
 def _draw_line(

@@ -1,11 +1,13 @@
 """The video with the reconstructed pose on it: the quickest way to see whether to trust it.
 
 Beside it, or instead of it, the figure can be shown from elsewhere: standing on its floor, in
-parallel projection, the middle of its hips in the middle.
+parallel projection, the middle of its hips in the middle. Where the court is known the figure is
+where it stands there, with the lines and the way about it.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -15,12 +17,12 @@ from jaxtyping import Float, UInt8
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.records import fitted_frames
-from keyrecon.io.formats.conventions import stand_on_floor
+from keyrecon.io.formats.conventions import IN_WORLD, WorldJoints, stand_on_floor
 from keyrecon.io.video import Video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Motion
-from keyrecon.report.court_drawing import draw_ground
+from keyrecon.report.court_drawing import draw_ground, draw_ground_beside
 from keyrecon.report.drawing import TRUNK, draw_club, draw_pose, joint_sides
 from keyrecon.world.records import WorldCamera, WorldMotion
 
@@ -37,6 +39,9 @@ SIDE_VIEWS = {
 and left of the picture, from opposite the camera, from above."""
 TALL, WIDE = 1.45, 1.2
 """Height and width of a view in statures: a raised arm fits."""
+COURT_TALL = 8.0
+"""Metres of a court that the view from above shows from its top to its bottom: at least a line is
+in it wherever a player stands on a court."""
 GROUND, PAPER = (150, 152, 156), (206, 208, 212)
 """Colours of the floor and of what is behind, dark enough for a white trunk."""
 LARGEST = 4096
@@ -115,7 +120,8 @@ def overlay_frames(
         motion, club = _where_fitted(motion, club)
     hidden = _hidden_joints(motion, options.skeleton)
     sides = [view for view in options.view if view != "camera"]
-    seen = {view: _side_view(motion, view, height) for view in sides}
+    beside = court if options.court else None
+    seen = {view: _side_view(motion, view, height, beside) for view in sides}
     pictures = video.frames(first, last + 1)
     for frame, picture in enumerate(
         progress(pictures, "Drawing the overlay", last - first + 1), first
@@ -130,7 +136,7 @@ def overlay_frames(
             if view == "camera":
                 panes.append(_camera_pane(picture, motion, frame, hidden, height))
             else:
-                panes.append(_side_pane(seen[view], motion, frame, hidden, height, view != "above"))
+                panes.append(_side_pane(seen[view], motion, frame, hidden))
         shown = np.concatenate(panes, axis=1)
         _write_label(shown, f"frame {frame}   {video.time[frame]:.2f} s")
         yield shown
@@ -184,16 +190,52 @@ def _camera_pane(
     return draw_pose(picture, shown, motion.skeleton, depth, source, tall)
 
 
-def _side_view(motion: Motion, view: str, height: int) -> Float[np.ndarray, "T J 3"]:
-    """Joints as the view shows them: px right, px down, depth away."""
-    standing = stand_on_floor(motion, even_times=False)
-    scale = height / (TALL * standing.stature)
+@dataclass(frozen=True, eq=False)
+class _SideView:
+    """How the figure is seen from elsewhere."""
+
+    joints: Float[np.ndarray, "T J 3"]
+    """px right, px down, depth away."""
+    to_view: Float[np.ndarray, "3 3"]
+    """From axes with Y up to those of the view, px."""
+    held: Float[np.ndarray, "T 3"]
+    """What lies at `middle` in each frame, with Y up."""
+    middle: Float[np.ndarray, "3"]
+    """px"""
+    height: int
+    floor: bool
+    """Whether it is seen from the side, with the floor below it."""
+    tall: float
+    """Stature, px."""
+    court: tuple[WorldMotion, WorldCamera] | None
+    """Where the figure is where the court has it."""
+
+    def project(self, frame: int, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
+        """Points in the world as they are seen in a frame, px."""
+        placed = points[:, [0, 2, 1]] * [1, 1, -1]
+        return ((placed - self.held[frame]) @ self.to_view.T + self.middle)[:, :2]
+
+
+def _side_view(
+    motion: Motion, view: str, height: int, court: tuple[WorldMotion, WorldCamera] | None
+) -> _SideView:
+    """The figure as a view shows it; on the court where it has a place there in all frames."""
+    world = None if court is None else WorldJoints(court[0].points, court[1].origin)
+    standing = stand_on_floor(motion, even_times=False, world=world)
+    if world is not None and not standing.placing.startswith(IN_WORLD[world.origin]):
+        court = None
+    above = view == "above"
+    scale = height / (COURT_TALL if above and court else TALL * standing.stature)
     hips = [j for j, n in enumerate(motion.skeleton.names) if n in ("left_hip", "right_hip")]
-    middle = standing.points[:, hips or [motion.skeleton.root]].mean(axis=1, keepdims=True)
-    held = middle * ([1, 0, 1] if view != "above" else [1, 1, 1])
-    seen = (standing.points - held) @ SIDE_VIEWS[view].T * scale
-    at = 0.5 * height if view == "above" else _floor_row(height)
-    return seen + np.array([0.5 * round(WIDE / TALL * height), at, 0])
+    middle = standing.points[:, hips or [motion.skeleton.root]].mean(axis=1)
+    held = middle * ([1, 1, 1] if above else [1, 0, 1])
+    to_view = SIDE_VIEWS[view] * scale
+    at = 0.5 * height if above else float(_floor_row(height))
+    shift = np.array([0.5 * round(WIDE / TALL * height), at, 0])
+    joints = (standing.points - held[:, None]) @ to_view.T + shift
+    return _SideView(
+        joints, to_view, held, shift, height, not above, scale * standing.stature, court
+    )
 
 
 def _floor_row(height: int) -> int:
@@ -201,24 +243,20 @@ def _floor_row(height: int) -> int:
 
 
 def _side_pane(
-    seen: Float[np.ndarray, "T J 3"],
-    motion: Motion,
-    frame: int,
-    hidden: np.ndarray,
-    height: int,
-    floor: bool,
+    view: _SideView, motion: Motion, frame: int, hidden: np.ndarray
 ) -> UInt8[np.ndarray, "y x 3"]:
-    """The figure alone, on its floor."""
-    pane = np.full((height, round(WIDE / TALL * height), 3), PAPER if floor else GROUND, np.uint8)
-    if floor:
-        pane[_floor_row(height) :] = GROUND
-    if frame >= len(seen):
+    """The figure alone, on its floor, and the court about it."""
+    size = (view.height, round(WIDE / TALL * view.height), 3)
+    pane = np.full(size, PAPER if view.floor else GROUND, np.uint8)
+    if view.floor:
+        pane[_floor_row(view.height) :] = GROUND
+    if frame >= len(view.joints):
         return pane
-    points = np.where(hidden[:, None], np.nan, seen[frame])
-    tall = height / TALL
-    return draw_pose(
-        pane, points[:, :2], motion.skeleton, seen[frame, :, 2], motion.source[frame], tall
-    )
+    if view.court is not None and np.isfinite(view.held[frame]).all():
+        draw_ground_beside(pane, partial(view.project, frame), view.court, motion, frame)
+    seen = view.joints[frame]
+    points, tall = np.where(hidden[:, None], np.nan, seen), view.tall
+    return draw_pose(pane, points[:, :2], motion.skeleton, seen[:, 2], motion.source[frame], tall)
 
 
 def _write_label(picture: UInt8[np.ndarray, "h w 3"], text: str) -> None:

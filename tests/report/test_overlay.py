@@ -193,6 +193,26 @@ def test_court_way_and_standing_feet_are_drawn_where_the_court_is_known(tmp_path
     assert np.abs(frame(6) - frame(6, court=False)).max() > 40  # no way, but the court
 
 
+@pytest.mark.parametrize("view", ["above", "right"])
+def test_court_and_way_are_drawn_from_elsewhere_too(tmp_path, view):
+    material = on_court(make_material(tmp_path))
+
+    def frame(**chosen):
+        options = OverlayOptions(skeleton="none", view=(view,), size=400, **chosen)
+        shown = overlay_frames(
+            material.video, material.motion, silent, options, (20, 20), material.court
+        )
+        return next(shown).astype(int)
+
+    drawn, plain = frame(), frame(court=False)
+    changed = (np.abs(drawn - plain).max(axis=2) > 20)[:380]
+    assert changed[200 if view == "above" else 372 :].any()
+    if view == "above":  # the baseline lies two metres before the player, 50 px a metre
+        root = material.court[0].root[20]
+        row = round(200 - 50 * (-11.835 - root[1]))
+        assert changed[row - 2 : row + 3].any(axis=0).all()
+
+
 def test_no_court_is_drawn_where_there_is_none(tmp_path):
     material = on_ground(make_material(tmp_path))
     world, camera = material.court
