@@ -47,7 +47,12 @@ def keep_marked(
     """The keyframes with frames that are marked already, upper and lower body, among them.
 
     A marked frame takes the place of the keyframe most like it, if that represents it; else it
-    comes on top, which costs the person nothing.
+    comes on top, which costs the person nothing. So less may be covered than was asked for.
+
+    Tried instead: the fewest others with which the marked ones cover as much, moved to the middle
+    of what they stand for. On six clips of `develop`, as they are and mirrored, at 2 % more marks:
+    95.2 instead of 95.7 % of the joints within a fifth of the torso (in strokes 92.5, not 93.5),
+    87.3 instead of 86.5 within a tenth.
     """
     halves = []
     for half, name, frames in zip(
