@@ -4,8 +4,7 @@ The path of the feet runs over pairs. An occluded foot is behind the other leg, 
 alone makes a pair too, with the hidden foot on the shin above it. Or it was detected a moment ago,
 or will be in a moment: where a strong candidate of a frame nearby lies on the player now, it is
 a weak candidate of this frame too. A foot that stands therefore stays, while one in the air is soon
-forgotten. What legs to both feet leave of the player speaks against a pair (see `leg_cover`). Weak
-candidates give way to strong ones before and after them (see `smoothing`).
+forgotten. Weak candidates give way to strong ones before and after them (see `smoothing`).
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +25,6 @@ from keyrecon.tracking.foot_pairs import (
     foot_pairs,
     foot_pose_cost,
 )
-from keyrecon.tracking.leg_cover import LegPlaces, find_leg_places, unexplained_costs
 from keyrecon.tracking.smoothing import (
     fill_gaps,
     smooth_pairs,
@@ -68,8 +66,6 @@ class Detections:
     foot_strength: Float[np.ndarray, "n"]
     covered: Bool[np.ndarray, "y x"]
     """Where the player covers the scene, at half the resolution of the crop."""
-    player: Float[np.ndarray, "y x"]
-    """How much of the player's colours is there, 0-1, as coarse."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +82,6 @@ class FootMotionModel:
     """Cost of a foot that is not detected and taken to be behind the other."""
     stiffness: float
     """How smooth the paths of feet are: r of `smooth_path`."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Below:
-    """What feet are the feet of: a head, and what is seen of the legs."""
-
-    head: Float[np.ndarray, "2"]
-    """px"""
-    height: float
-    """px"""
-    legs: LegPlaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +145,7 @@ def link_feet(
         cost = np.concatenate([part_costs(detected.foot_strength), propagated])
         feet = np.concatenate([stable[t], hidden[t]])
         in_picture = warp_points(from_reference[t], feet) if len(feet) else feet
-        legs = find_leg_places(detected.player, cropping, t, head[t], float(height[t]))
-        below = _Below(head[t], float(height[t]), legs)
-        both = _pair(in_picture, cost, motion.occlusion_cost, below)
+        both = _pair(in_picture, cost, motion.occlusion_cost, head[t], float(height[t]))
         pairs.append(replace(both, places=warp_points(camera.to_reference[t], both.places)))
     places, costs = anchored_states([p.places for p in pairs], [p.cost for p in pairs], marked)
     fixed = np.isfinite(marked).all(axis=(1, 2))
@@ -180,7 +163,8 @@ def _pair(
     feet: Float[np.ndarray, "n 2"],
     cost: Float[np.ndarray, "n"],
     occlusion_cost: float,
-    below: _Below,
+    head: Float[np.ndarray, "2"],
+    height: float,
 ) -> FootPairs:
     """The best pairs of feet below a head, and their costs.
 
@@ -189,10 +173,9 @@ def _pair(
     every = foot_pairs(len(feet))
     both, each = feet[every], cost[every]
     alone = every[:, 0] == every[:, 1]
-    both[alone, 1, 1] -= HIDDEN_FOOT_RISE * below.height
+    both[alone, 1, 1] -= HIDDEN_FOOT_RISE * height
     each[alone, 1] = occlusion_cost
-    total = each.sum(axis=1) + foot_pose_cost(both, below.head, below.height, FILTER_PRIOR)
-    total += unexplained_costs((feet - below.head) / below.height, every, below.legs)
+    total = each.sum(axis=1) + foot_pose_cost(both, head, height, FILTER_PRIOR)
     best = np.argsort(total)[:MAX_PAIRS]
     return FootPairs(both[best], each[best], total[best])
 

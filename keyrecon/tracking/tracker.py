@@ -304,11 +304,8 @@ def detect_in_crop(
     weight *= 1 - LEG_PENALTY * np.minimum(_leg_beneath(player, tall) / LEG_SHARE, 1)
     weighted = np.maximum(response[1], 0) * weight
     feet, foot_strength = find_peaks(weighted, FOOT_RADIUS * tall, MAX_FEET, low)
-    covered, colored = (
-        cv2.resize(map_, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-        for map_ in (differs, player.astype(np.float32))
-    )
-    return Detections(heads, head_strength, feet, foot_strength, covered > 0.5, colored)
+    covered = cv2.resize(differs, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) > 0.5
+    return Detections(heads, head_strength, feet, foot_strength, covered)
 
 
 def _leg_beneath(player: Float[np.ndarray, "h w"], tall: float) -> Float[np.ndarray, "h w"]:

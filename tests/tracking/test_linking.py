@@ -1,6 +1,5 @@
 """Paths of feet from what filters saw, with one foot hidden for a while."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -14,7 +13,6 @@ from keyrecon.tracking.tracker import _through_marks, detect_in_crop
 COUNT, TALL = 60, 56.0
 HEAD, LEFT, RIGHT = (np.array(spot) for spot in ((200.0, 100.0), (195.0, 150.0), (205.0, 158.0)))
 GONE = slice(20, 40)
-STEPPING, STRETCHED = np.array((189.0, 151.0)), np.array((224.0, 153.0))
 
 
 def track(feet=(LEFT, RIGHT)):
@@ -32,44 +30,11 @@ def link(covered):
         places = cropping.from_picture(spots, t)
         strength = np.ones(len(places))
         mask = np.full([n // 2 for n in cropping.size], covered)
-        detections.append(detected(places, strength, mask, np.zeros(mask.shape)))
-    return link_detections(detections)
-
-
-def detected(places, strength, covered, player):
-    """Detections of feet alone."""
-    colors = player.astype(np.float32)
-    return Detections(np.zeros((0, 2)), np.zeros(0), places, strength, covered, colors)
-
-
-def link_detections(detections):
-    """Feet below the head of who stands still, before a camera that does."""
-    cropping = Cropping.below_heads(track(), TALL)
+        detections.append(Detections(np.zeros((0, 2)), np.zeros(0), places, strength, mask))
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
     standing, motion = track(), FootMotionModel(0.04 * TALL, 25, 50, 1.0, 1.0)
     unmarked = np.full((len(detections), 2, 2), np.nan)
     return link_feet(detections, camera, cropping, standing.head, standing.height, unmarked, motion)
-
-
-def legs_to(*feet):
-    """The player's colours of legs from the hips to some feet, at half the resolution."""
-    cropping = Cropping.below_heads(track(), TALL)
-    hips, *ends = cropping.from_picture(np.stack([HEAD + np.array((0, 0.48 * TALL)), *feet]), 0)
-    picture = np.zeros(cropping.size, np.uint8)
-    for end in ends:
-        ways = np.rint(np.stack([hips, end])).astype(int).tolist()
-        cv2.line(picture, *ways, 255, round(0.08 * TALL))
-    return cv2.resize(picture / 255, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-
-
-def link_lunge(*legs):
-    """Ankle and toe of one shoe look more like feet than the other; legs lead to `legs`."""
-    spots = np.stack([STEPPING, STEPPING + np.array((-7, 3)), STRETCHED])
-    cropping = Cropping.below_heads(track(), TALL)
-    places, strength = cropping.from_picture(spots, 0), np.array([0.94, 0.66, 0.17])
-    player = legs_to(*legs)
-    feet, _ = link_detections([detected(places, strength, player > 0.5, player)] * COUNT)
-    return feet[COUNT // 2]
 
 
 def test_a_foot_behind_the_other_leg_stays_where_it_stood():
@@ -85,15 +50,6 @@ def test_a_foot_is_not_remembered_where_the_scene_shows_but_is_behind_the_other_
     assert nearest == pytest.approx(RIGHT, abs=0.02 * TALL)
     assert farthest[0] == pytest.approx(RIGHT[0], abs=0.02 * TALL)
     assert 0 < (RIGHT - farthest)[1] < 0.1 * TALL
-
-
-def test_a_leg_stretched_out_has_the_other_foot_and_not_the_toe_of_the_same_shoe():
-    feet = link_lunge(STEPPING, STRETCHED)
-    assert feet[feet[:, 0].argmax()] == pytest.approx(STRETCHED, abs=0.02 * TALL)
-
-
-def test_a_place_like_a_foot_to_which_no_leg_leads_is_none():
-    assert link_lunge(STEPPING)[:, 0].max() < STEPPING[0] + 0.05 * TALL
 
 
 def test_feet_that_stand_while_the_camera_turns_stand_in_between_too():
