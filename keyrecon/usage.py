@@ -77,8 +77,10 @@ def _reason(words: Sequence[str], refusal: Sequence[str], options: Mapping[str, 
         needed = [line.strip() for line in refusal if re.match(r" {4}\S", line)]
         return f"What is missing: {', '.join(needed)}"
     if match := re.match(r"invalid choice '(.*)' for argument '(.+?)'. Expected one of (.+)", text):
-        named = (choice for choice in re.findall(r"'([^']*)'", match[3]) if choice != "None")
-        choices = ", ".join(named)
+        # The parser lists a set, in another order in every process: that of the help counts.
+        listed = options.get(match[2], "")
+        named = {choice for choice in re.findall(r"'([^']*)'", match[3]) if choice != "None"}
+        choices = ", ".join(sorted(named, key=lambda choice: (listed.find(choice), choice)))
         return f"{match[2]} cannot be '{match[1]}'; it is one of {choices}"
     return text.rstrip(".")
 

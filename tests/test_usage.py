@@ -66,6 +66,17 @@ def test_a_refusal_is_read_whatever_the_terminal_shows(frame, colour):
     assert told == "What is missing: --frame INT; see keyrecon pick --help."
 
 
+@pytest.mark.parametrize("choices", ["'swing', 'windows'", "'windows', 'swing'"])
+def test_choices_are_told_in_the_order_of_the_help(choices):
+    refusal = f"""╭─ Invalid choice ────────────╮
+│ invalid choice 'c' for argument '--method'. Expected one of ({choices}, 'None'). │
+│ ───────────────────────────── │
+╰───────────────────────────────╯"""
+    for listed, told in (("{windows,swing}", "windows, swing"), ("X", "swing, windows")):
+        line = explain_refusal("keyrecon golf fit", [], refusal, f"  --method {listed}   How")
+        assert line.startswith(f"--method cannot be 'c'; it is one of {told};")
+
+
 def test_no_option_that_there_is_is_taken_for_one_that_there_is_not(capsys):
     keyrecon("run", "--help-all")
     shown = capsys.readouterr().out
