@@ -35,11 +35,11 @@ def write_bvh(path: Path, motion: Motion, world: World = None) -> str:
     by their names), so it stands in a text beside the file, NAME.bvh.txt.
     Raises KeyreconError for a skeleton without the limbs, hips and neck of a person.
     """
-    standing = stand_on_floor(motion, world=world).standing_still()
+    standing = stand_on_floor(motion, world=world)
     figure = make_humanoid(standing)
     write_durably(path, _format(figure, standing.fps))
     placed = f"Y up, x to the right of the picture, z towards the camera; {standing.placing}; "
-    done = placed + standing.timing + figure.differences(standing.units)
+    done = placed + standing.standing_still().timing + figure.differences(standing.units)
     beside = f"{path.name}, written by keyrecon, in {standing.units}: {done}\n"
     write_durably(path.with_name(path.name + ".txt"), beside)
     return done

@@ -89,9 +89,10 @@ def write_glb(path: Path, motion: Motion, world: World = None) -> str:
 
     Raises KeyreconError where a joint is missing.
     """
-    standing = stand_on_floor(motion, even_times=False, world=world).standing_still()
+    shown = stand_on_floor(motion, even_times=False, world=world)
+    standing = shown.standing_still()
     person = not missing_joints(motion.skeleton.names)
-    figure = _person(standing) if person else _sticks(standing)
+    figure = _person(shown) if person else _sticks(standing)
     buffer = _Buffer()
     nodes, skin = _joint_nodes(buffer, figure)
     mesh, materials = _mesh(buffer, figure)

@@ -23,13 +23,14 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import ANKLE_HEIGHT
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.conventions import StandingMotion
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.timeline import frames_before
 
 Points = Float[np.ndarray, "T 3"]
 Turns = Float[np.ndarray, "T 3 3"]
@@ -103,6 +104,11 @@ class Humanoid:
             f"; up to {self.worst:.3f} {units} off, since bones of this motion change their length"
         )
 
+    def at(self, frames: Int[np.ndarray, "N"]) -> "Humanoid":
+        """The same figure in frames that are chosen."""
+        joints = tuple(replace(joint, turn=joint.turn[frames]) for joint in self.joints)
+        return replace(self, joints=joints, root=self.root[frames])
+
     def local_turn(self, joint: int) -> Turns:
         """Rotation of a joint relative to its parent's."""
         turn, parent = self.joints[joint].turn, self.joints[joint].parent
@@ -121,7 +127,7 @@ class _Node:
 
 
 def make_humanoid(standing: StandingMotion) -> Humanoid:
-    """The rig and its motion.
+    """The rig and its motion, made from frames with a figure; in others the one before is held.
 
     Raises KeyreconError for a skeleton without the limbs, hips and neck of a person.
     """
@@ -130,8 +136,11 @@ def make_humanoid(standing: StandingMotion) -> Humanoid:
             f"BVH needs a person's skeleton, and this one has no {', '.join(missing)}; use .csv, "
             ".c3d or .glb."
         )
-    joints = {name: standing.points[:, j] for j, name in enumerate(standing.skeleton.names)}
-    return _with_constant_offsets(_build_nodes(joints, standing.stature), standing.stature)
+    known = np.flatnonzero(standing.known)
+    shown = standing.points[known]
+    joints = {name: shown[:, j] for j, name in enumerate(standing.skeleton.names)}
+    figure = _with_constant_offsets(_build_nodes(joints, standing.stature), standing.stature)
+    return figure.at(frames_before(known, len(standing.points)))
 
 
 def missing_joints(names: tuple[str, ...]) -> list[str]:

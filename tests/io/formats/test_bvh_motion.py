@@ -74,6 +74,20 @@ def test_our_bvh_is_a_person_to_the_motion_capture_reader(tmp_path):
     assert np.abs(capture.joints - stand_on_floor(motion).points).max() < 0.001
 
 
+def test_where_nobody_is_every_joint_stands_still(tmp_path):
+    motion = make_motion(wildness=0.3)
+    arm = [LSP14.index(f"right_{joint}") for joint in ("shoulder", "elbow", "wrist")]
+    points, gap = motion.points3d.copy(), slice(len(motion.time) // 3, len(motion.time) // 2)
+    # The arm is straight before and after the gap: how it is rolled is told by other frames.
+    near = slice(gap.start - 4, gap.stop + 4)
+    points[near, arm[2]] = 2 * points[near, arm[1]] - points[near, arm[0]]
+    points[gap] = np.nan
+    write_bvh(tmp_path / "a.bvh", replace(motion, points3d=points))
+    held = (tmp_path / "a.bvh").read_text().splitlines()[-len(points) :]
+    assert len({*held[gap.start - 1 : gap.stop]}) == 1
+    assert len({*held}) == len(points) - (gap.stop - gap.start)
+
+
 def test_no_zero_is_negative(tmp_path):
     write_bvh(tmp_path / "a.bvh", make_motion(wildness=0.2))
     assert "-0.000000" not in (tmp_path / "a.bvh").read_text().partition("MOTION")[2].split()
