@@ -77,6 +77,7 @@ USED = {
         "unlikeness",
         "end unlikeness",
         "bone unlikeness",
+        "color unlikeness",
         "other side",
         "off flow",
         "off lines",

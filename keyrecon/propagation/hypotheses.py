@@ -77,6 +77,8 @@ class PoseHypotheses:
     """How unlike marks joints look (`JointAppearance`); 0 where pictures were not looked at."""
     bone_unlikeness: Float[np.ndarray, "T S 2 B"]
     """The same of the middles of limbs' bones."""
+    color_unlikeness: Float[np.ndarray, "T S 2 B"]
+    """How improbable the colours along limbs' bones are (`BoneColors`), nats."""
 
     @property
     def best(self) -> Int[np.ndarray, "T"]:
@@ -153,6 +155,7 @@ def fit_hypotheses(
         start.template.reshape(shape),
         np.zeros((shape[0], len(joints) // shape[0])),
         np.zeros((shape[0], len(joints) // shape[0], 2, joints.shape[1])),
+        np.zeros((shape[0], len(joints) // shape[0], 2, residual.shape[1])),
         np.zeros((shape[0], len(joints) // shape[0], 2, residual.shape[1])),
     )
 

@@ -8,7 +8,9 @@ and forearms of a few lengths and directions are compared, two links of a pictor
 
 With them a hypothesis has the wrist right in 87, 81, 81 and 87 % of the frames marked by eye of
 four real clips, without in 71, 63, 70 and 73 %; with the best of them alone 66, 31, 27 and 40 %:
-looks propose, all evidence together chooses. Of legs other hypotheses lack nothing (99.5 % right);
+looks propose, all evidence together chooses. With the colours along their bones (`bone_color`) some
+hypothesis of six real clips has 98.4, 97.9, 96.0, 99.4, 95.0 and 99.2 % of the arms' joints right,
+without 94.6, 96.5, 94.2, 99.0, 95.4 and 99.2. Of legs other hypotheses lack nothing (99.5 % right);
 where no keyframe has the kick of a serve it is 93.5 %, and with legs looked for likewise 94.2.
 """
 
@@ -18,6 +20,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Int
 
 from keyrecon.propagation.appearance import JointAppearance
+from keyrecon.propagation.bone_color import BoneColors
 from keyrecon.propagation.correspondence import ElementIndex, TemplateFits, score_limb
 from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates
 
@@ -37,7 +40,9 @@ limbs halved or doubled, others with it: at most 0.0 points, 0.1 mm on one clip.
 MAX_LIMBS = 24
 """Limbs tried; of more, those that differ most. Halved or doubled, others with it: at most 0.0
 points, 0.1 mm on one clip."""
-TAKEN = 9.0
+COLOR_COST = 0.15
+"""Cost of a nat of colour along a bone, in units of likeness: about as the evidence weighs them."""
+TAKEN = 99.0
 """Cost of an arm like one that was found: more than any. A quarter more or less, others with it: at
 most 1.5 points, 2.1 mm on nine clips."""
 
@@ -105,6 +110,7 @@ def _score_limbs(
 
 def search_by_looks(
     appearance: JointAppearance,
+    colors: BoneColors,
     poses: AnnotatedPoses,
     trunk: Complex[np.ndarray, "T J"],
     count: int,
@@ -129,7 +135,9 @@ def search_by_looks(
         looks = appearance.describe(np.full(grid.size, frame), (middle + grid).ravel())
         for number, limb in enumerate(limbs):
             start = trunk[frame, limb.joints[0]] - middle
-            offsets[row, :, number] = _find_limbs(appearance, looks, limb, start, count)
+            cost = _limb_costs(appearance, looks, limb, start)
+            cost += COLOR_COST * _color_costs(colors, frame, limb, middle + start)
+            offsets[row, :, number] = _best_limbs(cost, limb, count)
     nearest = _nearest(described, len(trunk))
     joints = np.repeat(trunk[:, None], count, axis=1)
     for number, (limb, side) in enumerate(zip(limbs, sides, strict=True)):
@@ -163,15 +171,10 @@ def _limb_of(poses: AnnotatedPoses, side: tuple[int, ...]) -> _Limb | None:
     return _Limb((inner, middle, outer), bones, (one, other))
 
 
-def _find_limbs(
-    appearance: JointAppearance,
-    looks: Float32[np.ndarray, "g C"],
-    limb: _Limb,
-    start: complex,
-    count: int,
-) -> Complex[np.ndarray, "N 2"]:
-    """Middle and outer joint of the best limbs that differ, from the first; `start` from the middle
-    of the places that `looks` describes."""
+def _limb_costs(
+    appearance: JointAppearance, looks: Float32[np.ndarray, "g C"], limb: _Limb, start: complex
+) -> Float[np.ndarray, "n m"]:
+    """How unlike marks limbs look; `start` from the middle of the places `looks` describes."""
     one, other = limb.steps
     middle = start + one
     outer = middle[:, None] + other
@@ -179,13 +182,34 @@ def _find_limbs(
     cost = cost + _unlike(looks, appearance.bones[limb.bones[0]], start + one / 2)
     total = cost[:, None] + _unlike(looks, appearance.marks[limb.joints[2]], outer)
     total += _unlike(looks, appearance.bones[limb.bones[1]], middle[:, None] + other / 2)
+    return total
+
+
+def _color_costs(
+    colors: BoneColors, frame: int, limb: _Limb, start: complex
+) -> Float[np.ndarray, "n m"]:
+    """How improbable the colours along limbs are; `start` in player coordinates."""
+    one, other = limb.steps
+    middle = start + one
+    inner = colors.along(frame, limb.bones[0], np.full(len(one), start), middle)
+    outer = middle[:, None] + other
+    first = np.broadcast_to(middle[:, None], outer.shape)
+    return inner[:, None] + colors.along(frame, limb.bones[1], first, outer)
+
+
+def _best_limbs(
+    cost: Float[np.ndarray, "n m"], limb: _Limb, count: int
+) -> Complex[np.ndarray, "N 2"]:
+    """Middle and outer joint of the best limbs that differ, from the first."""
+    middle = limb.steps[0]
+    outer = middle[:, None] + limb.steps[1]
     limbs = np.zeros((count, 2), complex)
     for rank in range(count):
-        a, b = np.unravel_index(total.argmin(), total.shape)
+        a, b = np.unravel_index(cost.argmin(), cost.shape)
         limbs[rank] = middle[a], outer[a, b]
         near = np.abs(middle - middle[a]) < DISTINCTION
-        total[near[:, None] & (np.abs(outer - outer[a, b]) < DISTINCTION)] = TAKEN
-    return limbs - start
+        cost[near[:, None] & (np.abs(outer - outer[a, b]) < DISTINCTION)] = TAKEN
+    return limbs
 
 
 def _unlike(

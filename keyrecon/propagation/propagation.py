@@ -37,6 +37,7 @@ from keyrecon.propagation.body_frame import (
     stabilise_shots,
 )
 from keyrecon.propagation.bone_bounds import bound_bones
+from keyrecon.propagation.bone_color import learn_bone_colors
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
@@ -280,19 +281,21 @@ def propagate_half(
     with ThreadPoolExecutor(1) as beside:
         tracked = beside.submit(track_from_keyframes, templates, index, nearest, shots, fps)
         appearance = learn_appearance(player.features, poses, fitted.joints[:, 0])
+        colors = learn_bone_colors(player.features, poses, fitted.joints[:, 0])
         trunk, count = fitted.best_joints, LIMB_HYPOTHESES
         limbs = search_by_edges(templates, index, trunk, count)
         parts = [fit_limbs(templates, index, fitted, limbs)]
         parts.append(follow_marks(templates, index, start.ways, nearest))
         searched = [search_by_silhouette(player.silhouettes, poses, trunk)]
         if half.middle:
-            searched.append(search_by_looks(appearance, poses, trunk, count))
+            searched.append(search_by_looks(appearance, colors, poses, trunk, count))
         parts += [fit_poses(templates, index, p, nearest) for p in searched if p.shape[1]]
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
     hypotheses = replace(
         hypotheses,
         unlikeness=appearance.unlikeness(hypotheses.joints),
         bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
+        color_unlikeness=colors.unlikeness(hypotheses.joints),
     )
     limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed

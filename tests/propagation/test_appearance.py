@@ -1,79 +1,27 @@
 """What joints look like, learnt from marks."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
+from drawn_legs import (
+    BODY,
+    FRAMES,
+    JOINTS,
+    LEGS,
+    ONE,
+    OTHER,
+    SIZE,
+    Drawn,
+    draw,
+    marked_poses,
+    replace_fps,
+)
 
-from keyrecon.body import LSP14
-from keyrecon.io.frame_reader import reduce_picture
-from keyrecon.io.video import Video
 from keyrecon.propagation.appearance import describe_player, learn_appearance, regular_frames
 from keyrecon.propagation.body_frame import BodyFrame
-from keyrecon.propagation.edge_template import AnnotatedPoses
-from keyrecon.propagation.half_body import split_body
+from keyrecon.propagation.bone_color import learn_bone_colors
 from keyrecon.propagation.limb_identity import appearance_gain
 from keyrecon.propagation.limb_search import search_by_looks
-
-LEGS = split_body(LSP14)[0]
-ONE, OTHER = map(list, LEGS.sides)
-SIZE, TALL, FRAMES = (400, 300), 200.0, 12
-PINK, BLACK = (230, 60, 140), (20, 20, 20)
-
-
-class Drawn(Video):
-    """Pictures in memory."""
-
-    def __init__(self, drawn):
-        stamps = np.arange(len(drawn))
-        high, wide = drawn[0].shape[:2]
-        super().__init__(Path("none.mp4"), wide, high, stamps, stamps / 25, 25.0, 0, False, None)
-        object.__setattr__(self, "drawn", drawn)
-
-    def chosen_frames(self, numbers, last):
-        """Some of them."""
-        yield from (p for n, p in enumerate(self.frames(0, last + 1)) if n in numbers)
-
-    def frames(self, start=0, stop=None, width=None):
-        """Reduced to a width."""
-        for picture in self.drawn[start:stop]:
-            yield picture if width is None else reduce_picture(picture, width)
-
-
-def replace_fps(video, fps):
-    """The same pictures, faster."""
-    object.__setattr__(video, "fps", fps)
-    return video
-
-
-def walk(at):
-    """Two legs that stand at -.15 and .15 body heights at first, and change places."""
-    joints = np.zeros((FRAMES, len(LEGS.joints)), complex)
-    joints[:, ONE] = -at[:, None] + 1j * np.array([0.0, 0.2, 0.4])
-    joints[:, OTHER] = at[:, None] + 1j * np.array([0.0, 0.2, 0.4])
-    return joints
-
-
-JOINTS = walk(np.linspace(0.15, -0.15, FRAMES))
-BODY = BodyFrame(np.full(FRAMES, 200.0 + 120.0j), np.full(FRAMES, TALL))
-
-
-def draw(joints, colors=(PINK, BLACK)):
-    """Legs as thick lines on grass."""
-    grass = np.random.default_rng(1).integers(90, 130, (FRAMES, SIZE[1], SIZE[0], 3), np.uint8)
-    for t in range(FRAMES):
-        for side, color in zip((ONE, OTHER), colors, strict=True):
-            path = BODY.to_pixels(joints[t, side], t)
-            cv2.polylines(grass[t], [np.rint(path).astype(np.int32)], False, color, 14)
-    return Drawn(list(grass))
-
-
-def marked_poses():
-    """The first and the last frame."""
-    marked = np.array([0, FRAMES - 1])
-    known, longest = np.ones((2, len(LEGS.joints)), bool), np.full(len(LEGS.bones), np.inf)
-    return AnnotatedPoses(LEGS, marked, JOINTS[marked], known, longest)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +46,8 @@ def test_the_middle_of_a_bone_looks_like_that_of_a_marked_one(appearance):
 def test_limbs_are_found_where_they_look_like_marked_ones(appearance):
     trunk = JOINTS.copy()
     trunk[:, [*ONE[1:], *OTHER[1:]]] = 9
-    found = search_by_looks(appearance, marked_poses(), trunk, 3)
+    colors = learn_bone_colors(appearance.features, marked_poses(), JOINTS)
+    found = search_by_looks(appearance, colors, marked_poses(), trunk, 3)
     away = np.abs(found - JOINTS[:, None])[..., [*ONE, *OTHER]].max(axis=2)
     apart = np.abs(JOINTS[:, ONE[0]] - JOINTS[:, OTHER[0]]) > 0.15
     assert (away.min(axis=1)[apart] < 0.08).all()

@@ -52,7 +52,7 @@ def test_a_limb_is_where_flow_and_near_marks_lead(half, sure):
 
 
 @pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
-@pytest.mark.parametrize("what", ["unlikeness", "bone_unlikeness", "residual"])
+@pytest.mark.parametrize("what", ["unlikeness", "bone_unlikeness", "color_unlikeness", "residual"])
 def test_a_limb_that_looks_like_marked_ones_on_its_outline_is_chosen(half, what):
     here, there, (templates, hypotheses) = poses(half)
     side = list(half.sides[0])

@@ -26,5 +26,6 @@ def choice(half, joints, cost, longest):
         cost,
         np.zeros((count, width, 2, len(half.joints))),
         np.zeros((count, width, 2, len(half.bones))),
+        np.zeros((count, width, 2, len(half.bones))),
     )
     return templates, hypotheses
