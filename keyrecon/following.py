@@ -46,6 +46,7 @@ from keyrecon.tracking.shot_sorting import (
     sort_shots,
 )
 from keyrecon.tracking.tracker import TrackOptions, track_player
+from keyrecon.tracking.tracklets import linked_to_player
 from keyrecon.tracking.verification import verify_track
 
 HELD = 1e9
@@ -88,8 +89,16 @@ class _Shot:
     camera: CameraPath
     colors: Colors
     anchors: TrackAnchors
-    picked: bool
-    """Whether a person clicked or marked in it."""
+    picks: tuple[Pick, ...]
+    """What a person clicked or marked in it."""
+
+    def joined_part(self, track: Track) -> Track:
+        """A track that is sure of nothing where it is not joined to the player who was told."""
+        heads = [pick for pick in self.picks if pick.part == "head"]
+        frames = np.array([pick.frame for pick in heads], dtype=np.int64)
+        places = np.array([(pick.x, pick.y) for pick in heads]).reshape(-1, 2)
+        linked = linked_to_player(track, self.camera, frames, places, self.video.fps)
+        return replace(track, confidence=track.confidence * linked)
 
 
 def follow_player(
@@ -110,7 +119,7 @@ def follow_player(
     asked = numbered_shots(options.shots.use, len(shots.parts))
     numbered_shots(options.shots.skip, len(shots.parts))
     if not camera.cuts:
-        only = _Shot("", 0, video, camera, colors, anchors, True)
+        only = _Shot("", 0, video, camera, colors, anchors, tuple(clicks))
         detected = keep(
             "find", find_player, video, colors, camera, anchors,
             options=options.find, progress=progress,
@@ -118,7 +127,7 @@ def follow_player(
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
     sightings = _sight_each(each, asked, options.find, keep, progress)
-    picked = np.array([shot.picked for shot in each])
+    picked = np.array([bool(shot.picks) for shot in each])
     shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
     found = [_found(sightings[number]) for number in usable]
@@ -173,7 +182,7 @@ def _shot(
         part_of_path(camera, part),
         replace(colors, height=picked_height(picks)) if sized else colors,
         part_of_anchors(anchors, part),
-        bool(picks),
+        tuple(picks),
     )
 
 
@@ -205,7 +214,7 @@ def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
 ) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
     """Track and edges of a shot in which the player was found, and what speaks for the track."""
-    video = hold_if_small(shot.video, HELD)
+    video, detected = hold_if_small(shot.video, HELD), shot.joined_part(detected)
     background = keep(
         f"background{shot.name}", build_background, video, shot.camera, detected,
         options=options.background, progress=progress,
@@ -214,6 +223,7 @@ def _follow(
         f"track{shot.name}", track_player, video, detected, shot.camera, background,
         shot.colors, shot.anchors, options=options.track, progress=progress,
     )  # fmt: skip
+    seen, track = track.confidence > 0, shot.joined_part(track)
     edges = keep(
         f"edges{shot.name}", find_edges, video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,
@@ -222,7 +232,8 @@ def _follow(
         f"verify{shot.name}", verify_track, video, track, shot.camera, background,
         shot.colors, progress=progress,
     )  # fmt: skip
-    return track, edges, verification
+    unlinked = (seen & (track.confidence == 0))[verification.frames]
+    return track, edges, replace(verification, unlinked=unlinked)
 
 
 def follow_marks(

@@ -15,11 +15,12 @@ from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
+from keyrecon.keyframes.absence import list_stretches, listed_stretches
 from keyrecon.library import read_models, reconstruct
 from keyrecon.pipeline import Options, as_printed, with_height
 from keyrecon.progress import Progress
 from keyrecon.ranges import SHORTEST, TALLEST
-from keyrecon.records import Annotations, Keyframes, Motion, Preparation
+from keyrecon.records import Annotations, Keyframes, Motion, Preparation, Shots
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.uncertainty import describe_uncertainty
@@ -87,10 +88,24 @@ def run(
     note_run(workspace, RunNotes(evidence, tuple(doubts)))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion)]
+    told = [*doubts, *wrong, *describe_unseen(motion, preparation.shots)]
+    lines = [*placed.lines, *shots, *told, *describe_uncertainty(motion)]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
+
+
+def describe_unseen(motion: Motion, shots: Shots) -> list[str]:
+    """A line where usable shots have frames without a figure."""
+    hidden = ~motion.known
+    hidden &= np.isin(np.arange(len(hidden)), shots.usable_frames)
+    stretches = list_stretches(hidden)
+    if not stretches:
+        return []
+    return [
+        f"Nobody seen in frames {listed_stretches(stretches)}: there is no figure there. Where the "
+        "player is there after all, mark the body."
+    ]
 
 
 def _describe_files(workspace: Workspace, motion: Motion) -> list[str]:

@@ -25,6 +25,7 @@ from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Shots, Track, TrackVerification
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
+from keyrecon.tracking.tracklets import MAX_STEP, MAX_STEP_SECONDS
 
 RATE = 6.0
 """Frames looked at per second: who walks past the player is seen three times within a height."""
@@ -57,8 +58,6 @@ decides only what is told of the track."""
 MEETS = 1.0
 """Nearer than this the track may change over, player heights. It decides only what is told of the
 track."""
-MAX_STEP_SECONDS, MAX_STEP = 0.12, 0.9
-"""Nobody's head moves farther in that time, player heights: 13 m/s. A sprinter reaches 12."""
 HIDDEN_SHARE, WAY_POINTS = 0.15, 13
 """Share of the way from head to feet, of so many points, from which something hides the player: a
 trunk is a third of it."""
