@@ -38,6 +38,7 @@ from keyrecon.timeline import (
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
+from keyrecon.tracking.scale import measured, zoom
 from keyrecon.tracking.shot_sorting import (
     ShotOptions,
     Sighting,
@@ -92,13 +93,20 @@ class _Shot:
     picks: tuple[Pick, ...]
     """What a person clicked or marked in it."""
 
-    def joined_part(self, track: Track) -> Track:
-        """A track that is sure of nothing where it is not joined to the player who was told."""
+    def joined_part(self, track: Track, envelope: float) -> Track:
+        """A track that is sure of nothing where it is not joined to the player who was told.
+
+        Nor has it the size of who is there; `envelope` as in the options of the tracker.
+        """
         heads = [pick for pick in self.picks if pick.part == "head"]
         frames = np.array([pick.frame for pick in heads], dtype=np.int64)
         places = np.array([(pick.x, pick.y) for pick in heads]).reshape(-1, 2)
         linked = linked_to_player(track, self.camera, frames, places, self.video.fps)
-        return replace(track, confidence=track.confidence * linked)
+        if linked.all():
+            return track
+        joined = replace(track, confidence=track.confidence * linked)
+        window = round(envelope * self.video.fps)
+        return measured(joined, zoom(self.camera, self.video), window)
 
 
 def follow_player(
@@ -214,7 +222,8 @@ def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
 ) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
     """Track and edges of a shot in which the player was found, and what speaks for the track."""
-    video, detected = hold_if_small(shot.video, HELD), shot.joined_part(detected)
+    detected = shot.joined_part(detected, options.find.envelope)
+    video = hold_if_small(shot.video, HELD)
     background = keep(
         f"background{shot.name}", build_background, video, shot.camera, detected,
         options=options.background, progress=progress,
@@ -223,7 +232,7 @@ def _follow(
         f"track{shot.name}", track_player, video, detected, shot.camera, background,
         shot.colors, shot.anchors, options=options.track, progress=progress,
     )  # fmt: skip
-    seen, track = track.confidence > 0, shot.joined_part(track)
+    seen, track = track.confidence > 0, shot.joined_part(track, options.track.envelope)
     edges = keep(
         f"edges{shot.name}", find_edges, video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,

@@ -195,11 +195,12 @@ def _link(
     model = TransitionModel(options.foot_speed * step, max_gap, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
-    frames = round(options.envelope * video.fps)
-    standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
     halves = [c / 2 for c in costs]
     confidence = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
     confidence = np.interp(np.arange(len(head)), numbers, confidence)
+    frames = round(options.envelope * video.fps)
+    magnification, seen = zoom(camera, video), confidence > 0
+    standing = standing_height(head, feet.mean(axis=1), magnification, frames, seen)
     return Track(head, feet, standing, player_boxes(head, feet, standing), confidence)
 
 
