@@ -32,8 +32,8 @@ from keyrecon.records import (
 )
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
-from keyrecon.tracking.tracklets import MAX_STEP_SECONDS
-from keyrecon.tracking.verification import find_jumps, find_meetings
+from keyrecon.tracking.tracklets import MAX_STEP_SECONDS, find_jumps
+from keyrecon.tracking.verification import find_meetings
 
 MAX_PICK_DISTANCE = 0.25
 """A click lies off its part where the track passes it farther away than this, player heights: a

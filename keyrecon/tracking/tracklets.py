@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.numerics.geometry import warp_points
-from keyrecon.records import CameraPath, Track
+from keyrecon.records import CameraPath, Shots, Track
 from keyrecon.tracking.linking import MAX_GAP_SECONDS
 
 MAX_STEP_SECONDS, MAX_STEP = 0.12, 0.9
@@ -57,6 +57,20 @@ def linked_to_player(
             end = path.frames[tracklets[number + 1][0]] if number + 1 < len(tracklets) else None
             linked[start:end] = False
     return linked
+
+
+def find_jumps(track: Track, camera: CameraPath, shots: Shots, fps: float) -> list[int]:
+    """Frames of a shot to which the head moves farther than anybody does, the camera's motion
+    apart; of several close together the first."""
+    jumps: list[int] = []
+    for shot in shots.parts:
+        frames = shot.start + np.flatnonzero(track.confidence[shot] > 0)
+        path = _SeenPath.of(track, camera, frames, fps)
+        for first, _ in path.tracklets()[1:]:
+            frame = int(frames[first])
+            if not jumps or frame - jumps[-1] > 2 * MAX_STEP_SECONDS * fps:
+                jumps.append(frame)
+    return jumps
 
 
 @dataclass(frozen=True, eq=False)

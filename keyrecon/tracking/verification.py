@@ -22,10 +22,9 @@ from keyrecon.io.frame_reader import read_small, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Background, CameraPath, Colors, Shots, Track, TrackVerification
+from keyrecon.records import Background, CameraPath, Colors, Track, TrackVerification
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
-from keyrecon.tracking.tracklets import MAX_STEP, MAX_STEP_SECONDS
 
 RATE = 6.0
 """Frames looked at per second: who walks past the player is seen three times within a height."""
@@ -275,24 +274,3 @@ def find_meetings(
     breaks = np.flatnonzero(np.diff(near) > fps)
     firsts, lasts = near[np.r_[0, breaks + 1]], near[np.r_[breaks, len(near) - 1]]
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
-
-
-def find_jumps(track: Track, camera: CameraPath, shots: Shots, fps: float) -> list[int]:
-    """Frames of a shot to which the head moves farther than anybody does, the camera's motion
-    apart."""
-    step = max(1, round(MAX_STEP_SECONDS * fps))
-    if len(track.head) <= step:
-        return []
-    change = np.linalg.inv(camera.to_reference[step:]) @ camera.to_reference[:-step]
-    before = warp_points(change, track.head[:-step])
-    far = np.linalg.norm(track.head[step:] - before, axis=1) / track.height[step:]
-    same_shot = shots.number[step:] == shots.number[:-step]
-    frames = np.flatnonzero(same_shot & (far > MAX_STEP)) + step
-    if not len(frames):
-        return []
-    firsts = np.r_[0, np.flatnonzero(np.diff(frames) > 2 * step) + 1]
-    ends = np.r_[firsts[1:], len(frames)]
-    return [
-        int(frames[first:end][np.argmax(far[frames[first:end] - step])])
-        for first, end in zip(firsts.tolist(), ends.tolist(), strict=True)
-    ]
