@@ -69,7 +69,7 @@ def run(
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
     wrong = describe_doubtful_marks(preparation, annotations, motion)
-    shots = describe_shots(preparation.shots)
+    shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
         track=preparation.track,
@@ -88,8 +88,7 @@ def run(
     note_run(workspace, RunNotes(evidence, tuple(doubts)))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    told = [*doubts, *wrong, *describe_unseen(motion, preparation.shots)]
-    lines = [*placed.lines, *shots, *told, *describe_uncertainty(motion)]
+    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion)]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
