@@ -264,10 +264,11 @@ def _best_places(
 def find_meetings(
     verification: TrackVerification, track: Track, fps: float
 ) -> list[tuple[int, int]]:
-    """First and last frames of the stretches in which a distractor is near the player, a second or
-    more apart."""
-    frames = verification.frames
-    away = np.linalg.norm(track.head[frames] - verification.distractor, axis=1)
+    """First and last frames of the stretches in which a distractor is near the player who is seen,
+    a second or more apart."""
+    frames = verification.frames[track.confidence[verification.frames] > 0]
+    distractor = verification.distractor[track.confidence[verification.frames] > 0]
+    away = np.linalg.norm(track.head[frames] - distractor, axis=1)
     near = frames[away < MEETS * track.height[frames]]  # not where there is none, which is NaN
     if not len(near):
         return []

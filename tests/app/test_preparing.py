@@ -88,6 +88,11 @@ def test_who_looks_like_the_player_is_told_until_the_player_is_marked_on_both_si
     assert identity() == []
 
 
+def test_nobody_meets_a_player_who_is_not_seen():
+    (line,) = identity(meeting=range(90, 111), unlinked=range(80, 200))
+    assert "jumps" in line
+
+
 def test_a_hop_of_the_track_is_told_with_its_frame():
     (line,) = identity(jump=120)
     assert "in frame 12" in line
