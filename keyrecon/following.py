@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Bool
 
 from keyrecon.io.held_video import hold_if_small
 from keyrecon.io.video import Video
@@ -35,6 +36,7 @@ from keyrecon.timeline import (
     part_of_path,
     part_of_picks,
     put_back,
+    spread_edges,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
@@ -93,20 +95,21 @@ class _Shot:
     picks: tuple[Pick, ...]
     """What a person clicked or marked in it."""
 
-    def joined_part(self, track: Track, envelope: float) -> Track:
-        """A track that is sure of nothing where it is not joined to the player who was told.
-
-        Nor has it the size of who is there; `envelope` as in the options of the tracker.
-        """
+    def linked(self, track: Track) -> Bool[np.ndarray, "T"]:
+        """Frames in which a track is joined to the player who was told."""
         heads = [pick for pick in self.picks if pick.part == "head"]
         frames = np.array([pick.frame for pick in heads], dtype=np.int64)
         places = np.array([(pick.x, pick.y) for pick in heads]).reshape(-1, 2)
-        linked = linked_to_player(track, self.camera, frames, places, self.video.fps)
+        return linked_to_player(track, self.camera, frames, places, self.video.fps)
+
+    def joined_part(self, track: Track, linked: Bool[np.ndarray, "T"], envelope: float) -> Track:
+        """A track that is sure of nothing where it is not `linked`, nor has the size of who is
+        there; `envelope` as in the options of the tracker."""
         if linked.all():
             return track
         joined = replace(track, confidence=track.confidence * linked)
         window = round(envelope * self.video.fps)
-        return measured(joined, zoom(self.camera, self.video), window)
+        return measured(joined, zoom(self.camera, self.video), window, joined.confidence > 0)
 
 
 def follow_player(
@@ -222,7 +225,8 @@ def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
 ) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
     """Track and edges of a shot in which the player was found, and what speaks for the track."""
-    detected = shot.joined_part(detected, options.find.envelope)
+    joined = shot.linked(detected)
+    detected = shot.joined_part(detected, joined, options.find.envelope)
     video = hold_if_small(shot.video, HELD)
     background = keep(
         f"background{shot.name}", build_background, video, shot.camera, detected,
@@ -232,7 +236,8 @@ def _follow(
         f"track{shot.name}", track_player, video, detected, shot.camera, background,
         shot.colors, shot.anchors, options=options.track, progress=progress,
     )  # fmt: skip
-    seen, track = track.confidence > 0, shot.joined_part(track, options.track.envelope)
+    seen, linked = track.confidence > 0, shot.linked(track)
+    track = shot.joined_part(track, linked, options.track.envelope)
     edges = keep(
         f"edges{shot.name}", find_edges, video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,
@@ -241,7 +246,10 @@ def _follow(
         f"verify{shot.name}", verify_track, video, track, shot.camera, background,
         shot.colors, progress=progress,
     )  # fmt: skip
-    unlinked = (seen & (track.confidence == 0))[verification.frames]
+    player = np.flatnonzero(linked & (joined | (track.confidence > 0)))
+    if len(player) < len(edges):  # of somebody else nothing is carried
+        edges = spread_edges([edges[t] for t in player], player, len(edges))
+    unlinked = (seen & ~linked)[verification.frames]
     return track, edges, replace(verification, unlinked=unlinked)
 
 

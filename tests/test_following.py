@@ -71,5 +71,7 @@ def test_somebody_to_whom_the_player_would_have_to_jump_is_not_followed(tmp_path
     followed = follow_player(video, still, colors, clicks, nothing, options, call_stage)
     assert (followed.track.confidence[: COUNT - 3] > 0).all()
     assert (followed.track.confidence[COUNT:] == 0).all()
+    assert all(len(edges.points) for edges in followed.edges[: COUNT - 3])
+    assert not any(len(edges.points) for edges in followed.edges[COUNT:])
     unlinked = followed.verification.frames[followed.verification.unlinked]
     assert unlinked.min() >= COUNT - 3 and unlinked.max() > 2 * COUNT - 10

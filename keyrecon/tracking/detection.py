@@ -195,12 +195,14 @@ def _link(
     model = TransitionModel(options.foot_speed * step, max_gap, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
+    frames = round(options.envelope * video.fps)
+    # Places that were missed are on the way between those that were not.
+    standing = standing_height(
+        head, feet.mean(axis=1), zoom(camera, video), frames, np.ones(len(head), dtype=bool)
+    )
     halves = [c / 2 for c in costs]
     confidence = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
     confidence = np.interp(np.arange(len(head)), numbers, confidence)
-    frames = round(options.envelope * video.fps)
-    magnification, seen = zoom(camera, video), confidence > 0
-    standing = standing_height(head, feet.mean(axis=1), magnification, frames, seen)
     return Track(head, feet, standing, player_boxes(head, feet, standing), confidence)
 
 

@@ -50,11 +50,14 @@ def standing_height(
     return np.interp(np.arange(len(head)), known, smooth) * magnification
 
 
-def measured(track: Track, magnification: Float[np.ndarray, "T"], frames: int) -> Track:
-    """The track with standing height and box by the frames in which it is sure of the player."""
-    height = standing_height(
-        track.head, track.mid_feet, magnification, frames, track.confidence > 0
-    )
+def measured(
+    track: Track,
+    magnification: Float[np.ndarray, "T"],
+    frames: int,
+    seen: Bool[np.ndarray, "T"],
+) -> Track:
+    """The track with standing height and box by the frames in which the player was `seen`."""
+    height = standing_height(track.head, track.mid_feet, magnification, frames, seen)
     return replace(track, height=height, box=player_boxes(track.head, track.feet, height))
 
 

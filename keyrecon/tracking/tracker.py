@@ -46,7 +46,7 @@ from keyrecon.tracking.linking import (
     link_head,
 )
 from keyrecon.tracking.radial_symmetry import find_peaks
-from keyrecon.tracking.scale import measured, player_boxes, zoom
+from keyrecon.tracking.scale import measured, zoom
 from keyrecon.tracking.visibility import is_visible
 
 Record = TypeVar("Record", Crops, Track)
@@ -280,11 +280,14 @@ def _link(
         detections, camera, cropping, head, frames.rough.height, frames.marked_feet, gait
     )
     confidence = np.sqrt(head_confidence * feet_confidence)
-    rough = frames.rough.height
-    track = Track(head, feet, rough, player_boxes(head, feet, rough), confidence)
-    visible = is_visible(frames.crops, cropping, track, frames.rough.confidence > 0)
     window = round(options.envelope * fps)
-    return measured(replace(track, confidence=confidence * visible), frames.magnification, window)
+    rough = Track(head, feet, frames.rough.height, frames.rough.box, confidence)
+    track = measured(rough, frames.magnification, window, np.ones(len(head), dtype=bool))
+    visible = is_visible(frames.crops, cropping, track, frames.rough.confidence > 0)
+    if visible.all():
+        return track
+    track = replace(track, confidence=confidence * visible)
+    return measured(track, frames.magnification, window, visible)
 
 
 def detect_in_crop(
