@@ -265,10 +265,17 @@ def _lift(
         preparation.keyframes,
         height,
         video.fps,
-        LiftPriors(expected, models.depth, preparation.shots),
+        LiftPriors(expected, models.depth, preparation.shots, focal_length(options.lift, video)),
         options=options.lift,
         progress=progress,
     )
+
+
+def focal_length(options: LiftOptions, video: Video) -> float | None:
+    """Focal length by the field of view, px; None where that is not known."""
+    if options.field_of_view is None:
+        return None
+    return float(video.width / 2 / np.tan(np.radians(options.field_of_view) / 2))
 
 
 def carry_joints(
@@ -376,3 +383,8 @@ def as_printed(options: Options = Options()) -> Options:
 def with_height(options: Options, height: float | None) -> Options:
     """Options for an athlete of some height, metres; None where it is not known."""
     return replace(options, lift=replace(options.lift, height=height))
+
+
+def with_field_of_view(options: Options, degrees: float | None) -> Options:
+    """Options for a camera of some angle across the picture; None where it is not known."""
+    return replace(options, lift=replace(options.lift, field_of_view=degrees))
