@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from keyrecon.app.lens import OPEN_FOCAL, known_focal
-from keyrecon.app.placing import MAX_TILT_ERROR, old_report, place_again
+from keyrecon.app.placing import most_tilt_error, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.ground_marks import merge_marks
@@ -216,7 +216,7 @@ def _advice(
     """What is open, and what would tell it."""
     open_focal = found.sd.log_focal > OPEN_FOCAL
     tilt = float(np.nanmax(found.camera.sd_tilt))
-    if not open_focal and tilt <= MAX_TILT_ERROR:
+    if not open_focal and tilt <= most_tilt_error(found.camera):
         return []
     near, far = found.distances
     lines = []
