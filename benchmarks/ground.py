@@ -47,7 +47,7 @@ from world import (
     true_camera,
 )
 
-from keyrecon.app.placing import MAX_TILT_ERROR
+from keyrecon.app.placing import most_tilt_error
 from keyrecon.records import CameraPath, Motion
 from keyrecon.synthetic.motion import MotionOptions, place_joints
 from keyrecon.synthetic.rally import PointPlan, Pose
@@ -232,7 +232,7 @@ def _pose(found: GroundCalibration, scene: Scene) -> str:
     axes = sight_axes(camera, motion.points2d[:, HIPS].mean(axis=1))
     before = np.einsum("tij,tnj->tni", axes, motion.points3d)
     olds = [measured(before, true) for measured in (_n_mpjpe, _pa_mpjpe, _lean)]
-    if np.nanmax(found_camera.sd_tilt) > MAX_TILT_ERROR:
+    if np.nanmax(found_camera.sd_tilt) > most_tilt_error(found_camera):
         return "".join(f"{old:7.1f} >    -" for old in olds) + "  not used"
     world = place_motion(motion, found_camera)
     if world is None:

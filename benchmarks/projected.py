@@ -1,12 +1,14 @@
 """The lift alone: joints of captured people projected, with errors like those of propagated ones.
 
     python benchmarks/projected.py [--work DIR] [--mocap DIR] [--only NAME ...] [--other] [--fps 25]
+        [--lens 1]
 
 Takes minutes where accuracy.py takes an hour, as nothing is drawn and nothing is looked for: the
 first 12 s of the sequences of `sequences.py`, seen by their cameras. Joints are off by .9 % of the
 player's height, which wanders within a quarter of a second, and by .3 % of noise, elbows and wrists
 by 1.4 times as much; scale by 1 %. 3 % of the frames are marked, at even distances, with the click
-noise of accuracy.py; with `--fps` as many a second, at another frame rate than 50. The depth model
+noise of accuracy.py; with `--fps` as many a second, at another frame rate than 50. With `--lens`
+the lift is told so many times the true focal length, and takes perspective out. The depth model
 has not learnt from the players of the table; `--other` takes motion that is no tennis, and models
 without it. Prints PA-MPJPE and N-MPJPE, mm, and what a coach would read (`posture.py`), with depth
 signs from the person and without.
@@ -49,6 +51,8 @@ class Truth(NamedTuple):
     """Stature, metres."""
     height_px: np.ndarray
     """Standing height in every frame."""
+    focal: np.ndarray
+    """(T,), px."""
 
 
 def film(sequence: Sequence, mocap: Path) -> Truth:
@@ -61,11 +65,14 @@ def film(sequence: Sequence, mocap: Path) -> Truth:
     tall = stage.move.focal[: len(points)] if np.ndim(stage.move.focal) else stage.move.focal
     height_px = tall / whole[..., 2].mean(axis=1) * stage.pointers.stature
     flat = stage.move.project(stage.points)[: len(points)]
-    return Truth(whole, flat, float(stage.pointers.stature), height_px)
+    focal = np.broadcast_to(tall, len(points))
+    return Truth(whole, flat, float(stage.pointers.stature), height_px, focal)
 
 
-def lift(sequence: Sequence, truth: Truth, model: DepthModel, signs: bool) -> np.ndarray:
-    """Joints in space from joints in the picture that are off."""
+def lift(
+    sequence: Sequence, truth: Truth, model: DepthModel, signs: bool, lens: float | None
+) -> np.ndarray:
+    """Joints in space from joints in the picture that are off; `lens` as `--lens`."""
     frames, fps = len(truth.points2d), sequence.fps
     rng = np.random.default_rng(sequence.seed)
     tall = float(np.median(truth.height_px))
@@ -82,7 +89,8 @@ def lift(sequence: Sequence, truth: Truth, model: DepthModel, signs: bool) -> np
     seen = truth.height_px * (1 + SCALE_ERROR * rng.standard_normal())
     typed = truth.height * (1 + rng.uniform(-HEIGHT_ERROR, HEIGHT_ERROR))
     given = tracks, marks, keyframes, seen, fps
-    result = lift_motion(*given, LiftPriors(depth_model=model), LiftOptions(height=typed))
+    priors = LiftPriors(depth_model=model, focal=None if lens is None else lens * truth.focal)
+    result = lift_motion(*given, priors, LiftOptions(height=typed))
     return result.points3d
 
 
@@ -97,14 +105,15 @@ def errors(frames: int, fps: float, rng: np.random.Generator) -> np.ndarray:
     return np.array(arms)[:, None] * (WANDERING * wander + NOISE * noise)
 
 
-def measure(listed: Sequence, fps: float | None, work: Path, mocap: Path) -> list[list[float]]:
+def measure(listed: Sequence, words: argparse.Namespace) -> list[list[float]]:
     """Print and give the scores of one sequence, with signs and without."""
-    (_, model), sequence = unseen_model(listed, work, mocap), replace(listed, fps=fps or listed.fps)
+    (_, model) = unseen_model(listed, words.work, words.mocap)
+    sequence, mocap = replace(listed, fps=words.fps or listed.fps), words.mocap
     truth = film(sequence, mocap)
     known = {"points3d": truth.points3d, "joint_names": np.array(LSP14.names)}
     rows = []
     for signs in (True, False):
-        points = lift(sequence, truth, model, signs)
+        points = lift(sequence, truth, model, signs, words.lens)
         motion = SimpleNamespace(points3d=points, skeleton=LSP14, fps=sequence.fps)
         scores = posture.judge_posture(motion, known)  # type: ignore[arg-type]
         off = 1000 * pa_mpjpe(points, truth.points3d), 1000 * n_mpjpe(points, truth.points3d, HIPS)
@@ -122,13 +131,14 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names of sequences")
     parser.add_argument("--other", action="store_true", help="motion that is no tennis")
     parser.add_argument("--fps", type=float, help="frames per second in place of a sequence's own")
+    parser.add_argument("--lens", type=float, help="tell so many times the true focal length")
     words = parser.parse_args()
     words.work.mkdir(parents=True, exist_ok=True)
     print(f"{'sequence':<22}{'told':<7}{'PA':>7}{'N':>7}{posture.COLUMNS}")
     table = [
         s for s in (OTHER if words.other else TENNIS) if not words.only or s.name in words.only
     ]
-    rows = np.array([measure(listed, words.fps, words.work, words.mocap) for listed in table])
+    rows = np.array([measure(listed, words) for listed in table])
     for form, mean in zip(("signs", "none"), rows.mean(axis=0), strict=True):
         print(f"{'mean':<22}{form:<7}{mean[0]:7.1f}{mean[1]:7.1f}")
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Bool
 
 from keyrecon.io.held_video import hold_if_small
 from keyrecon.io.video import Video
@@ -35,9 +36,11 @@ from keyrecon.timeline import (
     part_of_path,
     part_of_picks,
     put_back,
+    spread_edges,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
+from keyrecon.tracking.scale import measured, zoom
 from keyrecon.tracking.shot_sorting import (
     ShotOptions,
     Sighting,
@@ -46,6 +49,7 @@ from keyrecon.tracking.shot_sorting import (
     sort_shots,
 )
 from keyrecon.tracking.tracker import TrackOptions, track_player
+from keyrecon.tracking.tracklets import linked_to_player
 from keyrecon.tracking.verification import verify_track
 
 HELD = 1e9
@@ -88,8 +92,24 @@ class _Shot:
     camera: CameraPath
     colors: Colors
     anchors: TrackAnchors
-    picked: bool
-    """Whether a person clicked or marked in it."""
+    picks: tuple[Pick, ...]
+    """What a person clicked or marked in it."""
+
+    def linked(self, track: Track) -> Bool[np.ndarray, "T"]:
+        """Frames in which a track is joined to the player who was told."""
+        heads = [pick for pick in self.picks if pick.part == "head"]
+        frames = np.array([pick.frame for pick in heads], dtype=np.int64)
+        places = np.array([(pick.x, pick.y) for pick in heads]).reshape(-1, 2)
+        return linked_to_player(track, self.camera, frames, places, self.video.fps)
+
+    def joined_part(self, track: Track, linked: Bool[np.ndarray, "T"], envelope: float) -> Track:
+        """A track that is sure of nothing where it is not `linked`, nor has the size of who is
+        there; `envelope` as in the options of the tracker."""
+        if linked.all():
+            return track
+        joined = replace(track, confidence=track.confidence * linked)
+        window = round(envelope * self.video.fps)
+        return measured(joined, zoom(self.camera, self.video), window, joined.confidence > 0)
 
 
 def follow_player(
@@ -110,7 +130,7 @@ def follow_player(
     asked = numbered_shots(options.shots.use, len(shots.parts))
     numbered_shots(options.shots.skip, len(shots.parts))
     if not camera.cuts:
-        only = _Shot("", 0, video, camera, colors, anchors, True)
+        only = _Shot("", 0, video, camera, colors, anchors, tuple(clicks))
         detected = keep(
             "find", find_player, video, colors, camera, anchors,
             options=options.find, progress=progress,
@@ -118,7 +138,7 @@ def follow_player(
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
     sightings = _sight_each(each, asked, options.find, keep, progress)
-    picked = np.array([shot.picked for shot in each])
+    picked = np.array([bool(shot.picks) for shot in each])
     shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
     found = [_found(sightings[number]) for number in usable]
@@ -173,7 +193,7 @@ def _shot(
         part_of_path(camera, part),
         replace(colors, height=picked_height(picks)) if sized else colors,
         part_of_anchors(anchors, part),
-        bool(picks),
+        tuple(picks),
     )
 
 
@@ -205,6 +225,8 @@ def _follow(
     shot: _Shot, detected: Track, options: FollowOptions, keep: Keep, progress: Progress
 ) -> tuple[Track, tuple[Edges, ...], TrackVerification]:
     """Track and edges of a shot in which the player was found, and what speaks for the track."""
+    joined = shot.linked(detected)
+    detected = shot.joined_part(detected, joined, options.find.envelope)
     video = hold_if_small(shot.video, HELD)
     background = keep(
         f"background{shot.name}", build_background, video, shot.camera, detected,
@@ -214,6 +236,8 @@ def _follow(
         f"track{shot.name}", track_player, video, detected, shot.camera, background,
         shot.colors, shot.anchors, options=options.track, progress=progress,
     )  # fmt: skip
+    seen, linked = track.confidence > 0, shot.linked(track)
+    track = shot.joined_part(track, linked, options.track.envelope)
     edges = keep(
         f"edges{shot.name}", find_edges, video, track, shot.camera, background, shot.colors,
         options=options.edges, progress=progress,
@@ -222,7 +246,11 @@ def _follow(
         f"verify{shot.name}", verify_track, video, track, shot.camera, background,
         shot.colors, progress=progress,
     )  # fmt: skip
-    return track, edges, verification
+    player = np.flatnonzero(linked & (joined | (track.confidence > 0)))
+    if len(player) < len(edges):  # of somebody else nothing is carried
+        edges = spread_edges([edges[t] for t in player], player, len(edges))
+    unlinked = (seen & ~linked)[verification.frames]
+    return track, edges, replace(verification, unlinked=unlinked)
 
 
 def follow_marks(

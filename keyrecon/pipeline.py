@@ -61,6 +61,7 @@ from keyrecon.tracking.mark_flow import FlowOptions
 from keyrecon.tracking.shot_sorting import ShotOptions
 from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
+from keyrecon.unseen import without_unseen
 from keyrecon.usable_shots import in_file, marks_in_shots, usable_part
 
 
@@ -216,7 +217,8 @@ def reconstruct(
     """Propagate the annotated joints to every frame and recover the 3D motion.
 
     ECCV 2004, Sections 5 and 6. Lengths are in metres where `options.lift.height` is given, else
-    in body heights. Raises KeyreconError when keyframes are not annotated.
+    in body heights. Where nobody is seen for long there is no motion. Raises KeyreconError when
+    keyframes are not annotated.
     """
     shots, whole = preparation.shots, preparation.video
     if not all(shots.usable):
@@ -225,7 +227,10 @@ def reconstruct(
     part, marks, tracks = _carry_usable(preparation, annotations, options, keep, progress)
     lifted = _lift(part, tracks, marks, models, options, keep, progress)
     motion = assemble_motion(part.video, marks, tracks, lifted, options.lift.height, part.shots)
-    return motion if len(shots.parts) == 1 else motion_in_file(motion, shots, whole.time)
+    if len(shots.parts) > 1:
+        motion = motion_in_file(motion, shots, whole.time)
+    # A prior of the whole motion tells what nobody saw.
+    return without_unseen(motion) if options.prior == "none" else motion
 
 
 def _lift(
@@ -260,10 +265,17 @@ def _lift(
         preparation.keyframes,
         height,
         video.fps,
-        LiftPriors(expected, models.depth, preparation.shots),
+        LiftPriors(expected, models.depth, preparation.shots, focal_length(options.lift, video)),
         options=options.lift,
         progress=progress,
     )
+
+
+def focal_length(options: LiftOptions, video: Video) -> float | None:
+    """Focal length by the field of view, px; None where that is not known."""
+    if options.field_of_view is None:
+        return None
+    return float(video.width / 2 / np.tan(np.radians(options.field_of_view) / 2))
 
 
 def carry_joints(
@@ -371,3 +383,8 @@ def as_printed(options: Options = Options()) -> Options:
 def with_height(options: Options, height: float | None) -> Options:
     """Options for an athlete of some height, metres; None where it is not known."""
     return replace(options, lift=replace(options.lift, height=height))
+
+
+def with_field_of_view(options: Options, degrees: float | None) -> Options:
+    """Options for a camera of some angle across the picture; None where it is not known."""
+    return replace(options, lift=replace(options.lift, field_of_view=degrees))

@@ -15,5 +15,7 @@ def within(least: int | float, most: int | float) -> Meta:
 SHORTEST, TALLEST = 0.5, 2.6
 """Of people, metres."""
 BODY_HEIGHTS = within(SHORTEST, TALLEST)
+FIELDS_OF_VIEW = within(3, 150)
+"""Of cameras, across the width of the picture, degrees."""
 SEEDS = within(0, 2**32 - 1)
 """What NumPy's generators take."""

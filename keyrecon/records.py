@@ -137,6 +137,9 @@ class TrackVerification:
     """Head of another figure that looks like the player, px; NaN where there is none."""
     hidden: Bool[np.ndarray, "n"]
     """Whether something laid over the picture, such as a score, hides a part of the player."""
+    unlinked: Bool[np.ndarray, "n"] | None = None
+    """Whether somebody was followed there who is not joined to the player that a person told; None
+    where that was not looked at."""
 
 
 @dataclass(frozen=True, eq=False)

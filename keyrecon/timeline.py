@@ -94,7 +94,7 @@ def put_back(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerF
     values: dict[str, Any] = {}
     for field in fields(record):
         own: np.ndarray | None = getattr(record, field.name)
-        values[field.name] = None if own is None else _spread(field.name, own, frames, count)
+        values[field.name] = None if own is None else spread_values(field.name, own, frames, count)
     return type(record)(**values)
 
 
@@ -103,7 +103,9 @@ SAYING_NOTHING |= {"source": float(SOURCES.index("interpolated"))}
 """What some values are in frames of which nothing is known; others are NaN, or 0."""
 
 
-def _spread(name: str, values: np.ndarray, frames: Int[np.ndarray, "n"], count: int) -> np.ndarray:
+def spread_values(
+    name: str, values: np.ndarray, frames: Int[np.ndarray, "n"], count: int
+) -> np.ndarray:
     """Values of `frames` among `count`: NaN between them, or what says nothing."""
     unknown = np.nan if values.dtype.kind == "f" else 0
     whole = np.full((count, *values.shape[1:]), SAYING_NOTHING.get(name, unknown), values.dtype)
@@ -221,7 +223,8 @@ def motion_in_file(motion: Motion, shots: Shots, time: Float[np.ndarray, "T"]) -
 
     told = [name for name in TOLD_PER_FRAME if getattr(motion, name) is not None]
     own: dict[str, Any] = {
-        name: _spread(name, getattr(motion, name), frames, count) for name in (*PER_FRAME, *told)
+        name: spread_values(name, getattr(motion, name), frames, count)
+        for name in (*PER_FRAME, *told)
     }
     return replace(
         motion,

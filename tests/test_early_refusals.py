@@ -100,6 +100,16 @@ def test_a_height_is_told_in_metres_or_centimetres(keyrecon, project, height, mo
     assert heard[0].lift.height == pytest.approx(1.88)
 
 
+def test_the_angle_of_the_camera_reaches_the_lift(keyrecon, project, monkeypatch):
+    heard = []
+    monkeypatch.setattr(
+        "keyrecon.app.running.run", lambda _, chosen, *__, **___: heard.append(chosen) or ""
+    )
+    assert keyrecon("run", project, "--fov", "36")[0] == 0
+    assert heard[0].lift.field_of_view == 36
+    assert one_line(keyrecon("run", project, "--fov", "0"), "--fov is the angle across")
+
+
 @pytest.mark.parametrize("height", ["tall", "18.8", "0.3", "nan", "400"])
 def test_a_height_that_nobody_has_is_told_with_those_there_are(keyrecon, project, height):
     told = keyrecon("run", project, "--height", height)

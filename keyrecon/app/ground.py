@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.placing import MAX_TILT_ERROR, old_report, place_again
+from keyrecon.app.lens import OPEN_FOCAL, known_focal
+from keyrecon.app.placing import most_tilt_error, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.ground_marks import merge_marks
 from keyrecon.io.formats.motion_file import read_motion
-from keyrecon.io.lens_metadata import lens_focal
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
@@ -40,11 +40,6 @@ FORMS = {
     "horizon": ("FRAME:X,Y:X,Y", "0:20,301:1260,305"),
 }
 """How marks are typed, with an example of each."""
-TYPED_ERROR, LENS_ERROR = 0.05, 0.12
-"""Spread of the logarithm of a focal length by a field of view that was typed, and by the lens that
-the file names: phones crop up to 10 % of the width where they stabilise (our estimate)."""
-OPEN_FOCAL = 0.2
-"""Spread from which on the focal length counts as open."""
 
 
 def ground_mark(kind: Kind, text: str) -> GroundMark:
@@ -81,7 +76,7 @@ def find_ground(
     together = merge_marks(kept, told)
     _keep_court(workspace)
     motion = _motion_of(workspace, video)
-    known = _known_focal(video, together.field_of_view)
+    known = known_focal(video, together.field_of_view)
     options = workspace.options(Options(), Options()).camera
     path = workspace.stages.keep(
         "camera", estimate_camera_motion, video, options=options, progress=progress
@@ -150,17 +145,6 @@ def _keep_court(workspace: Workspace) -> None:
             f"{file} has the camera from a court, which tells it more surely than the ground can; "
             "to use the ground all the same, move that file away."
         )
-
-
-def _known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
-    """What is known of the focal length without looking at the picture."""
-    if degrees is not None:
-        focal = video.width / 2 / np.tan(np.radians(degrees) / 2)
-        return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
-    if video.joints:  # several files, perhaps of several lenses
-        return None
-    lens = lens_focal(video.path, (video.width, video.height))
-    return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")
 
 
 def _whose(kept: GroundMarks, told: GroundMarks) -> str:
@@ -232,7 +216,7 @@ def _advice(
     """What is open, and what would tell it."""
     open_focal = found.sd.log_focal > OPEN_FOCAL
     tilt = float(np.nanmax(found.camera.sd_tilt))
-    if not open_focal and tilt <= MAX_TILT_ERROR:
+    if not open_focal and tilt <= most_tilt_error(found.camera):
         return []
     near, far = found.distances
     lines = []

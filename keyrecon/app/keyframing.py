@@ -5,10 +5,15 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
 from keyrecon.annotation_budget import annotation_cost, check_budget
-from keyrecon.app.preparing import describe_shots, prepare_project, with_chosen_shots
+from keyrecon.app.preparing import (
+    describe_shots,
+    prepare_project,
+    unlinked_stretches,
+    with_chosen_shots,
+)
 from keyrecon.app.project import load_annotations
 from keyrecon.errors import counted, quoted
 from keyrecon.io.durable import make_folder, write_durably
@@ -18,7 +23,7 @@ from keyrecon.io.held_video import with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
-from keyrecon.keyframes.absence import absent_frames, list_stretches
+from keyrecon.keyframes.absence import absent_frames, list_stretches, listed_stretches
 from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
@@ -92,7 +97,12 @@ def describe_keyframes(
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     keyframes, frames = preparation.keyframes, len(preparation.video)
-    unsure = unsure_track(preparation.track, preparation.shots, keyframes.reach)
+    told = _told_to_be_unlinked(preparation)
+    unsure = [
+        stretch
+        for stretch in unsure_track(preparation.track, preparation.shots, keyframes.reach)
+        if not told[stretch.frame]
+    ]
     folder, used = quoted(workspace.folder), preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
     halves = [
@@ -146,12 +156,21 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     """Stretches in which no keyframes are asked for."""
     reach = preparation.keyframes.reach
     absent = absent_frames(preparation.pose_distances, reach) & preparation.track.known
+    absent &= ~_told_to_be_unlinked(preparation)
     stretches = list_stretches(absent)
     if not stretches:
         return []
-    listed = ", ".join(f"{first}-{last}" for first, last in stretches[:8])
-    more = f" and {len(stretches) - 8} more" if len(stretches) > 8 else ""
-    return [f"Nobody seen in frames {listed}{more}: no keyframe is asked for there."]
+    listed = listed_stretches(stretches)
+    return [f"Nobody seen in frames {listed}: no keyframe is asked for there."]
+
+
+def _told_to_be_unlinked(preparation: Preparation) -> Bool[np.ndarray, "T"]:
+    """Frames of which `contradictions` tell already that who is followed there may be anybody."""
+    told = np.zeros(len(preparation.track.head), dtype=bool)
+    if preparation.verification is not None:
+        for first, last in unlinked_stretches(preparation.track, preparation.verification):
+            told[first : last + 1] = True
+    return told
 
 
 def write_keyframe_pictures(

@@ -18,6 +18,7 @@ from keyrecon.io.formats.coco import coco_text, read_coco
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
+from keyrecon.keyframes.absence import MOST_STRETCHES, list_stretches, listed_stretches
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
 from keyrecon.records import (
@@ -31,7 +32,8 @@ from keyrecon.records import (
 )
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
-from keyrecon.tracking.verification import find_jumps, find_meetings
+from keyrecon.tracking.tracklets import MAX_STEP_SECONDS, find_jumps
+from keyrecon.tracking.verification import find_meetings
 
 MAX_PICK_DISTANCE = 0.25
 """A click lies off its part where the track passes it farther away than this, player heights: a
@@ -206,13 +208,38 @@ def describe_identity(
             f"Another figure that looks like the player comes close in frames {where}: the track "
             f"may go on with the wrong one. Mark the player's body in frame {mark} to be sure."
         )
+    apart = unlinked_stretches(track, verification)
+    if apart:
+        mark = ", ".join(str((first + last) // 2) for first, last in apart[:MOST_STRETCHES])
+        lines.append(
+            "The player found jumps to another place, farther than anybody moves: nothing joins "
+            f"frames {listed_stretches(apart)} to the player who was marked, so they are left "
+            "out, and no keyframe is asked for there. Where the player is to be seen there, mark "
+            f"the body: frame {mark}."
+        )
     lines += [
         f"The player found jumps to another place in frame {frame}, farther than anybody moves: "
         "on one side of it that is not the player. Look there, and mark the player's body where "
         "it is somebody else."
-        for frame in jumps[:4]
+        for frame in [f for f in jumps if not _is_beside(f, apart, fps)][:4]
     ]
     return lines
+
+
+def unlinked_stretches(track: Track, verification: TrackVerification) -> list[tuple[int, int]]:
+    """First and last frames of stretches in which somebody was followed who may not be the player,
+    those about them included in which nobody was seen."""
+    if verification.unlinked is None:
+        return []
+    frames = verification.frames[verification.unlinked]
+    unseen = list_stretches(track.confidence == 0)
+    return [s for s in unseen if ((s[0] <= frames) & (frames <= s[1])).any()]
+
+
+def _is_beside(frame: int, stretches: Sequence[tuple[int, int]], fps: float) -> bool:
+    """Whether a jump leads into one of the stretches, or out of it."""
+    near = MAX_STEP_SECONDS * fps
+    return any(first - near <= frame <= last + near for first, last in stretches)
 
 
 MOST_LISTED = 12

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from keyrecon.app.lens import field_of_view, lens_advice
 from keyrecon.app.mark_checks import describe_doubtful_marks
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
@@ -15,14 +16,16 @@ from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.workspace import Workspace
+from keyrecon.keyframes.absence import list_stretches, listed_stretches
 from keyrecon.library import read_models, reconstruct
-from keyrecon.pipeline import Options, as_printed, with_height
+from keyrecon.pipeline import Options, as_printed, with_field_of_view, with_height
 from keyrecon.progress import Progress
 from keyrecon.ranges import SHORTEST, TALLEST
-from keyrecon.records import Annotations, Keyframes, Motion, Preparation
+from keyrecon.records import Annotations, Keyframes, Motion, Preparation, Shots
 from keyrecon.report.markup import ReportMaterial
 from keyrecon.report.page import write_report
 from keyrecon.uncertainty import describe_uncertainty
+from keyrecon.world.ground_marks import check_field_of_view
 
 
 def settings(
@@ -30,14 +33,18 @@ def settings(
     given: Options,
     height: float | None = None,
     told: Collection[str] = (),
+    fov: float | None = None,
 ) -> Options:
-    """The project's options and what is told now, with the height in metres.
+    """The project's options and what is told now: height in metres, angle of the camera in degrees.
 
     Options `told` by dotted names count also where they are as usual.
     """
     if height is not None and not SHORTEST <= height <= TALLEST:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
+    if fov is not None:
+        check_field_of_view(fov)
     options = workspace.options(given, Options(), told=told)
+    options = options if fov is None else with_field_of_view(options, fov)
     return options if height is None else with_height(options, height)
 
 
@@ -59,6 +66,8 @@ def run(
     read_models(options)  # a file that is none is told of before any stage
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
+    if options.lift.field_of_view is None:
+        options = with_field_of_view(options, field_of_view(workspace, workspace.video()))
     evidence = marks_evidence(workspace)
     annotations = annotated(workspace, partial)
     asked = asked_for(workspace)
@@ -68,7 +77,7 @@ def run(
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
     wrong = describe_doubtful_marks(preparation, annotations, motion)
-    shots = describe_shots(preparation.shots)
+    shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
         track=preparation.track,
@@ -88,9 +97,24 @@ def run(
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
     lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion)]
+    if options.lift.field_of_view is None and options.lift.method != "paper":
+        lines += lens_advice(workspace, motion, workspace.video())
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
+
+
+def describe_unseen(motion: Motion, shots: Shots) -> list[str]:
+    """A line where usable shots have frames without a figure."""
+    hidden = ~motion.known
+    hidden &= np.isin(np.arange(len(hidden)), shots.usable_frames)
+    stretches = list_stretches(hidden)
+    if not stretches:
+        return []
+    return [
+        f"Nobody seen in frames {listed_stretches(stretches)}: there is no figure there. Where the "
+        "player is there after all, mark the body."
+    ]
 
 
 def _describe_files(workspace: Workspace, motion: Motion) -> list[str]:

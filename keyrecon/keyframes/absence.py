@@ -6,6 +6,7 @@ keyframes are chosen, as if the video had been cut there, and put back afterward
 does not show the player at all, however short.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,9 @@ from scipy.ndimage import binary_opening
 
 from keyrecon.records import HalfKeyframes, PoseDistances
 from keyrecon.timeline import frames_before
+
+MOST_STRETCHES = 8
+"""Stretches that are listed one by one."""
 
 
 def absent_frames(comparison: PoseDistances, reach: int) -> Bool[np.ndarray, "T"]:
@@ -35,6 +39,13 @@ def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
     """First and last frame of every stretch."""
     turns = np.flatnonzero(np.diff(absent, prepend=False, append=False))
     return [(int(first), int(end) - 1) for first, end in turns.reshape(-1, 2)]
+
+
+def listed_stretches(stretches: Sequence[tuple[int, int]]) -> str:
+    """The first stretches in words, and how many more there are."""
+    listed = ", ".join(f"{first}-{last}" for first, last in stretches[:MOST_STRETCHES])
+    more = len(stretches) - MOST_STRETCHES
+    return f"{listed} and {more} more" if more > 0 else listed
 
 
 def select_frames(comparison: PoseDistances, kept: Int[np.ndarray, "n"]) -> PoseDistances:

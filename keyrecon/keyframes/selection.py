@@ -80,7 +80,7 @@ class KeyframeOptions:
 
     Annotation cost: (upper + lower keyframes) / 2 per frame of the video; None takes as many as
     reach the coverage at `sufficient_beta`, no fewer than half a minute would, and no more
-    than is usual for its length (`usual_budget`).
+    than is usual for as many frames as show the player (`usual_budget`).
     """
     sufficient_beta: Annotated[float, within(0.001, 1)] = SUFFICIENT_BETA
     """Pose distance that is near enough, player heights: without a budget, keyframes that reach
@@ -200,9 +200,11 @@ def choose_keyframes(
     cannot be (`count_labels`).
     """
     frames = len(comparison.row)
-    labels = count_labels(options, frames, fps)
     reach = max(1, round(options.reach * fps / 50))
     kept = np.flatnonzero(~absent_frames(comparison, reach))
+    # A budget that is set is a share of all frames; what is usual, of those with the player.
+    counted = len(kept) if options.budget is None else frames
+    labels = count_labels(options, counted, fps)
     comparison = select_frames(comparison, kept)
     halves: list[HalfKeyframes] = []
     flexible = options.budget is None and options.method == "coverage"

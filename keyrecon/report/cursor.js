@@ -114,4 +114,4 @@ for (const image of document.querySelectorAll("[data-copy]"))
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   restyled.forEach((restyle) => restyle());
 });
-addEventListener("DOMContentLoaded", () => show(0));
+addEventListener("DOMContentLoaded", () => show(data.first));

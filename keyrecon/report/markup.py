@@ -40,7 +40,8 @@ class ReportMaterial:
     contradictions: Sequence[str] = ()
     """What of the video and of what a person told does not fit the rest, a line each."""
     shots: Sequence[str] = ()
-    """Which shots the motion is of, a line; none for a video of one."""
+    """Which shots the motion is of, and where nobody is seen in them, a line each; none where the
+    whole video shows the player."""
 
     @cached_property
     def true_joints(self) -> Truth | None:

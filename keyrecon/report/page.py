@@ -315,6 +315,7 @@ def _numbers(material: ReportMaterial) -> dict[str, object]:
     every = thinning(len(motion.time))
     return {
         "fps": motion.fps,
+        "first": int(motion.known.argmax()),
         "cuts": [] if motion.cuts is None else motion.cuts.tolist(),
         "late": pack(motion.time - np.arange(len(motion.time)) / motion.fps, every),
         "bones": drawn_bones(skeleton).tolist(),

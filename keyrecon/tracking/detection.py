@@ -196,7 +196,10 @@ def _link(
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)
-    standing = standing_height(head, feet.mean(axis=1), zoom(camera, video), frames)
+    # Places that were missed are on the way between those that were not.
+    standing = standing_height(
+        head, feet.mean(axis=1), zoom(camera, video), frames, np.ones(len(head), dtype=bool)
+    )
     halves = [c / 2 for c in costs]
     confidence = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
     confidence = np.interp(np.arange(len(head)), numbers, confidence)

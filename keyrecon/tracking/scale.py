@@ -2,15 +2,18 @@
 
 Players crouch, lunge and jump, so the standing height from head to mid-feet is an upper envelope
 over time of the distance between them. A zooming camera changes it faster than any player can; its
-magnification is taken out first.
+magnification is taken out first. Where the player was not seen, head and feet lie anywhere, and far
+from each other more often than not: those frames tell nothing.
 """
 
+from dataclasses import replace
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
 from keyrecon.io.video import Video
-from keyrecon.records import CameraPath
+from keyrecon.records import CameraPath, Track
 
 
 def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
@@ -31,16 +34,31 @@ def standing_height(
     mid_feet: Float[np.ndarray, "T 2"],
     magnification: Float[np.ndarray, "T"],
     frames: int,
+    seen: Bool[np.ndarray, "T"],
 ) -> Float[np.ndarray, "T"]:
-    """Upper envelope of the distance from head to mid-feet over about `frames` frames, px.
+    """Upper envelope of the distance from head to mid-feet over about `frames` frames, px, told by
+    those in which the player was `seen`; by all where there are none.
 
     The zoom is undone before and done again after. A crouch longer than that passes for a change
     of distance.
     """
-    length = np.linalg.norm(mid_feet - head, axis=1) / magnification
+    known = np.flatnonzero(seen if seen.any() else ~seen)
+    length = np.linalg.norm(mid_feet - head, axis=1)[known] / magnification[known]
     window = min(len(length), max(3, frames) | 1)
     envelope = percentile_filter(length, 80, size=window, mode="nearest")
-    return gaussian_filter1d(envelope, window / 4, mode="nearest") * magnification
+    smooth = gaussian_filter1d(envelope, window / 4, mode="nearest")
+    return np.interp(np.arange(len(head)), known, smooth) * magnification
+
+
+def measured(
+    track: Track,
+    magnification: Float[np.ndarray, "T"],
+    frames: int,
+    seen: Bool[np.ndarray, "T"],
+) -> Track:
+    """The track with standing height and box by the frames in which the player was `seen`."""
+    height = standing_height(track.head, track.mid_feet, magnification, frames, seen)
+    return replace(track, height=height, box=player_boxes(track.head, track.feet, height))
 
 
 def player_boxes(

@@ -46,7 +46,7 @@ from keyrecon.tracking.linking import (
     link_head,
 )
 from keyrecon.tracking.radial_symmetry import find_peaks
-from keyrecon.tracking.scale import player_boxes, standing_height, zoom
+from keyrecon.tracking.scale import measured, zoom
 from keyrecon.tracking.visibility import is_visible
 
 Record = TypeVar("Record", Crops, Track)
@@ -279,12 +279,15 @@ def _link(
     feet, feet_confidence = link_feet(
         detections, camera, cropping, head, frames.rough.height, frames.marked_feet, gait
     )
-    window = round(options.envelope * fps)
-    height = standing_height(head, feet.mean(axis=1), frames.magnification, window)
     confidence = np.sqrt(head_confidence * feet_confidence)
-    track = Track(head, feet, height, player_boxes(head, feet, height), confidence)
+    window = round(options.envelope * fps)
+    rough = Track(head, feet, frames.rough.height, frames.rough.box, confidence)
+    track = measured(rough, frames.magnification, window, np.ones(len(head), dtype=bool))
     visible = is_visible(frames.crops, cropping, track, frames.rough.confidence > 0)
-    return replace(track, confidence=confidence * visible)
+    if visible.all():
+        return track
+    track = replace(track, confidence=confidence * visible)
+    return measured(track, frames.magnification, window, visible)
 
 
 def detect_in_crop(

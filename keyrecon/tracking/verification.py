@@ -22,7 +22,7 @@ from keyrecon.io.frame_reader import read_small, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Background, CameraPath, Colors, Shots, Track, TrackVerification
+from keyrecon.records import Background, CameraPath, Colors, Track, TrackVerification
 from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
 
@@ -57,8 +57,6 @@ decides only what is told of the track."""
 MEETS = 1.0
 """Nearer than this the track may change over, player heights. It decides only what is told of the
 track."""
-MAX_STEP_SECONDS, MAX_STEP = 0.12, 0.9
-"""Nobody's head moves farther in that time, player heights: 13 m/s. A sprinter reaches 12."""
 HIDDEN_SHARE, WAY_POINTS = 0.15, 13
 """Share of the way from head to feet, of so many points, from which something hides the player: a
 trunk is a third of it."""
@@ -266,34 +264,14 @@ def _best_places(
 def find_meetings(
     verification: TrackVerification, track: Track, fps: float
 ) -> list[tuple[int, int]]:
-    """First and last frames of the stretches in which a distractor is near the player, a second or
-    more apart."""
-    frames = verification.frames
-    away = np.linalg.norm(track.head[frames] - verification.distractor, axis=1)
+    """First and last frames of the stretches in which a distractor is near the player who is seen,
+    a second or more apart."""
+    frames = verification.frames[track.confidence[verification.frames] > 0]
+    distractor = verification.distractor[track.confidence[verification.frames] > 0]
+    away = np.linalg.norm(track.head[frames] - distractor, axis=1)
     near = frames[away < MEETS * track.height[frames]]  # not where there is none, which is NaN
     if not len(near):
         return []
     breaks = np.flatnonzero(np.diff(near) > fps)
     firsts, lasts = near[np.r_[0, breaks + 1]], near[np.r_[breaks, len(near) - 1]]
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
-
-
-def find_jumps(track: Track, camera: CameraPath, shots: Shots, fps: float) -> list[int]:
-    """Frames of a shot to which the head moves farther than anybody does, the camera's motion
-    apart."""
-    step = max(1, round(MAX_STEP_SECONDS * fps))
-    if len(track.head) <= step:
-        return []
-    change = np.linalg.inv(camera.to_reference[step:]) @ camera.to_reference[:-step]
-    before = warp_points(change, track.head[:-step])
-    far = np.linalg.norm(track.head[step:] - before, axis=1) / track.height[step:]
-    same_shot = shots.number[step:] == shots.number[:-step]
-    frames = np.flatnonzero(same_shot & (far > MAX_STEP)) + step
-    if not len(frames):
-        return []
-    firsts = np.r_[0, np.flatnonzero(np.diff(frames) > 2 * step) + 1]
-    ends = np.r_[firsts[1:], len(frames)]
-    return [
-        int(frames[first:end][np.argmax(far[frames[first:end] - step])])
-        for first, end in zip(firsts.tolist(), ends.tolist(), strict=True)
-    ]

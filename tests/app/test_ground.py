@@ -6,7 +6,7 @@ from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
 
 from keyrecon.annotate.assist.ground_views import describe_ground
-from keyrecon.app import ground
+from keyrecon.app import ground, lens
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
@@ -166,7 +166,7 @@ def test_a_field_of_view_that_no_camera_has_is_told(stood):
 
 
 def test_the_lens_that_a_phone_wrote_into_the_file_counts(stood, monkeypatch):
-    monkeypatch.setattr(ground, "lens_focal", lambda path, size: 1100.0)
+    monkeypatch.setattr(lens, "lens_focal", lambda path, size: 1100.0)
     assert "the lens that the file names" in told(stood)
     assert "the lens" not in told(stood, fov=60.0)
     told(stood, forget=["fov"])

@@ -30,23 +30,26 @@ def test_a_video_of_one_shot_tells_nothing():
 FRAMES = np.arange(0, 200, 4)
 
 
-def verified(truncated=(), meeting=(), hidden=()):
+def verified(truncated=(), meeting=(), hidden=(), unlinked=()):
     """What is seen of a player who stands at (100, 50), in frames of ranges."""
     cut = np.isin(FRAMES, truncated)
     near = np.isin(FRAMES, meeting)[:, None]
     distractor = np.where(near, (140.0, 50.0), np.nan)
-    return TrackVerification(FRAMES, cut, distractor, np.isin(FRAMES, hidden))
+    apart = np.isin(FRAMES, unlinked)
+    return TrackVerification(FRAMES, cut, distractor, np.isin(FRAMES, hidden), apart)
 
 
-def identity(meeting=(), known=(), jump=None):
+def identity(meeting=(), known=(), jump=None, unlinked=()):
     head = np.tile((100.0, 50.0), (200, 1))
     if jump is not None:
         head[jump:, 0] += 400
     feet = np.repeat(head[:, None] + np.array([0, 100]), 2, axis=1)
-    track = Track(head, feet, np.full(200, 100.0), np.zeros((200, 4)), np.ones(200))
+    sure = 1.0 - np.isin(np.arange(200), unlinked)
+    track = Track(head, feet, np.full(200, 100.0), np.zeros((200, 4)), sure)
     still = CameraPath(np.tile(np.eye(3), (200, 1, 1)), np.ones(200))
     shots = Shots.between((), 200)
-    return describe_identity(track, still, 25.0, shots, verified(meeting=meeting), known)
+    seen = verified(meeting=meeting, unlinked=unlinked)
+    return describe_identity(track, still, 25.0, shots, seen, known)
 
 
 def test_feet_that_the_picture_cuts_off_are_told_with_how_often_and_where():
@@ -85,9 +88,20 @@ def test_who_looks_like_the_player_is_told_until_the_player_is_marked_on_both_si
     assert identity() == []
 
 
+def test_nobody_meets_a_player_who_is_not_seen():
+    (line,) = identity(meeting=range(90, 111), unlinked=range(80, 200))
+    assert "jumps" in line
+
+
 def test_a_hop_of_the_track_is_told_with_its_frame():
     (line,) = identity(jump=120)
     assert "in frame 12" in line
+    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+
+
+def test_frames_beyond_a_hop_that_nothing_joins_to_the_player_are_told_once():
+    (line,) = identity(jump=120, unlinked=range(120, 200))
+    assert "frames 120-199" in line and "frame 159." in line
     assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
 
 

@@ -54,6 +54,13 @@ def test_keyframes_are_those_of_the_video_with_the_stretch_cut_out(poses):
     assert whole.upper.beta == pytest.approx(alone.upper.beta, rel=0.1)
 
 
+def test_unless_a_budget_is_set_an_absence_asks_for_no_more_marks(poses):
+    whole = choose_keyframes(comparison_of(*poses, 1.0 - AWAY), 50.0)
+    alone = choose_keyframes(comparison_of(*(p[~AWAY] for p in poses)), 50.0)
+    for half, other in ((whole.upper, alone.upper), (whole.lower, alone.lower)):
+        assert len(half.frames) == len(other.frames)
+
+
 @pytest.mark.parametrize("method", ["coverage", "paper"])
 @pytest.mark.parametrize("between", ["a cut", "an absence"])
 def test_nothing_is_interpolated_over_a_cut_or_an_absence(method, between):

@@ -145,6 +145,14 @@ def test_the_small_video_shows_nobody_where_there_is_no_motion(material, tmp_pat
     assert shown[:20].min() > 5 > shown[21:].max()
 
 
+def test_the_page_opens_with_the_first_frame_that_shows_the_player(material, tmp_path):
+    unseen = material.motion.points3d.copy()
+    unseen[:7] = np.nan
+    hidden = replace(material, motion=replace(material.motion, points3d=unseen))
+    write_report(tmp_path / "report.html", hidden)
+    assert '"first":7' in (tmp_path / "report.html").read_text().replace(" ", "")
+
+
 def test_without_truth_the_report_tells_the_expected_error_and_no_accuracy(
     material, pictures, page
 ):

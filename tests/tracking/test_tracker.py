@@ -134,7 +134,17 @@ def test_a_crouch_does_not_change_the_standing_height():
     head = np.zeros((200, 2))
     feet = np.tile([0.0, 100.0], (200, 1))
     head[80:110, 1] = 30.0
-    assert standing_height(head, feet, np.ones(200), 150) == pytest.approx(100)
+    seen = np.ones(200, dtype=bool)
+    assert standing_height(head, feet, np.ones(200), 150, seen) == pytest.approx(100)
+
+
+@pytest.mark.parametrize("unseen", [slice(0, 60), slice(70, 130), slice(150, 200)])
+def test_frames_that_do_not_show_the_player_tell_nothing_of_the_standing_height(unseen):
+    head, feet = np.zeros((200, 2)), np.tile([0.0, 100.0], (200, 1))
+    head[unseen, 0] = 800.0
+    seen = np.ones(200, dtype=bool)
+    seen[unseen] = False
+    assert standing_height(head, feet, np.ones(200), 150, seen) == pytest.approx(100)
 
 
 def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):

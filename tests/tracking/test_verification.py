@@ -1,6 +1,7 @@
 """Films of a drawn player: alone, cut above the ankles, and with another one passing."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from keyrecon.segmentation.background_model import build_background
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking import verification as verification_module
 from keyrecon.tracking.scale import player_boxes
-from keyrecon.tracking.verification import find_jumps, find_meetings, hidden_shares, verify_track
+from keyrecon.tracking.tracklets import find_jumps
+from keyrecon.tracking.verification import find_meetings, hidden_shares, verify_track
 
 COUNT = 60
 HEAD = heads(COUNT) - corners(COUNT, False)
@@ -97,6 +99,22 @@ def test_a_track_that_hops_to_somebody_else_is_told_with_the_frame():
     assert 40 <= jump <= 44
     assert find_jumps(track_along(hopped), CAMERA, Shots.between((40,), COUNT), 30.0) == []
     assert find_jumps(track_along(HEAD), CAMERA, ONE_SHOT, 30.0) == []
+
+
+def test_where_nobody_is_seen_nothing_jumps():
+    lost, frames = (
+        np.where(np.arange(COUNT)[:, None] < 40, HEAD + 3 * HEIGHT, HEAD),
+        np.arange(COUNT),
+    )
+    track = replace(track_along(lost), confidence=(frames >= 40).astype(float))
+    assert find_jumps(track, CAMERA, ONE_SHOT, 30.0) == []
+
+
+def test_who_is_seen_again_farther_away_than_anybody_gets_has_jumped():
+    gone = np.isin(np.arange(COUNT), range(35, 45))
+    hopped = np.where(np.arange(COUNT)[:, None] < 40, HEAD, HEAD + np.array([4.0 * HEIGHT, 0]))
+    track = replace(track_along(hopped), confidence=1.0 - gone)
+    assert find_jumps(track, CAMERA, ONE_SHOT, 30.0) == [45]
 
 
 def test_a_camera_that_turns_makes_no_jump():

@@ -1,0 +1,67 @@
+"""What a project knows of its camera's lens without looking at the picture."""
+
+import numpy as np
+
+from keyrecon.errors import quoted
+from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.lens_metadata import lens_focal
+from keyrecon.io.video import Video
+from keyrecon.io.workspace import Workspace
+from keyrecon.records import Motion
+from keyrecon.uncertainty import player_height
+from keyrecon.world.ground_calibration import USUAL_FOCAL, FieldOfView
+
+TYPED_ERROR, LENS_ERROR = 0.05, 0.12
+"""Spread of the logarithm of a focal length by a field of view that was typed, and by the lens that
+the file names: phones crop up to 10 % of the width where they stabilise (our estimate)."""
+OPEN_FOCAL = 0.2
+"""Spread from which on the focal length counts as open."""
+NEAR_SHARE = 1 / 3
+"""Stature in the picture's longer side from which on a player counts as near: with the usual lens
+that is three body heights. PA-MPJPE with the lens told is a sixth less at two body heights (four
+views of one man), a twentieth less at six to seven (`benchmarks/projected.py --lens 1`)."""
+
+
+def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
+    """The focal length by a field of view that was told, else by the lens that the file names."""
+    if degrees is not None:
+        focal = video.width / 2 / np.tan(np.radians(degrees) / 2)
+        return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
+    if video.joints:  # several files, perhaps of several lenses
+        return None
+    lens = lens_focal(video.path, (video.width, video.height))
+    return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")
+
+
+def field_of_view(workspace: Workspace, video: Video) -> float | None:
+    """Angle across the picture, degrees: told with `keyrecon ground`, by the file, or by the camera
+    that a court or the ground told; None where none of them does."""
+    known = known_focal(video, workspace.ground_marks().field_of_view)
+    focal = _calibrated_focal(workspace) if known is None else known.focal
+    if focal is None:
+        return None
+    return float(np.degrees(2 * np.arctan(video.width / 2 / focal)))
+
+
+def lens_advice(workspace: Workspace, motion: Motion, video: Video) -> list[str]:
+    """That the camera may have stood near a player who is large in a picture of an unknown lens."""
+    share = float(np.nanmedian(player_height(motion))) / max(video.width, video.height)
+    if share < NEAR_SHARE:
+        return []
+    return [
+        f"The player is {share:.0%} of the picture's longer side tall: unless the camera zoomed in "
+        f"it stood within {USUAL_FOCAL / share:.1f} body heights, where limbs that are nearer look "
+        "longer. Depths come out better if it is told what the camera sees across the picture: "
+        f"keyrecon run {quoted(workspace.folder)} --fov DEGREES (phones 60 to 75, held upright 35 "
+        "to 45)."
+    ]
+
+
+def _calibrated_focal(workspace: Workspace) -> float | None:
+    """px, the median of all frames; None where nothing has told it."""
+    if not workspace.camera_file.is_file():
+        return None
+    camera = read_camera(workspace.camera_file)
+    focal = camera.focal[camera.found]
+    sure = len(focal) and np.median(camera.sd_focal[camera.found] / focal) <= OPEN_FOCAL
+    return float(np.median(focal)) if sure else None

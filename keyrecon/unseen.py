@@ -1,0 +1,49 @@
+"""Where a motion shows nobody: the player has not come yet, has left, or is hidden for long.
+
+Between two frames that tell of the player a moment without evidence is bridged by the motion before
+and after. A longer one cannot be, and before the first such frame and after the last there is
+nothing to bridge to: a figure there would be made up, and look like any other.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool
+
+from keyrecon.records import SOURCES, Motion
+from keyrecon.timeline import PER_FRAME, TOLD_PER_FRAME, spread_values
+
+BRIDGED_SECONDS = 0.5
+"""Longest time without evidence that the motion before and after bridges: a step. From one side
+alone half of it."""
+
+
+def unseen_frames(motion: Motion) -> Bool[np.ndarray, "T"]:
+    """Frames of stretches in which no joint was marked or carried, longer than what is bridged."""
+    nothing = (motion.source == SOURCES.index("interpolated")).all(axis=1)
+    unseen = np.zeros(len(nothing), dtype=bool)
+    longest = BRIDGED_SECONDS * motion.fps
+    for shot in motion.stretches:
+        turns = np.flatnonzero(np.diff(nothing[shot], prepend=False, append=False)) + shot.start
+        for first, end in turns.reshape(-1, 2).tolist():
+            sides = (first > shot.start) + (end < shot.stop)
+            unseen[first:end] = end - first > longest * sides / 2
+    return unseen
+
+
+def without_unseen(motion: Motion) -> Motion:
+    """The motion, unknown where nobody is seen: as if those frames were shots of something else."""
+    unseen = unseen_frames(motion)
+    if not unseen.any():
+        return motion
+    shown = np.flatnonzero(~unseen)
+    names = [name for name in (*PER_FRAME, *TOLD_PER_FRAME) if name != "time"]
+    own: dict[str, Any] = {
+        name: spread_values(name, getattr(motion, name)[shown], shown, len(unseen))
+        for name in names
+        if getattr(motion, name) is not None
+    }
+    turns = np.flatnonzero(np.diff(unseen)) + 1
+    cuts = turns if motion.cuts is None else np.union1d(turns, motion.cuts)
+    return replace(motion, **own, cuts=cuts)

@@ -1,0 +1,55 @@
+"""Facts about what a project knows of its lens, and what it says where it knows nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from court_walker import court_camera
+from ground_walker import CAMERA, SIZE, seen, standing
+
+from keyrecon.app import lens
+from keyrecon.app.project import start
+from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.video_writer import write_video
+from keyrecon.io.workspace import Workspace
+from keyrecon.world.records import GroundMarks
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    write_video(tmp_path / "v.mp4", [np.zeros((SIZE[1], SIZE[0], 3), np.uint8)] * 3, 50.0)
+    start(tmp_path / "v.mp4", tmp_path / "p")
+    return Workspace(tmp_path / "p")
+
+
+def degrees_of(focal):
+    return np.degrees(2 * np.arctan(SIZE[0] / 2 / focal))
+
+
+def test_nothing_is_known_of_a_lens_that_nobody_told(workspace):
+    assert lens.field_of_view(workspace, workspace.video()) is None
+
+
+def test_a_lens_is_known_by_the_camera_of_a_court_unless_its_focal_length_is_open(workspace):
+    camera = court_camera(CAMERA, 3)
+    write_camera(workspace.camera_file, camera)
+    known = lens.field_of_view(workspace, workspace.video())
+    assert known == pytest.approx(degrees_of(CAMERA.focal))
+    write_camera(workspace.camera_file, replace(camera, sd_focal=0.4 * camera.focal))
+    assert lens.field_of_view(workspace, workspace.video()) is None
+
+
+def test_what_a_person_told_of_the_lens_counts_before_what_the_file_tells(workspace, monkeypatch):
+    monkeypatch.setattr(lens, "lens_focal", lambda path, size: 1100.0)
+    by_file = lens.field_of_view(workspace, workspace.video())
+    assert by_file == pytest.approx(degrees_of(1100.0))
+    workspace.change_ground_marks(GroundMarks(field_of_view=48.0))
+    assert lens.field_of_view(workspace, workspace.video()) == pytest.approx(48.0)
+
+
+def test_a_player_who_fills_the_picture_is_asked_for_the_lens(workspace):
+    motion = seen(standing(steps=2))
+    assert lens.lens_advice(workspace, motion, workspace.video()) == []
+    near = replace(motion, scale=0.5 * max(SIZE) / 1.75 * np.ones(len(motion.time)))
+    (line,) = lens.lens_advice(workspace, near, workspace.video())
+    assert "--fov DEGREES" in line
