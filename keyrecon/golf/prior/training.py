@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.prior.captured_swing import place_turns, retarget_swing
+from keyrecon.golf.prior.captured_swing import change_swing, place_turns
 from keyrecon.golf.prior.motion_vectors import (
     FARTHEST_TURN,
     farthest_turn,
@@ -30,9 +30,10 @@ from keyrecon.golf.prior.motion_vectors import (
     motion_vector,
     sample_swing,
 )
-from keyrecon.golf.prior.skeleton import NAMES, PARENTS, SEGMENTS, size_body
+from keyrecon.golf.prior.shoulder_rhythm import follow_arms
+from keyrecon.golf.prior.skeleton import NAMES, PARENTS, SEGMENTS, size_body, turns_from_swing
 from keyrecon.golf.prior.variation import VariationOptions, vary_swing
-from keyrecon.golf.records import MotionModel, Swing
+from keyrecon.golf.records import Body, MotionModel, Swing
 from keyrecon.metrics import mpjpe, pa_mpjpe
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
@@ -76,7 +77,7 @@ def collect_swings(
         raise KeyreconError("One swing has no variance; give several, or variations of it.")
     body = size_body(REFERENCE)
     keys = mean_keys(swings)
-    captured = [retarget_swing(swing, body) for swing in swings]
+    captured = [_with_shoulders(swing, body) for swing in swings]
     sampled = [sample_swing(swing, keys) for swing in captured]
     centre = find_centre(np.stack([turns for turns, _ in sampled]))
     vectors = [motion_vector(turns, place, centre) for turns, place in sampled]
@@ -87,6 +88,12 @@ def collect_swings(
     for swing in progress(wanted, "Varying swings", len(wanted)):
         vectors.append(_vary(swing, keys, centre, options.variation, rng))
     return Database(centre, np.stack(vectors), keys, len(swings))
+
+
+def _with_shoulders(swing: Swing, body: Body) -> Swing:
+    """A captured swing as a player with this body makes it, his shoulders following his arms."""
+    turns, place = turns_from_swing(swing)
+    return change_swing(swing, body, follow_arms(turns), place)
 
 
 def _check_turns(name: str, vector: Float[np.ndarray, "N D"]) -> None:
