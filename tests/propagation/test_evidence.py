@@ -51,8 +51,13 @@ def test_a_limb_is_where_flow_and_near_marks_lead(half, sure):
         np.testing.assert_array_equal(found[2, side], pose[side])
 
 
-@pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
-@pytest.mark.parametrize("what", ["unlikeness", "bone_unlikeness", "color_unlikeness", "residual"])
+LOOKS = "unlikeness", "bone_unlikeness", "residual"
+
+
+@pytest.mark.parametrize(
+    ("half", "what"),
+    [*((LEGS, w) for w in LOOKS), *((ARMS, w) for w in (*LOOKS, "color_unlikeness"))],
+)
 def test_a_limb_that_looks_like_marked_ones_on_its_outline_is_chosen(half, what):
     here, there, (templates, hypotheses) = poses(half)
     side = list(half.sides[0])
