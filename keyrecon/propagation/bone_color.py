@@ -5,8 +5,9 @@ lies by its colour, along its whole length, while what surrounds it changes with
 beside the likeness of places (`appearance`), which takes in what is around them, the pixels on a
 bone are asked by themselves: how much more probable is their colour on this bone of the marks than
 anywhere about the player? (Colour models of parts: Ramanan, "Learning to parse images of
-articulated bodies", NIPS 2006.) Marks of hidden limbs count too: a forearm that is hidden by the
-trunk in half of the marks has its colours half of the time.
+articulated bodies", NIPS 2006.) Only colours that are less probable speak, against the bone: that a
+sleeve of the shirt's colour lies on the shirt says nothing for it. Marks of hidden limbs count too:
+a forearm that is hidden by the trunk in half of the marks has its colours half of the time.
 """
 
 from dataclasses import dataclass
@@ -42,8 +43,8 @@ class BoneColors:
     features: PlayerFeatures
     half: BodyHalf
     tables: Float32[np.ndarray, "B N"]
-    """Logarithm of how much less probable each colour is on a bone than about the player; 0 for
-    bones of the trunk."""
+    """Logarithm of how much less probable each colour is on a bone than about the player; 0 where
+    it is more probable, and for bones of the trunk."""
 
     def unlikeness(self, joints: Complex[np.ndarray, "T S J"]) -> Float32[np.ndarray, "T S 2 B"]:
         """Mean of the tables along every bone, nats: of the bone itself, then of its mirror image.
@@ -109,7 +110,7 @@ def learn_bone_colors(
         both = np.concatenate([own, _colors_of_marks(features, poses, int(half.bone_mirror[bone]))])
         if len(both):
             seen = len(own) * _count(own) + _count(both)
-            tables[bone] = np.log((len(own) + 2) * usual / (seen + usual))
+            tables[bone] = np.maximum(np.log((len(own) + 2) * usual / (seen + usual)), 0)
     return BoneColors(features, half, tables)
 
 

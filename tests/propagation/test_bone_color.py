@@ -33,13 +33,13 @@ def colors():
 def test_a_bone_is_where_its_colour_is(colors):
     both = np.stack([JOINTS, JOINTS + 0.1, JOINTS - 0.1], axis=1)
     cost = colors.unlikeness(both)[APART][:, :, 0, THIGH]
-    assert (cost[:, 0] < -0.5).all()
+    assert (cost[:, 0] < 0.1).all()
     assert (cost[:, 1:] > 0.5).all()
 
 
-def test_colours_tell_sides_where_they_differ(colors):
-    cost = colors.unlikeness(JOINTS[:, None])[APART][:, 0, :, THIGH]
-    assert (cost[:, 0] + 1 < cost[:, 1]).all()
+def test_a_colour_of_the_marks_speaks_for_nothing(colors):
+    assert colors.tables.min() == 0
+    assert not colors.unlikeness(JOINTS[:, None])[APART][:, 0, 0, THIGH].any()
 
 
 def test_a_colour_that_no_mark_has_costs_no_more_than_marks_are_many(colors):
@@ -49,7 +49,7 @@ def test_a_colour_that_no_mark_has_costs_no_more_than_marks_are_many(colors):
 def test_where_all_has_one_colour_it_tells_nothing():
     grey = (110, 110, 110)
     cost = learn(colors=(grey, grey)).unlikeness(JOINTS[:, None])
-    assert np.abs(cost).max() < 0.7
+    assert cost.max() < 0.5
 
 
 def test_many_places_of_a_bone_cost_about_what_its_pixels_do(colors):
