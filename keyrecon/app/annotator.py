@@ -37,7 +37,7 @@ from keyrecon.io.video import Video
 from keyrecon.io.work_lock import at_work
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options, marked_frames, with_height
+from keyrecon.pipeline import Options, marked_frames, with_field_of_view, with_height
 from keyrecon.progress import Progress
 from keyrecon.report.overlay import Limbs, OverlayOptions, View
 from keyrecon.world.calibration import CalibrationOptions
@@ -171,9 +171,12 @@ def _find_keyframes(workspace: Workspace, options: dict[str, Any], progress: Pro
 
 
 def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> str:
-    settings = running.settings(workspace, Options(), options.get("height"))
+    height, fov = options.get("height"), options.get("field_of_view")
+    settings = running.settings(workspace, Options(), height, fov=fov)
     if options.get("height", settings.lift.height) is None:  # its field was cleared
         settings = with_height(settings, None)
+    if options.get("field_of_view", settings.lift.field_of_view) is None:
+        settings = with_field_of_view(settings, None)
     return _contradictions(running.run(workspace, settings, progress, partial=True))
 
 

@@ -1,5 +1,7 @@
 """What a project knows of its camera's lens without looking at the picture."""
 
+from pathlib import Path
+
 import numpy as np
 
 from keyrecon.errors import quoted
@@ -20,6 +22,9 @@ NEAR_SHARE = 1 / 3
 """Stature in the picture's longer side from which on a player counts as near: with the usual lens
 that is three body heights. PA-MPJPE with the lens told is a sixth less at two body heights (four
 views of one man), a twentieth less at six to seven (`benchmarks/projected.py --lens 1`)."""
+
+USUAL_DEGREES = "phones 60 to 75, held upright 35 to 45"
+"""Across the picture."""
 
 
 def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
@@ -43,18 +48,32 @@ def field_of_view(workspace: Workspace, video: Video) -> float | None:
     return float(np.degrees(2 * np.arctan(video.width / 2 / focal)))
 
 
-def lens_advice(workspace: Workspace, motion: Motion, video: Video) -> list[str]:
+def lens_advice(folder: Path, nearness: str) -> str:
+    """What would help whose player was filmed from near, as a command."""
+    return (
+        f"{nearness} Depths come out better if it is told what the camera sees across the picture: "
+        f"keyrecon run {quoted(folder)} --fov DEGREES ({USUAL_DEGREES})."
+    )
+
+
+def lens_caveat(nearness: str) -> str:
+    """What would help, for who reads the report."""
+    return (
+        f"{nearness} Depths come out better where the motion is made with the field of view: the "
+        f"degrees that the camera sees across the picture ({USUAL_DEGREES})."
+    )
+
+
+def describe_nearness(motion: Motion, video: Video) -> str | None:
     """That the camera may have stood near a player who is large in a picture of an unknown lens."""
     share = float(np.nanmedian(player_height(motion))) / max(video.width, video.height)
     if share < NEAR_SHARE:
-        return []
-    return [
+        return None
+    return (
         f"The player is {share:.0%} of the picture's longer side tall: unless the camera zoomed in "
         f"it stood within {USUAL_FOCAL / share:.1f} body heights, where limbs that are nearer look "
-        "longer. Depths come out better if it is told what the camera sees across the picture: "
-        f"keyrecon run {quoted(workspace.folder)} --fov DEGREES (phones 60 to 75, held upright 35 "
-        "to 45)."
-    ]
+        "longer."
+    )
 
 
 def _calibrated_focal(workspace: Workspace) -> float | None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from keyrecon.app.lens import field_of_view, lens_advice
+from keyrecon.app.lens import describe_nearness, field_of_view, lens_advice, lens_caveat
 from keyrecon.app.mark_checks import describe_doubtful_marks
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
@@ -78,6 +78,10 @@ def run(
     doubts = automatic.contradictions()
     wrong = describe_doubtful_marks(preparation, annotations, motion)
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
+    near = None
+    if options.lift.field_of_view is None and options.lift.method != "paper":
+        near = describe_nearness(motion, workspace.video())
+    advice = () if near is None else (lens_advice(workspace.folder, near),)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
         track=preparation.track,
@@ -91,14 +95,13 @@ def run(
         contradictions=[*doubts, *wrong, *placed.doubts],
         court=placed.court,
         shots=shots,
+        lens=None if near is None else lens_caveat(near),
     )
     write_report(workspace.report_file, material, progress)
-    note_run(workspace, RunNotes(evidence, tuple(doubts)))
+    note_run(workspace, RunNotes(evidence, tuple(doubts), advice))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion)]
-    if options.lift.field_of_view is None and options.lift.method != "paper":
-        lines += lens_advice(workspace, motion, workspace.video())
+    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion), *advice]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])

@@ -28,6 +28,8 @@ class RunNotes:
     """Digest of the marks that it was made from."""
     doubts: tuple[str, ...]
     """What spoke against the track, line by line."""
+    advice: tuple[str, ...] = ()
+    """What would make the motion better, line by line."""
 
 
 def marks_evidence(workspace: Workspace) -> str:
@@ -47,7 +49,7 @@ def golf_evidence(workspace: Workspace) -> str:
 
 
 def note_run(workspace: Workspace, notes: RunNotes) -> None:
-    """Keep what the motion was made from, and what spoke against its track."""
+    """Keep what the motion was made from, what spoke against its track, what would better it."""
     write_durably(_run_file(workspace), json.dumps(asdict(notes)))
 
 
@@ -55,7 +57,9 @@ def read_run(workspace: Workspace) -> RunNotes | None:
     """What was kept of the run; None for the motion of a golf fit or of an older version."""
     try:
         noted = parse_json(read_text(_run_file(workspace)))
-        return RunNotes(str(noted["evidence"]), tuple(map(str, noted["doubts"])))
+        advice = noted.get("advice", ())  # older versions kept none
+        lines = (tuple(map(str, told)) for told in (noted["doubts"], advice))
+        return RunNotes(str(noted["evidence"]), *lines)
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None
 

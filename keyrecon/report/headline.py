@@ -52,7 +52,7 @@ def figures(material: ReportMaterial) -> str:
         for name, value, more in cards
     )
     return (
-        f'<dl class="cards">{tiles}</dl>{_conventions(motion)}'
+        f'<dl class="cards">{tiles}</dl>{_lens(material)}{_conventions(motion)}'
         f"{'' if scores is None else accuracy(scores)}"
     )
 
@@ -125,6 +125,12 @@ def accuracy(scores: Scores) -> str:
     return "<h3>Accuracy against the known truth</h3>" + table(
         ("measure", "value", "meaning"), rows, "Accuracy", "texts"
     )
+
+
+def _lens(material: ReportMaterial) -> str:
+    if material.lens is None:
+        return ""
+    return note(f"<strong>The lens is not known.</strong> {text(material.lens)}")
 
 
 def _conventions(motion: Motion) -> str:

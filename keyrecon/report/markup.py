@@ -42,6 +42,8 @@ class ReportMaterial:
     shots: Sequence[str] = ()
     """Which shots the motion is of, and where nobody is seen in them, a line each; none where the
     whole video shows the player."""
+    lens: str | None = None
+    """What an unknown lens costs the depths, where the player may have been near it."""
 
     @cached_property
     def true_joints(self) -> Truth | None:

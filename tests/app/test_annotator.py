@@ -18,7 +18,7 @@ from keyrecon.app import annotator
 from keyrecon.app.annotator import announce, job_commands
 from keyrecon.io import workers as io_workers
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import Options, with_height
+from keyrecon.pipeline import Options, with_field_of_view, with_height
 from keyrecon.progress import silent
 
 
@@ -110,6 +110,24 @@ def test_a_height_that_was_cleared_is_none_and_one_that_is_not_told_stays(bare, 
     for told in ({}, {"height": 1.7}, {"height": None}):
         run(told, silent)
     assert heights == [1.8, 1.7, None]
+
+
+def test_a_field_of_view_is_told_cleared_and_kept_as_a_height_is(bare, monkeypatch):
+    told_to_run = []
+    run = job_commands(bare)["run"]
+
+    def note_lift(workspace, options, progress, partial):
+        told_to_run.append((options.lift.field_of_view, options.lift.height))
+        return ""
+
+    monkeypatch.setattr(annotator.running, "run", note_lift)
+    remembered = with_field_of_view(with_height(Options(), 1.8), 62.0)
+    Workspace(bare).remember(remembered, Options())
+    for told in ({}, {"field_of_view": 40.0}, {"field_of_view": None}, {"height": None}):
+        run(told, silent)
+    assert told_to_run == [(62, 1.8), (40, 1.8), (None, 1.8), (62, None)]
+    with pytest.raises(KeyreconError, match="200 cannot be"):
+        run({"field_of_view": 200.0}, silent)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Facts about what a project knows of its lens, and what it says where it knows nothing."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, seen, standing
 
+from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.app import lens
 from keyrecon.app.project import start
 from keyrecon.io.formats.camera_file import write_camera
@@ -49,7 +51,16 @@ def test_what_a_person_told_of_the_lens_counts_before_what_the_file_tells(worksp
 
 def test_a_player_who_fills_the_picture_is_asked_for_the_lens(workspace):
     motion = seen(standing(steps=2))
-    assert lens.lens_advice(workspace, motion, workspace.video()) == []
+    assert lens.describe_nearness(motion, workspace.video()) is None
     near = replace(motion, scale=0.5 * max(SIZE) / 1.75 * np.ones(len(motion.time)))
-    (line,) = lens.lens_advice(workspace, near, workspace.video())
-    assert "--fov DEGREES" in line
+    nearness = lens.describe_nearness(near, workspace.video())
+    line = lens.lens_advice(workspace.folder, nearness)
+    assert "53% of the picture" in line and "--fov DEGREES" in line
+
+
+def test_on_the_page_and_in_the_report_a_lens_is_asked_for_without_a_command(workspace):
+    line = in_page_words(lens.lens_advice(workspace.folder, "The player is near."))
+    assert "type it in degrees as field of view, beside the height (phones" in line
+    for text in (line, lens.lens_caveat("The player is near.")):
+        assert text.startswith("The player is near. Depths come out better")
+        assert not re.search("keyrecon|--|DEGREES|option", text)

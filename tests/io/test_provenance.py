@@ -45,8 +45,9 @@ def test_damaged_marks_are_left_to_their_reader(workspace, content):
 
 @pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff"])
 def test_torn_notes_are_none(workspace, content):
-    note_run(workspace, RunNotes("marks", ("a doubt",)))
-    assert read_run(workspace) == RunNotes("marks", ("a doubt",))
+    noted = RunNotes("marks", ("a doubt",), ("what helps",))
+    note_run(workspace, noted)
+    assert read_run(workspace) == noted
     (workspace.folder / "cache" / "run.json").write_bytes(content)
     assert read_run(workspace) is None
 

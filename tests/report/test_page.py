@@ -115,6 +115,15 @@ def test_the_page_shows_every_section_once(page):
     assert len(ids) == len(set(ids))
 
 
+def test_what_an_unknown_lens_costs_stands_where_it_is_told_how_far_to_trust(
+    material, pictures, page
+):
+    assert "The lens is not known" not in page
+    near = build_page(replace(material, lens="The player is <near>."), pictures)
+    trust = near.split('id="accuracy"')[1].split('id="doubts"')[0]
+    assert "The lens is not known.</strong> The player is &lt;near&gt;." in trust
+
+
 def test_names_from_files_cannot_become_markup(material, pictures, page):
     hostile = renamed_video(material, Path("<img src=x onerror=alert(1)></title><script>.mp4"))
     wrong = build_page(hostile, pictures)

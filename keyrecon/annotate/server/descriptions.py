@@ -151,24 +151,30 @@ def gains_of_frames(keyframes: Keyframes | None) -> dict[int, float]:
 def describe_settings(workspace: Workspace) -> Json:
     """Options of earlier runs that the page asks for; None where none was set."""
     options = workspace.project.get("options", {})
+    lift = options.get("lift", {})
     return {
         "budget": options.get("keyframes", {}).get("budget"),
-        "height": options.get("lift", {}).get("height"),
+        "height": lift.get("height"),
+        "field_of_view": lift.get("field_of_view"),
     }
 
 
 def describe_run(workspace: Workspace, revision: int) -> Json:
-    """What spoke against the track when the motion was made, in the words of the page, and whether
-    it was made from the marks as they are now (true where that is not known).
+    """What spoke against the track when the motion was made and what would make it better, in the
+    words of the page, and whether it was made from the marks as they are now (true where that is
+    not known).
 
     `revision` is that of the marks before their files are read: newer marks are not vouched for.
     """
     notes = read_run(workspace)
     if notes is None:
-        return {"doubts": [], "is_current": True, "revision": revision}
-    doubts = [in_page_words(line) for line in notes.doubts]
-    is_current = notes.evidence == marks_evidence(workspace)
-    return {"doubts": doubts, "is_current": is_current, "revision": revision}
+        return {"doubts": [], "advice": [], "is_current": True, "revision": revision}
+    return {
+        "doubts": [in_page_words(line) for line in notes.doubts],
+        "advice": [in_page_words(line) for line in notes.advice],
+        "is_current": notes.evidence == marks_evidence(workspace),
+        "revision": revision,
+    }
 
 
 def describe_state(state: JournalState) -> Json:

@@ -92,12 +92,13 @@ class PreviewRequest(Struct, forbid_unknown_fields=True):
 
 
 class JobOptions(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """How work is done; what is not told is as in the project, and a height of null is none."""
+    """How work is done; what is not told is as in the project, null is none of it."""
 
     budget: float | None = None
     coverage: float | None = None
     reach: float | None = None
     height: float | UnsetType | None = UNSET
+    field_of_view: float | UnsetType | None = UNSET
     formats: Annotated[tuple[Annotated[str, Meta(max_length=8)], ...], Meta(max_length=12)] = ()
     """Suffixes of the files to be written; what follows is said for these alone."""
     first: Frame | None = None

@@ -37,6 +37,8 @@ PHRASES = (
     (r"--height is the athlete's height in metres; (\S+) cannot be",
      r"the player's height cannot be \1 m"),
     (rf": keyrecon ground {_NAME} --(?:vertical|horizon|fov) [^.;\n]*", "."),
+    (rf": keyrecon run {_NAME} --fov DEGREES",
+     "; type it in degrees as field of view, beside the height"),
     (r"--fov is", "The field of view is"),
     (rf"first with keyrecon run {_NAME} --height METRES", "first (3 Motion)."),
     (r"\(keyrecon run --height\)", "(3 Motion)"),

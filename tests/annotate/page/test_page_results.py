@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 from functools import partial
 from typing import get_args
 
@@ -20,10 +21,12 @@ from page_project import (
 
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
+from keyrecon.app.lens import lens_advice
 from keyrecon.body import LSP14
 from keyrecon.io.formats.export import SUFFIXES
-from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
+from keyrecon.io.provenance import RunNotes, marks_evidence, note_run, read_run
 from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options, with_field_of_view
 from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
@@ -243,6 +246,51 @@ def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
             person.page.fill("#height", typed)
             person.await_text("#height-said", "metres or centimetres")
             assert person.page.is_disabled("#motion-primary")
+
+
+def test_a_field_of_view_is_remembered_told_to_the_run_and_cleared(folder, visit):
+    Workspace(folder).remember(with_field_of_view(Options(), 62.5), Options())
+    with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
+        person = visit(server)
+        person.open(40)
+        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.press("Alt+3")
+        assert person.page.input_value("#fov") == "62.5"
+        for typed in ("2", "180", "28 mm"):
+            person.page.fill("#fov", typed)
+            person.await_text("#fov-said", "degrees across the picture: 62")
+            assert person.page.is_disabled("#motion-primary")
+        for typed, said, degrees in (("70°", "degrees", 70), ("", "not told", None)):
+            person.page.fill("#fov", typed)
+            person.await_text("#fov-said", said)
+            with person.page.expect_response("**/api/jobs") as answer:
+                person.page.press("#fov", "Enter")
+            told = answer.value.request.post_data_json["options"]
+            assert answer.value.ok and told == {"height": None, "field_of_view": degrees}
+            person.await_text("#motion-text", "The motion is made")
+
+
+def run_of_near_player(folder, options, progress):
+    """Asks for the lens unless it was told."""
+    text = run_and_tell(folder, "", options, progress)
+    if options["field_of_view"] is None:
+        workspace = Workspace(folder)
+        advice = lens_advice(folder, "The player is 45% of the picture's longer side tall.")
+        note_run(workspace, replace(read_run(workspace), advice=(advice,)))
+    return text
+
+
+def test_an_unknown_lens_is_asked_for_beside_the_motion_in_words_of_the_page(folder, visit):
+    with serving(folder, commands={"run": partial(run_of_near_player, folder)}) as server:
+        person = visit(server)
+        mark_and_run(person)
+        person.await_text(
+            "#motion-advice", "45% .* type it in degrees as field of view, beside the height"
+        )
+        assert "keyrecon" not in person.text("#motion-advice")
+        person.page.fill("#fov", "62")
+        person.page.press("#fov", "Enter")
+        person.page.wait_for_selector("#motion-advice", state="hidden")
 
 
 def test_a_file_of_marks_that_is_not_taken_in_says_so(folder, visit, tmp_path):

@@ -145,6 +145,13 @@ test("a height is metres or centimetres, and nothing else", () => {
     assert.equal(workflow.heightIn(text).wrong, true, text);
 });
 
+test("a field of view is degrees that a camera can have, or empty", () => {
+  for (const text of ["62", " 62,0 ", "62°", "62 degrees"]) assert.equal(workflow.fieldOfViewIn(text).degrees, 62, text);
+  assert.deepEqual(workflow.fieldOfViewIn(" "), { degrees: null, said: "empty: not told", wrong: false });
+  for (const text of ["0", "3", "-62", "150", "wide", "6.2.0", "1e2", "28 mm"])
+    assert.equal(workflow.fieldOfViewIn(text).wrong, true, text);
+});
+
 const FRONT = { left_shoulder: [60, 20, 2], right_shoulder: [40, 20, 2], left_hip: [55, 60, 2], right_hip: [45, 60, 2] };
 
 test("marks tell front from back by left and right alone, and nothing from the side", () => {

@@ -134,6 +134,18 @@ export function heightIn(text) {
   return { metres: null, said: "metres or centimetres: 1.80, 180", wrong: true };
 }
 
+const FIELDS_OF_VIEW = [3, 150]; // of a camera, degrees across the picture
+
+// A field of view as it was typed: {degrees, said, wrong}; degrees is null for an empty field.
+export function fieldOfViewIn(text) {
+  const [, number] = text.trim().replace(",", ".").match(/^([\d.]+)\s*(?:°|deg|degrees)?$/i) ?? [],
+    degrees = Number(number);
+  if (!text.trim()) return { degrees: null, said: "empty: not told", wrong: false };
+  if (degrees > FIELDS_OF_VIEW[0] && degrees < FIELDS_OF_VIEW[1])
+    return { degrees, said: "degrees across the picture", wrong: false };
+  return { degrees: null, said: "degrees across the picture: 62", wrong: true };
+}
+
 // Parts whose colours are picked: those that the tracker cannot do without, then regions of one colour.
 export const REQUIRED_PARTS = [
   { part: "head", text: "head", hint: "the middle of the head", count: 1 },

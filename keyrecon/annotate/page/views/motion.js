@@ -3,7 +3,7 @@ import { drawHalo, drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
 import { createPoseFigure } from "./depth.js";
-import { heightIn, label } from "../state/workflow.js";
+import { fieldOfViewIn, heightIn, label } from "../state/workflow.js";
 import { byId, make, setText, toggle } from "./dom.js";
 import { createPlayer } from "./player.js";
 
@@ -69,12 +69,15 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     show(number);
   }
 
+  const typed = () => ({ height: heightIn(byId("height").value), fov: fieldOfViewIn(byId("fov").value) });
+
   async function makeMotion() {
-    const { metres, wrong } = heightIn(byId("height").value);
-    if (wrong) byId("height").focus();
-    if (wrong || shell.runningJob()) return;
+    const { height, fov } = typed();
+    if (height.wrong) byId("height").focus();
+    else if (fov.wrong) byId("fov").focus();
+    if (height.wrong || fov.wrong || shell.runningJob()) return;
     await model.whenSaved();
-    shell.startJob("run", { height: metres });
+    shell.startJob("run", { height: height.metres, field_of_view: fov.degrees });
   }
 
   // Whether the motion was made from the marks as they are.
@@ -83,10 +86,12 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     return made !== null && model.marksAreOf(made);
   }
 
-  // Whether there is nothing to make anew: neither marks nor the height changed.
+  // Whether there is nothing to make anew: neither marks nor what is typed changed.
   function isMade() {
-    const { metres } = heightIn(byId("height").value);
-    return showsMarks() && metres === (model.project.settings.height ?? null);
+    const { height, fov } = typed(),
+      { settings } = model.project;
+    const isSame = height.metres === (settings.height ?? null) && fov.degrees === (settings.field_of_view ?? null);
+    return isSame && showsMarks();
   }
 
   function primary() {
@@ -95,7 +100,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   }
 
   byId("height").value = project.settings.height ?? "";
-  byId("height").addEventListener("input", model.redraw);
+  byId("fov").value = project.settings.field_of_view ?? "";
+  for (const field of ["height", "fov"]) byId(field).addEventListener("input", model.redraw);
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);
@@ -129,14 +135,27 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     return `Expected error here: ${mean.toFixed(0)} px; least sure: ${named.join(", ")}. Discs show it.`;
   }
 
-  // What spoke against the track when the motion was made; it stays true when its notice is closed.
-  function drawDoubts() {
-    const list = byId("motion-doubts"),
-      doubts = exists() ? model.project.run.doubts : [];
-    list.hidden = !doubts.length;
-    if (list.dataset.content === doubts.join("\n")) return;
-    list.dataset.content = doubts.join("\n");
-    list.replaceChildren(...doubts.map((text) => make("p", { className: "note wrong" }, text)));
+  // What spoke against the track when the motion was made, and what would make it better; both stay
+  // true when their notice is closed.
+  function drawNotes() {
+    const { doubts, advice } = model.project.run;
+    fillNotes(byId("motion-doubts"), exists() ? doubts : [], "note wrong");
+    fillNotes(byId("motion-advice"), exists() ? advice : [], "note");
+  }
+
+  function fillNotes(list, lines, className) {
+    list.hidden = !lines.length;
+    if (list.dataset.content === lines.join("\n")) return;
+    list.dataset.content = lines.join("\n");
+    list.replaceChildren(...lines.map((text) => make("p", { className }, text)));
+  }
+
+  function drawSettings() {
+    for (const [name, { said, wrong }] of Object.entries(typed())) {
+      setText(byId(`${name}-said`), said);
+      toggle(byId(`${name}-said`), "wrong", wrong);
+    }
+    byId("motion-primary").disabled = Object.values(typed()).some(({ wrong }) => wrong);
   }
 
   function drawStretches() {
@@ -185,11 +204,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const idle = !shell.runningJob() && model.keyframes().some(model.isDone);
     setText(byId("motion-text"), text);
     setText(byId("motion-more"), more);
-    byId("motion-primary").hidden = byId("height-row").hidden = !idle;
-    const { said, wrong } = heightIn(byId("height").value);
-    setText(byId("height-said"), said);
-    toggle(byId("height-said"), "wrong", wrong);
-    byId("motion-primary").disabled = Boolean(wrong);
+    byId("motion-primary").hidden = byId("motion-settings").hidden = !idle;
+    drawSettings();
     byId("motion-report").hidden = !model.project.has.report;
     byId("motion-files").hidden = !exists();
     toggle(byId("motion-files"), "primary", isMade());
@@ -202,7 +218,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
         : "",
     );
     setText(byId("motion-errors"), leastSure());
-    drawDoubts();
+    drawNotes();
     drawStretches();
     slider.value = frame;
     setText(byId("motion-where"), `frame ${frame} of ${project.n_frames}, ${seconds.toFixed(2)} s`);
