@@ -10,8 +10,9 @@ With them a hypothesis has the wrist right in 87, 81, 81 and 87 % of the frames 
 four real clips, without in 71, 63, 70 and 73 %; with the best of them alone 66, 31, 27 and 40 %:
 looks propose, all evidence together chooses. With the colours along their bones (`bone_color`) some
 hypothesis of six real clips has 98.4, 97.9, 96.0, 99.4, 95.0 and 99.2 % of the arms' joints right,
-without 94.6, 96.5, 94.2, 99.0, 95.4 and 99.2. Of legs other hypotheses lack nothing (99.5 % right);
-where no keyframe has the kick of a serve it is 93.5 %, and with legs looked for likewise 94.2.
+without 94.6, 96.5, 94.2, 99.0, 95.4 and 99.2 (measured while colours spoke for bones, too). Of legs
+other hypotheses lack nothing (99.5 % right); where no keyframe has the kick of a serve it is 93.5
+%, and with legs looked for likewise 94.2.
 """
 
 from dataclasses import dataclass
