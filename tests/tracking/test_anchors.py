@@ -135,3 +135,21 @@ def test_a_click_lies_as_far_from_the_track_as_from_the_nearer_foot():
     track = standing(3)
     assert distance_to_track(track, Pick(1, "foot", 56.0, 120.0)) == 0
     assert distance_to_track(track, Pick(1, "head", 50.0, 70.0)) == pytest.approx(0.5)
+
+
+def test_marks_of_a_player_who_turns_over_lie_on_their_way_and_wrong_ones_do_not():
+    """A back flip in .6 s: head and feet go round the middle of the body, and no straight way."""
+    track = somersaulting(60, 25.0)
+    assert misplaced_marks(track, marks(track, [20, 26, 31, 38]), 25.0) == []
+    wrong = replace_head(marks(track, [20, 31, 50]), 1, (0.0, 130.0))
+    assert [(m.frame, m.part) for m in misplaced_marks(track, wrong, 25.0)] == [(31, "head")]
+
+
+def somersaulting(count, fps):
+    """Upright, once over from 1 s on within .6 s, upright again."""
+    turn = np.clip((np.arange(count) / fps - 1.0) / 0.6, 0, 1) * 2 * np.pi
+    axis = np.stack([np.sin(turn), -np.cos(turn)], axis=1)
+    still = standing(count)
+    middle, reach = np.array([50.0, 70.0]), 0.45 * still.height[:, None]
+    feet = (middle - reach * axis)[:, None] + np.array([[-5.0, 0.0], [5.0, 0.0]])
+    return replace(still, head=middle + reach * axis, feet=feet)
