@@ -110,7 +110,9 @@ def evidence_of_motion(
     """What a motion says for exchanged sides of the marks that it was made from, nats, beyond what
     it says of right marks now and then (`BY_CHANCE`).
 
-    0 for halves of the body that were marked anew since; None without a motion that tells.
+    0 for halves of the body that were marked anew since, and where no joint beyond shoulders or
+    hips is marked on both sides: what was filled in for one limb is no mark that could be
+    exchanged. None without a motion that tells.
     """
     if motion is None or motion.exchange_evidence is None:
         return None
@@ -120,8 +122,20 @@ def evidence_of_motion(
     same = ~(moved > SAME_PX) & np.isfinite(motion.points2d_propagated[annotations.frames, :, 0])
     lower = annotations.skeleton.is_lower
     kept = np.stack([same[:, half].all(axis=1) for half in (lower, ~lower)], axis=1)
+    kept &= _both_sides_marked(annotations)
     said = np.where(kept, motion.exchange_evidence[annotations.frames], 0.0)
     return np.minimum(said, 0.0) + np.maximum(said - BY_CHANCE, 0.0)
+
+
+def _both_sides_marked(annotations: Annotations) -> Bool[np.ndarray, "K 2"]:
+    """Whether legs, and arms, have a joint beyond hips and shoulders that is marked on both
+    sides."""
+    skeleton, marked = annotations.skeleton, np.isfinite(annotations.joints[:, :, 0])
+    outer = np.array([name.split("_")[-1] not in ("hip", "shoulder") for name in skeleton.names])
+    paired = (skeleton.mirror != np.arange(len(outer))) & outer
+    both = marked & marked[:, skeleton.mirror] & paired
+    halves = (skeleton.is_lower, ~skeleton.is_lower)
+    return np.stack([both[:, half].any(axis=1) for half in halves], axis=1)
 
 
 def measure_facing(annotations: Annotations, size: BodySize) -> Float[np.ndarray, "K"]:

@@ -177,3 +177,18 @@ def test_a_motion_speaks_of_the_marks_that_it_was_made_from_alone(careful):
     expected[ROW, 0] = 0
     np.testing.assert_array_equal(evidence_of_motion(moved, motion), expected)
     assert evidence_of_motion(annotations, None) is None
+
+
+def test_a_motion_says_nothing_of_sides_where_one_arm_alone_is_marked(careful):
+    _, annotations = careful
+    carried = np.zeros((14, 14, 2))
+    carried[annotations.frames] = annotations.joints
+    motion = Motion(
+        LSP14, np.zeros((14, 14, 3)), carried, carried, np.ones((14, 14)),
+        np.ones((14, 14), int), np.ones(14), 25.0, np.arange(14) / 25, "body heights",
+        annotations.frames, exchange_evidence=np.full((14, 2), 8.0),
+    )  # fmt: skip
+    one_arm = changed(annotations, left_elbow=np.nan, left_wrist=np.nan)
+    assert evidence_of_motion(one_arm, motion)[ROW].tolist() == [8.0 - BY_CHANCE, 0.0]
+    one_wrist = changed(annotations, left_wrist=np.nan)
+    assert evidence_of_motion(one_wrist, motion)[ROW].tolist() == [8.0 - BY_CHANCE] * 2
