@@ -78,9 +78,7 @@ def run(
     doubts = automatic.contradictions()
     wrong = describe_doubtful_marks(preparation, annotations, motion)
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
-    near = None
-    if options.lift.field_of_view is None and options.lift.method != "paper":
-        near = describe_nearness(motion, workspace.video())
+    near = _nearness(options, motion, workspace)
     advice = () if near is None else (lens_advice(workspace.folder, near),)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
@@ -105,6 +103,13 @@ def run(
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
+
+
+def _nearness(options: Options, motion: Motion, workspace: Workspace) -> str | None:
+    """That the player is near, where the lens is not known; the printed form asks for none."""
+    if options.lift.field_of_view is not None or options.lift.method == "paper":
+        return None
+    return describe_nearness(motion, workspace.video())
 
 
 def describe_unseen(motion: Motion, shots: Shots) -> list[str]:

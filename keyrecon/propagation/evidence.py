@@ -29,13 +29,15 @@ from keyrecon.propagation.silhouette import (
     uncovered,
 )
 
+COLOR_EVIDENCE = "color unlikeness"
+"""Evidence that is not gathered for a half of the body that does not weigh it."""
 WEIGHTS: dict[str, dict[str, float]] = {
     "upper": {
         "end residual": 2.05,
         "unlikeness": 1.62,
         "end unlikeness": 0.67,
         "bone unlikeness": 2.27,
-        "color unlikeness": 0.6,
+        COLOR_EVIDENCE: 0.6,
         "other side": 0.78,
         "off flow": 0.71,
         "off lines": 0.64,
@@ -193,7 +195,7 @@ def side_evidence(
             [unlike[:, :, n, side[-1]] for n, side in enumerate(states.members)]
         ),
         "bone unlikeness": of_both([middle[:, :, n, b].sum(axis=2) for n, b in enumerate(bones)]),
-        "color unlikeness": of_both(
+        COLOR_EVIDENCE: of_both(
             [hypotheses.color_unlikeness[:, :, n, b].sum(axis=2) for n, b in enumerate(bones)]
         ),
         "other side": of_both([np.zeros(shape), np.ones(shape)]),

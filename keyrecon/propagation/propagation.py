@@ -45,6 +45,7 @@ from keyrecon.propagation.edge_template import (
     learn_foot_offsets,
     make_edge_templates,
 )
+from keyrecon.propagation.evidence import COLOR_EVIDENCE, WEIGHTS
 from keyrecon.propagation.flow_agreement import with_flow
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import (
@@ -295,8 +296,9 @@ def propagate_half(
         hypotheses,
         unlikeness=appearance.unlikeness(hypotheses.joints),
         bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
-        color_unlikeness=colors.unlikeness(hypotheses.joints),
     )
+    if COLOR_EVIDENCE in WEIGHTS[half.name]:
+        hypotheses = replace(hypotheses, color_unlikeness=colors.unlikeness(hypotheses.joints))
     limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
