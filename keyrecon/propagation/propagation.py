@@ -25,6 +25,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.appearance import (
+    JointAppearance,
     PlayerFeatures,
     describe_player,
     learn_appearance,
@@ -37,7 +38,7 @@ from keyrecon.propagation.body_frame import (
     stabilise_shots,
 )
 from keyrecon.propagation.bone_bounds import bound_bones
-from keyrecon.propagation.bone_color import learn_bone_colors
+from keyrecon.propagation.bone_color import BoneColors, learn_bone_colors
 from keyrecon.propagation.correspondence import ElementIndex, index_elements, joint_confidence
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
@@ -50,6 +51,7 @@ from keyrecon.propagation.flow_agreement import with_flow
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import (
     MarkedWays,
+    PoseHypotheses,
     fit_limbs,
     fit_poses,
     fit_similar,
@@ -292,13 +294,7 @@ def propagate_half(
             searched.append(search_by_looks(appearance, colors, poses, trunk, count))
         parts += [fit_poses(templates, index, p, nearest) for p in searched if p.shape[1]]
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
-    hypotheses = replace(
-        hypotheses,
-        unlikeness=appearance.unlikeness(hypotheses.joints),
-        bone_unlikeness=appearance.bone_unlikeness(hypotheses.joints),
-    )
-    if COLOR_EVIDENCE in WEIGHTS[half.name]:
-        hypotheses = replace(hypotheses, color_unlikeness=colors.unlikeness(hypotheses.joints))
+    hypotheses = _with_looks(hypotheses, appearance, colors)
     limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
@@ -311,6 +307,21 @@ def propagate_half(
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
     template = identity.apply(half, limbs_chosen.template)
     return PropagatedHalf(joints, confidence, template, identity.exchange_evidence)
+
+
+def _with_looks(
+    hypotheses: PoseHypotheses, appearance: JointAppearance, colors: BoneColors
+) -> PoseHypotheses:
+    """The same with how unlike marks they look."""
+    joints = hypotheses.joints
+    looked_at = replace(
+        hypotheses,
+        unlikeness=appearance.unlikeness(joints),
+        bone_unlikeness=appearance.bone_unlikeness(joints),
+    )
+    if COLOR_EVIDENCE not in WEIGHTS[colors.half.name]:
+        return looked_at
+    return replace(looked_at, color_unlikeness=colors.unlikeness(joints))
 
 
 def _with_marks(
