@@ -1,9 +1,11 @@
 """The tables of keyrecon/uncertainty.py, from real clips whose joints were marked by eye.
 
     python benchmarks/expected_error.py [--work DIR] [--only NAME ...] [--half develop|report]
+        [--draws N]
 
-Takes every clip as benchmarks/real.py does (with the same `--work` what it stored is found again)
-and holds the refined joints against the marks by eye that nobody made for the program. Prints
+Takes every clip as benchmarks/real.py does (with the same `--work` what it stored is found again),
+with `--draws` with so many choices of marks as benchmarks/draws.py, and holds the refined joints
+against the marks by eye that nobody made for the program. Prints
 
     reliability    joints by the error that was expected of them, in eight groups of like size: what
                    was expected and what it was, in player heights. Each clip is predicted by
@@ -26,15 +28,21 @@ With `--half report` nothing is fitted: the tables that are there are measured o
 """
 
 import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import real
+from draws import mark_draw, prepare_clip
 from scipy.optimize import isotonic_regression
 from scipy.stats import spearmanr
 
+from keyrecon.app.console import show
 from keyrecon.body import LSP14
+from keyrecon.library import reconstruct
+from keyrecon.records import Annotations, Motion
 from keyrecon.uncertainty import (
     ERROR_TABLES,
     MAX_ERROR,
@@ -52,40 +60,65 @@ EDGES = {
     "part_correction": (0.0, 0.004, 0.006, 0.009, 0.013, 0.02, 0.03),
     "part_confidence": (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7),
     "speed": (0.0, 0.03, 0.09, 0.24, 0.6, 1.2),
+    "elsewhere": (0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6),
     "confidence": (0.0, 0.001, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8),
     "time": (0.0, 0.1, 0.2, 0.4),
 }
 """Lower ends of the bins: about equal numbers of joints, more of them where errors are large."""
 FALLS = "confidence", "part_confidence"
-USED = "correction", "part_correction", "part_confidence", "speed"
+USED = "correction", "part_correction", "part_confidence", "speed", "elsewhere"
 PRIOR = 20
 """Joints of the mean error that every bin is begun with, so that a rare one is not overrated."""
 GROUPS = 8
 CLASSES = 0.0, 0.1, 0.3, 0.5, 0.7, 1.01
 """Confidences of joints."""
 COST = 0.06
+APART = 1_000_000
+"""Between the numbers of frames of two choices of marks, which are not the same frames."""
 OFF = 0.2
 """Error that counts as off, in trunks: as in PCK@0.2."""
 
 Sample = dict[str, np.ndarray]
 
 
-def collect(name: str, work: Path) -> Sample:
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A clip, the marks that the program got, and its motion."""
+
+    clip: real.Clip
+    marks: Annotations
+    motion: Motion
+
+
+def solve(name: str, work: Path, draws: int) -> Iterator[Solved]:
+    """As benchmarks/real.py has it, or with some choices of marks."""
+    clip = real.load_clip(name)
+    if not draws:
+        result = real.solve(clip, COST, work)
+        yield Solved(clip, result.marks, result.motion)
+        return
+    prepared = prepare_clip(clip, COST, work)
+    for seed in range(draws):
+        made, marks = mark_draw(prepared, seed)
+        keep = prepared.store.keep
+        yield Solved(clip, marks, reconstruct(made, marks, prepared.options, keep, show))
+
+
+def collect(solved: Solved) -> Sample:
     """Errors and what may tell of them, for all joints of a clip that can be seen and were not
     marked for the program."""
-    clip = real.load_clip(name)
-    result = real.solve(clip, COST, work)
-    motion, frames = result.motion, clip.truth.frames
+    clip, marks, motion = solved.clip, solved.marks, solved.motion
+    frames = clip.truth.frames
     height = player_height(motion)[:, None]
-    used = real.held_out(clip, result.marks) & clip.seen
+    used = real.held_out(clip, marks) & clip.seen
     rows, joints = np.nonzero(used)
     at = frames[rows], joints
     error = np.linalg.norm(motion.points2d[frames] - clip.truth.joints, axis=2) / height[frames]
     predictors = error_predictors(motion)
-    marked = np.isfinite(result.marks.joints[..., 0])
-    away = [np.abs(result.marks.frames[marked[:, j]] - t).min() for t, j in zip(*at, strict=True)]
+    marked = np.isfinite(marks.joints[..., 0])
+    away = [np.abs(marks.frames[marked[:, j]] - t).min() for t, j in zip(*at, strict=True)]
     return {
-        "clip": np.full(len(rows), name),
+        "clip": np.full(len(rows), clip.name),
         "frame": at[0],
         "joint": at[1],
         "error": np.minimum(error[rows, joints], MAX_ERROR),
@@ -183,14 +216,12 @@ def print_shipped(sample: Sample) -> None:
             print(f"  confidence {least:.1f}-{most:.1f} {own.sum():>6} joints: {ratio:.2f}")
 
 
-def print_told(samples: list[Sample], work: Path) -> None:
+def print_told(samples: list[Sample], motions: list[Motion]) -> None:
     """Frames that are off and lie in stretches that a run tells, and the other way about."""
     total = np.zeros(6, int)
-    for sample in samples:
-        name = str(sample["clip"][0])
-        motion = real.solve(real.load_clip(name), COST, work).motion
+    for sample, motion in zip(samples, motions, strict=True):
         off = sample["error"] > OFF * sample["trunk"]
-        frames, group = np.unique(sample["frame"], return_inverse=True)
+        frames, group = np.unique(sample["frame"] % APART, return_inverse=True)
         wrong = np.bincount(group, off) > 0
         inside = [
             np.any([(frames >= s.first) & (frames <= s.last) for s in stretches], axis=0)
@@ -223,16 +254,30 @@ def any_of_group(
     return told, wrong
 
 
-def main() -> None:
-    """Print everything."""
+def read_words() -> argparse.Namespace:
+    """What was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--work", type=Path, default=Path("benchmarks/work/real"))
     parser.add_argument("--only", nargs="*", help="names of clips")
+    parser.add_argument("--draws", type=int, default=0, help="choices of marks of each clip")
     parser.add_argument("--half", choices=("develop", "report"), default="develop")
-    words = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Print everything."""
+    words = read_words()
     names = [file.stem for file in sorted(real.TRUTH.glob("*.json"))]
     chosen = [n for n in names if (n in real.DEVELOP) == (words.half == "develop")]
-    samples = [collect(n, words.work) for n in chosen if not words.only or n in words.only]
+    every = [
+        solved
+        for n in chosen
+        if not words.only or n in words.only
+        for solved in solve(n, words.work, words.draws)
+    ]
+    samples = [collect(solved) for solved in every]
+    for number, one in enumerate(samples):
+        one["frame"] = one["frame"] + number * APART
     sample = {key: np.concatenate([one[key] for one in samples]) for key in samples[0]}
     if words.half == "report":
         expected = predict_error({name: sample[name] for name in ERROR_TABLES})
@@ -240,12 +285,12 @@ def main() -> None:
         print_reported(sample, expected)
         return
     print_shipped(sample)
-    print_told(samples, words.work)
+    print_told(samples, [solved.motion for solved in every])
     left_out = leave_one_out(sample, USED)
     print_reliability(sample, left_out)
     print_reported(sample, left_out)
     pair = ("confidence", "correction")
-    for more in (("confidence",), pair, (*pair, "speed"), USED, (*USED, "time")):
+    for more in (("confidence",), pair, (*pair, "speed"), USED[:-1], USED, (*USED, "time")):
         expected = leave_one_out(sample, more)
         score = float((np.log(expected) + sample["error"] / expected).mean())
         rank = spearmanr(expected, sample["error"])[0]

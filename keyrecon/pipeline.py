@@ -358,6 +358,7 @@ def assemble_motion(
         units="body heights" if height is None else "m",
         keyframes=annotations.frames,
         exchange_evidence=tracks.exchange_evidence,
+        elsewhere=tracks.elsewhere,
     )
     if shots is None:
         shots = Shots.between((), len(video))

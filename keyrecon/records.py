@@ -348,6 +348,9 @@ class JointTracks:
     exchange_evidence: Float[np.ndarray, "T 2"] | None = None
     """What motion says for left and right being exchanged in the marks of the lower body, and of
     the upper, nats; 0 in frames without marks, None where nobody looked."""
+    elsewhere: Float[np.ndarray, "T J"] | None = None
+    """Probability that a joint of a limb is a fifth of a trunk and more from here, by the limbs
+    that a frame might show (0 of the trunk); None where there is one choice only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -395,6 +398,8 @@ class Motion:
     """Expected distance of `points2d` from the joints, px; None where it is not known."""
     exchange_evidence: Float[np.ndarray, "T 2"] | None = None
     """As in `JointTracks`."""
+    elsewhere: Float[np.ndarray, "T J"] | None = None
+    """As in `JointTracks`; of `points2d_propagated`."""
     cuts: Int[np.ndarray, "C"] | None = None
     """Frames with which another shot begins; None where there is one shot. In shots that do not
     show the player everything but the time is unknown, and confidence is 0."""

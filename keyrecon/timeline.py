@@ -98,7 +98,7 @@ def put_back(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerF
     return type(record)(**values)
 
 
-SAYING_NOTHING = {"confidence": 0.0, "exchange_evidence": 0.0}
+SAYING_NOTHING = {"confidence": 0.0, "exchange_evidence": 0.0, "elsewhere": 0.0}
 SAYING_NOTHING |= {"source": float(SOURCES.index("interpolated"))}
 """What some values are in frames of which nothing is known; others are NaN, or 0."""
 
@@ -196,7 +196,7 @@ def part_of_keyframes(keyframes: Keyframes, frames: Int[np.ndarray, "n"]) -> Key
 
 PER_FRAME = ("points3d", "points2d", "points2d_propagated", "confidence", "source", "scale", "time")
 """Values of a motion that have one entry per frame."""
-TOLD_PER_FRAME = ("expected_error", "exchange_evidence")
+TOLD_PER_FRAME = ("expected_error", "exchange_evidence", "elsewhere")
 """Further ones, that some motions lack."""
 
 

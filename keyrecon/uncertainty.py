@@ -1,18 +1,16 @@
 """How far off each joint probably is, and the stretches that are worst.
 
-Four things tell of the error of a joint in a frame: the correction, how far the refinement had
+Five things tell of the error of a joint in a frame: the correction, how far the refinement had
 to move it in the picture; the mean correction of its part of the body (arms, legs, head); the
-mean confidence with which that part was propagated; and the speed of the joint. Each has a
-monotone table of factors; the expected error, in player heights, is their product times a mean,
+mean confidence with which that part was propagated; the speed of the joint; and how probable the
+limbs are that have it elsewhere, of all that the frame might show. Each has a monotone table of
+factors; the expected error, in player heights, is their product times a mean, cut at `MAX_ERROR`:
+a joint that is farther off is lost, by how much does not matter. Where nothing of a part was seen
+there was nothing to correct, and what moved is a guess: its joints are at least as far off as
+straight lines in time from the nearest marks are (`UNSEEN_ERRORS`).
 
-    E|error| = mean * f(correction) * g(part's correction) * h(part's confidence) * k(speed),
-
-cut at `MAX_ERROR`: a joint that is farther off is lost, by how much does not matter. Where nothing
-of a part was seen there was nothing to correct, and what moved is a guess: its joints are at least
-as far off as straight lines in time from the nearest marks are (`UNSEEN_ERRORS`).
-
-The tables were fitted to joints marked by eye on real clips. `python benchmarks/expected_error.py`
-makes them and prints what they are worth, every clip predicted from the others alone.
+The tables were fitted to joints marked by eye on real clips. `python benchmarks/expected_error.py
+--draws 2` makes them and prints what they are worth, every clip predicted from the others alone.
 """
 
 from collections.abc import Mapping
@@ -24,33 +22,35 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.records import SOURCES, HalfName, Motion, Shots, Track
 
-MEAN_ERROR = 0.0205
-"""Player heights. Fitted, as the tables, to 2613 joints of nine clips. With every clip predicted
-from the others, eight groups of joints expected to be off by .007, .009, .011, .013, .015, .020,
-.028 and .055 heights were off by .006, .008, .010, .014, .016, .020, .028 and .055, and clips by
-.79 to 1.2 of what was expected. The score (mean of log p + error / p) was -3.172, with the joint's
-own confidence alone -3.029, with it added to the four -3.180: that tells hardly more. On the same
-clips as they come out after later changes of propagation the eight groups are off by .84 to 1.13 of
-what is expected, joints by their own confidence by .83 to 1.11, and with tables fitted anew, each
-clip by the others, by .88 to 1.21: these were kept. Tried as further predictors, no better (score
-within .002): kind of joint, acceleration, change of the bones' lengths, corrections and confidence
-of each limb."""
+MEAN_ERROR = 0.0213
+"""Player heights. Fitted, as the tables, to 5298 joints of nine clips, two choices of marks each
+(`benchmarks/draws.py` has them). With every clip predicted from the others, eight groups of joints
+expected to be off by .008, .010, .011, .013, .015, .019, .024 and .050 heights were off by .007,
+.009, .010, .014, .016, .020, .026 and .047, and clips by .93 to 1.11 of what was expected. The
+score (mean of log p + error / p) was -3.171, without what limbs elsewhere tell -3.147. Tried as
+further predictors, no better (score within .005): kind of joint, acceleration, change of the bones'
+lengths, corrections and confidence of each limb, the joint's own confidence, how far limbs scatter,
+and the worst of its part in that."""
 ERROR_TABLES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "correction": (
         (0.0, 0.004, 0.008, 0.012, 0.02, 0.03, 0.05),
-        (0.60, 0.70, 0.78, 0.98, 1.13, 1.37, 1.88),
+        (0.75, 0.85, 0.92, 1.0, 1.18, 1.31, 1.81),
     ),
     "part_correction": (
         (0.0, 0.004, 0.006, 0.009, 0.013, 0.02, 0.03),
-        (0.76, 0.87, 0.97, 1.03, 1.16, 1.38, 1.57),
+        (0.87, 0.92, 1.07, 1.13, 1.26, 1.26, 1.26),
     ),
     "part_confidence": (
         (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7),
-        (1.27, 1.27, 1.27, 1.05, 0.95, 0.92, 0.92),
+        (1.20, 1.20, 1.18, 1.02, 0.96, 0.89, 0.85),
     ),
     "speed": (
         (0.0, 0.03, 0.09, 0.24, 0.6, 1.2),
-        (0.63, 0.72, 0.93, 1.04, 1.20, 1.87),
+        (0.72, 0.85, 1.0, 1.11, 1.11, 1.31),
+    ),
+    "elsewhere": (
+        (0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6),
+        (0.68, 0.84, 0.84, 1.15, 1.15, 1.45, 1.67),
     ),
 }
 """By predictor the lower ends of its bins, and their factors."""
@@ -70,9 +70,9 @@ clips, three frames at a time, the clips' means."""
 UNCERTAIN = 0.055
 """Expected error of the worst joint of arms, legs or head from which the part is uncertain, player
 heights. Chosen so that as many parts are called uncertain as have a joint off by more than a fifth
-of the trunk: in nine clips marked by eye, each predicted from the others, 10 % of the parts of
-frames are called so and 10 % are off (23 and 21 % of the frames); of those called so 65 % are off,
-and of those off 68 % are called so. By the mean of a part's joints 60 and 63 %."""
+of the trunk: in nine clips marked by eye, each predicted from the others, 7.8 % of the parts of
+frames are called so and 8.2 % are off (18 and 19 % of the frames); of those called so 63 % are off,
+and of those off 60 % are called so (58 and 42 % without what limbs elsewhere tell)."""
 MERGED_SECONDS = 0.2
 """Uncertain frames that are nearer to each other than this make one stretch."""
 LEAST_SECONDS = 0.1
@@ -134,7 +134,7 @@ def measure_correction(motion: Motion) -> Float[np.ndarray, "T J"]:
 
 def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
     """What tells of each joint's error: `correction` and `part_correction` in player heights,
-    `part_confidence`, and `speed` in player heights per second."""
+    `part_confidence`, `speed` in player heights per second, and `elsewhere` where it is known."""
     correction, confidence = measure_correction(motion), motion.confidence
     part_correction, part_confidence = np.zeros_like(correction), np.zeros_like(correction)
     for members in body_parts(motion.skeleton).values():
@@ -144,12 +144,13 @@ def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
     for part in motion.stretches:
         if part.stop - part.start > 1:
             velocity[part] = np.gradient(motion.points2d[part], motion.time[part], axis=0)
-    return {
+    told = {
         "correction": correction,
         "part_correction": part_correction,
         "part_confidence": part_confidence,
         "speed": np.linalg.norm(velocity, axis=2) / player_height(motion)[:, None],
     }
+    return told if motion.elsewhere is None else {**told, "elsewhere": motion.elsewhere}
 
 
 def expected_error(motion: Motion) -> Float[np.ndarray, "T J"]:
@@ -184,10 +185,11 @@ def _seconds_to_marks(motion: Motion) -> Float[np.ndarray, "T J"]:
 
 
 def predict_error(predictors: Mapping[str, Float[np.ndarray, "*n"]]) -> Float[np.ndarray, "*n"]:
-    """Expected error in player heights."""
+    """Expected error in player heights; `elsewhere` may be missing."""
     factors = [
         np.array(table)[find_bins(predictors[name], edges)]
         for name, (edges, table) in ERROR_TABLES.items()
+        if name in predictors
     ]
     return np.minimum(MEAN_ERROR * np.prod(factors, axis=0), MAX_ERROR)
 

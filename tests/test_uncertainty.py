@@ -91,6 +91,18 @@ def test_a_joint_that_was_not_propagated_counts_as_moved_far():
     assert expected_error(motion)[3, 4] > 2 * expected_error(motion)[3, 5]
 
 
+def test_a_joint_that_other_limbs_have_elsewhere_is_expected_to_be_farther_off():
+    motion = make_motion()
+    doubted = np.zeros((FRAMES, 14))
+    sure = expected_error(replace(motion, elsewhere=doubted))
+    assert (sure <= expected_error(motion)).all()  # of which nobody told
+    doubted = doubted.copy()
+    doubted[3, 4], doubted[3, 5] = 0.8, 0.15
+    told = expected_error(replace(motion, elsewhere=doubted))
+    assert told[3, 4] > told[3, 5] > sure[3, 5]
+    np.testing.assert_array_equal(told[4], sure[4])
+
+
 def test_a_stretch_is_told_with_its_part_its_size_and_the_frame_to_mark():
     (stretch,) = uncertain_stretches(with_lost_arms(41, 50))
     assert (stretch.first, stretch.last, stretch.what, stretch.half) == (41, 50, "arms", "upper")

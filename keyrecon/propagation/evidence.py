@@ -161,6 +161,22 @@ def weigh_evidence(half: str, evidence: LimbEvidence) -> LimbCosts:
     return LimbCosts((SCALE * one, SCALE * other), SCALE * pairs)
 
 
+def state_probabilities(costs: LimbCosts) -> tuple[Float[np.ndarray, "T S"], ...]:
+    """Of the states of each side, by what is seen in a frame alone and not by the frames around it.
+
+    What the weights were fitted to give: exp(-cost), so that of hypotheses that are told to be
+    right with .8 eight in ten are.
+    """
+    one, other = costs.sides
+    of_sides = np.zeros((2, *one.shape))
+    for t, pairs in enumerate(costs.pairs):
+        total = (one[t][:, None] + other[t] + pairs) / SCALE
+        chance = np.exp(total.min() - total)
+        chance /= chance.sum()
+        of_sides[:, t] = chance.sum(axis=1), chance.sum(axis=0)
+    return tuple(of_sides)
+
+
 def side_states(hypotheses: PoseHypotheses, templates: EdgeTemplates, side: int) -> SideStates:
     """States of one side."""
     own = np.array(templates.half.sides[side])

@@ -46,8 +46,10 @@ def with_flow(
     replaced = elsewhere & flow.joined & (doubted | (flow.confidence > SURE_FLOW))
     places = np.where(replaced[..., None], flow.joints, tracks.joints)
     replaced &= ~stretched_ends(places, height, bounds, tracks.joints)
+    elsewhere = tracks.elsewhere
     return replace(
         tracks,
         joints=np.where(replaced[..., None], flow.joints, tracks.joints),
         confidence=np.where(replaced, flow.confidence, tracks.confidence),
+        elsewhere=None if elsewhere is None else np.where(replaced, 1 - flow.confidence, elsewhere),
     )

@@ -155,6 +155,8 @@ class PropagatedHalf:
     confidence: Float[np.ndarray, "T J"]
     template: Int[np.ndarray, "T J"]
     """Row of the annotated frame that each joint comes from."""
+    elsewhere: Float[np.ndarray, "T J"]
+    """As in `JointTracks`."""
     exchange_evidence: Float[np.ndarray, "T"]
     """What motion says for left and right being exchanged in the marks, nats."""
 
@@ -203,7 +205,8 @@ def _propagate_fused(
     index = index_elements(preparation.edges, player.body_frame)
     frames = np.arange(len(preparation.edges))
     joints = np.full((len(frames), annotations.joints.shape[1]), np.nan + 0j)
-    confidence, source = np.zeros(joints.shape), np.zeros(joints.shape, dtype=np.int64)
+    confidence, elsewhere = np.zeros((2, *joints.shape))
+    source = np.zeros(joints.shape, dtype=np.int64)
     exchanged: list[Float[np.ndarray, "T"]] = []
     halves = split_body(annotations.skeleton)
     for half in progress(halves, "Propagating joints", len(halves)):
@@ -215,10 +218,12 @@ def _propagate_fused(
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
+        elsewhere[:, free] = result.elsewhere[:, half.free]
         source[:, free] = poses.frames[result.template[:, half.free]]
         exchanged.append(result.exchange_evidence)
     places = player.body_frame.to_pixels(joints, frames[:, None])
-    tracks = JointTracks(places, confidence, source, np.stack(exchanged, axis=1))
+    evidence = np.stack(exchanged, axis=1)
+    tracks = JointTracks(places, confidence, source, evidence, elsewhere)
     return with_flow(tracks, flow, preparation.track.height, player.bounds)
 
 
@@ -305,8 +310,14 @@ def propagate_half(
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
-    template = identity.apply(half, limbs_chosen.template)
-    return PropagatedHalf(joints, confidence, template, identity.exchange_evidence)
+    template, elsewhere = (
+        identity.apply(half, values)
+        for values in (
+            limbs_chosen.template,
+            limbs_chosen.elsewhere(identity.apply(half, joints)),
+        )
+    )
+    return PropagatedHalf(joints, confidence, template, elsewhere, identity.exchange_evidence)
 
 
 def _with_looks(
@@ -339,4 +350,9 @@ def _with_marks(
     joints[frame, joint] = annotations.joints[row, joint]
     confidence[frame, joint] = 1
     source[frame, joint] = frame
-    return replace(tracks, joints=joints, confidence=confidence, keyframe=source)
+    tracks = replace(tracks, joints=joints, confidence=confidence, keyframe=source)
+    if tracks.elsewhere is None:
+        return tracks
+    elsewhere = tracks.elsewhere.copy()
+    elsewhere[frame, joint] = 0
+    return replace(tracks, elsewhere=elsewhere)

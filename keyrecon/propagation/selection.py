@@ -16,7 +16,13 @@ from jaxtyping import Complex, Float, Int
 from keyrecon.numerics.viterbi import find_cheapest_path
 from keyrecon.propagation.bone_bounds import ROUNDING
 from keyrecon.propagation.edge_template import EdgeTemplates
-from keyrecon.propagation.evidence import SideStates, find_evidence, weigh_evidence
+from keyrecon.propagation.evidence import (
+    LimbCosts,
+    SideStates,
+    find_evidence,
+    state_probabilities,
+    weigh_evidence,
+)
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
 from keyrecon.propagation.silhouette import Silhouettes
@@ -33,6 +39,8 @@ three; kept for long videos."""
 TRUNK_RESIDUAL, TRUNK_UNLIKENESS = 3.0, 4.0
 """Cost of a trunk whose elements match nothing, and of a joint of it that looks like no mark of it
 at all. Halved or doubled, others with them: at most 0.3 points, 0.4 mm on one clip."""
+ELSEWHERE = 0.06
+"""Player heights from which a joint is somewhere else: a fifth of a trunk."""
 TOO_LONG_COST = 1e3
 """Cost of a bone that is longer than it can be: no such limb while there is another. A quarter more
 or less, others with it: at most 1.2 points, 2.1 mm on nine clips."""
@@ -60,6 +68,21 @@ class LimbStates:
 
 
 @dataclass(frozen=True, eq=False)
+class LimbProbabilities:
+    """How probable each limb of one side is, by what is seen in a frame."""
+
+    members: Int[np.ndarray, "j"]
+    """Joints of the side."""
+    joints: Complex[np.ndarray, "T S j"]
+    probability: Float[np.ndarray, "T S"]
+
+    def elsewhere(self, joints: Complex[np.ndarray, "T J"]) -> Float[np.ndarray, "T j"]:
+        """Probability that each joint of the side is not where it is taken to be."""
+        apart = np.abs(self.joints - joints[:, None, self.members])
+        return np.einsum("ts,tsj->tj", self.probability, apart > ELSEWHERE)
+
+
+@dataclass(frozen=True, eq=False)
 class ChosenLimbs:
     """The chosen hypotheses, limb by limb."""
 
@@ -68,6 +91,15 @@ class ChosenLimbs:
     """Row of the annotated frame that each joint comes from."""
     unlikeness: Float[np.ndarray, "T 2 J"]
     """How unlike marks each joint looks: those of its own side, then of the other."""
+    probabilities: tuple[LimbProbabilities, LimbProbabilities]
+
+    def elsewhere(self, joints: Complex[np.ndarray, "T J"]) -> Float[np.ndarray, "T J"]:
+        """Probability that joints are elsewhere, 0 of those of the trunk; `joints` are on the sides
+        of this choice."""
+        result = np.zeros(joints.shape)
+        for side in self.probabilities:
+            result[:, side.members] = side.elsewhere(joints)
+        return result
 
 
 def choose_limbs(
@@ -98,6 +130,13 @@ def choose_limbs(
     clash = costs.pairs
     clash[templates.poses.frames] = 0
     clash += _breadth_costs(templates, one, other)
+    weighed = LimbCosts((one.cost, other.cost), clash)
+    of_one, of_other = (
+        LimbProbabilities(np.array(group), state.joints, probability)
+        for group, state, probability in zip(
+            half.sides, (one, other), state_probabilities(weighed), strict=True
+        )
+    )
     for state, group, path in zip(
         (one, other), half.sides, choose_two(one, other, clash), strict=True
     ):
@@ -105,7 +144,7 @@ def choose_limbs(
         unlikeness[..., group] = state.unlikeness[frames, path]
         row = hypotheses.template[frames, path % hypotheses.prior_cost.shape[1]]
         template[:, group] = row[:, None]
-    return ChosenLimbs(joints, template, unlikeness)
+    return ChosenLimbs(joints, template, unlikeness, (of_one, of_other))
 
 
 def _choose_trunk(

@@ -7,10 +7,16 @@ import pytest
 from hypothesis_choice import choice
 
 from keyrecon.body import LSP14
-from keyrecon.propagation.evidence import WEIGHTS, find_evidence
+from keyrecon.propagation.evidence import (
+    SCALE,
+    WEIGHTS,
+    LimbCosts,
+    find_evidence,
+    state_probabilities,
+)
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import MarkedWays
-from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.selection import ELSEWHERE, choose_limbs
 from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Shots
 
@@ -80,3 +86,35 @@ def test_every_weight_is_of_some_evidence_and_none_is_negative():
         names = {*found.of_sides[0], *(name for name, _ in found.of_pairs)}
         assert {*WEIGHTS[half.name]} <= names
         assert min(WEIGHTS[half.name].values()) >= 0
+
+
+def test_probabilities_of_states_are_those_of_the_pairs_that_they_are_in():
+    random = np.random.default_rng(4)
+    one, other, pairs = (random.uniform(0, 9, (2, *n)) for n in ((3,), (3,), (3, 3)))
+    one[1, 2] = np.inf
+    chances = state_probabilities(LimbCosts((one, other), pairs))
+    for t in range(2):
+        every = {
+            (a, b): np.exp(-(one[t, a] + other[t, b] + pairs[t, a, b]) / SCALE)
+            for a in range(3)
+            for b in range(3)
+        }
+        for state in range(3):
+            own = [sum(v for pair, v in every.items() if pair[n] == state) for n in (0, 1)]
+            expected = np.array(own) / sum(every.values())
+            np.testing.assert_allclose([c[t, state] for c in chances], expected)
+    assert chances[0][1, 2] == 0
+
+
+@pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
+def test_a_joint_is_elsewhere_by_as_much_as_speaks_for_limbs_that_have_it_there(half):
+    here, there, scene = poses(half)
+    chosen = choose_limbs(*scene, ONE_SHOT, 50.0, ways(here, confidence=0.9))
+    side, other = (list(members) for members in half.sides)
+    elsewhere = chosen.elsewhere(np.tile(here, (FRAMES, 1)))
+    assert (elsewhere[2, side] < 0.5).all() and (elsewhere[2, side] > 0).all()
+    away = chosen.elsewhere(np.tile(there, (FRAMES, 1)))
+    assert (away[2, side] > 0.5).all()
+    np.testing.assert_array_equal(elsewhere[2, list(half.middle)], 0)
+    near = np.tile(here + 0.9 * ELSEWHERE, (FRAMES, 1))
+    np.testing.assert_allclose(chosen.elsewhere(near)[2, other], elsewhere[2, other])

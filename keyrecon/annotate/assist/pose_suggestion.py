@@ -261,7 +261,8 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     limb_poses = search_by_edges(templates, index, fitted.best_joints, LIMB_HYPOTHESES)
     hypotheses = join_hypotheses(fitted, fit_limbs(templates, index, fitted, limb_poses))
     limbs = _choose_each(templates, hypotheses, fitting.silhouettes, fitting.fps)
-    chosen = np.where(np.isfinite(known), known, limbs.joints)
+    found = np.concatenate([one.joints for one in limbs])
+    chosen = np.where(np.isfinite(known), known, found)
     weight = np.where(np.isfinite(known), FIXED_WEIGHT, HYPOTHESIS_WEIGHT)
     similar = fitted.template[:, 0]
     start = TemplateFits(np.arange(len(known)), similar, chosen)
@@ -270,13 +271,14 @@ def _suggest_half(fitting: Fitting, known: Complex[np.ndarray, "N J"]) -> _HalfS
     ).joints
     confidence = joint_confidence(templates, index, chosen, final)
     free = templates.half.free
-    source = fitting.sources[limbs.template[:, free]]
+    template = np.concatenate([one.template for one in limbs])
+    source = fitting.sources[template[:, free]]
     return _HalfSuggestion(final[:, free], confidence[:, free], source)
 
 
 def _choose_each(
     templates: EdgeTemplates, hypotheses: PoseHypotheses, silhouettes: Silhouettes, fps: float
-) -> ChosenLimbs:
+) -> list[ChosenLimbs]:
     """The best hypotheses, each frame by itself."""
     no_poses = replace(
         templates.poses, **{f.name: getattr(templates.poses, f.name)[:0] for f in _PER_POSE_FIELDS}
@@ -295,9 +297,4 @@ def _choose_each(
         )
         silhouette = silhouettes.take(slice(n, n + 1))
         chosen.append(choose_limbs(single, one, Shots.between((), 1), fps, None, silhouette))
-    return ChosenLimbs(
-        *(
-            np.concatenate([getattr(one, field.name) for one in chosen])
-            for field in fields(ChosenLimbs)
-        )
-    )
+    return chosen

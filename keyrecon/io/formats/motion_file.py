@@ -31,7 +31,7 @@ KINDS = {"source": np.int64, "keyframes": np.int64, "cuts": np.int64}
 """Arrays that are whole numbers."""
 WITH_GAPS = ("points3d", "points2d", "points2d_propagated", "expected_error", "scale")
 UNITS = ("m", "body heights")
-OPTIONAL = {"expected_error": "TJ", "exchange_evidence": "T2", "cuts": "C"}
+OPTIONAL = {"expected_error": "TJ", "exchange_evidence": "T2", "elsewhere": "TJ", "cuts": "C"}
 """Arrays that files of former versions and of golf fits lack; `cuts` that of one shot."""
 ABOUT = (
     *("source_names", "joint_names", "parents", "mirrored", "proportions", "lower"),
