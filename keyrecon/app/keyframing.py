@@ -16,10 +16,11 @@ from keyrecon.app.preparing import (
 )
 from keyrecon.app.project import load_annotations
 from keyrecon.errors import counted, quoted
+from keyrecon.following import HELD
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.frame_reader import side_by_side
-from keyrecon.io.held_video import with_exposure
+from keyrecon.io.held_video import hold_if_small, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
@@ -79,7 +80,7 @@ def find_keyframes(
     options = replace(options, keyframes=chosen.over(options.keyframes))
     check_options(options)
     forms = as_printed(options) if printed else options
-    video = workspace.video()
+    video = hold_if_small(workspace.video(), HELD)  # camera, player and pictures read it
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
     prepared = prepare_project(workspace, video, marks, forms, progress)
     preparation = prepared.preparation

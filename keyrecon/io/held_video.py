@@ -55,15 +55,19 @@ class HeldVideo(Video):
         return self.source.fingerprint
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> Video:
-        """That of the source, not held."""
+        """That of the source, which decodes nothing again that was decoded for the whole."""
         shown = replace(
             self.source, turns=self.turns, mirrored=self.mirrored, exposure=self.exposure
-        )
-        return shown.part(frames)
+        ).part(frames)
+        if not self._held.is_filled:
+            return shown
+        part = hold_frames(shown, self.most_in_memory)
+        vars(part)["_held"] = self._held.part(frames)
+        return part
 
     @cached_property
     def _held(self) -> "_HeldFrames":
-        return _HeldFrames(self.source._decoded(0, None), self.most_in_memory)
+        return _HeldFrames(self.source, self.most_in_memory)
 
     def _decoded(self, start: int, stop: int | None) -> "Iterator[av.VideoFrame]":
         yield from self._held.read(start, len(self) if stop is None else min(stop, len(self)))
@@ -77,6 +81,8 @@ def hold_frames(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> HeldVid
 
 def hold_if_small(video: Video, most_in_memory: float = MOST_IN_MEMORY) -> Video:
     """The same video, decoded only once where all of its frames can be held in memory."""
+    if isinstance(video, HeldVideo):
+        return video
     size = LEAST_BYTES_PER_PIXEL * video.width * video.height * len(video)
     return hold_frames(video, most_in_memory) if size < most_in_memory else video
 
@@ -132,27 +138,48 @@ class _StoredFrame:
 class _HeldFrames:
     """Decoded frames, the first ones in memory, the others in an unnamed file."""
 
-    def __init__(self, frames: "Iterator[av.VideoFrame]", most_in_memory: float) -> None:
-        """Hold all frames of an iterator."""
+    def __init__(self, source: Video, most_in_memory: float) -> None:
+        """Hold all frames of a video once any is read."""
+        self._source = source
+        self._most_in_memory = most_in_memory
         self._memory: list[av.VideoFrame] = []
         self._stored: list[_StoredFrame] = []
         self._file: IO[bytes] | None = None
         self._lock = Lock()
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether the frames have been decoded."""
+        return len(self._memory) + len(self._stored) == len(self._source)
+
+    def read(self, start: int, stop: int) -> "Iterator[av.VideoFrame]":
+        """Frames start..stop-1."""
+        with self._lock:
+            if not self.is_filled:
+                self._fill()
+        for number in range(start, stop):
+            yield self._frame(number)
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> "_HeldPart":
+        """Some of the frames, which are held once."""
+        return _HeldPart(self, np.arange(len(self._source))[frames])
+
+    def _fill(self) -> None:
+        """Decode all frames."""
+        self._memory.clear()
+        self._stored.clear()
         held = 0
-        for frame in frames:
+        for frame in self._source._decoded(0, None):
             held += sum(plane.buffer_size for plane in frame.planes)
-            if held <= most_in_memory:
+            if held <= self._most_in_memory:
                 self._memory.append(frame)
             else:
                 self._store(frame)
 
-    def read(self, start: int, stop: int) -> "Iterator[av.VideoFrame]":
-        """Frames start..stop-1."""
-        for number in range(start, stop):
-            if number < len(self._memory):
-                yield self._memory[number]
-            else:
-                yield self._restore(self._stored[number - len(self._memory)])
+    def _frame(self, number: int) -> "av.VideoFrame":
+        if number < len(self._memory):
+            return self._memory[number]
+        return self._restore(self._stored[number - len(self._memory)])
 
     def _store(self, frame: "av.VideoFrame") -> None:
         if self._file is None:
@@ -185,3 +212,21 @@ class _HeldFrames:
             width = min(size, plane.line_size)  # both have all pixels and some padding
             target[:, :width] = source[:, :width]
         return frame
+
+
+@dataclass(frozen=True)
+class _HeldPart:
+    """Some of the frames that are held for a video."""
+
+    whole: _HeldFrames
+    numbers: Int[np.ndarray, "n"]
+    is_filled = True
+
+    def read(self, start: int, stop: int) -> "Iterator[av.VideoFrame]":
+        """Frames start..stop-1 of the part."""
+        for number in self.numbers[start:stop].tolist():
+            yield from self.whole.read(number, number + 1)
+
+    def part(self, frames: slice | Int[np.ndarray, "n"]) -> "_HeldPart":
+        """Some of them."""
+        return _HeldPart(self.whole, self.numbers[frames])

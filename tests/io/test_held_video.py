@@ -1,8 +1,11 @@
 """Frames held in memory or in a file are those of the video."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from keyrecon.errors import KeyreconError
 from keyrecon.io.held_video import hold_frames, hold_if_small, mirror_video
 from keyrecon.io.joined_video import join_videos
 from keyrecon.io.video import Video, open_video
@@ -62,6 +65,35 @@ def test_a_held_video_is_decoded_once(video, decoded, bytes_in_memory):
     for _ in range(3):
         assert sum(1 for _ in held.frames()) == sum(1 for _ in held.grey_frames()) == FRAMES - 1
     assert len(decoded) == FRAMES - 1
+
+
+@pytest.mark.parametrize("bytes_in_memory", [1e9, 6e4])
+@pytest.mark.parametrize("some", [slice(3, 8), np.array([1, 4, 9])])
+def test_parts_of_a_held_video_are_decoded_with_the_whole(video, decoded, some, bytes_in_memory):
+    expected = [np.array(p) for p in video.part(some).part(slice(1, 3)).frames()]
+    held = hold_frames(video, bytes_in_memory)
+    parts = {"before": held.part(some)}
+    assert list(held.grey_frames())
+    parts["after"] = held.part(some)
+    decoded.clear()
+    for when, part in parts.items():
+        assert np.array_equal(part.time, video.time[some])
+        shown = [np.array(p) for p in part.part(slice(1, 3)).frames()]
+        assert all(np.array_equal(a, b) for a, b in zip(shown, expected, strict=True))
+        assert bool(decoded) == (when == "before")
+        decoded.clear()
+
+
+def test_a_held_video_is_held_once(video):
+    held = hold_frames(video)
+    assert hold_if_small(held, 0.0) is held
+
+
+def test_a_video_that_cannot_be_decoded_is_said_to_be_so_each_time(video):
+    broken = hold_frames(replace(video, stamps=video.stamps + 1))
+    for _ in range(2):
+        with pytest.raises(KeyreconError, match="cannot be decoded"):
+            list(broken.frames())
 
 
 def test_a_held_video_counts_as_the_same_video(video):
