@@ -213,6 +213,13 @@ def color_bins(lab: UInt8[np.ndarray, "*n 3"]) -> UInt16[np.ndarray, "*n"]:
     return ((bits[..., 0] >> 4) << 10) | ((bits[..., 1] >> 3) << 5) | (bits[..., 2] >> 3)
 
 
+def look_up(
+    table: Float[np.ndarray, "*C bins"], bins: UInt16[np.ndarray, "*n"]
+) -> Float[np.ndarray, "..."]:
+    """Entries of a table of colour bins, or of several, for every pixel."""
+    return np.take(table, bins, axis=-1, mode="clip")  # which asks for no copy, as "raise" does
+
+
 def posterior_tables(colors: Colors) -> Float[np.ndarray, "C bins"]:
     """Probability of each part rather than the surroundings, by colour bin."""
     return colors.histograms / (colors.histograms + colors.surroundings + MIN_DENSITY)

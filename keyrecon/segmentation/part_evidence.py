@@ -20,7 +20,7 @@ from keyrecon.segmentation.background_model import (
     median_background,
     sample_frames,
 )
-from keyrecon.segmentation.color_model import color_bins, to_lab
+from keyrecon.segmentation.color_model import color_bins, look_up, to_lab
 from keyrecon.segmentation.static_overlay import find_overlay
 
 Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]
@@ -69,7 +69,10 @@ def model_scene_by_colour(
     lab = [to_lab(p) for p in pictures(used)]
     paths = camera.to_reference[used]
     window = np.ones((3, 3), np.uint8)
-    free = [cv2.dilate((player[color_bins(p)] > 0.5).astype(np.uint8), window) == 0 for p in lab]
+    free = [
+        cv2.dilate((look_up(player, color_bins(p)) > 0.5).astype(np.uint8), window) == 0
+        for p in lab
+    ]
     overlay = find_overlay(lab, free, paths, shrink)
     clear = median_background(lab, free, paths, shrink, min_share=MIN_CLEAR_SHARE, overlay=overlay)
     anywhere = [np.ones_like(f) for f in free]
@@ -89,15 +92,15 @@ def evaluate_evidence(
     """
     bins = color_bins(lab)
     weight = (BACKGROUND_WEIGHT + (1 - BACKGROUND_WEIGHT) * foreground).astype(np.float32)
-    head = tables[0][bins] * weight
-    foot = tables[1][bins] * weight
-    any_part = tables[2][bins] * foreground.astype(np.float32)
+    head = look_up(tables[0], bins) * weight
+    foot = look_up(tables[1], bins) * weight
+    any_part = look_up(tables[2], bins) * foreground.astype(np.float32)
     return Evidence(
         head=cv2.GaussianBlur(head, (0, 0), max(0.8, 0.25 * HEAD_RADIUS * tall)),
         foot=cv2.GaussianBlur(foot, (0, 0), max(0.8, 0.25 * SHOE_RADIUS * tall)),
         player=any_part,
         inside=cv2.integral(any_part),
-        trunk=cv2.integral(tables[3][bins] * weight) if len(tables) > 3 else None,
+        trunk=cv2.integral(look_up(tables[3], bins) * weight) if len(tables) > 3 else None,
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from keyrecon.records import Colors
-from keyrecon.segmentation.color_model import BINS, color_bins, distinct_parts
+from keyrecon.segmentation.color_model import BINS, color_bins, distinct_parts, look_up
 
 UNIFORM_WEIGHT = 16.0
 """Weight of a colour that is none of the player's, against all colours being equally likely. A
@@ -82,7 +82,7 @@ def label_crop(
     """
     bins = color_bins(lab)
     unknown = foreground == 0.5
-    anything = np.take(tables.any_different, bins) * foreground
+    anything = look_up(tables.any_different, bins) * foreground
     anything[unknown] = tables.any_unknown[bins[unknown]]
     anything = _low_pass(anything, player)
     labels = np.zeros(bins.shape, np.uint8)

@@ -19,7 +19,13 @@ from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Colors, Track
 from keyrecon.segmentation.background_model import ForegroundModel
-from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_tables, to_lab
+from keyrecon.segmentation.color_model import (
+    color_bins,
+    foot_table,
+    look_up,
+    posterior_tables,
+    to_lab,
+)
 from keyrecon.segmentation.part_evidence import BACKGROUND_WEIGHT
 
 ABOVE_HEAD, BELOW_HEAD, ASIDE = 0.3, 1.25, 0.86
@@ -141,7 +147,7 @@ class Channels:
         parts = len(self.tables)
         channels = np.empty((1 + parts + DIRECTIONS, *foreground.shape), np.float32)
         np.multiply(foreground, np.float32(1 / 255), out=channels[0])
-        np.take(self.tables, color_bins(lab), axis=1, out=channels[1 : 1 + parts])
+        channels[1 : 1 + parts] = look_up(self.tables, color_bins(lab))
         channels[1 : 1 + parts] *= BACKGROUND_WEIGHT + (1 - BACKGROUND_WEIGHT) * channels[0]
         light = np.ascontiguousarray(lab[..., 0])
         gx, gy = (cv2.Sobel(light, cv2.CV_32F, *d, scale=0.25) for d in ((1, 0), (0, 1)))

@@ -27,7 +27,13 @@ from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import PLAYER, CameraPath, Colors, Shots, Track, TrackAnchors
-from keyrecon.segmentation.color_model import color_bins, foot_table, posterior_tables, to_lab
+from keyrecon.segmentation.color_model import (
+    color_bins,
+    foot_table,
+    look_up,
+    posterior_tables,
+    to_lab,
+)
 from keyrecon.segmentation.player_crops import Cropping
 from keyrecon.segmentation.repeated_frames import COMPARED_WIDTH, find_repeats, picture_change
 from keyrecon.tracking.detection import FindOptions, find_player
@@ -129,7 +135,7 @@ def _layouts(video: Video, colors: Colors, track: Track) -> Float[np.ndarray, "n
     pictures = read_small(video, width, set(frames.tolist()))
     for t, picture in zip(frames.tolist(), pictures, strict=True):
         way = (to_small @ cropping.crop_to_picture(t))[:2]
-        maps = tables[:, color_bins(to_lab(cut_affine(picture, way, cropping.size)))]
+        maps = look_up(tables, color_bins(to_lab(cut_affine(picture, way, cropping.size))))
         small = [cv2.resize(one, CELLS[::-1], interpolation=cv2.INTER_AREA) for one in maps]
         both = np.stack(small)
         layouts.append((both + both[..., ::-1]) / 2)

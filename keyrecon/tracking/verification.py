@@ -24,7 +24,7 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackVerification
 from keyrecon.segmentation.background_model import ForegroundModel
-from keyrecon.segmentation.color_model import color_bins, posterior_tables, to_lab
+from keyrecon.segmentation.color_model import color_bins, look_up, posterior_tables, to_lab
 
 RATE = 6.0
 """Frames looked at per second: who walks past the player is seen three times within a height."""
@@ -128,7 +128,7 @@ class _View:
     @property
     def parts(self) -> Float32[np.ndarray, "C h w"]:
         """Back-projection of each part where the scene is covered."""
-        return self.tables[:, color_bins(self.colors)] * self.foreground
+        return look_up(self.tables, color_bins(self.colors)) * self.foreground
 
     def is_truncated(self) -> bool:
         """Whether the player's colours reach the last rows under the feet."""

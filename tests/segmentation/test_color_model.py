@@ -11,6 +11,7 @@ from keyrecon.segmentation.color_model import (
     distinct_parts,
     grow_patch,
     learn_colors,
+    look_up,
     posterior_tables,
     to_lab,
 )
@@ -46,6 +47,13 @@ def test_a_part_is_told_from_the_surroundings(video):
     shirt = tables[colors.names.index("shirt")]
     assert shirt[red] > 0.9
     assert shirt[green] < 0.05
+
+
+def test_looking_up_colours_takes_the_entry_of_each_pixel():
+    rng = np.random.default_rng(0)
+    bins, tables = rng.integers(0, 20, (3, 4)).astype(np.uint16), rng.random((2, 20))
+    assert np.array_equal(look_up(tables, bins), tables[:, bins])
+    assert np.array_equal(look_up(tables[0], bins), tables[0][bins])
 
 
 def test_a_click_beneath_the_sole_still_teaches_the_shoe(video):
