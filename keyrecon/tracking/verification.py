@@ -17,6 +17,7 @@ from itertools import islice
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
+from scipy.fft import irfft2, next_fast_len, rfft2
 
 from keyrecon.io.frame_reader import read_small, shrinking
 from keyrecon.io.video import Video
@@ -243,14 +244,9 @@ def _best_places(
     view: _View, template: Float[np.ndarray, "C a b"], height: float
 ) -> tuple[float, float, Float[np.ndarray, "2"]]:
     """The template's response on the player, the best away from there, and its place."""
-    above, below, aside = _margins(height)
-    rows, columns = view.foreground.shape
-    response = np.zeros((rows, columns), np.float32)
-    for part, weights in zip(view.parts, template, strict=True):
-        padded = cv2.copyMakeBorder(part, above, below, aside, aside, cv2.BORDER_CONSTANT)
-        filtered = cv2.filter2D(padded, cv2.CV_32F, weights, anchor=(aside, above))
-        response += filtered[above : above + rows, aside : aside + columns]
-    y, x = np.mgrid[:rows, :columns]
+    columns = view.foreground.shape[1]
+    response = _matched_filter(view.parts, template, _margins(height))
+    y, x = np.ogrid[: len(response), :columns]
     across, along = np.abs(x - view.head[0]), np.abs(y - view.head[1])
     near = np.maximum(across, along) <= max(1.0, 0.12 * height)
     away = (across > APART[0] * height) | (along > APART[1] * height)
@@ -259,6 +255,24 @@ def _best_places(
     best = int(np.where(away, response, -np.inf).argmax())
     at_player = float(response[near].max()) if near.any() else 0.0
     return at_player, float(response.flat[best]), np.array([best % columns, best // columns], float)
+
+
+def _matched_filter(
+    parts: Float32[np.ndarray, "C h w"],
+    template: Float32[np.ndarray, "C a b"],
+    margins: tuple[int, int, int],
+) -> Float32[np.ndarray, "h w"]:
+    """Correlation of part maps with a template, summed over the parts; nothing is outside them.
+
+    In the frequency domain, where the sum needs one transform back. What the template reaches
+    beyond one side is the room beyond the other, as transforms take maps for periodic.
+    """
+    above, below, aside = margins
+    rows, columns = parts.shape[1:]
+    size = next_fast_len(rows + max(above, below), True), next_fast_len(columns + aside, True)
+    spectra = rfft2(parts, size) * rfft2(template, size).conj()
+    response = np.roll(irfft2(spectra.sum(axis=0), size), (above, aside), (0, 1))
+    return response[:rows, :columns]
 
 
 def find_meetings(

@@ -15,7 +15,12 @@ from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking import verification as verification_module
 from keyrecon.tracking.scale import player_boxes
 from keyrecon.tracking.tracklets import find_jumps
-from keyrecon.tracking.verification import find_meetings, hidden_shares, verify_track
+from keyrecon.tracking.verification import (
+    _matched_filter,
+    find_meetings,
+    hidden_shares,
+    verify_track,
+)
 
 COUNT = 60
 HEAD = heads(COUNT) - corners(COUNT, False)
@@ -161,3 +166,14 @@ def test_a_player_behind_a_panel_is_hidden_and_one_beside_it_is_not():
     shares = hidden_shares(track_along(head, rows=400), background)
     assert shares[0] == 0
     assert shares[1] == pytest.approx(20 / HEIGHT, abs=0.1)
+
+
+def test_a_template_responds_as_its_products_place_by_place_add_up_to():
+    rng = np.random.default_rng(0)
+    above, below, aside = margins = 3, 7, 2
+    parts = rng.random((2, 9, 14)).astype(np.float32)
+    template = rng.normal(size=(2, above + below + 1, 2 * aside + 1)).astype(np.float32)
+    around = np.pad(parts, ((0, 0), (above, below), (aside, aside)))
+    windows = np.lib.stride_tricks.sliding_window_view(around, template.shape)[0]
+    expected = (windows * template).sum(axis=(2, 3, 4))
+    np.testing.assert_allclose(_matched_filter(parts, template, margins), expected, atol=1e-4)
