@@ -10,7 +10,7 @@ Slow-motion footage tells its factor, so that times are those of the world.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
@@ -108,14 +108,16 @@ class Video:
         self, start: int = 0, stop: int | None = None, width: int | None = None
     ) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
         """Frames start..stop-1 in order, one in memory at a time; reduced to `width` if given."""
+        convert = self._converter(width)
         for number, frame in enumerate(self._decoded(start, stop), start):
-            yield even_exposure(self._picture(frame, width), self._exposure(number))
+            yield even_exposure(convert(frame), self._exposure(number))
 
     def chosen_frames(self, numbers: Container[int], last: int) -> Iterator[np.ndarray]:
         """The frames with these numbers up to `last`; the others are decoded but not converted."""
+        convert = self._converter(None)
         for number, frame in enumerate(self._decoded(0, last + 1)):
             if number in numbers:
-                yield even_exposure(self._picture(frame, None), self._exposure(number))
+                yield even_exposure(convert(frame), self._exposure(number))
 
     def grey_frames(
         self, wanted: Container[int] | None = None
@@ -188,16 +190,22 @@ class Video:
             raise KeyreconError(f"Frame {index} is outside the video of {len(self)} frames.")
         return next(self.frames(index, index + 1, width))
 
-    def _picture(self, frame: av.VideoFrame, width: int | None) -> UInt8[np.ndarray, "h w 3"]:
+    def _converter(
+        self, width: int | None
+    ) -> Callable[[av.VideoFrame], UInt8[np.ndarray, "h w 3"]]:
+        """Makes RGB pictures of frames, one after the other, reduced to `width` if given.
+
+        One scaler does for all: it keeps its tables, which each frame would make and hold anew.
+        """
+        from av.video.reformatter import VideoReformatter
+
+        wanted: dict[str, Any] = {"format": "rgb24"}
         if width and width != self.width:
             height = max(1, round(self.height * width / self.width))
             stored = (height, width) if self.turns % 2 else (width, height)
-            picture = frame.to_ndarray(
-                format="rgb24", width=stored[0], height=stored[1], interpolation="AREA"
-            )
-        else:
-            picture = frame.to_ndarray(format="rgb24")
-        return self._upright(picture)
+            wanted |= {"width": stored[0], "height": stored[1], "interpolation": "AREA"}
+        scaler = VideoReformatter()
+        return lambda frame: self._upright(scaler.reformat(frame, **wanted).to_ndarray())
 
     def _upright(self, stored: UInt8[np.ndarray, "h w *c"]) -> UInt8[np.ndarray, "y x *c"]:
         """A stored picture as players show it."""
