@@ -109,8 +109,8 @@ class Neighborhoods:
     def union(self, candidates: list[int]) -> Bool[np.ndarray, "T"]:
         """W: frames that any of the candidates represents."""
         represented = np.zeros(self.n_frames, dtype=bool)
-        for candidate in candidates:
-            represented[self.of(candidate)] = True
+        runs = self.only(np.array(candidates, dtype=np.int64))
+        represented[ranges(runs.start, runs.stop - runs.start)] = True
         return represented
 
     def without(self, represented: Bool[np.ndarray, "T"]) -> "Neighborhoods":

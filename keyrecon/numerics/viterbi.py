@@ -17,7 +17,6 @@ states are chosen together: (a1, b1) -> (b1, a2) -> (a2, b2), which minimises ov
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import count
 
 import numpy as np
 from jaxtyping import Float, Int, UInt
@@ -43,16 +42,17 @@ def find_cheapest_path(
     if order > 1 and max_gap > 1:
         raise ValueError("only a first-order path can skip frames")
     path = np.full(frames + order - 1, -1)
-    recent: deque[tuple[np.ndarray, float]] = deque(maxlen=max_gap)
+    recent: deque[np.ndarray] = deque(maxlen=max_gap)
+    least = np.empty(frames)
     back: list[_Predecessors] = []
     cheapest, end = _times(frames, skip_cost), None
     for t, cost in enumerate(unary):
-        arrival, predecessors = _arrive(cost.shape, recent, transition, t, skip_cost)
+        arrival, predecessors = _arrive(cost.shape, recent, least, transition, t, skip_cost)
         total = arrival + cost
-        least = float(total.min(initial=np.inf))
-        recent.appendleft((total, least))
+        least[t] = total.min(initial=np.inf)
+        recent.appendleft(total)
         back.append(predecessors)
-        ended = least + _times(frames - 1 - t, skip_cost)
+        ended = least[t] + _times(frames - 1 - t, skip_cost)
         if ended < cheapest:
             cheapest, end = ended, (t, np.unravel_index(total.argmin(), total.shape))
     while end is not None:
@@ -79,22 +79,26 @@ class _Predecessors:
 
 def _arrive(
     shape: tuple[int, ...],
-    recent: Sequence[tuple[np.ndarray, float]],
+    recent: Sequence[np.ndarray],
+    least: Float[np.ndarray, "T"],
     transition: Transition,
     t: int,
     skip_cost: float,
 ) -> tuple[Float[np.ndarray, "*S"], _Predecessors]:
-    """Cheapest way to each state of frame t; `recent` has the totals of the frames before it, and
-    the least of each."""
+    """Cheapest way to each state of frame t; `recent` has the totals of the frames before it, the
+    last one first, `least` the least total of each frame."""
     best = np.full(shape, _times(t, skip_cost))
     step = np.zeros(shape, np.min_scalar_type(len(recent)))
-    oldest = np.zeros(shape, np.min_scalar_type(max((len(r) for r, _ in recent), default=0)))
+    oldest = np.zeros(shape, np.min_scalar_type(max(map(len, recent), default=0)))
     dearest = _times(t, skip_cost) if best.size else -np.inf
-    for gap, (before, least) in zip(count(1), recent):
+    gaps = np.arange(1, len(recent) + 1)
+    cheapest = least[t - gaps]
+    cheapest[1:] += (gaps[1:] - 1) * skip_cost
+    for gap in gaps[cheapest < dearest].tolist():
+        if cheapest[gap - 1] >= dearest:
+            continue  # no gap this long can be cheaper than the shorter ones are by now
         skipped = _times(gap - 1, skip_cost)
-        if least + skipped >= dearest:
-            continue  # no gap this long can be cheaper
-        through = before[..., None] + transition(t - gap, t)
+        through = recent[gap - 1][..., None] + transition(t - gap, t)
         if skipped:
             through += skipped
         last = through.argmin(axis=0)

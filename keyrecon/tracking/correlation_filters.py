@@ -91,7 +91,7 @@ def peaks_at(
     places: Float[np.ndarray, "k 2"], size: tuple[int, int], spread: float
 ) -> Float[np.ndarray, "h w"]:
     """A target: a Gaussian of height 1 at each place (x, y), none added up."""
-    y, x = np.mgrid[: size[0], : size[1]]
+    y, x = np.ogrid[: size[0], : size[1]]
     squares = [(x - px) ** 2 + (y - py) ** 2 for px, py in places]
     return np.exp(-np.min(squares, axis=0) / (2 * spread**2))
 

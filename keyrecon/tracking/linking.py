@@ -224,10 +224,12 @@ def _new_places(
     places: Float[np.ndarray, "m 2"], known: Float[np.ndarray, "n 2"], min_distance: float
 ) -> Float[np.ndarray, "k 2"]:
     """The first few places that are no known ones, and not one another."""
-    taken, count = known, len(known)
-    for place in places:
-        if len(taken) == count + MAX_PROPAGATED:
+    taken = np.concatenate([known, places])
+    apart = np.linalg.norm(taken[None] - places[:, None], axis=2) > min_distance
+    new: list[int] = []
+    for row in np.flatnonzero(apart[:, : len(known)].all(axis=1)).tolist():
+        if len(new) == MAX_PROPAGATED:
             break
-        if not len(taken) or np.linalg.norm(taken - place, axis=1).min() > min_distance:
-            taken = np.concatenate([taken, place[None]])
-    return taken[count:]
+        if apart[row, len(known) :][new].all():
+            new.append(row)
+    return places[new]

@@ -125,7 +125,9 @@ class _SeenPath:
         earliest = np.searchsorted(self.time, self.time - MAX_STEP_SECONDS - 1e-6)
         before = np.maximum(np.minimum(earliest, rows - 1), 0)
         step = self.speed * np.diff(self.time, prepend=0)
-        far = np.flatnonzero(self.moved(before, rows) > self.reach(before, rows))
+        moved = self.moved(before, rows)
+        far = np.flatnonzero(moved > MAX_STEP)  # nobody's reach is less, and few move as far
+        far = far[moved[far] > self.reach(before[far], far)]
         breaks = {int(before[row] + 1 + step[before[row] + 1 : row + 1].argmax()) for row in far}
         return [(first, end - 1) for first, end in pairwise([0, *sorted(breaks), len(rows)])]
 
