@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from keyrecon.app import keyframing, running
 from keyrecon.app.console import show
 from keyrecon.commands.arguments import (
     MaybeHeight,
@@ -57,6 +56,8 @@ def keyframes(
         force: Make every stage again.
         workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
+    from keyrecon.app import keyframing  # each command reads what it needs itself
+
     printed = _is_printed(method, options)
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
     with at_work(project, "keyrecon keyframes"), open_workers(workers) as made_by:
@@ -95,6 +96,8 @@ def run(
         force: Make every stage again.
         workers: Number of processes here, or address of a Dask scheduler, such as tcp://head:8786.
     """
+    from keyrecon.app import running  # and all that draws the report
+
     printed = _is_printed(method, options)
     with at_work(project, "keyrecon run"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
