@@ -304,7 +304,8 @@ def offer_distances(
 ) -> Float32[np.ndarray, "G B"]:
     """M for some frames: distance of each cell to each frame.
 
-    Pairs of an element and a cell are many, so those of one frame at a time stay in the cache.
+    Pairs of an element and a cell are many, so those of one frame at a time stay in the cache, and
+    their numbers are made those that arrays are indexed by once, not at each use.
     """
     nearest = np.full((len(frames), len(cells.center)), reach * reach, dtype=np.float32)
     points = elements.points.view(np.complex64)[:, 0]
@@ -313,7 +314,7 @@ def offer_distances(
         part = slice(*span)
         cell = cells.of_element[part]
         count = cells.first[cell + 1] - cells.first[cell]
-        target = cells.neighbor[ranges(cells.first[cell], count)]
+        target = cells.neighbor[ranges(cells.first[cell], count)].astype(np.intp)
         away = cells.center[target]
         away -= np.repeat(points[part], count)
         squared = np.square(away.real) + np.square(away.imag)
