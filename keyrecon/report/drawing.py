@@ -7,6 +7,9 @@ where a joint comes from: a diamond was marked by a person, a disc was found in 
 ring was filled in.
 """
 
+from dataclasses import dataclass
+from functools import cache
+
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -93,17 +96,42 @@ def draw_pose(
     height = min(height, 4.0 * max(picture.shape[:2]))
     thickness = max(1, round(BONE_SHARE * height))
     depth = np.zeros(len(points2d)) if depth is None else np.nan_to_num(depth)
-    colors = np.array((LEFT, RIGHT, TRUNK))
-    bones, bone_colors = drawn_bones(skeleton), colors[bone_sides(skeleton)].tolist()
-    for bone in np.argsort(-depth[bones].mean(axis=1), kind="stable"):
-        if known[bones[bone]].all():
-            _draw_bone(drawn, points2d[bones[bone]], bone_colors[bone], thickness)
-    joint_colors = colors[joint_sides(skeleton)].tolist()
-    for joint in np.argsort(-depth, kind="stable"):
-        if known[joint]:
-            kind = SOURCES[1 if source is None else source[joint]]
-            _draw_joint(drawn, points2d[joint], kind, joint_colors[joint], thickness)
+    paint = _paint(skeleton)
+    shown = np.where(known[:, None], points2d, 0)
+    places: list[tuple[int, int]] = [(x, y) for x, y in _fixed_point(shown).tolist()]
+    middles = depth[np.array(paint.bones)].mean(axis=1)
+    for bone in np.argsort(-middles, kind="stable").tolist():
+        start, stop = paint.bones[bone]
+        if known[start] and known[stop]:
+            _draw_bone(drawn, places[start], places[stop], paint.of_bones[bone], thickness)
+    for joint in np.argsort(-depth, kind="stable").tolist():
+        if not known[joint]:
+            continue
+        kind, color = SOURCES[1 if source is None else source[joint]], paint.of_joints[joint]
+        if kind == "annotated":
+            _draw_diamond(drawn, points2d[joint], color, thickness)
+        else:
+            _draw_disc(drawn, places[joint], kind == "interpolated", color, thickness)
     return drawn
+
+
+@dataclass(frozen=True)
+class _Paint:
+    """What is drawn of a skeleton, and in which colours."""
+
+    bones: list[list[int]]
+    of_bones: list[list[int]]
+    of_joints: list[list[int]]
+
+
+@cache
+def _paint(skeleton: Skeleton) -> _Paint:
+    colors = np.array((LEFT, RIGHT, TRUNK))
+    return _Paint(
+        drawn_bones(skeleton).tolist(),
+        colors[bone_sides(skeleton)].tolist(),
+        colors[joint_sides(skeleton)].tolist(),
+    )
 
 
 def draw_club(picture: UInt8[np.ndarray, "h w 3"], ends: Float[np.ndarray, "2 2"]) -> None:
@@ -116,35 +144,45 @@ def draw_club(picture: UInt8[np.ndarray, "h w 3"], ends: Float[np.ndarray, "2 2"
 
 def _draw_bone(
     picture: UInt8[np.ndarray, "h w 3"],
-    ends: Float[np.ndarray, "2 2"],
+    start: tuple[int, int],
+    stop: tuple[int, int],
     color: list[int],
     thickness: int,
 ) -> None:
-    start, stop = (tuple(end) for end in _fixed_point(ends).tolist())
+    """Ends as OpenCV's fixed-point numbers."""
     for paint, width in ((SEAM, thickness + max(2, round(0.6 * thickness))), (color, thickness)):
         cv2.line(picture, start, stop, paint, width, cv2.LINE_AA, SUBPIXEL)
 
 
-def _draw_joint(
+def _draw_diamond(
     picture: UInt8[np.ndarray, "h w 3"],
     point: Float[np.ndarray, "2"],
-    kind: str,
     color: list[int],
     thickness: int,
 ) -> None:
-    radius = 0.5 + 0.9 * thickness
-    if kind == "annotated":
-        corners = point + 1.5 * radius * np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])
-        shape = [_fixed_point(corners)]
-        cv2.fillPoly(picture, shape, color, cv2.LINE_AA, SUBPIXEL)
-        cv2.polylines(picture, shape, True, SEAM, 1, cv2.LINE_AA, SUBPIXEL)
-        return
-    center = tuple(_fixed_point(point).tolist())
-    reach = round(radius * 2**SUBPIXEL)
-    fill = SEAM if kind == "interpolated" else color
-    edge = color if kind == "interpolated" else SEAM
+    reach = 1.5 * _joint_radius(thickness)
+    shape = [_fixed_point(point + reach * np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]))]
+    cv2.fillPoly(picture, shape, color, cv2.LINE_AA, SUBPIXEL)
+    cv2.polylines(picture, shape, True, SEAM, 1, cv2.LINE_AA, SUBPIXEL)
+
+
+def _draw_disc(
+    picture: UInt8[np.ndarray, "h w 3"],
+    center: tuple[int, int],
+    ring: bool,
+    color: list[int],
+    thickness: int,
+) -> None:
+    """Or a ring; the centre as OpenCV's fixed-point numbers."""
+    reach = round(_joint_radius(thickness) * 2**SUBPIXEL)
+    fill, edge = (SEAM, color) if ring else (color, SEAM)
     cv2.circle(picture, center, reach, fill, -1, cv2.LINE_AA, SUBPIXEL)
     cv2.circle(picture, center, reach, edge, max(1, thickness // 3), cv2.LINE_AA, SUBPIXEL)
+
+
+def _joint_radius(thickness: int) -> float:
+    """px"""
+    return 0.5 + 0.9 * thickness
 
 
 def _fixed_point(points: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:

@@ -68,10 +68,10 @@ class Windows:
         x0, x1, y0, y1 = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
         border = (y0 - corner[1], corner[1] + side - y1, x0 - corner[0], corner[0] + side - x1)
         top, bottom, left, right = np.maximum(border, 0).tolist()
-        inner = cv2.copyMakeBorder(
-            picture[y0:y1, x0:x1], top, bottom, left, right, cv2.BORDER_REPLICATE
-        )[:side, :side]
-        return reduce_picture(inner, size)
+        inner = picture[y0:y1, x0:x1]
+        if top or bottom or left or right:
+            inner = cv2.copyMakeBorder(inner, top, bottom, left, right, cv2.BORDER_REPLICATE)
+        return reduce_picture(inner[:side, :side], size)
 
     def _square(self, frame: int) -> tuple[Int[np.ndarray, "2"], int]:
         side = max(2, round(float(self.side[frame])))
