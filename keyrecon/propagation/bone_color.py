@@ -63,19 +63,23 @@ class BoneColors:
                 result[frames, :, side, number] = share * self.tables[bone][colors].mean(axis=-1)
         return result
 
+    def numbers(self, frame: int) -> Int[np.ndarray, "N N"]:
+        """Which colour each cell of one described frame has."""
+        return _number(self.features.cells[np.searchsorted(self.features.frames, frame), ..., -3:])
+
     def along(
         self,
-        frame: int,
+        numbers: Int[np.ndarray, "N N"],
         bone: int,
         start: Complex[np.ndarray, "*n"],
         stop: Complex[np.ndarray, "*n"],
     ) -> Float32[np.ndarray, "*n"]:
-        """The same of many places of one bone in one described frame, by fewer places along it."""
-        table = self.tables[bone]
-        row = np.searchsorted(self.features.frames, frame)
-        cost = table[_number(self.features.cells[row, ..., -3:])]
-        places = start[..., None] + (stop - start)[..., None] * ALONG[::2]
-        return cost[_cells_of(self.features, places)].mean(axis=-1)
+        """The same of many places of one bone where cells have these `numbers`, by fewer places
+        along it."""
+        cost = self.tables[bone].take(numbers)
+        shares = ALONG[::2].reshape(-1, *np.ones(start.ndim, int))
+        row, column = _cells_of(len(numbers), start + (stop - start) * shares)
+        return cost.take(row * len(numbers) + column).mean(axis=0)
 
 
 def along_bone(
@@ -136,19 +140,25 @@ def _colors_at(
     features: PlayerFeatures, row: Int[np.ndarray, "..."], places: Complex[np.ndarray, "..."]
 ) -> Int[np.ndarray, "..."]:
     """Numbers of the colours at places in described frames."""
-    return _number(features.cells[row, *_cells_of(features, places), -3:])
+    return _number(features.cells[row, *_cells_of(features.cells.shape[1], places), -3:])
 
 
 def _cells_of(
-    features: PlayerFeatures, places: Complex[np.ndarray, "*n"]
+    side: int, places: Complex[np.ndarray, "*n"]
 ) -> tuple[Int[np.ndarray, "*n"], Int[np.ndarray, "*n"]]:
-    """Rows and columns, those beyond the picture as at its edge."""
-    last = features.cells.shape[1] - 1
+    """Rows and columns of `side` cells each, those beyond the picture as at its edge."""
     row, column = (
-        np.clip(np.rint((PLAYER_HEIGHT * part + REACH - STRIDE / 2) / STRIDE), 0, last).astype(int)
+        rounded_within((PLAYER_HEIGHT * part + REACH - STRIDE / 2) / STRIDE, side - 1).astype(int)
         for part in (places.imag, places.real)
     )
     return row, column
+
+
+def rounded_within(values: Float[np.ndarray, "*n"], most: int) -> Float[np.ndarray, "*n"]:
+    """Whole numbers from 0 to `most`, in the place of the values."""
+    np.rint(values, out=values)
+    np.maximum(values, 0, out=values)
+    return np.minimum(values, most, out=values)
 
 
 def _number(lab: UInt8[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n"]:

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Int
 
 from keyrecon.propagation.appearance import JointAppearance
-from keyrecon.propagation.bone_color import BoneColors
+from keyrecon.propagation.bone_color import BoneColors, rounded_within
 from keyrecon.propagation.correspondence import ElementIndex, TemplateFits, score_limb
 from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates
 
@@ -130,14 +130,16 @@ def search_by_looks(
     across = np.arange(-REACH, REACH + SPACING, SPACING)
     grid = across + 1j * across[:, None]
     described = appearance.features.frames
+    marks = [_marks_of(appearance, limb) for limb in limbs]
     offsets = np.zeros((len(described), count, 2, 2), complex)
     for row, frame in enumerate(described.tolist()):
         middle = trunk[frame, starts].mean()
         looks = appearance.describe(np.full(grid.size, frame), (middle + grid).ravel())
+        numbers = colors.numbers(frame)
         for number, limb in enumerate(limbs):
             start = trunk[frame, limb.joints[0]] - middle
-            cost = _limb_costs(appearance, looks, limb, start)
-            cost += COLOR_COST * _color_costs(colors, frame, limb, middle + start)
+            cost = _limb_costs(looks, marks[number], limb, start)
+            cost += COLOR_COST * _color_costs(colors, numbers, limb, middle + start)
             offsets[row, :, number] = _best_limbs(cost, limb, count)
     nearest = _nearest(described, len(trunk))
     joints = np.repeat(trunk[:, None], count, axis=1)
@@ -172,30 +174,40 @@ def _limb_of(poses: AnnotatedPoses, side: tuple[int, ...]) -> _Limb | None:
     return _Limb((inner, middle, outer), bones, (one, other))
 
 
+def _marks_of(appearance: JointAppearance, limb: _Limb) -> tuple[Float32[np.ndarray, "_ C"], ...]:
+    """What its middle and outer joint look like, and the middles of its inner and outer bone."""
+    joints = [appearance.marks[joint] for joint in limb.joints[1:]]
+    return *joints, *(appearance.bones[bone] for bone in limb.bones)
+
+
 def _limb_costs(
-    appearance: JointAppearance, looks: Float32[np.ndarray, "g C"], limb: _Limb, start: complex
+    looks: Float32[np.ndarray, "g C"],
+    marks: tuple[Float32[np.ndarray, "_ C"], ...],
+    limb: _Limb,
+    start: complex,
 ) -> Float[np.ndarray, "n m"]:
     """How unlike marks limbs look; `start` from the middle of the places `looks` describes."""
     one, other = limb.steps
     middle = start + one
     outer = middle[:, None] + other
-    cost = _unlike(looks, appearance.marks[limb.joints[1]], middle)
-    cost = cost + _unlike(looks, appearance.bones[limb.bones[0]], start + one / 2)
-    total = cost[:, None] + _unlike(looks, appearance.marks[limb.joints[2]], outer)
-    total += _unlike(looks, appearance.bones[limb.bones[1]], middle[:, None] + other / 2)
+    of_middle, of_outer, of_inner_bone, of_outer_bone = marks
+    cost = _unlike(looks, of_middle, middle)
+    cost = cost + _unlike(looks, of_inner_bone, start + one / 2)
+    total = cost[:, None] + _unlike(looks, of_outer, outer)
+    total += _unlike(looks, of_outer_bone, middle[:, None] + other / 2)
     return total
 
 
 def _color_costs(
-    colors: BoneColors, frame: int, limb: _Limb, start: complex
+    colors: BoneColors, numbers: Int[np.ndarray, "N N"], limb: _Limb, start: complex
 ) -> Float[np.ndarray, "n m"]:
     """How improbable the colours along limbs are; `start` in player coordinates."""
     one, other = limb.steps
     middle = start + one
-    inner = colors.along(frame, limb.bones[0], np.full(len(one), start), middle)
+    inner = colors.along(numbers, limb.bones[0], np.full(len(one), start), middle)
     outer = middle[:, None] + other
     first = np.broadcast_to(middle[:, None], outer.shape)
-    return inner[:, None] + colors.along(frame, limb.bones[1], first, outer)
+    return inner[:, None] + colors.along(numbers, limb.bones[1], first, outer)
 
 
 def _best_limbs(
@@ -221,10 +233,10 @@ def _unlike(
     """How unlike the most similar mark the described place next to each place looks, 0-2."""
     if not len(marks):
         return np.zeros(places.shape)
-    unlike = 1 - (looks @ marks.T).max(axis=1).astype(float)
+    # marks in rows: the greatest of columns is found several at a time
+    unlike = 1 - (marks @ looks.T).max(axis=0).astype(float)
     width = round(len(looks) ** 0.5)
     column, row = (
-        np.clip(np.rint((part + REACH) / SPACING).astype(int), 0, width - 1)
-        for part in (places.real, places.imag)
+        rounded_within((part + REACH) / SPACING, width - 1) for part in (places.real, places.imag)
     )
-    return unlike[row * width + column]
+    return unlike.take((row * width + column).astype(np.intp))

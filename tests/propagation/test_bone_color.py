@@ -55,6 +55,6 @@ def test_where_all_has_one_colour_it_tells_nothing():
 def test_many_places_of_a_bone_cost_about_what_its_pixels_do(colors):
     start, stop = JOINTS[3, ONE[0]], JOINTS[3, ONE[1]]
     shifts = np.array([0.0, 0.3])
-    few = colors.along(3, THIGH, start + shifts, stop + shifts)
+    few = colors.along(colors.numbers(3), THIGH, start + shifts, stop + shifts)
     whole = colors.unlikeness(np.stack([JOINTS, JOINTS + 0.3], axis=1))[3, :, 0, THIGH]
     np.testing.assert_allclose(few, whole, atol=0.4)
