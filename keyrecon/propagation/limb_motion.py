@@ -19,6 +19,7 @@ nothing where they meet.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -95,22 +96,38 @@ def filter_motion(
 ) -> tuple[Complex[np.ndarray, "T 2 n j"], Float[np.ndarray, "T j 2 2"]]:
     """Place and velocity of every joint from all frames up to each, and their covariance, which is
     that of any places."""
-    noise = _process_noise(spread)
+    gains, covariances = _filter_gains(len(places), tuple(spread.tolist()))
     states = np.zeros((len(places), 2, *places.shape[1:]), dtype=complex)
-    covariances = np.zeros((len(places), len(spread), 2, 2))
     place, velocity = places[0], np.zeros(places.shape[1:], dtype=complex)
-    covariance = np.zeros((len(spread), 2, 2))
-    covariance[:, 0, 0], covariance[:, 1, 1] = PLACE_SPREAD**2, (6 * spread) ** 2
     for t, seen in enumerate(places):
         if t:
             place = place + velocity
+        gap = seen - place
+        place, velocity = place + gains[t, 0] * gap, velocity + gains[t, 1] * gap
+        states[t, 0], states[t, 1] = place, velocity
+    return states, covariances
+
+
+@lru_cache(maxsize=4)
+def _filter_gains(
+    frames: int, spread: tuple[float, ...]
+) -> tuple[Float[np.ndarray, "T 2 j"], Float[np.ndarray, "T j 2 2"]]:
+    """Kalman gains of place and velocity, and covariances: any places have the same, and limbs are
+    filtered again and again while exchanges are tried."""
+    deviation = np.array(spread)
+    noise = _process_noise(deviation)
+    gains, covariances = np.zeros((frames, 2, len(spread))), np.zeros((frames, len(spread), 2, 2))
+    covariance = np.zeros((len(spread), 2, 2))
+    covariance[:, 0, 0], covariance[:, 1, 1] = PLACE_SPREAD**2, (6 * deviation) ** 2
+    for t in range(frames):
+        if t:
             covariance = STEP @ covariance @ STEP.T + noise
         gain = covariance[:, :, 0] / (covariance[:, :1, 0] + PLACE_SPREAD**2)
-        gap = seen - place
-        place, velocity = place + gain[:, 0] * gap, velocity + gain[:, 1] * gap
         covariance = covariance - gain[:, :, None] * covariance[:, :1]
-        states[t, 0], states[t, 1], covariances[t] = place, velocity, covariance
-    return states, covariances
+        gains[t], covariances[t] = gain.T, covariance
+    for kept in (gains, covariances):
+        kept.flags.writeable = False
+    return gains, covariances
 
 
 @dataclass(frozen=True, eq=False)
