@@ -210,27 +210,28 @@ def _remedy(workspace: Workspace) -> str:
     return f"To restore it, {copy}delete it and take the marks anew: keyrecon import {folder} FILE"
 
 
-def asked_for(workspace: Workspace) -> Keyframes:
-    """The keyframes that the person was asked to annotate."""
+def asked_for(workspace: Workspace, video: Video) -> Keyframes:
+    """The keyframes of the project's video that the person was asked to annotate."""
     if not workspace.keyframes_file.is_file():
         workspace.picks()
         raise KeyreconError(
             f"No keyframes have been chosen yet; run: keyrecon keyframes {quoted(workspace.folder)}"
         )
     asked = read_keyframes(workspace.keyframes_file)
-    n_frames = len(workspace.video())
-    if len(asked.upper.nearest) != n_frames:
+    if len(asked.upper.nearest) != len(video):
         raise KeyreconError(
             f"{workspace.keyframes_file} was made for {len(asked.upper.nearest)} frames and the "
-            f"video has {n_frames}; run: keyrecon keyframes {quoted(workspace.folder)}"
+            f"video has {len(video)}; run: keyrecon keyframes {quoted(workspace.folder)}"
         )
     return asked
 
 
-def annotated(workspace: Workspace, partial: bool = False) -> Annotations:
-    """The project's annotations; KeyreconError names the keyframes that lack theirs."""
-    file, asked = workspace.annotations_file, asked_for(workspace)
-    annotations = load_annotations(workspace, workspace.video()) if file.is_file() else None
+def annotated(
+    workspace: Workspace, video: Video, asked: Keyframes, partial: bool = False
+) -> Annotations:
+    """The project's annotations; KeyreconError names the `asked` keyframes that lack theirs."""
+    there = workspace.annotations_file.is_file()
+    annotations = load_annotations(workspace, video) if there else None
     missing = missing_marks(annotations, asked.upper.frames, asked.lower.frames)
     if annotations is None or (missing and not partial):
         folder = quoted(workspace.folder)

@@ -15,6 +15,7 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
+from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import list_stretches, listed_stretches
 from keyrecon.library import read_models, reconstruct
@@ -66,19 +67,20 @@ def run(
     read_models(options)  # a file that is none is told of before any stage
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
+    video = workspace.video()
     if options.lift.field_of_view is None:
-        options = with_field_of_view(options, field_of_view(workspace, workspace.video()))
+        options = with_field_of_view(options, field_of_view(workspace, video))
     evidence = marks_evidence(workspace)
-    annotations = annotated(workspace, partial)
-    asked = asked_for(workspace)
-    automatic = prepare_project(workspace, workspace.video(), annotations, options, progress)
+    asked = asked_for(workspace, video)
+    annotations = annotated(workspace, video, asked, partial)
+    automatic = prepare_project(workspace, video, annotations, options, progress)
     preparation = replace(automatic.preparation, keyframes=asked)
     motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
     wrong = describe_doubtful_marks(preparation, annotations, motion)
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
-    near = _nearness(options, motion, workspace)
+    near = _nearness(options, motion, video)
     advice = () if near is None else (lens_advice(workspace.folder, near),)
     material = ReportMaterial(
         video=with_exposure(preparation.video, None),
@@ -105,11 +107,11 @@ def run(
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
 
 
-def _nearness(options: Options, motion: Motion, workspace: Workspace) -> str | None:
+def _nearness(options: Options, motion: Motion, video: Video) -> str | None:
     """That the player is near, where the lens is not known; the printed form asks for none."""
     if options.lift.field_of_view is not None or options.lift.method == "paper":
         return None
-    return describe_nearness(motion, workspace.video())
+    return describe_nearness(motion, video)
 
 
 def describe_unseen(motion: Motion, shots: Shots) -> list[str]:
@@ -160,6 +162,7 @@ def prepared(
     marks: Annotations | None = None,
 ) -> Preparation:
     """The automatic part, with the keyframes that the person was asked to annotate."""
-    asked = asked_for(workspace)
-    automatic = prepare_project(workspace, workspace.video(), marks, options, progress)
+    video = workspace.video()
+    asked = asked_for(workspace, video)
+    automatic = prepare_project(workspace, video, marks, options, progress)
     return replace(automatic.preparation, keyframes=asked)

@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor, stature
+from keyrecon.numerics.peaks import prominent_peaks
 from keyrecon.records import Motion
 from keyrecon.report.summary import hinge_angles, hinges, stretch_times
 
@@ -42,16 +43,14 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
     hands = [n for n in ("right_wrist", "left_wrist") if n in motion.skeleton.names]
     if not hands or len(motion.time) < 5:
         return []
-    from scipy.signal import find_peaks  # which loads all of scipy.stats: half a second
-
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
     peaks: list[int] = []
     for part in motion.stretches:
-        places, _ = find_peaks(
+        places = prominent_peaks(
             np.pad(fastest[part], 1),
-            height=LEAST_SPEED * stature(motion),
-            prominence=STANDS_OUT * float(fastest.max()),
+            LEAST_SPEED * stature(motion),
+            STANDS_OUT * float(fastest.max()),
         )
         peaks += _apart(part.start + places - 1, fastest, motion.time)
     chosen = sorted(sorted(peaks, key=lambda t: -fastest[t])[:MOST])

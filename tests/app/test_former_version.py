@@ -45,7 +45,7 @@ def test_a_workspace_finds_what_was_picked_chosen_set_and_made(folder):
     assert {pick.part for pick in workspace.picks()} >= {"head", "foot"}
     options = workspace.options(Options(), Options())
     assert (options.keyframes.budget, options.lift.height) == (0.08, 1.78)
-    assert len(project.asked_for(workspace).frames) == 7
+    assert len(project.asked_for(workspace, workspace.video()).frames) == 7
     motion = read_motion(workspace.motion_file)
     assert (len(motion.time), motion.units) == (FRAMES, "m")
 
