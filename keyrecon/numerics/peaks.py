@@ -23,7 +23,8 @@ def prominent_peaks(
     tops = 1 + np.flatnonzero(rises[:-1] & ~rises[1:])
     places = ((starts + stops - 1) // 2)[tops]
     high = places[values[places] >= height]
-    return np.array([at for at in high.tolist() if _prominence(values, at) >= prominence], dtype=int)
+    kept = [at for at in high.tolist() if _prominence(values, at) >= prominence]
+    return np.array(kept, dtype=int)
 
 
 def _prominence(values: Float[np.ndarray, "n"], at: int) -> float:
