@@ -2,7 +2,11 @@
 
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.checks import completed_halves, find_checks
-from keyrecon.annotate.assist.mark_appearance import compare_appearance, describe_frames
+from keyrecon.annotate.assist.mark_appearance import (
+    SeenFrames,
+    compare_appearance,
+    describe_frames,
+)
 from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import scene_of
 from keyrecon.annotate.assist.side_checks import evidence_of_motion
@@ -15,12 +19,21 @@ MOST_TOLD = 8
 """Lines at most."""
 
 
-def describe_doubtful_marks(
-    preparation: Preparation, annotations: Annotations, motion: Motion
-) -> list[str]:
-    """A line for each marked joint or limb that looks wrong, the most suspicious first."""
+def marks_to_see(preparation: Preparation, annotations: Annotations) -> SeenFrames:
+    """What the checks look at: pictures of marked frames."""
     scene, completed = scene_of(preparation, annotations), completed_halves(annotations)
-    described = describe_frames(preparation, scene.body_frame, completed.frames)
+    return SeenFrames(preparation, scene.body_frame, completed.frames)
+
+
+def describe_doubtful_marks(
+    preparation: Preparation, annotations: Annotations, motion: Motion, seen: SeenFrames
+) -> list[str]:
+    """A line for each marked joint or limb that looks wrong, the most suspicious first.
+
+    Pictures of marked frames that were not `seen` are read.
+    """
+    scene, completed = scene_of(preparation, annotations), completed_halves(annotations)
+    described = describe_frames(preparation, scene.body_frame, completed.frames, seen.features)
     checks = find_checks(
         annotations,
         estimate_body(annotations, {}, preparation.track.height, preparation.video.fps).size,

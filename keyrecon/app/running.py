@@ -1,13 +1,14 @@
 """`keyrecon run`: from marks to motion and report, in a project folder."""
 
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from keyrecon.app.lens import describe_nearness, field_of_view, lens_advice, lens_caveat
-from keyrecon.app.mark_checks import describe_doubtful_marks
+from keyrecon.app.mark_checks import describe_doubtful_marks, marks_to_see
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
@@ -24,7 +25,7 @@ from keyrecon.progress import Progress
 from keyrecon.ranges import SHORTEST, TALLEST
 from keyrecon.records import Annotations, Keyframes, Motion, Preparation, Shots
 from keyrecon.report.markup import ReportMaterial
-from keyrecon.report.page import write_report
+from keyrecon.report.page import cut_report_pictures, write_page
 from keyrecon.uncertainty import describe_uncertainty
 from keyrecon.world.ground_marks import check_field_of_view
 
@@ -78,7 +79,6 @@ def run(
     motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
-    wrong = describe_doubtful_marks(preparation, annotations, motion)
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
     near = _nearness(options, motion, video)
     advice = () if near is None else (lens_advice(workspace.folder, near),)
@@ -92,12 +92,12 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=[*doubts, *wrong, *placed.doubts],
+        contradictions=placed.doubts,
         court=placed.court,
         shots=shots,
         lens=None if near is None else lens_caveat(near),
     )
-    write_report(workspace.report_file, material, progress)
+    wrong = _write_report(workspace.report_file, preparation, material, doubts, progress)
     note_run(workspace, RunNotes(evidence, tuple(doubts), advice))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
@@ -105,6 +105,26 @@ def run(
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])
+
+
+def _write_report(
+    path: Path,
+    preparation: Preparation,
+    material: ReportMaterial,
+    doubts: Sequence[str],
+    progress: Progress,
+) -> list[str]:
+    """Write the report with what is doubtful; returns the lines on marks that look wrong.
+
+    These are found with the pictures that the report shows, so that the video is read once.
+    """
+    annotations = material.annotations
+    seen = marks_to_see(preparation, annotations)
+    pictures = cut_report_pictures(material, progress, seen.see)
+    wrong = describe_doubtful_marks(preparation, annotations, material.motion, seen)
+    told = [*doubts, *wrong, *material.contradictions]
+    write_page(path, replace(material, contradictions=told), pictures)
+    return wrong
 
 
 def _nearness(options: Options, motion: Motion, video: Video) -> str | None:

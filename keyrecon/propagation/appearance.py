@@ -11,7 +11,6 @@ of this player, so that only what is peculiar to a place counts (Hariharan, Mali
 ECCV 2012); likeness is the cosine to the most similar of the joint's marks.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -91,31 +90,48 @@ def regular_frames(video: Video) -> Int[np.ndarray, "k"]:
     return np.arange(0, len(video), max(1, round(video.fps / RATE)))
 
 
+@dataclass(frozen=True, eq=False)
+class UprightCrop:
+    """Cuts the player out of pictures, upright in the middle and of one size."""
+
+    body_frame: BodyFrame
+    width: int
+    """Of the reduced pictures that it cuts, px."""
+    shrink: float
+
+    @classmethod
+    def of(cls, video: Video, body_frame: BodyFrame) -> "UprightCrop":
+        """For pictures of a video, or of those of its frames that `body_frame` has."""
+        tall = float(np.median(body_frame.height))
+        width = min(video.width, max(16, round(video.width * PLAYER_HEIGHT / tall)))
+        return cls(body_frame, width, width / video.width)
+
+    def cut(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "s s 3"]:
+        """The player of one frame, by its place in `body_frame`, from its reduced picture."""
+        grow = PLAYER_HEIGHT / (self.body_frame.height[frame] * self.shrink)
+        middle = self.shrink * (self.body_frame.origin[frame] + 0.5 + 0.5j) - (0.5 + 0.5j)
+        x, y = REACH - 0.5 - grow * middle.real, REACH - 0.5 - grow * middle.imag
+        player: UInt8[np.ndarray, "s s 3"] = cv2.warpAffine(
+            picture,
+            np.array([[grow, 0, x], [0, grow, y]]),
+            (2 * REACH, 2 * REACH),
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        return player
+
+
 def describe_player(
     video: Video, body_frame: BodyFrame, frames: Int[np.ndarray, "D"]
 ) -> PlayerFeatures:
     """Features of some frames, in order."""
-    tall = float(np.median(body_frame.height))
-    width = min(video.width, max(16, round(video.width * PLAYER_HEIGHT / tall)))
-    shrink = width / video.width
-
-    def cut_out() -> Iterator[UInt8[np.ndarray, "s s 3"]]:
-        pictures = read_small(video, width, set(frames.tolist()))
-        for frame, picture in zip(frames, pictures, strict=True):
-            grow = PLAYER_HEIGHT / (body_frame.height[frame] * shrink)
-            middle = shrink * (body_frame.origin[frame] + 0.5 + 0.5j) - (0.5 + 0.5j)
-            x, y = REACH - 0.5 - grow * middle.real, REACH - 0.5 - grow * middle.imag
-            yield cv2.warpAffine(
-                picture,
-                np.array([[grow, 0, x], [0, grow, y]]),
-                (2 * REACH, 2 * REACH),
-                borderMode=cv2.BORDER_REPLICATE,
-            )
-
-    return PlayerFeatures(frames, np.stack(list(side_by_side(_describe, cut_out()))))
+    crop = UprightCrop.of(video, body_frame)
+    pictures = read_small(video, crop.width, set(frames.tolist()))
+    numbered = zip(frames.tolist(), pictures, strict=True)
+    players = (crop.cut(frame, picture) for frame, picture in numbered)
+    return PlayerFeatures(frames, np.stack(list(side_by_side(describe_cells, players))))
 
 
-def _describe(picture: UInt8[np.ndarray, "s s 3"]) -> UInt8[np.ndarray, "n n C"]:
+def describe_cells(picture: UInt8[np.ndarray, "s s 3"]) -> UInt8[np.ndarray, "n n C"]:
     """Colour in CIE Lab, and gradient energy in four directions relative to all around."""
     lab = cv2.cvtColor(picture, cv2.COLOR_RGB2LAB)
     light = lab[..., 0].astype(np.float32)

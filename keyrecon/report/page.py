@@ -33,7 +33,7 @@ from keyrecon.report.markup import (
     thinning,
     to_json,
 )
-from keyrecon.report.pictures import Pictures, cut_pictures
+from keyrecon.report.pictures import Pictures, Watch, cut_pictures, ignore
 from keyrecon.report.scripts import bundle_scripts
 from keyrecon.report.summary import (
     center_on_root,
@@ -56,14 +56,26 @@ def write_report(path: Path, material: ReportMaterial, progress: Progress = sile
 
     Of hours, the video in it has smaller pictures (`pictures.clip_side`).
     """
-    pictures = cut_pictures(
+    write_page(path, material, cut_report_pictures(material, progress))
+
+
+def cut_report_pictures(
+    material: ReportMaterial, progress: Progress = silent, watch: Watch = ignore
+) -> Pictures:
+    """What the report shows of the video; `watch` sees the marked frames too."""
+    return cut_pictures(
         material.video,
         material.track,
         material.annotations,
         material.motion,
         progress=progress,
         instants=[instant.frame for instant in key_instants(material.motion)],
+        watch=watch,
     )
+
+
+def write_page(path: Path, material: ReportMaterial, pictures: Pictures) -> None:
+    """Write the report to one HTML file with pictures that were cut before."""
     write_durably(path, build_page(material, pictures))
 
 

@@ -7,7 +7,7 @@ keeps the player's size; crops with the pose on them become a small video that p
 
 import base64
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,6 +41,14 @@ ROOM = 1.65
 """Side of the window in player heights: a raised arm with a racket fits."""
 CALM = 0.2
 """Seconds over which the window's motion is smoothed, so that the player moves, not the picture."""
+
+
+Watch = Callable[[int, UInt8[np.ndarray, "h w 3"]], None]
+"""Somebody else who wants to see pictures that are read: called with the frame and its picture."""
+
+
+def ignore(frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
+    """Nobody else."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +122,10 @@ def cut_pictures(
     strip: int = 24,
     progress: Progress = silent,
     instants: Sequence[int] = (),
+    watch: Watch = ignore,
 ) -> Pictures:
-    """Read the video once and cut everything that the report shows of it."""
+    """Read the video once and cut everything that the report shows of it; `watch` sees all marked
+    frames too."""
     windows = follow_player(track, motion)
     shown_motion = motion.known
     known = np.flatnonzero(shown_motion)
@@ -128,8 +138,8 @@ def cut_pictures(
     def cut(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> UInt8[np.ndarray, "side side 3"]:
         frame, picture = entry
         if frame in annotations.frames:
-            row = int(np.searchsorted(annotations.frames, frame))
-            marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, row))
+            watch(frame, picture)
+            marked[frame] = jpeg_uri(_marked_still(windows, picture, annotations, frame))
         if frame in even or frame in instants:
             stills[frame] = jpeg_uri(_posed_crop(windows, frame, picture, motion, SIDE))
         if not shown_motion[frame] or frame % every:
@@ -200,10 +210,10 @@ def _posed_crop(
 
 
 def _marked_still(
-    windows: Windows, picture: UInt8[np.ndarray, "h w 3"], annotations: Annotations, row: int
+    windows: Windows, picture: UInt8[np.ndarray, "h w 3"], annotations: Annotations, frame: int
 ) -> UInt8[np.ndarray, "side side 3"]:
     """Marks as a person made them; joints placed though hidden are rings."""
-    frame = int(annotations.frames[row])
+    row = int(np.searchsorted(annotations.frames, frame))
     return draw_pose(
         windows.cut(frame, picture, SIDE),
         windows.to_crop(frame, annotations.joints[row], SIDE),

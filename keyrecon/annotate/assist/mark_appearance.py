@@ -15,14 +15,18 @@ Hidden joints look like what hides them, and have no excess.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float32, Int
+from jaxtyping import Bool, Complex, Float, Float32, Int, UInt8
 
 from keyrecon.body import Skeleton
+from keyrecon.io.evening import even_exposure
+from keyrecon.io.frame_reader import reduce_picture
 from keyrecon.propagation.appearance import (
     COMPONENTS,
     SAMPLE_SPREAD,
     SAMPLES,
     PlayerFeatures,
+    UprightCrop,
+    describe_cells,
     describe_player,
 )
 from keyrecon.propagation.body_frame import BodyFrame
@@ -74,6 +78,38 @@ def describe_frames(
         return PlayerFeatures(lacking, cells)
     order = np.argsort(both := np.concatenate([described.frames, lacking]))
     return PlayerFeatures(both[order], np.concatenate([described.cells, cells])[order])
+
+
+class SeenFrames:
+    """What `describe_frames` gives, of pictures that are read for something else as well."""
+
+    def __init__(
+        self, preparation: Preparation, body_frame: BodyFrame, frames: Int[np.ndarray, "K"]
+    ) -> None:
+        """Some frames."""
+        self._video = preparation.video
+        self._frames = np.unique(frames)[preparation.track.known[np.unique(frames)]]
+        own = BodyFrame(body_frame.origin[self._frames], body_frame.height[self._frames])
+        self._crop = UprightCrop.of(self._video, own) if len(self._frames) else None
+        self._cells: dict[int, UInt8[np.ndarray, "n n C"]] = {}
+
+    def see(self, frame: int, picture: UInt8[np.ndarray, "h w 3"]) -> None:
+        """Describe a frame as it was filmed, if it is one of them."""
+        row = int(np.searchsorted(self._frames, frame))
+        if self._crop is None or frame not in self._frames[row : row + 1]:
+            return
+        exposure = self._video.exposure
+        evened = picture if exposure is None else even_exposure(picture, float(exposure[frame]))
+        small = reduce_picture(evened, self._crop.width)
+        self._cells[frame] = describe_cells(self._crop.cut(row, small))
+
+    @property
+    def features(self) -> PlayerFeatures | None:
+        """Of the frames that were seen; None where none was."""
+        seen = sorted(self._cells)
+        if not seen:
+            return None
+        return PlayerFeatures(np.array(seen), np.stack([self._cells[t] for t in seen]))
 
 
 def compare_appearance(

@@ -9,9 +9,14 @@ from capsule_player import LIMBS, hide, marks, scene, standing, turned
 
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.checks import find_checks
-from keyrecon.annotate.assist.mark_appearance import compare_appearance, describe_frames
+from keyrecon.annotate.assist.mark_appearance import (
+    SeenFrames,
+    compare_appearance,
+    describe_frames,
+)
 from keyrecon.annotate.assist.pose_suggestion import scene_of
 from keyrecon.body import LSP14
+from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 
@@ -115,6 +120,23 @@ def test_frames_are_described_once(filmed):
     whole = describe_frames(preparation, body_frame, annotations.frames)
     np.testing.assert_array_equal(more.frames, whole.frames)
     np.testing.assert_array_equal(more.cells, whole.cells)
+
+
+@pytest.mark.parametrize("light", [1.0, 0.8])
+def test_pictures_that_were_seen_need_not_be_read_again(filmed, light):
+    """Whoever reads the video sees it as filmed; frames are compared in one light."""
+    preparation, annotations = filmed
+    body_frame = scene_of(preparation, annotations).body_frame
+    film = preparation.video
+    exposure = np.linspace(light, 1.0, len(film))
+    preparation = replace(preparation, video=with_exposure(film, exposure))
+    seen = SeenFrames(preparation, body_frame, annotations.frames[[2, 8, 5]])
+    assert seen.features is None
+    for frame, picture in enumerate(film.frames()):
+        seen.see(frame, picture)
+    read = describe_frames(preparation, body_frame, annotations.frames[[2, 5, 8]])
+    np.testing.assert_array_equal(seen.features.frames, read.frames)
+    np.testing.assert_array_equal(seen.features.cells, read.cells)
 
 
 def test_a_single_marked_frame_has_nothing_to_be_compared_with(filmed):
