@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor, stature
-from keyrecon.numerics.peaks import prominent_peaks
 from keyrecon.records import Motion
+from keyrecon.report.peaks import prominent_peaks
 from keyrecon.report.summary import hinge_angles, hinges, stretch_times
 
 MOST = 8

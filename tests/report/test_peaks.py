@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from keyrecon.numerics.peaks import prominent_peaks
+from keyrecon.report.peaks import prominent_peaks
 
 
 @pytest.mark.parametrize("levels", [4, 1000])
