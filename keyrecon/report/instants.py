@@ -14,7 +14,6 @@ from scipy.ndimage import gaussian_filter1d
 from keyrecon.body import Skeleton
 from keyrecon.io.formats.conventions import stand_on_floor, stature
 from keyrecon.records import Motion
-from keyrecon.report.peaks import prominent_peaks
 from keyrecon.report.summary import hinge_angles, hinges, stretch_times
 
 MOST = 8
@@ -43,14 +42,16 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
     hands = [n for n in ("right_wrist", "left_wrist") if n in motion.skeleton.names]
     if not hands or len(motion.time) < 5:
         return []
+    from scipy.signal import find_peaks  # which loads all of scipy.stats: half a second
+
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
     peaks: list[int] = []
     for part in motion.stretches:
-        places = prominent_peaks(
+        places, _ = find_peaks(
             np.pad(fastest[part], 1),
-            LEAST_SPEED * stature(motion),
-            STANDS_OUT * float(fastest.max()),
+            height=LEAST_SPEED * stature(motion),
+            prominence=STANDS_OUT * float(fastest.max()),
         )
         peaks += _apart(part.start + places - 1, fastest, motion.time)
     chosen = sorted(sorted(peaks, key=lambda t: -fastest[t])[:MOST])
