@@ -316,7 +316,10 @@ def _open(path: Path) -> av.container.InputContainer:
     import av
 
     try:
-        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
+        # Older programs wrote titles in other codes than UTF-8; they are of no use here.
+        container = av.open(
+            f"file:{path}", options={"protocol_whitelist": "file"}, metadata_errors="replace"
+        )
     except (av.FFmpegError, ValueError) as fault:
         raise KeyreconError(
             f"{path} cannot be read as a video ({getattr(fault, 'strerror', fault)}); it may be "

@@ -157,6 +157,18 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         open_video(tmp_path / "text.mp4")
 
 
+def test_a_title_in_letters_of_an_older_code_does_not_hinder_reading(tmp_path):
+    with av.open(str(tmp_path / "utf8.avi"), "w") as container:
+        container.metadata["title"] = "cafe"
+        stream = container.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 32, 32, "yuv420p"
+        picture = av.VideoFrame.from_ndarray(np.zeros((32, 32, 3), np.uint8), "rgb24")
+        container.mux([*stream.encode(picture), *stream.encode()])
+    latin1 = (tmp_path / "utf8.avi").read_bytes().replace(b"cafe", "café".encode("latin1"))
+    (tmp_path / "latin1.avi").write_bytes(latin1)
+    assert len(list(open_video(tmp_path / "latin1.avi").frames())) == 1
+
+
 def test_sound_alone_is_not_a_video(tmp_path):
     with av.open(str(tmp_path / "sound.mp4"), "w") as container:
         stream = container.add_stream("aac", rate=8000)
