@@ -379,6 +379,17 @@ def test_a_misplaced_joint_is_found_by_the_bones_it_stretches():
     assert all(text.startswith("frame 20: ") and "left_elbow" in text for text in found)
 
 
+def test_marks_of_a_small_player_may_be_off_by_a_pixel():
+    marks = standing(5)
+    marks.joints[:] = marks.joints * 100 / np.ptp(FIGURE[:, 1])
+    head, neck = LSP14.index("head_top"), LSP14.index("neck")
+    trunk = marks.joints[:, neck] - marks.joints[:, head]
+    marks.joints[2, head] -= 0.48 * trunk[2]  # nearly as long a head and neck as there may be
+    marks.joints[2, head, 1] -= 1
+    marks.joints[2, neck, 1] += 1
+    assert implausible_bones(marks) == []
+
+
 def test_foreshortened_limbs_do_not_make_the_others_look_long():
     marks = standing(5)
     marks.joints[2, [0, 1, 4, 5, 6, 7, 10, 11]] = FIGURE[[2, 2, 3, 3, 8, 8, 9, 9]]
