@@ -263,5 +263,8 @@ def _describe(
     ]
     named = ", ".join(str(other) for others in similar for other in others)
     beside = f"frames {named}" if named else "other frames"
-    text = f"Left and right of the {LIMBS[limb]} look swapped beside {beside}."
+    text = (
+        f"Left and right of the {LIMBS[limb]} look swapped beside {beside}, unless the player "
+        "faces the other way in those."
+    )
     return Check(frame, names[-1], "crossed", doubt, text, names)
