@@ -22,6 +22,11 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from keyrecon.errors import KeyreconError, counted
+from keyrecon.io.decoding_times import (
+    lacks_presentation_times,
+    stamped_as_decoded,
+    stamps_as_decoded,
+)
 from keyrecon.io.evening import LUMA_FIRST, black_of, even_exposure
 from keyrecon.io.fingerprint import fingerprint_file
 from keyrecon.io.frame_times import even_out
@@ -345,11 +350,14 @@ def _shown_stamps(container: av.container.InputContainer, path: Path) -> list[in
     """Presentation times of all packets that a player would show."""
     import av
 
-    stamps = []
+    stamps: list[int] = []
     try:
-        for packet in container.demux(video=0):
-            if packet.pts is not None and packet.size and not packet.is_discard:
-                stamps.append(packet.pts)
+        if lacks_presentation_times(container):
+            stamps += stamps_as_decoded(container)
+        else:
+            for packet in container.demux(video=0):
+                if packet.pts is not None and packet.size and not packet.is_discard:
+                    stamps.append(packet.pts)
     except av.FFmpegError as fault:
         raise KeyreconError(
             f"{path} breaks off after {len(stamps)} frames ({fault}); repair or re-encode it."
@@ -382,6 +390,8 @@ def _decode_from(container: av.container.InputContainer, stamp: int) -> Iterator
         except av.FFmpegError:  # where the index is damaged, some places cannot be sought
             continue
         frames = container.decode(stream)
+        if lacks_presentation_times(container):
+            frames = stamped_as_decoded(frames)
         try:
             first = next(frames, None)
             if back is not None and (first is None or first.pts is None or first.pts > stamp):

@@ -4,7 +4,16 @@ import av
 import numpy as np
 import pytest
 from numbered_pictures import read_number
-from numbered_videos import EVEN, KINDS, OPEN_GOP, UNEVEN, copy_packets, trim_with_edit_list, turn
+from numbered_videos import (
+    EVEN,
+    KINDS,
+    OPEN_GOP,
+    UNEVEN,
+    copy_packets,
+    trim_with_edit_list,
+    turn,
+    write_divx,
+)
 
 from keyrecon import KeyreconError
 from keyrecon.io.frame_reader import read_grey, read_small
@@ -138,6 +147,13 @@ def test_a_reduced_picture_shows_the_same_frame(write_numbered):
     video = open_video(write_numbered("small.mp4", EVEN))
     small = next(video.frames(7, 8, width=64))
     assert small.shape == (32, 64, 3)
+
+
+def test_pictures_of_an_old_avi_come_in_the_order_in_which_they_were_filmed(tmp_path):
+    video = open_video(write_divx(tmp_path / "divx.avi", 30))
+    assert [read_number(p) for p in video.frames()] == list(range(30))
+    assert [read_number(video.frame(n)) for n in (29, 12, 0, 13, 1)] == [29, 12, 0, 13, 1]
+    assert not video.variable_rate
 
 
 def test_a_missing_video_is_named(tmp_path):

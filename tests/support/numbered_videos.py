@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import av
 import numpy as np
+from numbered_pictures import numbered_picture
 
 EVEN = list(range(0, 60 * 12, 12))
 UNEVEN = np.cumsum([0, *np.random.default_rng(3).choice([10, 12, 30], 59)]).tolist()
@@ -32,6 +33,26 @@ def copy_packets(source, target, skip_until=0, earlier=0):
                 packet.stream = copied
                 new.mux(packet)
     return target
+
+
+def write_divx(path, count):
+    """MPEG-4 with B pictures in AVI as DivX wrote it: its name, a packet without picture."""
+    with av.open(str(path), "w") as container:
+        options = {"bf": "1", "g": "12", "b_strategy": "0"}
+        stream = container.add_stream("mpeg4", rate=30, options=options)
+        stream.width, stream.height, stream.pix_fmt = 128, 64, "yuv420p"
+        packets = []
+        for number in range(count):
+            packets += stream.encode(av.VideoFrame.from_ndarray(numbered_picture(number), "rgb24"))
+        first, *others = [*packets, *stream.encode()]
+        header, picture, rest = bytes(first).partition(b"\0\0\1\xb6")
+        named = av.Packet(header + b"\0\0\1\xb2DivX503b1393p" + picture + rest)
+        named.is_keyframe = True
+        for time, packet in enumerate([named, av.Packet(b"\x7f"), *others]):
+            packet.stream, packet.time_base = stream, Fraction(1, 30)
+            packet.dts = packet.pts = time
+            container.mux(packet)
+    return path
 
 
 def trim_with_edit_list(source, target, first, count):
