@@ -40,7 +40,7 @@ from keyrecon.timeline import (
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
-from keyrecon.tracking.scale import measured, zoom
+from keyrecon.tracking.scale import SizeEvidence, measured
 from keyrecon.tracking.shot_sorting import (
     ShotOptions,
     Sighting,
@@ -109,7 +109,8 @@ class _Shot:
             return track
         joined = replace(track, confidence=track.confidence * linked)
         window = round(envelope * self.video.fps)
-        return measured(joined, zoom(self.camera, self.video), window, joined.confidence > 0)
+        evidence = SizeEvidence.of(self.camera, self.video, self.anchors)
+        return measured(joined, evidence, window, joined.confidence > 0)
 
 
 def follow_player(

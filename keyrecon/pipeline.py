@@ -27,6 +27,7 @@ from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes, count_labels
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
+from keyrecon.lifting.marked_sizes import marked_heights
 from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.marked_poses import LEAST_MARKED
@@ -44,7 +45,11 @@ from keyrecon.records import (
 from keyrecon.segmentation.background_model import BackgroundOptions
 from keyrecon.segmentation.color_model import ColorOptions, learn_colors
 from keyrecon.segmentation.contours import EdgeOptions
-from keyrecon.segmentation.marked_bodies import anchors_from_bodies, picks_from_bodies
+from keyrecon.segmentation.marked_bodies import (
+    anchors_from_bodies,
+    picks_from_bodies,
+    with_heights,
+)
 from keyrecon.shot_groups import propagate_in_groups
 from keyrecon.timeline import (
     cut_motion,
@@ -132,6 +137,9 @@ def prepare(
         flow = follow_marks(video, marks, shots, options.flow, keep, progress)
         anchors = anchors_from_bodies(marks, flow)
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
+    if marks is not None:
+        heights = marked_heights(marks, colors.height, len(video), video.fps, shots)
+        anchors = with_heights(anchors, marks.frames, heights)
     follow_options = FollowOptions(
         options.shots, options.find, options.background, options.track, options.edges
     )

@@ -154,6 +154,9 @@ class TrackAnchors:
     """Both shoes, px; NaN where not both are marked."""
     marked: Bool[np.ndarray, "A"]
     """False where flow between marks has found them, not a person."""
+    height: Float[np.ndarray, "A"]
+    """How tall the marked bodies would stand from head centre to mid-feet by the lengths of their
+    bones, px; NaN where nothing tells."""
 
     @classmethod
     def none(cls) -> "TrackAnchors":
@@ -163,6 +166,7 @@ class TrackAnchors:
             np.zeros((0, 2)),
             np.zeros((0, 2, 2)),
             np.zeros(0, dtype=bool),
+            np.zeros(0),
         )
 
 

@@ -80,6 +80,7 @@ def part_of_anchors(anchors: TrackAnchors, part: slice) -> TrackAnchors:
         anchors.head[inside],
         anchors.feet[inside],
         anchors.marked[inside],
+        anchors.height[inside],
     )
 
 

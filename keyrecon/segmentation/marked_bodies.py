@@ -7,7 +7,7 @@ limbs. Hidden joints and their limbs tell nothing of colours.
 """
 
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -73,6 +73,15 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
     )
 
 
+def with_heights(
+    anchors: TrackAnchors, frames: Int[np.ndarray, "K"], heights: Float[np.ndarray, "K"]
+) -> TrackAnchors:
+    """The same with how tall the bodies marked in `frames` (ascending) would stand, px."""
+    row = np.searchsorted(frames, anchors.frames).clip(max=len(frames) - 1)
+    told = anchors.marked & (frames[row] == anchors.frames)
+    return replace(anchors, height=np.where(told, heights[row], anchors.height))
+
+
 def _anchors(
     names: tuple[str, ...],
     frames: Int[np.ndarray, "n"],
@@ -89,7 +98,9 @@ def _anchors(
     feet = np.stack(shoes, axis=1)
     feet[~np.isfinite(feet).all(axis=(1, 2))] = np.nan
     useful = np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
-    return TrackAnchors(frames[useful], head[useful], feet[useful], np.full(useful.sum(), marked))
+    count = int(useful.sum())
+    told = np.full(count, marked), np.full(count, np.nan)
+    return TrackAnchors(frames[useful], head[useful], feet[useful], *told)
 
 
 class _Body:

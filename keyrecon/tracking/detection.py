@@ -40,7 +40,7 @@ from keyrecon.tracking.foot_pairs import (
     foot_pose_cost,
 )
 from keyrecon.tracking.linking import MAX_GAP_SECONDS
-from keyrecon.tracking.scale import player_boxes, standing_height, zoom
+from keyrecon.tracking.scale import SizeEvidence, measured
 from keyrecon.tracking.smoothing import (
     fill_gaps,
     state_confidence,
@@ -196,14 +196,16 @@ def _link(
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
     frames = round(options.envelope * video.fps)
+    evidence = SizeEvidence.of(camera, video, anchors)
+    of_head = state_confidence(head_cost, chosen)
+    of_feet = state_confidence([c / 2 for c in costs], taken)
+    of_feet = np.where(evidence.cut(head)[numbers], of_head, of_feet)
+    confidence = np.interp(np.arange(len(head)), numbers, np.sqrt(of_head * of_feet))
+    unmeasured = np.full(len(head), np.nan), np.full((len(head), 4), np.nan)
+    track = Track(head, feet, *unmeasured, confidence)
     # Places that were missed are on the way between those that were not.
-    standing = standing_height(
-        head, feet.mean(axis=1), zoom(camera, video), frames, np.ones(len(head), dtype=bool)
-    )
-    halves = [c / 2 for c in costs]
-    confidence = np.sqrt(state_confidence(head_cost, chosen) * state_confidence(halves, taken))
-    confidence = np.interp(np.arange(len(head)), numbers, confidence)
-    return Track(head, feet, standing, player_boxes(head, feet, standing), confidence)
+    every = np.ones(len(head), dtype=bool)
+    return measured(track, evidence, frames, every)
 
 
 def _pair(

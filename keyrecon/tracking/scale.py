@@ -4,17 +4,67 @@ Players crouch, lunge and jump, so the standing height from head to mid-feet is 
 over time of the distance between them. A zooming camera changes it faster than any player can; its
 magnification is taken out first. Where the player was not seen, head and feet lie anywhere, and far
 from each other more often than not: those frames tell nothing.
+
+Nor do frames whose lower edge cuts the feet off: what is taken for feet there is whatever lies
+lowest in the picture, and a player who comes near would shrink while he grows. Where bodies were
+marked their bones tell how tall they would stand, against those whose feet are seen, and the feet
+are put there, out of the picture.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, percentile_filter
 
 from keyrecon.io.video import Video
-from keyrecon.records import CameraPath, Track
+from keyrecon.records import CameraPath, Track, TrackAnchors
 from keyrecon.segmentation.color_model import STANDING
+
+SURELY_CUT = 0.85
+"""Feet that would be farther below the head than this, of the standing height that marks tell, are
+out of the picture: a crouch takes less away, and what marks tell is off by as much."""
+
+
+@dataclass(frozen=True, eq=False)
+class SizeEvidence:
+    """What tells of the player's size beside head and feet, in every frame."""
+
+    magnification: Float[np.ndarray, "T"]
+    """By the camera's zoom."""
+    told: Float[np.ndarray, "T"]
+    """Standing height by the bones of marked bodies, between these by the zoom, px; NaN where none
+    tells."""
+    feet_marked: Bool[np.ndarray, "T"]
+    """Where a person marked both feet: they are in the picture."""
+    rows: int
+    """Of the picture."""
+
+    @classmethod
+    def of(cls, camera: CameraPath, video: Video, anchors: TrackAnchors) -> "SizeEvidence":
+        """By the camera and by marked bodies."""
+        magnification, feet = zoom(camera, video), np.zeros(len(video), dtype=bool)
+        feet[anchors.frames[anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))]] = True
+        told, known = np.full(len(video), np.nan), np.isfinite(anchors.height)
+        if known.any():
+            frames = anchors.frames[known]
+            grown = np.log(anchors.height[known] / magnification[frames])
+            told = np.exp(np.interp(np.arange(len(video)), frames, grown)) * magnification
+        return cls(magnification, told, feet, video.height)
+
+    def every(self, step: int) -> "SizeEvidence":
+        """That of each `step`-th frame."""
+        return SizeEvidence(
+            self.magnification[::step], self.told[::step], self.feet_marked[::step], self.rows
+        )
+
+    def cut(
+        self, head: Float[np.ndarray, "T 2"], share: float = SURELY_CUT
+    ) -> Bool[np.ndarray, "T"]:
+        """Frames whose lower edge cuts off the feet of who stands under these heads, and is a
+        `share` of what is told tall."""
+        # comparisons with NaN are false: where nothing is told feet are taken to be seen
+        return (head[:, 1] + share * self.told > self.rows) & ~self.feet_marked
 
 
 def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
@@ -52,14 +102,37 @@ def standing_height(
 
 
 def measured(
-    track: Track,
-    magnification: Float[np.ndarray, "T"],
-    frames: int,
-    seen: Bool[np.ndarray, "T"],
+    track: Track, evidence: SizeEvidence, frames: int, seen: Bool[np.ndarray, "T"]
 ) -> Track:
-    """The track with standing height and box by the frames in which the player was `seen`."""
-    height = standing_height(track.head, track.mid_feet, magnification, frames, seen)
-    return replace(track, height=height, box=player_boxes(track.head, track.feet, height))
+    """The track with standing height and box by the frames in which the player was `seen`, and
+    with feet out of the picture where its edge cuts them off."""
+    cut, head = evidence.cut(track.head), track.head
+    whole = seen & ~cut
+    height = standing_height(head, track.mid_feet, evidence.magnification, frames, whole)
+    if not cut.any():
+        return replace(track, height=height, box=player_boxes(head, track.feet, height))
+    height = _as_told(height, evidence, whole, seen & ~evidence.cut(head, 1.0))
+    below = head[:, None] + height[:, None, None] * [0, 1]
+    feet = np.where(cut[:, None, None], below, track.feet)
+    return replace(track, feet=feet, height=height, box=player_boxes(head, feet, height))
+
+
+def _as_told(
+    height: Float[np.ndarray, "T"],
+    evidence: SizeEvidence,
+    whole: Bool[np.ndarray, "T"],
+    surely: Bool[np.ndarray, "T"],
+) -> Float[np.ndarray, "T"]:
+    """The standing height as marked bodies tell it where the player may not be `surely` whole.
+
+    Feet and bones differ by a share, which whole frames tell and which goes on between them.
+    """
+    surely = surely if surely.any() else whole
+    if not surely.any():
+        return evidence.told
+    at = np.flatnonzero(surely)
+    share = np.interp(np.arange(len(height)), at, height[at] / evidence.told[at])
+    return np.where(surely, height, share * evidence.told)
 
 
 def player_boxes(

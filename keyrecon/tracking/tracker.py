@@ -46,7 +46,7 @@ from keyrecon.tracking.linking import (
     link_head,
 )
 from keyrecon.tracking.radial_symmetry import find_peaks
-from keyrecon.tracking.scale import measured, zoom
+from keyrecon.tracking.scale import SizeEvidence, measured
 from keyrecon.tracking.visibility import is_visible
 
 Record = TypeVar("Record", Crops, Track)
@@ -146,10 +146,10 @@ def track_player(
         return rough
     cropping = Cropping.below_heads(rough, options.player)
     crops = cut_crops(video, cropping, ForegroundModel(background, camera), progress)
-    zooming = zoom(camera, video)
+    evidence = SizeEvidence.of(camera, video, anchors)
     head, feet = marked_places(anchors, np.arange(len(video)), camera)
     frames = _CroppedFrames(
-        crops, cropping, options.player, rough, camera, zooming, head, feet, video.fps
+        crops, cropping, options.player, rough, camera, evidence, head, feet, video.fps
     )
     channels = Channels.of(colors, cropping.size)
     marked = _marked_examples(frames, channels, anchors)
@@ -173,8 +173,8 @@ class _CroppedFrames:
     rough: Track
     """The track that the crops lie on."""
     camera: CameraPath
-    magnification: Float[np.ndarray, "T"]
-    """By the camera's zoom."""
+    evidence: SizeEvidence
+    """Of the player's size."""
     marked_head: Float[np.ndarray, "T 1 2"]
     """Heads that a person marked, in the reference frame; else NaN."""
     marked_feet: Float[np.ndarray, "T 2 2"]
@@ -189,7 +189,7 @@ class _CroppedFrames:
             self.player,
             _thinned(self.rough, step),
             part_of_path(self.camera, slice(None, None, step)),
-            self.magnification[::step],
+            self.evidence.every(step),
             self.marked_head[::step],
             self.marked_feet[::step],
             self.fps / step,
@@ -279,15 +279,18 @@ def _link(
     feet, feet_confidence = link_feet(
         detections, camera, cropping, head, frames.rough.height, frames.marked_feet, gait
     )
-    confidence = np.sqrt(head_confidence * feet_confidence)
+    cut = frames.evidence.cut(head)
+    confidence = np.sqrt(head_confidence * np.where(cut, head_confidence, feet_confidence))
     window = round(options.envelope * fps)
     rough = Track(head, feet, frames.rough.height, frames.rough.box, confidence)
-    track = measured(rough, frames.magnification, window, np.ones(len(head), dtype=bool))
-    visible = is_visible(frames.crops, cropping, track, frames.rough.confidence > 0)
+    track = measured(rough, frames.evidence, window, np.ones(len(head), dtype=bool))
+    # beyond the edge of the picture nothing is seen
+    strip = replace(track, feet=np.minimum(track.feet, (np.inf, frames.evidence.rows - 1)))
+    visible = is_visible(frames.crops, cropping, strip, frames.rough.confidence > 0)
     if visible.all():
         return track
-    track = replace(track, confidence=confidence * visible)
-    return measured(track, frames.magnification, window, visible)
+    track = replace(rough, confidence=confidence * visible)
+    return measured(track, frames.evidence, window, visible)
 
 
 def detect_in_crop(

@@ -42,7 +42,9 @@ def marks(track, frames, shift=(0.0, 0.0)):
     """Anchors where the track is, moved by a shift."""
     frames = np.array(frames)
     head, feet = track.head[frames] + shift, track.feet[frames] + shift
-    return TrackAnchors(frames, head, feet, np.ones(len(frames), dtype=bool))
+    return TrackAnchors(
+        frames, head, feet, np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
+    )
 
 
 def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
@@ -100,7 +102,11 @@ def test_feet_contradict_in_no_particular_order_and_what_is_not_marked_contradic
     track = standing(30)
     crossed = marks(track, [5])
     crossed = TrackAnchors(
-        crossed.frames, crossed.head * np.nan, crossed.feet[:, ::-1], crossed.marked
+        crossed.frames,
+        crossed.head * np.nan,
+        crossed.feet[:, ::-1],
+        crossed.marked,
+        crossed.height,
     )
     assert len(contradicted_frames(track, crossed)) == 0
 

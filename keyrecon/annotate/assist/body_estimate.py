@@ -16,12 +16,11 @@ from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
 from keyrecon.body import Skeleton
 from keyrecon.lifting.depth_signs import choose_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions, estimate_lengths
+from keyrecon.lifting.marked_sizes import HEAD_TO_FEET
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
 from keyrecon.records import Annotations, JointTracks
 
-HEAD_TO_FEET = 0.9
-"""Share of stature from the head's centre to the feet (Drillis and Contini)."""
 UNCONFIRMED_SIGN = 0.3
 """Weight of a sign that nobody gave, against one that was given."""
 
