@@ -44,9 +44,9 @@ FORMS = (
     "propagation/limb_motion.py:SWINGING",
     "segmentation/background_model.py:COVERED",
     "segmentation/background_model.py:FREE",
-    "segmentation/background_model.py:UNKNOWN",
     "segmentation/color_model.py:BINS",
     "segmentation/contours.py:SMOOTHING_KERNEL",
+    "segmentation/foreground_model.py:UNKNOWN",
     "segmentation/player_crops.py:DIRECTIONS",
     "tracking/radial_symmetry.py:CIRCLE",
 )

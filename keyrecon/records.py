@@ -220,6 +220,11 @@ class Background:
     """Where something is laid over the picture, a score or a logo; pixels of reduced pictures."""
     shrink: float
     """Pixels of these that one of the full picture has."""
+    first: int = 0
+    """Frame from which on it holds."""
+    later: tuple["Background", ...] = ()
+    """Those that hold from later frames on, where one does not do for all: ascending, and without
+    others in them."""
 
 
 @dataclass(frozen=True, eq=False)

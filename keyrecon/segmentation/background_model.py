@@ -1,23 +1,25 @@
-"""The scene without the player, and how far a pixel is from it.
+"""The scene without the player.
 
 Sampled frames are warped into the coordinates of the reference frame, and every pixel of the
 background is the median of what was observed there while the player was elsewhere. Where the camera
-turns, it is a mosaic. A pixel of a frame is compared with the whole range of colours that the
-background has within a pixel of its place, so that a camera path that is a little off does not
-light up every edge (the idea of ViBe's neighbours, Barnich and Van Droogenbroeck, IEEE TIP 20,
-2011, turned into an interval), and darkening without a change of chroma, a shadow, counts for less.
+turns, it is a mosaic. How far a pixel is from it: see `foreground_model`.
+
+A camera that is carried along shows near things move before far ones, and no mosaic fits all of its
+frames: the range of colours at a place grows until it holds the player's too, who vanishes. It
+shows in the deviation from the median. Then the frames of a few seconds have a background of their
+own, the shorter the farther the scene is from lying still in its mosaic.
 
 The background is small: the player is `player` px tall in it, which is all that tracking and edges
 need.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.io.frame_reader import read_small, shrinking, side_by_side
 from keyrecon.io.video import Video
@@ -32,15 +34,6 @@ from keyrecon.segmentation.static_overlay import find_overlay
 MAX_MOSAIC_SIZE = 4.0
 """Sides of the mosaic, pictures: a camera that turns far enough leaves any plane. A quarter more or
 less, others with it: at most 1.9 points, 2.4 mm on four clips."""
-MIN_SPREAD = 4
-"""Deviation of video noise and compression, grey levels; the least that is assumed. A quarter more
-or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
-SHADOW_WEIGHT = 0.35
-"""Weight of a darkening: a shadow takes up to half of the light and leaves the chroma. A quarter
-more or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
-MIN_SHADOW_LIGHT = 0.45
-"""Share of the light that a cast shadow leaves, at least. A quarter more or less, others with it:
-at most 1.9 points, 2.4 mm on four clips."""
 TRUNK_WIDTH, LEG_WIDTH = 0.7, 0.5
 """Widths of the player, arms close and knees bent, in heights: beyond it is background. Legs a
 quarter wider: 2.6 points more on one real rally of 4 s; legs or trunk a quarter more or less, many
@@ -52,11 +45,6 @@ less, others with them: at most 1.9 points, 1.8 mm on four clips."""
 HIPS = 0.45
 """Where trunk becomes legs, share of the way from head to mid-feet. A quarter more or less, others
 with it: at most 1.9 points, 1.8 mm on four clips."""
-LIT_OR_SHADED = np.array([1.0, SHADOW_WEIGHT**2, *np.zeros(254)], np.float32)
-"""Weight of the square of a difference in L, by whether it may be a shadow's: looked up, which
-takes a tenth of the time of a product where a mask says so."""
-UNKNOWN = 255
-"""Spread of what was never observed."""
 FREE, COVERED = 255, 128
 """Marks of pixels of a sampled frame away from the player, and near or on the player."""
 MAX_SAME_DIFFERENCE = 5
@@ -76,17 +64,17 @@ MAX_CANDIDATES = 24
 STRIP = 4096
 """Pixels behind the player that are tried at a time, several strips side by side; changes nothing
 but time and memory."""
+MAX_MEAN_SPREAD = 8.0
+"""Mean deviation of the scene from its median, grey levels, up to which one background does for all
+frames: of four real clips, turned and held in the hand among them, it is .7 to 4.3; of a camera
+carried round a player 16.6 for 11 s, 13.8, 11.0 and 9.2 for halves, quarters and sevenths of it.
+Three times it, where a pixel is as likely the player as not, is a third of what there is between
+black and a mid grey."""
+LEAST_SECONDS = 2.0
+"""A background is made of the frames of so long a time at least: who is followed moves off his own
+place before it within a few steps, and not sooner."""
 NORMAL_QUARTILE = 0.6745
 """Distance of the quartiles of a normal distribution from its mean, standard deviations."""
-CHROMA_WEIGHT = 1.6
-"""Weight of a and b against L: chroma varies less with light. A quarter more or less, others with
-it: at most 1.9 points, 2.4 mm on four clips."""
-SQUARES = np.outer(
-    np.array((1, CHROMA_WEIGHT, CHROMA_WEIGHT), np.float32), np.arange(256, dtype=np.float32)
-)
-SQUARES *= SQUARES
-"""Weighted square of a difference in L, a and b, a row each. L by a quarter more or less, others
-with it: at most 1.9 points, 1.8 mm on four clips; halved or doubled: 4.2 mm."""
 
 
 @dataclass(frozen=True)
@@ -115,16 +103,79 @@ def build_background(
     options: BackgroundOptions = BackgroundOptions(),
     progress: Progress = silent,
 ) -> Background:
-    """The background of a sequence, with the tracked player left out."""
+    """The background of a sequence, with the tracked player left out; several, one after the other,
+    where the scene does not lie still in one."""
     width = reduced_width(video, float(np.median(track.height)), options)
-    shrink = width / video.width
-    frames = sample_frames(len(video), options.samples)
+    whole = _sample_scene(video, slice(0, len(video)), camera, track, width, options, progress)
+    overlay = find_overlay(whole.lab, whole.free, whole.paths, whole.shrink)
+    background = whole.background(overlay)
+    most = int(len(video) / (LEAST_SECONDS * video.fps))
+    count = 1
+    while _mean_spread(background) > MAX_MEAN_SPREAD and count < most:
+        count = min(2 * count, most)
+        ends = np.linspace(0, len(video), count + 1).round().astype(int).tolist()
+        each = [
+            _sample_scene(video, slice(*part), camera, track, width, options, silent)
+            for part in pairwise(ends)
+        ]
+        parts = [scene.background(overlay) for scene in each]
+        background = replace(parts[0], later=tuple(parts[1:]))
+    return background
+
+
+def _mean_spread(background: Background) -> float:
+    """Mean deviation of what was observed, in all of the backgrounds, grey levels."""
+    every = (background, *background.later)
+    return float(np.mean([part.spread[part.known].mean() for part in every if part.known.any()]))
+
+
+@dataclass(frozen=True, eq=False)
+class _SceneSamples:
+    """Some frames of a part of a sequence, reduced."""
+
+    first: int
+    """Frame that the part begins with."""
+    lab: list[UInt8[np.ndarray, "h w 3"]]
+    free: list[Bool[np.ndarray, "h w"]]
+    """Away from the player."""
+    paths: Float[np.ndarray, "n 3 3"]
+    """To the frame in the middle of the part, or to the reference frame for all of it."""
+    to_own: Float[np.ndarray, "3 3"]
+    """From the reference frame to that."""
+    shrink: float
+
+    def background(self, overlay: Bool[np.ndarray, "h w"]) -> Background:
+        """Their median, in coordinates of the reference frame."""
+        own = median_background(
+            self.lab, self.free, self.paths, self.shrink, inpaint=True, overlay=overlay
+        )
+        return replace(own, from_reference=own.from_reference @ self.to_own, first=self.first)
+
+
+def _sample_scene(
+    video: Video,
+    part: slice,
+    camera: CameraPath,
+    track: Track,
+    width: int,
+    options: BackgroundOptions,
+    progress: Progress,
+) -> _SceneSamples:
+    """Frames spread over a part of a sequence.
+
+    The mosaic of a short part lies about its own middle, which may be far from the reference.
+    """
+    count, shrink = part.stop - part.start, width / video.width
+    frames = part.start + sample_frames(count, options.samples)
     pictures = read_small(video, width, set(frames.tolist()))
     lab = [to_lab(p) for p in progress(pictures, "Modelling the background", len(frames))]
     free = [~_player_mask(track, int(t), shrink, lab[0].shape[:2]) for t in frames]
-    paths = camera.to_reference[frames]
-    overlay = find_overlay(lab, free, paths, shrink)
-    return median_background(lab, free, paths, shrink, inpaint=True, overlay=overlay)
+    to_own = np.eye(3)
+    if count < len(video):
+        to_own = np.linalg.inv(camera.to_reference[part.start + count // 2])
+    return _SceneSamples(
+        part.start, lab, free, to_own @ camera.to_reference[frames], to_own, shrink
+    )
 
 
 def complete_background(first: Background, other: Background) -> Background:
@@ -184,82 +235,6 @@ def median_background(
     if inpaint:
         _inpaint_behind_player(stack, color, spread, known)
     return Background(color, spread, known, shift @ small, overlay, shrink)
-
-
-@dataclass(frozen=True, eq=False)
-class ForegroundModel:
-    """A background ready to be compared with the frames of its video."""
-
-    background: Background
-    camera: CameraPath
-    sure: float = BackgroundOptions.sure
-
-    @cached_property
-    def _low(self) -> UInt8[np.ndarray, "h w 3"]:
-        """Least colour around every pixel of the background."""
-        return cv2.erode(self.background.color, np.ones((3, 3), np.uint8))
-
-    @cached_property
-    def _high(self) -> UInt8[np.ndarray, "h w 3"]:
-        """Greatest colour around every pixel of the background."""
-        return cv2.dilate(self.background.color, np.ones((3, 3), np.uint8))
-
-    @cached_property
-    def _spread(self) -> UInt8[np.ndarray, "h w"]:
-        """Deviation in steps of 1/8 grey level; UNKNOWN where the scene was not observed."""
-        spread = np.clip(self.background.spread * 8, 8 * MIN_SPREAD, UNKNOWN - 1).astype(np.uint8)
-        unseen = cv2.dilate((~self.background.known).astype(np.uint8), np.ones((3, 3), np.uint8))
-        spread[unseen > 0] = UNKNOWN
-        return spread
-
-    @cached_property
-    def _even_odds(self) -> Float32[np.ndarray, "256"]:
-        """Square of the difference that is as likely the player as not, by `_spread`."""
-        return np.square(np.arange(256, dtype=np.float32) * np.float32(self.sure / 8))
-
-    def foreground(
-        self,
-        lab: UInt8[np.ndarray, "h w 3"],
-        frame: int,
-        to_picture: Float[np.ndarray, "3 3"],
-    ) -> Float[np.ndarray, "h w"]:
-        """Probability that each pixel of a crop is not background; 0.5 where nobody knows.
-
-        0 where something is laid over the picture: whoever is behind it is not seen.
-
-        `to_picture` maps pixels of the crop to those of the full picture of this frame.
-        """
-        to_scene = self.background.from_reference @ self.camera.to_reference[frame] @ to_picture
-        size = (lab.shape[1], lab.shape[0])
-        low, high = (_warp_to_crop(color, to_scene, size) for color in (self._low, self._high))
-        spread = _warp_to_crop(self._spread, to_scene, size)
-        under = cv2.subtract(low, lab)
-        differences = cv2.split(cv2.max(under, cv2.subtract(lab, high)))
-        light, a, b = (cv2.LUT(d, s) for d, s in zip(differences, SQUARES, strict=True))
-        # A shadow darkens by a share; deeper than any shadow counts fully again.
-        floor = cv2.multiply(cv2.extractChannel(low, 0), MIN_SHADOW_LIGHT)  # type: ignore[call-overload]  # stubs want an array
-        shadow = (cv2.extractChannel(under, 0) > 0) & (cv2.extractChannel(lab, 0) > floor)
-        square = light * cv2.LUT(shadow.view(np.uint8), LIT_OR_SHADED) + a + b
-        likely = square / (square + cv2.LUT(spread, self._even_odds))
-        likely[spread == UNKNOWN] = 0.5
-        if self.background.overlay.any():
-            overlay = self.background.overlay.astype(np.uint8)
-            to_overlay = shrinking(self.background.shrink) @ to_picture
-            likely[_warp_to_crop(overlay, to_overlay, size) == 1] = 0.0
-        return likely
-
-
-def _warp_to_crop(
-    scene: UInt8[np.ndarray, "h w *c"], to_scene: Float[np.ndarray, "3 3"], size: tuple[int, int]
-) -> UInt8[np.ndarray, "y x *c"]:
-    """The part of the scene that lies behind a crop of `size` (columns, rows)."""
-    to_scene = to_scene / to_scene[2, 2]
-    if scene.shape[1::-1] == size and np.allclose(to_scene, np.eye(3), atol=1e-6):
-        return scene
-    smooth = cv2.INTER_LINEAR if scene.ndim == 3 else cv2.INTER_NEAREST
-    return cv2.warpPerspective(
-        scene, to_scene, size, flags=smooth | cv2.WARP_INVERSE_MAP, borderValue=UNKNOWN
-    )
 
 
 def _player_mask(

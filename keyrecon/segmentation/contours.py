@@ -21,8 +21,8 @@ from keyrecon.numerics.ragged import ranges
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Colors, Edges, Track
-from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.part_labels import build_part_tables, label_crop
 from keyrecon.segmentation.player_crops import Cropping
 

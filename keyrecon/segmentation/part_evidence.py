@@ -15,12 +15,12 @@ from jaxtyping import Float, Int, UInt8
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.background_model import (
     BackgroundOptions,
-    ForegroundModel,
     complete_background,
     median_background,
     sample_frames,
 )
 from keyrecon.segmentation.color_model import color_bins, look_up, to_lab
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.static_overlay import find_overlay
 
 Reader = Callable[[Int[np.ndarray, "n"]], Iterable[UInt8[np.ndarray, "h w 3"]]]

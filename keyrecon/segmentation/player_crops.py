@@ -18,7 +18,6 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import cut_affine
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Colors, Track
-from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import (
     color_bins,
     foot_table,
@@ -26,6 +25,7 @@ from keyrecon.segmentation.color_model import (
     posterior_tables,
     to_lab,
 )
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.part_evidence import BACKGROUND_WEIGHT
 
 ABOVE_HEAD, BELOW_HEAD, ASIDE = 0.3, 1.25, 0.86

@@ -20,7 +20,7 @@ NEXT = 8
 clips at hand. On one side alone it would be the end of a rest."""
 LEAST_CHANGE = 4.0
 """Grey levels; where frames around change by less, all are noise and none is dropped. As much as
-the noise of video that a background is given (`MIN_SPREAD` of `background_model`)."""
+the noise of video that a background is given (`MIN_SPREAD` of `foreground_model`)."""
 
 
 def picture_change(one: Int16[np.ndarray, "h w"], other: Int16[np.ndarray, "h w"]) -> float:

@@ -24,7 +24,7 @@ from keyrecon.numerics.viterbi import TransitionModel
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
-from keyrecon.segmentation.background_model import ForegroundModel
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
 from keyrecon.timeline import part_of_path
 from keyrecon.tracking.anchors import marked_places

@@ -24,8 +24,8 @@ from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Background, CameraPath, Colors, Track, TrackVerification
-from keyrecon.segmentation.background_model import ForegroundModel
 from keyrecon.segmentation.color_model import color_bins, look_up, posterior_tables, to_lab
+from keyrecon.segmentation.foreground_model import ForegroundModel
 
 RATE = 6.0
 """Frames looked at per second: who walks past the player is seen three times within a height."""

@@ -8,6 +8,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath, Track
 from keyrecon.segmentation.background_model import build_background, median_background
 from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.foreground_model import ForegroundModel
 
 
 def scene_with_limb(shift, rng):
@@ -83,3 +84,67 @@ def test_the_spread_of_normal_noise_is_its_deviation():
     free, paths = [np.ones((20, 20), bool)] * 400, np.tile(np.eye(3), (400, 1, 1))
     spread = median_background(pictures, free, paths, 1.0).spread
     assert np.median(spread) == pytest.approx(6, rel=0.05)
+
+
+def carried_film(file, count, size=(320, 180)):
+    """A camera is carried along: what is far goes by at 1 px per frame, the ground at 4. It follows
+    a player of 100 px who stays in the picture's middle and swings his legs."""
+    columns, rows = size
+    x = np.arange(columns)
+    noise = np.random.default_rng(0).normal(0, 3, (rows, columns, 3))
+
+    def frames():
+        for t in range(count):
+            picture = np.empty((rows, columns, 3))
+            picture[:90] = (100 + 60 * np.sin((x + t) / 50))[None, :, None]
+            picture[90:] = (130 + 60 * np.sin((x + 4 * t) / 180))[None, :, None]
+            picture += noise
+            swing = round(14 * np.sin(t / 5))
+            cv2.rectangle(picture, (150, 40), (170, 90), (40, 40, 40), -1)
+            for foot in (160 - swing, 160 + swing):
+                cv2.line(picture, (160, 88), (foot, 140), (40, 40, 40), 9)
+            yield picture.clip(0, 255).astype(np.uint8)
+
+    write_video(file, frames(), 30.0, crf=12)
+    return open_video(file)
+
+
+def test_a_player_is_told_from_a_scene_that_a_carried_camera_shows_from_ever_other_places(tmp_path):
+    count = 300
+    video = carried_film(tmp_path / "carried.mp4", count)
+    path = np.tile(np.eye(3), (count, 1, 1))
+    path[:, 0, 2] = np.arange(count)
+    camera = CameraPath(path, np.ones(count))
+    swing = np.round(14 * np.sin(np.arange(count) / 5))
+    head = np.tile([160.0, 42.0], (count, 1))
+    feet = np.stack([np.stack([160 + s * swing, np.full(count, 140.0)], 1) for s in (-1, 1)], 1)
+    tall = np.full(count, 98.0)
+    track = Track(head, feet, tall, np.zeros((count, 4)), np.ones(count))
+    background = build_background(video, camera, track)
+    model = ForegroundModel(background, camera)
+    legs, ground = [], []
+    for t, picture in enumerate(video.frames()):
+        foreground = model.foreground(to_lab(picture), t, np.eye(3))[100:135]
+        legs.append(foreground[picture[100:135, :, 0] < 55].mean())
+        ground.append(foreground[:, :100].mean())
+    assert np.mean(legs) > 0.6
+    assert np.mean(ground) < 0.2
+
+
+def test_one_background_does_for_a_camera_that_only_turns(tmp_path):
+    count = 200
+
+    def frames():
+        for t in range(count):
+            yield scene()[:180, t : t + 240]
+
+    write_video(tmp_path / "turns.mp4", frames(), 30.0, crf=18)
+    path = np.tile(np.eye(3), (count, 1, 1))
+    path[:, 0, 2] = np.arange(count)
+    nowhere = np.tile([-500.0, 0.0], (count, 1))
+    track = Track(
+        nowhere, np.stack([nowhere] * 2, 1), np.full(count, 100.0), np.zeros((count, 4)),
+        np.ones(count),
+    )  # fmt: skip
+    camera = CameraPath(path, np.ones(count))
+    assert not build_background(open_video(tmp_path / "turns.mp4"), camera, track).later

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from keyrecon.records import CameraPath
-from keyrecon.segmentation.background_model import ForegroundModel, median_background
+from keyrecon.segmentation.background_model import median_background
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.static_overlay import find_overlay
 
 SIZE = 200, 360

@@ -6,9 +6,10 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.frame_reader import read_small
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import CameraPath, TrackAnchors
-from keyrecon.segmentation.background_model import ForegroundModel, build_background
+from keyrecon.segmentation.background_model import build_background
 from keyrecon.segmentation.color_model import learn_colors, to_lab
 from keyrecon.segmentation.contours import find_edges
+from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.tracking.detection import find_player
 from keyrecon.tracking.scale import standing_height, zoom

@@ -34,8 +34,9 @@ from keyrecon.numerics.picture_points import sample_picture
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Background, CameraPath
-from keyrecon.segmentation.background_model import ForegroundModel, median_background
+from keyrecon.segmentation.background_model import median_background
 from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.foreground_model import ForegroundModel
 
 LIMB_WIDTH, HAND_LENGTH = 0.032, 0.03
 """A forearm is thicker, and a hand reaches no farther from it, player heights."""
