@@ -22,6 +22,7 @@ from keyrecon.io.frame_reader import in_threads
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
 from keyrecon.keeping import Keep, call_stage, spread_of
+from keyrecon.keyframes.absence import legs_outside, without_legs
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
 from keyrecon.keyframes.pose_time import pose_seconds
@@ -154,6 +155,9 @@ def prepare(
         spread=spread_of(keep),
     )
     distances = end_at_cuts(distances, followed.shots.joined())
+    outside = legs_outside(followed.track, video.height)
+    if outside.any():
+        distances = without_legs(distances, outside)
     keyframes = keep(
         "keyframes",
         choose_keyframes,

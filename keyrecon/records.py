@@ -250,7 +250,8 @@ class PoseDistances:
     visibility_score: Float[np.ndarray, "T"]
     """0-1: how well a person could annotate each frame (tracked, not blurred)."""
     seen: Float[np.ndarray, "2 T"]
-    """Share of its usual outline that each half of the body shows, upper and lower, 0-1."""
+    """Share of its usual outline that each half of the body shows, upper and lower, 0-1; NaN where
+    the picture ends above that half."""
 
 
 @dataclass(frozen=True, eq=False)

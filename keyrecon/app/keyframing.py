@@ -158,11 +158,18 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     reach = preparation.keyframes.reach
     absent = absent_frames(preparation.pose_distances, reach) & preparation.track.known
     absent &= ~_told_to_be_unlinked(preparation)
-    stretches = list_stretches(absent)
-    if not stretches:
-        return []
-    listed = listed_stretches(stretches)
-    return [f"Nobody seen in frames {listed}: no keyframe is asked for there."]
+    lines = []
+    if stretches := list_stretches(absent):
+        listed = listed_stretches(stretches)
+        lines.append(f"Nobody seen in frames {listed}: no keyframe is asked for there.")
+    legless = np.isnan(preparation.pose_distances.seen[1]) & preparation.track.known & ~absent
+    if stretches := list_stretches(legless):
+        listed = listed_stretches(stretches)
+        lines.append(
+            f"Both legs out of the picture in frames {listed}: no keyframe of the lower body is "
+            "asked for there."
+        )
+    return lines
 
 
 def _told_to_be_unlinked(preparation: Preparation) -> Bool[np.ndarray, "T"]:

@@ -3,7 +3,8 @@
 A frame or two in which the player was not detected are bridged like any other gap (Eq. 1). A
 stretch longer than that, in which the player has left the picture or is hidden, is taken out before
 keyframes are chosen, as if the video had been cut there, and put back afterwards. So is a shot that
-does not show the player at all, however short.
+does not show the player at all, however short. Where the picture ends above the knees the same
+goes for the lower body.
 """
 
 from collections.abc import Sequence
@@ -13,11 +14,30 @@ import numpy as np
 from jaxtyping import Bool, Int
 from scipy.ndimage import binary_opening
 
-from keyrecon.records import HalfKeyframes, PoseDistances
+from keyrecon.records import HalfKeyframes, PoseDistances, Track
 from keyrecon.timeline import frames_before
 
 MOST_STRETCHES = 8
 """Stretches that are listed one by one."""
+
+
+KNEES = 0.68
+"""Where a standing player has the knees, share of the way from the head's centre to the feet: .285
+statures up (Drillis and Contini), and a little higher where they are bent."""
+
+
+def legs_outside(track: Track, rows: int) -> Bool[np.ndarray, "T"]:
+    """Frames of `rows` rows that end above the knees: there is no leg to annotate."""
+    knees = track.head[:, 1] + KNEES * (track.mid_feet - track.head)[:, 1]
+    # feet that were found are in the picture; those that it cuts off were put below it
+    return (track.mid_feet[:, 1] >= rows) & (knees >= rows)
+
+
+def without_legs(comparison: PoseDistances, outside: Bool[np.ndarray, "T"]) -> PoseDistances:
+    """The same with nothing seen of the lower body in frames in which it is out of the picture."""
+    seen = comparison.seen.copy()
+    seen[1, outside] = np.nan
+    return replace(comparison, seen=seen)
 
 
 def absent_frames(comparison: PoseDistances, reach: int) -> Bool[np.ndarray, "T"]:
@@ -27,6 +47,14 @@ def absent_frames(comparison: PoseDistances, reach: int) -> Bool[np.ndarray, "T"
         return np.zeros(len(visible), dtype=bool)
     never = np.bincount(shot, visible) == 0
     return never[shot] | binary_opening(~visible, np.ones(reach + 1))
+
+
+def shown_frames(
+    comparison: PoseDistances, kept: Int[np.ndarray, "n"], half: int
+) -> Int[np.ndarray, "m"]:
+    """Those of the kept frames that show a half of the body, the upper one 0; all if none does."""
+    shown = kept[np.isfinite(comparison.seen[half, kept])]
+    return shown if len(shown) else kept
 
 
 def shot_numbers(comparison: PoseDistances) -> Int[np.ndarray, "T"]:

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int
 
-from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames
+from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames, shown_frames
 from keyrecon.keyframes.selection import KeyframeOptions, half_distances, record_half
 from keyrecon.progress import Progress, silent
 from keyrecon.records import HalfKeyframes, Keyframes, PoseDistances
@@ -24,15 +24,16 @@ def adopt_keyframes(
     away = absent_frames(comparison, asked.reach)
     away[np.concatenate(annotated)] = False
     kept, everyone = np.flatnonzero(~away), len(comparison.row)
-    comparison = select_frames(comparison, kept)
     halves: list[HalfKeyframes] = []
     names = progress(("upper", "lower"), "Assigning frames to keyframes", 2)
     for index, (name, frames) in enumerate(zip(names, annotated, strict=True)):
-        half = half_distances(comparison, getattr(comparison, name), index, asked.reach, options)
+        shown = np.union1d(shown_frames(comparison, kept, index), frames)
+        part = select_frames(comparison, shown)
+        half = half_distances(part, getattr(part, name), index, asked.reach, options)
         beta = getattr(asked, name).beta
-        chosen = np.searchsorted(kept, np.unique(frames))
+        chosen = np.searchsorted(shown, np.unique(frames))
         adopted = record_half(half, half.goal(beta), beta, chosen)
-        halves.append(restore_frames(adopted, kept, everyone))
+        halves.append(restore_frames(adopted, shown, everyone))
     upper, lower = halves
     return Keyframes(upper, lower, reach=asked.reach, alpha=asked.alpha, method=asked.method)
 

@@ -33,7 +33,13 @@ from jaxtyping import Float, Int
 
 from keyrecon.annotation_budget import check_budget, least_labels, usual_budget
 from keyrecon.errors import KeyreconError
-from keyrecon.keyframes.absence import absent_frames, restore_frames, select_frames, shot_numbers
+from keyrecon.keyframes.absence import (
+    absent_frames,
+    restore_frames,
+    select_frames,
+    shot_numbers,
+    shown_frames,
+)
 from keyrecon.keyframes.assignment import assign_frames, find_neighborhoods, represent_frames
 from keyrecon.keyframes.coverage import TIME_UNIT, choose_greedily
 from keyrecon.keyframes.mark_gains import order_by_gain
@@ -196,8 +202,8 @@ def choose_keyframes(
 ) -> Keyframes:
     """Keyframes of both halves of the body within the budget.
 
-    None in stretches without the player. Raises KeyreconError where the options ask for what
-    cannot be (`count_labels`).
+    None in stretches without the player, nor of the lower body where it is out of the picture.
+    Raises KeyreconError where the options ask for what cannot be (`count_labels`).
     """
     frames = len(comparison.row)
     reach = max(1, round(options.reach * fps / 50))
@@ -205,18 +211,22 @@ def choose_keyframes(
     # A budget that is set is a share of all frames; what is usual, of those with the player.
     counted = len(kept) if options.budget is None else frames
     labels = count_labels(options, counted, fps)
-    comparison = select_frames(comparison, kept)
     halves: list[HalfKeyframes] = []
     flexible = options.budget is None and options.method == "coverage"
     least = min(least_labels(fps), labels) if flexible else labels
     betas = options.beta_upper, options.beta_lower
     names = progress(("upper", "lower"), "Choosing keyframes", 2)
     for index, (name, beta) in enumerate(zip(names, betas, strict=True)):
-        half = half_distances(comparison, getattr(comparison, name), index, reach, options)
-        also = halves[0].frames if halves else np.zeros(0, dtype=np.int64)
-        few, many = ((count + 1 - index) // 2 for count in (least, labels))
-        halves.append(_choose_half(half, few, many, beta, also))
-    upper, lower = (restore_frames(half, kept, frames) for half in halves)
+        shown = shown_frames(comparison, kept, index)
+        part = select_frames(comparison, shown)
+        half = half_distances(part, getattr(part, name), index, reach, options)
+        also = np.flatnonzero(np.isin(shown, halves[0].frames if halves else []))
+        of_both = ((count + 1 - index) // 2 for count in (least, labels))
+        # what is shown for a part of the time has that part of the marks
+        few, many = (max(1, round(count * len(shown) / len(kept))) for count in of_both)
+        chosen = _choose_half(half, few, many, beta, also)
+        halves.append(restore_frames(chosen, shown, frames))
+    upper, lower = halves
     return Keyframes(upper, lower, reach=reach, alpha=options.coverage, method=options.method)
 
 

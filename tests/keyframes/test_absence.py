@@ -7,7 +7,13 @@ import pytest
 from sporting_poses import comparison_of, sporting_poses
 
 from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
-from keyrecon.keyframes.absence import absent_frames, list_stretches, select_frames
+from keyrecon.keyframes.absence import (
+    absent_frames,
+    legs_outside,
+    list_stretches,
+    select_frames,
+    without_legs,
+)
 from keyrecon.keyframes.adoption import adopt_keyframes
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Track
@@ -35,6 +41,23 @@ def test_nobody_is_asked_to_mark_where_nobody_is(poses, stand_ins):
     for half in (chosen.upper, chosen.lower):
         assert not AWAY[half.frames].any() and not AWAY[half.nearest].any()
         assert not half.represented[AWAY].any() and half.coverage >= 0.95
+
+
+def test_nobody_is_asked_to_mark_legs_below_the_edge_of_the_picture(poses):
+    compared = without_legs(comparison_of(*poses, np.ones(400)), AWAY)
+    chosen = choose_keyframes(compared, 50.0, SPARSE)
+    assert chosen.upper.represented[AWAY].any()
+    assert len(chosen.lower.frames) and not AWAY[chosen.lower.frames].any()
+    assert np.isinf(chosen.lower.distance[AWAY]).all()
+    assert not chosen.lower.represented[AWAY].any()
+
+
+def test_legs_are_outside_where_the_picture_ends_above_the_knees():
+    head = np.array([[50.0, 20.0], [50, 100], [50, 150]])
+    feet = np.repeat(head[:, None] + [0.0, 200.0], 2, axis=1)
+    feet[0, :, 1] = 199.0
+    track = Track(head, feet, np.full(3, 200.0), np.zeros((3, 4)), np.ones(3))
+    assert legs_outside(track, 250).tolist() == [False, False, True]
 
 
 def test_no_keyframe_stands_for_frames_without_the_player(poses):
