@@ -139,7 +139,7 @@ def prepare(
         anchors = anchors_from_bodies(marks, flow)
     colors = keep("colors", learn_colors, video, clicks, options=options.colors, progress=progress)
     if marks is not None:
-        heights = marked_heights(marks, colors.height, len(video), video.fps, shots)
+        heights = keep("sizes", marked_heights, marks, colors.height, video.fps, shots)
         anchors = with_heights(anchors, marks.frames, heights)
     follow_options = FollowOptions(
         options.shots, options.find, options.background, options.track, options.edges

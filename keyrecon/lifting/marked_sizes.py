@@ -6,6 +6,8 @@ tells the sizes of a few bodies against each other, with next to nothing expecte
 from one to the next.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -21,12 +23,13 @@ LEAST_BONES = 4
 """Bones of a body that tell its size; of fewer all may point at the camera."""
 
 
+APART_SECONDS, OTHER_SHOT_SECONDS = 1.0, 5.0
+"""Bodies farther apart than the first, or in different shots, may have any size: they are taken to
+be so far apart. What lies between them would only take time."""
+
+
 def marked_heights(
-    annotations: Annotations,
-    usual: float,
-    n_frames: int,
-    fps: float,
-    shots: Shots | None = None,
+    annotations: Annotations, usual: float, fps: float, shots: Shots
 ) -> Float[np.ndarray, "K"]:
     """How tall each marked body would stand from head centre to mid-feet, px; NaN where too few of
     its bones are marked.
@@ -38,9 +41,14 @@ def marked_heights(
     known = ends.sum(axis=1) >= LEAST_BONES
     if not known.any():
         return np.full(len(known), np.nan)
-    nothing = np.full((n_frames, len(skeleton.names), 2), np.nan)
+    apart = np.minimum(np.diff(annotations.frames), round(APART_SECONDS * fps))
+    cut = np.diff(shots.number[annotations.frames]) > 0
+    apart = np.where(cut, round(OTHER_SHOT_SECONDS * fps), apart)
+    nearer = replace(annotations, frames=np.append(0, np.cumsum(apart)))
+    count = int(nearer.frames[-1]) + 1
+    nothing = np.full((count, len(skeleton.names), 2), np.nan)
     nowhere = np.zeros(nothing.shape[:2])
     tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))
     free = LengthOptions(scale_spread=SIZE_SPREAD)
-    size = estimate_lengths(tracks, annotations, np.full(n_frames, usual), fps, free, shots)
-    return np.where(known, HEAD_TO_FEET * size.scale[annotations.frames], np.nan)
+    size = estimate_lengths(tracks, nearer, np.full(count, usual), fps, free)
+    return np.where(known, HEAD_TO_FEET * size.scale[nearer.frames], np.nan)

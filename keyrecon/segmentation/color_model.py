@@ -205,7 +205,10 @@ def _check_picks(video: "Video", picks: Sequence[Pick]) -> None:
     if "head" not in {p.part for p in picks}:
         raise KeyreconError("The head is not picked in any frame; pick its centre.")
     if "foot" not in {p.part for p in picks}:
-        raise KeyreconError("No foot is picked in any frame; pick both shoes.")
+        raise KeyreconError(
+            "No foot is picked in any frame; pick both shoes, or mark both knees and ankles of a "
+            "frame that shows them: a player whose feet are never in the picture has no known size."
+        )
 
 
 def to_lab(picture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:

@@ -5,7 +5,7 @@ import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.lifting.marked_sizes import marked_heights
-from keyrecon.records import Annotations
+from keyrecon.records import Annotations, Shots
 
 FRAMES = np.array([0, 60, 120, 180])
 SIZES = np.array([200.0, 220.0, 300.0, 380.0])
@@ -33,7 +33,7 @@ def bodies(lower=()):
 
 
 def test_bodies_without_legs_have_their_sizes_against_those_with_legs():
-    heights = marked_heights(bodies(lower=[0]), 200.0, 200, 30.0)
+    heights = marked_heights(bodies(lower=[0]), 200.0, 30.0, Shots.between((), 200))
     assert heights / heights[0] == pytest.approx(SIZES / SIZES[0], rel=0.1)
 
 
@@ -44,5 +44,5 @@ def test_a_body_of_few_bones_tells_nothing():
         np.nan
     )
     fewer = Annotations(LSP14, FRAMES, joints, marks.visible, marks.nearer)
-    heights = marked_heights(fewer, 200.0, 200, 30.0)
+    heights = marked_heights(fewer, 200.0, 30.0, Shots.between((), 200))
     assert np.isnan(heights[1]) and np.isfinite(heights[[0, 2, 3]]).all()
