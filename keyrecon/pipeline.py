@@ -67,7 +67,7 @@ from keyrecon.tracking.mark_flow import FlowOptions
 from keyrecon.tracking.shot_sorting import ShotOptions
 from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
-from keyrecon.unseen import without_unseen
+from keyrecon.unseen import without_hidden_legs, without_unseen
 from keyrecon.usable_shots import in_file, marks_in_shots, usable_part
 
 
@@ -319,7 +319,8 @@ def _carry_usable(
         annotations = part_of_marks(annotations, shots.usable_frames)
     part = usable_part(preparation)
     tracks = propagate_in_groups(part, annotations, flow, options.propagate, keep, progress)
-    return part, annotations, tracks
+    outside = legs_outside(part.track, part.video.height)
+    return part, annotations, without_hidden_legs(tracks, annotations, outside)
 
 
 def _with_annotated_keyframes(

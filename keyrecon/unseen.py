@@ -11,12 +11,28 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
-from keyrecon.records import SOURCES, Motion
+from keyrecon.records import SOURCES, Annotations, JointTracks, Motion
 from keyrecon.timeline import PER_FRAME, TOLD_PER_FRAME, spread_values
 
 BRIDGED_SECONDS = 0.5
 """Longest time without evidence that the motion before and after bridges: a step. From one side
 alone half of it."""
+
+
+def without_hidden_legs(
+    tracks: JointTracks, annotations: Annotations, outside: Bool[np.ndarray, "T"]
+) -> JointTracks:
+    """The tracks, with nothing known of what is below the hips in frames in which the picture ends
+    above the knees, but for what is marked: what was carried there lies on something else."""
+    if not outside.any():
+        return tracks
+    skeleton = annotations.skeleton
+    parents = np.array(skeleton.parents)
+    below_hips = skeleton.is_lower & (parents >= 0) & skeleton.is_lower[parents]
+    hidden = outside[:, None] & below_hips
+    hidden[annotations.frames] &= np.isnan(annotations.joints[..., 0])
+    confidence = np.where(hidden, 0.0, tracks.confidence)
+    return replace(tracks, confidence=confidence)
 
 
 def unseen_frames(motion: Motion) -> Bool[np.ndarray, "T"]:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from small_motion import make_motion
 
-from keyrecon.records import SOURCES
-from keyrecon.unseen import BRIDGED_SECONDS, without_unseen
+from keyrecon.body import LSP14
+from keyrecon.records import SOURCES, Annotations, JointTracks
+from keyrecon.unseen import BRIDGED_SECONDS, without_hidden_legs, without_unseen
 
 COUNT = 100
 INTERPOLATED = SOURCES.index("interpolated")
@@ -57,3 +58,17 @@ def test_one_joint_that_was_carried_is_enough():
     motion = motion_unseen_in((0, 40))
     motion.source[:40, 3] = SOURCES.index("propagated")
     assert without_unseen(motion) is motion
+
+
+def test_of_legs_below_the_picture_nothing_is_known_and_of_the_rest_what_was():
+    tracks = JointTracks(np.zeros((4, 14, 2)), np.full((4, 14), 0.5), np.zeros((4, 14), int))
+    outside = np.array([False, True, True, False])
+    legs = np.array([name.endswith(("knee", "ankle")) for name in LSP14.names])
+    joints = np.where(LSP14.is_lower[:, None], np.nan, np.zeros((1, 14, 2)))
+    joints[0, LSP14.index("left_knee")] = 0.0
+    seen, signs = np.isfinite(joints[..., 0]), np.zeros((1, len(LSP14.bones)), int)
+    marks = Annotations(LSP14, np.array([2]), joints, seen, signs)
+    confidence = without_hidden_legs(tracks, marks, outside).confidence
+    assert (confidence[1, legs] == 0).all()
+    assert (confidence[2, legs] > 0).sum() == 1
+    assert (confidence[:, ~legs] == 0.5).all() and (confidence[[0, 3]] == 0.5).all()
