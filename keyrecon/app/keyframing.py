@@ -145,10 +145,11 @@ def _describe_gains(keyframes: Keyframes) -> list[str]:
             continue
         first, middle = gains.order[:3].tolist(), (len(gains.order) + 1) // 2
         lines.append(
-            f"{name} body, most useful first ({', '.join(map(str, first))}, ...; the order is in "
-            f"keyframes.json): {counted(middle, 'mark')} would stand for "
-            f"{gains.coverage[middle - 1]:.1%} of the frames to {gains.beta:.1%} of the height, "
-            f"all {gains.coverage[-1]:.1%}, one more than all {gains.next_gain:.2%} more."
+            f"{name} body, most useful first: {', '.join(map(str, first))}, ... (the whole order "
+            f"is in keyframes.json). The first {counted(middle, 'mark')} will show the pose of "
+            f"{gains.coverage[middle - 1]:.0%} of the frames to within {gains.beta:.1%} of the "
+            f"height, all {len(gains.order)} of {gains.coverage[-1]:.0%}; one more would add "
+            f"{gains.next_gain:.1%}."
         )
     return lines
 

