@@ -201,7 +201,7 @@ class Colors:
     surroundings: Float[np.ndarray, "bins"]
     """Share of the pixels around the player in each colour bin."""
     height: float
-    """Standing length from head to mid-feet where both were picked, px."""
+    """Length from head to mid-feet where both were picked, px."""
 
 
 @dataclass(frozen=True, eq=False)

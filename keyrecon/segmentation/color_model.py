@@ -40,11 +40,6 @@ quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips."
 PATCH_RADIUS = {"head": 0.05, "foot": 0.06}
 """How far around a click a part goes, player heights: half a head, half a shoe. A quarter more or
 less, others with it: at most 1.9 points, 2.4 mm on four clips."""
-STANDING = 0.8
-"""Share of the distances from head to mid-feet that are shorter than the standing one. Who does
-sport bends, crouches and lifts a foot in most frames, in those above all that are asked for: the
-median of marked frames is .85 of it on a boy who juggles a ball, .86 to .93 on golf from the front.
-"""
 ABOVE_SOLE = 0.02, 0.04, 0.06
 """How far above a click on a foot its shoe is looked for, player heights: up to the ankle. A
 quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
@@ -174,8 +169,7 @@ def _shoe_patch(
 
 
 def picked_height(picks: Sequence[Pick]) -> float:
-    """Standing length from head to mid-feet, px: `STANDING` of the frames where both were picked
-    are shorter, as in `standing_height`."""
+    """Length from head to mid-feet, px: the median over frames where both were picked."""
     heights = []
     for frame in {p.frame for p in picks}:
         heads = [(p.x, p.y) for p in picks if p.frame == frame and p.part == "head"]
@@ -187,7 +181,7 @@ def picked_height(picks: Sequence[Pick]) -> float:
             "No frame has both a head and a foot picked, so the player's size is unknown; "
             "pick the head and both feet in one frame where the player stands upright."
         )
-    return float(np.quantile(heights, STANDING))
+    return float(np.median(heights))
 
 
 def _check_picks(video: "Video", picks: Sequence[Pick]) -> None:

@@ -19,7 +19,6 @@ from scipy.ndimage import gaussian_filter1d, percentile_filter
 
 from keyrecon.io.video import Video
 from keyrecon.records import CameraPath, Track, TrackAnchors
-from keyrecon.segmentation.color_model import STANDING
 
 SURELY_CUT = 0.85
 """Feet that would be farther below the head than this, of the standing height that marks tell, are
@@ -96,7 +95,7 @@ def standing_height(
     known = np.flatnonzero(seen if seen.any() else ~seen)
     length = np.linalg.norm(mid_feet - head, axis=1)[known] / magnification[known]
     window = min(len(length), max(3, frames) | 1)
-    envelope = percentile_filter(length, 100 * STANDING, size=window, mode="nearest")
+    envelope = percentile_filter(length, 80, size=window, mode="nearest")
     smooth = gaussian_filter1d(envelope, window / 4, mode="nearest")
     return np.interp(np.arange(len(head)), known, smooth) * magnification
 

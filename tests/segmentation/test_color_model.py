@@ -12,7 +12,6 @@ from keyrecon.segmentation.color_model import (
     grow_patch,
     learn_colors,
     look_up,
-    picked_height,
     posterior_tables,
     to_lab,
 )
@@ -75,19 +74,6 @@ def test_histograms_are_shares(video):
 
 def test_the_players_size_is_the_length_from_head_to_mid_feet(video):
     assert learn_colors(video, picks(4)).height == pytest.approx(88)
-
-
-def test_a_player_who_lifts_a_foot_on_most_marked_frames_is_as_tall_as_when_standing():
-    def feet_at(frame: int, right: tuple[float, float]) -> list[Pick]:
-        return [
-            Pick(frame, "head", 50.0, 10.0),
-            Pick(frame, "foot", 50.0, 110.0),
-            Pick(frame, "foot", *right),
-        ]
-
-    standing = [pick for frame in (0, 1) for pick in feet_at(frame, (50.0, 110.0))]
-    kicking = [pick for frame in (2, 3, 4) for pick in feet_at(frame, (80.0, 60.0))]
-    assert picked_height([*standing, *kicking]) == pytest.approx(100)
 
 
 def test_a_head_of_skin_is_no_colour_of_its_own_beside_skin(video):
