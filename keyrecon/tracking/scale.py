@@ -22,8 +22,7 @@ from keyrecon.records import CameraPath, Track, TrackAnchors
 
 SURELY_CUT = 0.85
 """Feet that would be farther below the head than this, of the standing height that marks tell, are
-out of the picture, unless marked bodies with both feet bend more than that: a golfer at the ball
-whose feet are at the picture's edge has them .75 below his head."""
+out of the picture: a crouch takes less away, and what marks tell is off by as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,39 +38,30 @@ class SizeEvidence:
     """Where a person marked both feet: they are in the picture."""
     rows: int
     """Of the picture."""
-    bent: float = SURELY_CUT
-    """How far the feet are below the head of who bends most, as a share of the standing height."""
 
     @classmethod
     def of(cls, camera: CameraPath, video: Video, anchors: TrackAnchors) -> "SizeEvidence":
         """By the camera and by marked bodies."""
         magnification, feet = zoom(camera, video), np.zeros(len(video), dtype=bool)
-        whole = anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))
-        feet[anchors.frames[whole]] = True
-        below = anchors.feet[whole, :, 1].mean(axis=1) - anchors.head[whole, 1]
-        bent = np.nanmin(np.append(below / anchors.height[whole], SURELY_CUT))
+        feet[anchors.frames[anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))]] = True
         told, known = np.full(len(video), np.nan), np.isfinite(anchors.height)
         if known.any():
             frames = anchors.frames[known]
             grown = np.log(anchors.height[known] / magnification[frames])
             told = np.exp(np.interp(np.arange(len(video)), frames, grown)) * magnification
-        return cls(magnification, told, feet, video.height, float(bent))
+        return cls(magnification, told, feet, video.height)
 
     def every(self, step: int) -> "SizeEvidence":
         """That of each `step`-th frame."""
-        return replace(
-            self,
-            magnification=self.magnification[::step],
-            told=self.told[::step],
-            feet_marked=self.feet_marked[::step],
+        return SizeEvidence(
+            self.magnification[::step], self.told[::step], self.feet_marked[::step], self.rows
         )
 
     def cut(
-        self, head: Float[np.ndarray, "T 2"], share: float | None = None
+        self, head: Float[np.ndarray, "T 2"], share: float = SURELY_CUT
     ) -> Bool[np.ndarray, "T"]:
         """Frames whose lower edge cuts off the feet of who stands under these heads, and is a
-        `share` of what is told tall; as `bent` as ever where none is given."""
-        share = self.bent if share is None else share
+        `share` of what is told tall."""
         # comparisons with NaN are false: where nothing is told feet are taken to be seen
         return (head[:, 1] + share * self.told > self.rows) & ~self.feet_marked
 

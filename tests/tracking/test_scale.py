@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from keyrecon.io.video import open_video
-from keyrecon.io.video_writer import write_video
-from keyrecon.records import CameraPath, Track, TrackAnchors
+from keyrecon.records import Track
 from keyrecon.tracking.scale import SizeEvidence, measured
 
 COUNT, ROWS = 120, 360
@@ -51,16 +49,3 @@ def test_marked_feet_are_in_the_picture_however_tall_the_bones_are():
     everywhere = np.ones(COUNT, bool)
     found = measured(track, evidence(height, everywhere), 30, everywhere)
     assert (found.feet == track.feet).all()
-
-
-def test_feet_of_who_bends_as_on_a_mark_are_in_the_picture_at_its_very_edge(tmp_path):
-    count, tall, row = 60, 250.0, ROWS - 5.0
-    heads = np.tile([200.0, row - 0.75 * tall], (count, 1))
-    heads[30:, 1] = row - 0.6 * tall  # a picture that ends above the feet of whoever stands there
-    feet = np.tile([[190.0, row], [210.0, row]], (count, 1, 1))
-    bowed = TrackAnchors(np.array([3]), heads[[3]], feet[[3]], np.array([True]), np.array([tall]))
-    camera = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
-    pictures = (np.zeros((ROWS, 400, 3), np.uint8) for _ in range(count))
-    write_video(tmp_path / "dark.mp4", pictures, 25.0)
-    cut = SizeEvidence.of(camera, open_video(tmp_path / "dark.mp4"), bowed).cut(heads)
-    assert not cut[:30].any() and cut[30:].all()
