@@ -6,9 +6,10 @@ magnification is taken out first. Where the player was not seen, head and feet l
 from each other more often than not: those frames tell nothing.
 
 Nor do frames whose lower edge cuts the feet off: what is taken for feet there is whatever lies
-lowest in the picture, and a player who comes near would shrink while he grows. Where bodies were
-marked their bones tell how tall they would stand, against those whose feet are seen, and the feet
-are put there, out of the picture.
+lowest in the picture, and a player who comes near would shrink while he grows. Where a body was
+marked without feet, the bones of marked bodies tell how tall they would stand, against those whose
+feet are seen, and the feet are put there, out of the picture. Without such a mark a head that is
+low is a crouch, or was taken for one by mistake.
 """
 
 from dataclasses import dataclass, replace
@@ -34,27 +35,32 @@ class SizeEvidence:
     told: Float[np.ndarray, "T"]
     """Standing height by the bones of marked bodies, between these by the zoom, px; NaN where none
     tells."""
-    feet_marked: Bool[np.ndarray, "T"]
-    """Where a person marked both feet: they are in the picture."""
+    footless: Bool[np.ndarray, "T"]
+    """Next to a marked body without feet, up to the next one that has them."""
     rows: int
     """Of the picture."""
 
     @classmethod
     def of(cls, camera: CameraPath, video: Video, anchors: TrackAnchors) -> "SizeEvidence":
         """By the camera and by marked bodies."""
-        magnification, feet = zoom(camera, video), np.zeros(len(video), dtype=bool)
-        feet[anchors.frames[anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))]] = True
+        magnification, frames = zoom(camera, video), np.arange(len(video))
         told, known = np.full(len(video), np.nan), np.isfinite(anchors.height)
+        footless = np.zeros(len(video), dtype=bool)
         if known.any():
-            frames = anchors.frames[known]
-            grown = np.log(anchors.height[known] / magnification[frames])
-            told = np.exp(np.interp(np.arange(len(video)), frames, grown)) * magnification
-        return cls(magnification, told, feet, video.height)
+            at, height = anchors.frames[known], anchors.height[known]
+            told = np.exp(np.interp(frames, at, np.log(height / magnification[at]))) * magnification
+            feet = anchors.feet[known, :, 1]
+            lacking = ~(np.isfinite(feet) & (feet < video.height)).all(axis=1)
+            after = np.searchsorted(at, frames).clip(max=len(at) - 1)
+            before = (np.searchsorted(at, frames, side="right") - 1).clip(min=0)
+            footless = lacking[before] | lacking[after]
+            footless[at] = lacking
+        return cls(magnification, told, footless, video.height)
 
     def every(self, step: int) -> "SizeEvidence":
         """That of each `step`-th frame."""
         return SizeEvidence(
-            self.magnification[::step], self.told[::step], self.feet_marked[::step], self.rows
+            self.magnification[::step], self.told[::step], self.footless[::step], self.rows
         )
 
     def cut(
@@ -63,7 +69,7 @@ class SizeEvidence:
         """Frames whose lower edge cuts off the feet of who stands under these heads, and is a
         `share` of what is told tall."""
         # comparisons with NaN are false: where nothing is told feet are taken to be seen
-        return (head[:, 1] + share * self.told > self.rows) & ~self.feet_marked
+        return (head[:, 1] + share * self.told > self.rows) & self.footless
 
 
 def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:

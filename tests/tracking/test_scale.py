@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from keyrecon.records import Track
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
+from keyrecon.records import CameraPath, Track, TrackAnchors
 from keyrecon.tracking.scale import SizeEvidence, measured
 
 COUNT, ROWS = 120, 360
@@ -22,10 +24,9 @@ def approaching():
     return height, Track(head, feet, *unmeasured, np.ones(COUNT))
 
 
-def evidence(told, feet_marked=None):
+def evidence(told, footless=True):
     """A still camera, and what marked bodies tell."""
-    marked = np.zeros(COUNT, bool) if feet_marked is None else feet_marked
-    return SizeEvidence(np.ones(COUNT), told, marked, ROWS)
+    return SizeEvidence(np.ones(COUNT), told, np.full(COUNT, footless), ROWS)
 
 
 def test_a_player_whose_feet_the_picture_cuts_off_is_as_tall_as_marked_bones_tell():
@@ -44,8 +45,20 @@ def test_without_marked_bones_head_and_feet_tell():
     assert (found.feet == track.feet).all()
 
 
-def test_marked_feet_are_in_the_picture_however_tall_the_bones_are():
+def test_no_feet_are_cut_off_where_every_marked_body_has_them():
     height, track = approaching()
-    everywhere = np.ones(COUNT, bool)
-    found = measured(track, evidence(height, everywhere), 30, everywhere)
+    found = measured(track, evidence(height, footless=False), 30, np.ones(COUNT, bool))
     assert (found.feet == track.feet).all()
+
+
+def test_a_marked_body_without_feet_speaks_for_the_frames_up_to_those_that_have_them(tmp_path):
+    height, track = approaching()
+    marked = np.array([10, 60, 100])
+    feet = track.feet[marked].copy()
+    feet[1] = np.nan
+    bodies = TrackAnchors(marked, track.head[marked], feet, np.ones(3, bool), height[marked])
+    camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
+    write_video(tmp_path / "dark.mp4", np.zeros((COUNT, ROWS, 400, 3), np.uint8), 25.0)
+    told = SizeEvidence.of(camera, open_video(tmp_path / "dark.mp4"), bodies)
+    np.testing.assert_array_equal(np.flatnonzero(told.footless), np.arange(11, 100))
+    np.testing.assert_allclose(told.told[marked], height[marked])
