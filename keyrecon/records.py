@@ -157,6 +157,8 @@ class TrackAnchors:
     height: Float[np.ndarray, "A"]
     """How tall the marked bodies would stand from head centre to mid-feet by the lengths of their
     bones, px; NaN where nothing tells."""
+    footless: Bool[np.ndarray, "A"]
+    """Where hips or knees are marked and no foot is."""
 
     @classmethod
     def none(cls) -> "TrackAnchors":
@@ -167,6 +169,7 @@ class TrackAnchors:
             np.zeros((0, 2, 2)),
             np.zeros(0, dtype=bool),
             np.zeros(0),
+            np.zeros(0, dtype=bool),
         )
 
 

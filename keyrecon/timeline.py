@@ -81,6 +81,7 @@ def part_of_anchors(anchors: TrackAnchors, part: slice) -> TrackAnchors:
         anchors.feet[inside],
         anchors.marked[inside],
         anchors.height[inside],
+        anchors.footless[inside],
     )
 
 

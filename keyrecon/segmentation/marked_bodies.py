@@ -98,9 +98,19 @@ def _anchors(
     feet = np.stack(shoes, axis=1)
     feet[~np.isfinite(feet).all(axis=(1, 2))] = np.nan
     useful = np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
-    count = int(useful.sum())
-    told = np.full(count, marked), np.full(count, np.nan)
-    return TrackAnchors(frames[useful], head[useful], feet[useful], *told)
+    known = {name: np.isfinite(joints[:, n]).all(axis=1) for n, name in enumerate(names)}
+    of_legs, of_feet = (
+        np.any([known[name] for name in names if name.endswith(ends)], axis=0)
+        for ends in (("_hip", "_knee"), "_ankle")
+    )
+    return TrackAnchors(
+        frames[useful],
+        head[useful],
+        feet[useful],
+        np.full(int(useful.sum()), marked),
+        np.full(int(useful.sum()), np.nan),
+        (marked & of_legs & ~of_feet)[useful],
+    )
 
 
 class _Body:

@@ -49,8 +49,8 @@ class SizeEvidence:
         if known.any():
             at, height = anchors.frames[known], anchors.height[known]
             told = np.exp(np.interp(frames, at, np.log(height / magnification[at]))) * magnification
-            feet = anchors.feet[known, :, 1]
-            lacking = ~(np.isfinite(feet) & (feet < video.height)).all(axis=1)
+            below = (anchors.feet[known, :, 1] > video.height).all(axis=1)
+            lacking = anchors.footless[known] | below
             after = np.searchsorted(at, frames).clip(max=len(at) - 1)
             before = (np.searchsorted(at, frames, side="right") - 1).clip(min=0)
             footless = lacking[before] | lacking[after]

@@ -57,3 +57,11 @@ def test_sure_flow_gives_further_anchors_that_nobody_marked():
     anchors = anchors_from_bodies(body(), FlowTracks(joints, confidence, confidence > 0))
     assert anchors.frames.tolist() == [7, 8]
     assert anchors.marked.tolist() == [True, False]
+
+
+def test_a_body_is_footless_where_legs_are_marked_and_no_foot():
+    legs = [f"{side}_{name}" for side in ("right", "left") for name in ("hip", "knee", "ankle")]
+    feet = [name for name in legs if name.endswith("ankle")]
+    assert anchors_from_bodies(body(missing=feet)).footless.all()
+    assert not anchors_from_bodies(body(missing=feet[:1])).footless.any()
+    assert not anchors_from_bodies(body(missing=legs)).footless.any()  # the upper half alone

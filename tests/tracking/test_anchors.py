@@ -42,9 +42,8 @@ def marks(track, frames, shift=(0.0, 0.0)):
     """Anchors where the track is, moved by a shift."""
     frames = np.array(frames)
     head, feet = track.head[frames] + shift, track.feet[frames] + shift
-    return TrackAnchors(
-        frames, head, feet, np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
-    )
+    every, unknown = np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
+    return TrackAnchors(frames, head, feet, every, unknown, ~every)
 
 
 def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
@@ -101,13 +100,7 @@ def test_marks_where_the_track_is_contradict_nothing_and_others_are_named():
 def test_feet_contradict_in_no_particular_order_and_what_is_not_marked_contradicts_nothing():
     track = standing(30)
     crossed = marks(track, [5])
-    crossed = TrackAnchors(
-        crossed.frames,
-        crossed.head * np.nan,
-        crossed.feet[:, ::-1],
-        crossed.marked,
-        crossed.height,
-    )
+    crossed = replace(crossed, head=crossed.head * np.nan, feet=crossed.feet[:, ::-1])
     assert len(contradicted_frames(track, crossed)) == 0
 
 
