@@ -52,9 +52,9 @@ quarter more or less, others with it: at most 2.8 mm on eight clips."""
 _SPIKE_LIMIT = 4.0
 """Robust deviations from the median beyond which a joint is an outlier. A quarter more or less,
 others with it: at most 2.8 mm on eight clips."""
-MIN_SPIKE_DEVIATION = 1.4
-"""A deviation is at least this many times the noise of a sure track: about the length of an error
-in both directions of the image, sqrt 2."""
+MIN_SPIKE_DEVIATION = 2.0
+"""A deviation is at least this many times the noise of a sure track: as long as an error in both
+directions of the image, sqrt 2, of a track of half the confidence."""
 
 
 @dataclass(frozen=True)
