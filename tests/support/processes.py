@@ -11,6 +11,6 @@ def is_running(process):
     """Whether a process has not ended yet."""
     try:
         state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):  # gone before it is opened, or read
         return False
     return state != "Z"
