@@ -51,14 +51,6 @@ VIEW_COUNT = 12
 """Frames shown from elsewhere; the paper shows every 50th of 36 s."""
 
 
-def write_report(path: Path, material: ReportMaterial, progress: Progress = silent) -> None:
-    """Write the report to one HTML file; a minute of video makes it about 10 MB.
-
-    Of hours, the video in it has smaller pictures (`pictures.clip_side`).
-    """
-    write_page(path, material, cut_report_pictures(material, progress))
-
-
 def cut_report_pictures(
     material: ReportMaterial, progress: Progress = silent, watch: Watch = ignore
 ) -> Pictures:
@@ -75,7 +67,10 @@ def cut_report_pictures(
 
 
 def write_page(path: Path, material: ReportMaterial, pictures: Pictures) -> None:
-    """Write the report to one HTML file with pictures that were cut before."""
+    """Write the report to one HTML file with its pictures; a minute of video makes it about 10 MB.
+
+    Of hours, the video in it has smaller pictures (`pictures.clip_side`).
+    """
     write_durably(path, build_page(material, pictures))
 
 

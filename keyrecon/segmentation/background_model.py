@@ -114,11 +114,14 @@ def build_background(
     while _mean_spread(background) > MAX_MEAN_SPREAD and count < most:
         count = min(2 * count, most)
         ends = np.linspace(0, len(video), count + 1).round().astype(int).tolist()
-        each = [
-            _sample_scene(video, slice(*part), camera, track, width, options, silent)
-            for part in pairwise(ends)
+        spans = progress([*pairwise(ends)], "Modelling the background in parts", count)
+        parts = [
+            # one part's pictures at a time: of all together they would fill the memory
+            _sample_scene(video, slice(*span), camera, track, width, options, silent).background(
+                overlay
+            )
+            for span in spans
         ]
-        parts = [scene.background(overlay) for scene in each]
         background = replace(parts[0], later=tuple(parts[1:]))
     return background
 

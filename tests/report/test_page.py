@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_material import make_material, on_court, on_ground, renamed_video, walk
+from report_material import make_material, on_court, on_ground, renamed_video, walk, write_report
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
@@ -19,7 +19,7 @@ from keyrecon.io.video import open_video
 from keyrecon.report import summary
 from keyrecon.report.headline import in_words, marked_share
 from keyrecon.report.markup import MOST_FRAMES, pack, thinning
-from keyrecon.report.page import build_page, write_report
+from keyrecon.report.page import build_page
 from keyrecon.report.pictures import LEAST_SIDE, SIDE, Windows, clip_side, cut_pictures
 from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
 from keyrecon.report.views import VIEWS, pose_drawing

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from page_driver import BROWSER
-from report_material import make_material, on_court, on_ground
-
-from keyrecon.report.page import write_report
+from report_material import make_material, on_court, on_ground, write_report
 
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE REPORT IS NOT OPENED: there is no browser at {BROWSER}"

@@ -12,6 +12,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Motion, PoseDistances, Track
 from keyrecon.report.drawing import draw_pose
 from keyrecon.report.markup import ReportMaterial
+from keyrecon.report.page import cut_report_pictures, write_page
 from keyrecon.world.records import GROUND, WorldMotion
 
 SCALE, FPS = 90.0, 25.0
@@ -160,3 +161,8 @@ def on_ground(material):
 def renamed_video(material, path):
     """The same material with a video of another name."""
     return replace(material, video=replace(material.video, path=path))
+
+
+def write_report(path, material):
+    """The report of a material, as `keyrecon run` writes it."""
+    write_page(path, material, cut_report_pictures(material))
