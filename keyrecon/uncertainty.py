@@ -218,7 +218,7 @@ def uncertain_stretches(
     open_runs = [
         (shot, shot.start + first, shot.start + last)
         for shot in motion.stretches
-        for first, last in _runs(uncertain[shot], gap)
+        for first, last in list_runs(uncertain[shot], gap)
     ]
     while open_runs:
         shot, first, last = open_runs.pop()
@@ -308,7 +308,7 @@ def unsure_track(track: Track, shots: Shots, reach: int, count: int = 3) -> list
     runs = [
         (shot.start + first, shot.start + last)
         for shot in shots.parts
-        for first, last in _runs(guessed[shot], 0)
+        for first, last in list_runs(guessed[shot], 0)
         if last - first >= reach
     ]
     longest = sorted(runs, key=lambda run: run[0] - run[1])[:count]
@@ -347,7 +347,7 @@ def body_parts(skeleton: Skeleton) -> dict[str, Int[np.ndarray, "_"]]:
     return {name: members for name, members in parts.items() if len(members)}
 
 
-def _runs(flags: Bool[np.ndarray, "T"], gap: int) -> list[tuple[int, int]]:
+def list_runs(flags: Bool[np.ndarray, "T"], gap: int) -> list[tuple[int, int]]:
     """First and last frames of runs of True that are more than `gap` frames apart."""
     frames = np.flatnonzero(flags)
     if not len(frames):

@@ -13,6 +13,7 @@ from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.app.project import annotated, asked_for
 from keyrecon.errors import KeyreconError, quoted
+from keyrecon.hyperextension import hyperextended_stretches
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
@@ -101,7 +102,8 @@ def run(
     note_run(workspace, RunNotes(evidence, tuple(doubts), advice))
     workspace.remember(given, Options())
     seconds = time.perf_counter() - started
-    lines = [*placed.lines, *shots, *doubts, *wrong, *describe_uncertainty(motion), *advice]
+    unsure = [*(one.text for one in hyperextended_stretches(motion)), *describe_uncertainty(motion)]
+    lines = [*placed.lines, *shots, *doubts, *wrong, *unsure, *advice]
     choices = [*_waiting_choices(workspace), *_other_choice(workspace, options, asked)]
     files = _describe_files(workspace, motion)
     return "\n".join([*files, *lines, *choices, f"Took {seconds:.0f} s."])

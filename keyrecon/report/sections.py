@@ -6,6 +6,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import counted
+from keyrecon.hyperextension import hyperextended_stretches
 from keyrecon.io.formats.conventions import stature
 from keyrecon.records import HalfKeyframes, Motion
 from keyrecon.report.headline import in_words, marked_frames
@@ -90,13 +91,17 @@ def _length_there(motion: Motion, stretch: UncertainStretch) -> str:
 def doubts(material: ReportMaterial) -> str:
     """Where the motion is least sure of itself, and the frames with the largest expected errors;
     empty where none are known."""
-    motion = material.motion
-    if motion.expected_error is None:
+    motion, backward = material.motion, hyperextended_stretches(material.motion)
+    if motion.expected_error is None and not backward:
         return ""
-    lines = "".join(
-        f'<li><button type="button" class="goes" data-frame="{stretch.frame}">'
-        f"{text(stretch.in_words(_length_there(motion, stretch)))}</button></li>"
+    told = [(stretch.frame, stretch.text) for stretch in backward]
+    told += [
+        (stretch.frame, stretch.in_words(_length_there(motion, stretch)))
         for stretch in uncertain_stretches(motion)
+    ]
+    lines = "".join(
+        f'<li><button type="button" class="goes" data-frame="{frame}">{text(line)}</button></li>'
+        for frame, line in told
     )
     rows = [
         (

@@ -15,8 +15,9 @@ from report_material import make_material, on_court, on_ground, renamed_video, w
 
 from keyrecon.annotation_budget import annotation_cost
 from keyrecon.body import LSP14
+from keyrecon.hyperextension import HyperextendedStretch
 from keyrecon.io.video import open_video
-from keyrecon.report import summary
+from keyrecon.report import sections, summary
 from keyrecon.report.headline import in_words, marked_share
 from keyrecon.report.markup import MOST_FRAMES, pack, thinning
 from keyrecon.report.page import build_page
@@ -489,3 +490,11 @@ def test_the_report_tells_where_it_is_least_sure_and_each_line_goes_there(materi
     former = build_page(replace(material, motion=replace(motion, expected_error=None)), pictures)
     assert 'id="doubts"' not in former
     assert 'href="#doubts"' not in former
+
+
+def test_the_report_tells_of_a_knee_that_bends_forwards(material, pictures, monkeypatch):
+    backward = HyperextendedStretch(3, 9, "left", 41.0, 6)
+    monkeypatch.setattr(sections, "hyperextended_stretches", lambda motion: [backward])
+    for motion in (material.motion, replace(material.motion, expected_error=None)):
+        written = build_page(replace(material, motion=motion), pictures)
+        assert f'class="goes" data-frame="6">{backward.text}<' in written

@@ -44,10 +44,11 @@ from keyrecon.annotate.assist.shot_strip import choose_shot, describe_shots
 from keyrecon.annotate.assist.side_checks import evidence_of_motion
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
+from keyrecon.hyperextension import HyperextendedStretch, hyperextended_stretches
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import frames_to_mark, marked_frames
 from keyrecon.records import Annotations, Pick
-from keyrecon.uncertainty import uncertain_stretches, unsure_track
+from keyrecon.uncertainty import UncertainStretch, uncertain_stretches, unsure_track
 
 MIN_CERTAINTY = 0.8
 """Of the depth signs that come with a suggestion: nine in ten are right."""
@@ -281,13 +282,13 @@ def describe_stretches(cache: ProjectCache, annotations: Annotations) -> list[Js
     """The worst stretches, as the command line tells them; those that were marked since are out."""
     preparation, motion = cache.preparation(), cache.motion()
     upper, lower = marked_frames(annotations)
+    stretches: list[HyperextendedStretch | UncertainStretch] = []
     if motion is not None:
-        stretches = uncertain_stretches(motion, np.union1d(upper, lower))
+        stretches += hyperextended_stretches(motion, np.array(lower, int))
+        stretches += uncertain_stretches(motion, np.union1d(upper, lower))
     elif preparation is not None:
         reach = preparation.keyframes.reach
-        stretches = unsure_track(preparation.track, preparation.shots, reach)
-    else:
-        return []
+        stretches += unsure_track(preparation.track, preparation.shots, reach)
     return [
         {
             "first": stretch.first,
