@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.lens import OPEN_FOCAL, known_focal
 from keyrecon.app.placing import most_tilt_error, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
@@ -14,6 +13,7 @@ from keyrecon.io.formats.ground_marks import merge_marks
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
+from keyrecon.lens import OPEN_FOCAL, known_focal
 from keyrecon.pipeline import Options
 from keyrecon.progress import Progress
 from keyrecon.records import Motion

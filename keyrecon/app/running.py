@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.lens import describe_nearness, field_of_view, lens_advice, lens_caveat
 from keyrecon.app.mark_checks import describe_doubtful_marks, marks_to_see
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.preparing import describe_shots, prepare_project
@@ -20,6 +19,13 @@ from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import list_stretches, listed_stretches
+from keyrecon.lens import (
+    degrees_across,
+    describe_nearness,
+    known_lens,
+    lens_advice,
+    lens_caveat,
+)
 from keyrecon.library import read_models, reconstruct
 from keyrecon.pipeline import Options, as_printed, with_field_of_view, with_height
 from keyrecon.progress import Progress
@@ -70,8 +76,9 @@ def run(
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
     video = workspace.video()
-    if options.lift.field_of_view is None:
-        options = with_field_of_view(options, field_of_view(workspace, video))
+    lens = known_lens(workspace, video)
+    if options.lift.field_of_view is None and lens is not None:
+        options = with_field_of_view(options, degrees_across(lens, video))
     evidence = marks_evidence(workspace)
     asked = asked_for(workspace, video)
     annotations = annotated(workspace, video, asked, partial)

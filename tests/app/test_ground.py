@@ -5,8 +5,9 @@ import pytest
 from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
 
+from keyrecon import lens
 from keyrecon.annotate.assist.ground_views import describe_ground
-from keyrecon.app import ground, lens
+from keyrecon.app import ground
 from keyrecon.app.ground import find_ground, ground_mark
 from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start

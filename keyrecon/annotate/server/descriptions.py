@@ -16,6 +16,7 @@ from keyrecon.body import Skeleton
 from keyrecon.io.provenance import marks_evidence, read_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
+from keyrecon.lens import degrees_across, known_lens
 from keyrecon.records import Keyframes
 
 Json = dict[str, Any]
@@ -148,14 +149,18 @@ def gains_of_frames(keyframes: Keyframes | None) -> dict[int, float]:
     return gains
 
 
-def describe_settings(workspace: Workspace) -> Json:
-    """Options of earlier runs that the page asks for; None where none was set."""
+def describe_settings(workspace: Workspace, video: Video) -> Json:
+    """Options of earlier runs that the page asks for, None where none was set; and the angle across
+    the picture that a run takes where none is, with what tells it."""
+    lens, typed = known_lens(workspace, video), workspace.ground_marks().field_of_view
+    told_by = "step 6 Ground" if typed is not None else lens and lens.told_by
     options = workspace.project.get("options", {})
     lift = options.get("lift", {})
     return {
         "budget": options.get("keyframes", {}).get("budget"),
         "height": lift.get("height"),
         "field_of_view": lift.get("field_of_view"),
+        "lens": lens and {"degrees": degrees_across(lens, video), "told_by": told_by},
     }
 
 

@@ -97,7 +97,7 @@ def describe_project(session: Session) -> Json:
         "boxes": explained.get("boxes"),
         "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
-        "settings": describe_settings(Workspace(session.workspace.folder)),
+        "settings": describe_settings(Workspace(session.workspace.folder), session.frames.video),
         "run": describe_run(session.workspace, revision),
         "has": {
             "picks": bool(picks_of(cells)),

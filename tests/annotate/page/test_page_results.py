@@ -21,11 +21,11 @@ from page_project import (
 
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
-from keyrecon.app.lens import lens_advice
 from keyrecon.body import LSP14
 from keyrecon.io.formats.export import SUFFIXES
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run, read_run
 from keyrecon.io.workspace import Workspace
+from keyrecon.lens import lens_advice
 from keyrecon.pipeline import Options, with_field_of_view
 from keyrecon.report.overlay import Limbs, View
 

@@ -148,6 +148,9 @@ test("a height is metres or centimetres, and nothing else", () => {
 test("a field of view is degrees that a camera can have, or empty", () => {
   for (const text of ["62", " 62,0 ", "62°", "62 degrees"]) assert.equal(workflow.fieldOfViewIn(text).degrees, 62, text);
   assert.deepEqual(workflow.fieldOfViewIn(" "), { degrees: null, said: "empty: not told", wrong: false });
+  const lens = { degrees: 61.7, told_by: "the lens that the file names" };
+  assert.equal(workflow.fieldOfViewIn("", lens).said, "empty: 62 degrees by the lens that the file names");
+  assert.equal(workflow.fieldOfViewIn("70", lens).degrees, 70);
   for (const text of ["0", "3", "-62", "150", "wide", "6.2.0", "1e2", "28 mm"])
     assert.equal(workflow.fieldOfViewIn(text).wrong, true, text);
 });

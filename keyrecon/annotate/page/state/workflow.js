@@ -136,11 +136,13 @@ export function heightIn(text) {
 
 const FIELDS_OF_VIEW = [3, 150]; // of a camera, degrees across the picture
 
-// A field of view as it was typed: {degrees, said, wrong}; degrees is null for an empty field.
-export function fieldOfViewIn(text) {
+// A field of view as it was typed: {degrees, said, wrong}; degrees is null for an empty field. `lens`
+// is what tells it where nothing is typed, {degrees, told_by}.
+export function fieldOfViewIn(text, lens = null) {
   const [, number] = text.trim().replace(",", ".").match(/^([\d.]+)\s*(?:°|deg|degrees)?$/i) ?? [],
     degrees = Number(number);
-  if (!text.trim()) return { degrees: null, said: "empty: not told", wrong: false };
+  const known = lens ? `${lens.degrees.toFixed(0)} degrees by ${lens.told_by}` : "not told";
+  if (!text.trim()) return { degrees: null, said: `empty: ${known}`, wrong: false };
   if (degrees > FIELDS_OF_VIEW[0] && degrees < FIELDS_OF_VIEW[1])
     return { degrees, said: "degrees across the picture", wrong: false };
   return { degrees: null, said: "degrees across the picture: 62", wrong: true };

@@ -69,7 +69,10 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     show(number);
   }
 
-  const typed = () => ({ height: heightIn(byId("height").value), fov: fieldOfViewIn(byId("fov").value) });
+  const typed = () => ({
+    height: heightIn(byId("height").value),
+    fov: fieldOfViewIn(byId("fov").value, model.project.settings.lens),
+  });
 
   async function makeMotion() {
     const { height, fov } = typed();

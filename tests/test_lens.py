@@ -8,8 +8,9 @@ import pytest
 from court_walker import court_camera
 from ground_walker import CAMERA, SIZE, seen, standing
 
+from keyrecon import lens
+from keyrecon.annotate.server.descriptions import describe_settings
 from keyrecon.annotate.server.page_words import in_page_words
-from keyrecon.app import lens
 from keyrecon.app.project import start
 from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.video_writer import write_video
@@ -28,25 +29,49 @@ def degrees_of(focal):
     return np.degrees(2 * np.arctan(SIZE[0] / 2 / focal))
 
 
+def degrees_known(workspace):
+    """Across the picture by what the project knows."""
+    video = workspace.video()
+    known = lens.known_lens(workspace, video)
+    return None if known is None else lens.degrees_across(known, video)
+
+
 def test_nothing_is_known_of_a_lens_that_nobody_told(workspace):
-    assert lens.field_of_view(workspace, workspace.video()) is None
+    assert degrees_known(workspace) is None
 
 
 def test_a_lens_is_known_by_the_camera_of_a_court_unless_its_focal_length_is_open(workspace):
     camera = court_camera(CAMERA, 3)
     write_camera(workspace.camera_file, camera)
-    known = lens.field_of_view(workspace, workspace.video())
+    known = degrees_known(workspace)
     assert known == pytest.approx(degrees_of(CAMERA.focal))
     write_camera(workspace.camera_file, replace(camera, sd_focal=0.4 * camera.focal))
-    assert lens.field_of_view(workspace, workspace.video()) is None
+    assert degrees_known(workspace) is None
 
 
 def test_what_a_person_told_of_the_lens_counts_before_what_the_file_tells(workspace, monkeypatch):
     monkeypatch.setattr(lens, "lens_focal", lambda path, size: 1100.0)
-    by_file = lens.field_of_view(workspace, workspace.video())
+    by_file = degrees_known(workspace)
     assert by_file == pytest.approx(degrees_of(1100.0))
     workspace.change_ground_marks(GroundMarks(field_of_view=48.0))
-    assert lens.field_of_view(workspace, workspace.video()) == pytest.approx(48.0)
+    assert degrees_known(workspace) == pytest.approx(48.0)
+
+
+def test_the_page_is_told_of_a_lens_that_nobody_has_to_type(workspace, monkeypatch):
+    video = workspace.video()
+    assert describe_settings(workspace, video)["lens"] is None
+    write_camera(workspace.camera_file, court_camera(CAMERA, 3))
+    told = describe_settings(workspace, video)["lens"]
+    assert told == {
+        "degrees": pytest.approx(degrees_of(CAMERA.focal)),
+        "told_by": "the camera that the court told",
+    }
+    monkeypatch.setattr(lens, "lens_focal", lambda path, size: 1100.0)
+    told = describe_settings(workspace, video)["lens"]
+    assert told["told_by"] == "the lens that the file names"
+    workspace.change_ground_marks(GroundMarks(field_of_view=48.0))
+    told = describe_settings(workspace, video)["lens"]
+    assert told == {"degrees": pytest.approx(48.0), "told_by": "step 6 Ground"}
 
 
 def test_a_player_who_fills_the_picture_is_asked_for_the_lens(workspace):

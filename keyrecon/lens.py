@@ -38,14 +38,16 @@ def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
     return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")
 
 
-def field_of_view(workspace: Workspace, video: Video) -> float | None:
-    """Angle across the picture, degrees: told with `keyrecon ground`, by the file, or by the camera
-    that a court or the ground told; None where none of them does."""
+def known_lens(workspace: Workspace, video: Video) -> FieldOfView | None:
+    """The focal length by `keyrecon ground`, by the file, or by the camera that a court or the
+    ground told; None where none of them does."""
     known = known_focal(video, workspace.ground_marks().field_of_view)
-    focal = _calibrated_focal(workspace) if known is None else known.focal
-    if focal is None:
-        return None
-    return float(np.degrees(2 * np.arctan(video.width / 2 / focal)))
+    return _calibrated_lens(workspace) if known is None else known
+
+
+def degrees_across(lens: FieldOfView, video: Video) -> float:
+    """The angle across the picture, degrees."""
+    return float(np.degrees(2 * np.arctan(video.width / 2 / lens.focal)))
 
 
 def lens_advice(folder: Path, nearness: str) -> str:
@@ -76,11 +78,15 @@ def describe_nearness(motion: Motion, video: Video) -> str | None:
     )
 
 
-def _calibrated_focal(workspace: Workspace) -> float | None:
-    """px, the median of all frames; None where nothing has told it."""
+def _calibrated_lens(workspace: Workspace) -> FieldOfView | None:
+    """The median of all frames; None where no camera is known well enough."""
     if not workspace.camera_file.is_file():
         return None
     camera = read_camera(workspace.camera_file)
     focal = camera.focal[camera.found]
-    sure = len(focal) and np.median(camera.sd_focal[camera.found] / focal) <= OPEN_FOCAL
-    return float(np.median(focal)) if sure else None
+    if not len(focal):
+        return None
+    spread = float(np.median(camera.sd_focal[camera.found] / focal))
+    if not spread <= OPEN_FOCAL:
+        return None
+    return FieldOfView(float(np.median(focal)), spread, f"the camera that the {camera.origin} told")
