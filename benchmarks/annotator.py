@@ -120,14 +120,21 @@ def finish(person: Person, frame: int, answers: Answers, before: tuple[int, int,
     return Work(joints, clicks, drags, keys - before[2], person.keys - keys)
 
 
-def mark_all(folder: Path, frames: list[int], way: partial) -> tuple[list[Work], list[float]]:
+def mark_all(
+    folder: Path, frames: list[int], way: partial, own: list[int] | None = None
+) -> tuple[list[Work], list[float]]:
     """Mark the keyframes of a project through its page; work by keyframe, pose answers in ms.
 
-    The lists of checks are not open meanwhile, so they are not computed.
+    The lists of checks are not open meanwhile, so they are not computed. Frames of the person's
+    `own` are keyframes too.
     """
     assistant = replace(make_assistant(Workspace(folder)), checks=None, next_frames=None)
     with browser() as chromium, serving(folder, assistant) as server:
         person = Person(chromium.new_context(viewport=SCREEN), server.credentials.address)
+        if own:
+            person.add_keyframes(own)
+            person.page.reload()
+            person.await_text("#done-count", "of")
         work = [way(person, frame) for frame in show(frames, "Marking keyframes", len(frames))]
         poses = person.durations("pose")
         person.page.close()
