@@ -35,7 +35,6 @@ from variant import cut
 from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.app.console import show
 from keyrecon.body import LSP14
-from keyrecon.following import follow_marks
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
@@ -49,6 +48,7 @@ from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
 from keyrecon.propagation.propagation import propagate_joints
 from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Annotations, FlowTracks, Preparation
+from keyrecon.shots.following import follow_marks
 from keyrecon.tracking.mark_flow import track_marked_joints
 
 SEQUENCES = (

@@ -25,9 +25,9 @@ from typing import Any, NamedTuple, NoReturn
 from tyro.extras import SubcommandApp
 
 from keyrecon import __version__
+from keyrecon.commands.option_help import described_options
+from keyrecon.commands.refusals import explain_refusal, no_such_command
 from keyrecon.errors import KeyreconError
-from keyrecon.option_help import described_options
-from keyrecon.usage import explain_refusal, no_such_command
 
 DESCRIPTION = "3D motion of an athlete from one ordinary camera and a few keyframes."
 BAD_USAGE, INTERRUPTED, READER_GONE = 2, 130, 141

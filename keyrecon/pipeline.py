@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Int
 
 from keyrecon.errors import KeyreconError
-from keyrecon.following import FollowOptions, follow_marks, follow_player
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.frame_reader import in_threads
@@ -51,7 +50,9 @@ from keyrecon.segmentation.marked_bodies import (
     picks_from_bodies,
     with_heights,
 )
-from keyrecon.shot_groups import propagate_in_groups
+from keyrecon.shots.following import FollowOptions, follow_marks, follow_player
+from keyrecon.shots.groups import propagate_in_groups
+from keyrecon.shots.usable import in_file, marks_in_shots, usable_part
 from keyrecon.timeline import (
     cut_motion,
     end_at_cuts,
@@ -68,7 +69,6 @@ from keyrecon.tracking.shot_sorting import ShotOptions
 from keyrecon.tracking.tracker import TrackOptions
 from keyrecon.uncertainty import expected_error
 from keyrecon.unseen import without_hidden_legs, without_unseen
-from keyrecon.usable_shots import in_file, marks_in_shots, usable_part
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from command_line import keyrecon as call
 from small_motion import make_motion
 
 from keyrecon.errors import KeyreconError
-from keyrecon.following import FollowOptions, follow_player
 from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import CameraPath, Colors, TrackAnchors
+from keyrecon.shots.following import FollowOptions, follow_player
 from keyrecon.tracking.shot_sorting import ShotOptions
 
 

@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
 STAGES = {"tracking", "keyframes", "propagation", "lifting", "golf", "world", "strokes"}
-OUTER = {"app", "cli", "commands", "pipeline", "following", "annotate", "report", "synthetic"}
+OUTER = {"app", "cli", "commands", "pipeline", "shots", "annotate", "report", "synthetic"}
 OUTER |= {"keeping"}
 BASE = {
     "records",

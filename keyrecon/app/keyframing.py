@@ -16,7 +16,6 @@ from keyrecon.app.preparing import (
 )
 from keyrecon.app.project import load_annotations
 from keyrecon.errors import counted, quoted
-from keyrecon.following import HELD
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.frame_reader import side_by_side
@@ -30,6 +29,7 @@ from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import HalfKeyframes, Keyframes, Preparation
 from keyrecon.report.drawing import point_out
+from keyrecon.shots.following import HELD
 from keyrecon.uncertainty import unsure_track
 
 

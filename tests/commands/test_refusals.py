@@ -7,7 +7,7 @@ import pytest
 from command_line import keyrecon
 
 from keyrecon import cli
-from keyrecon.usage import explain_refusal
+from keyrecon.commands.refusals import explain_refusal
 
 FRAMES = (
     """╭─ Required options ────────────╮

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from keyrecon.records import Shots
-from keyrecon.shot_groups import group_shots
+from keyrecon.shots.groups import group_shots
 
 SHOTS = Shots.between((300, 420, 1500, 1530), 2000)
 ANNOTATED = np.array([10, 302, 700, 1990])

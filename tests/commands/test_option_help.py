@@ -6,8 +6,8 @@ import pytest
 from tyro import cli as typed
 
 from keyrecon import cli
+from keyrecon.commands.option_help import described_options, explained
 from keyrecon.lifting.lifting import LiftOptions
-from keyrecon.option_help import described_options, explained
 from keyrecon.tracking.mark_flow import FlowOptions
 
 VERBS = [

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Int
 
-from keyrecon.following import FollowedPlayer
 from keyrecon.io.video import Video
 from keyrecon.keyframes.absence import restore_frames, select_frames
 from keyrecon.records import (
@@ -17,6 +16,7 @@ from keyrecon.records import (
     Preparation,
     Shots,
 )
+from keyrecon.shots.following import FollowedPlayer
 from keyrecon.timeline import (
     part_of_keyframes,
     part_of_marks,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from drawn_player import SIZE, draw_player, film, heads, picks, scene
 
-from keyrecon.following import FollowOptions, follow_player
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.keeping import call_stage
 from keyrecon.records import PLAYER, CameraPath, TrackAnchors
 from keyrecon.segmentation.color_model import learn_colors
+from keyrecon.shots.following import FollowOptions, follow_player
 from keyrecon.tracking.shot_sorting import ShotOptions
 
 COUNT, SHOWN = 40, 12

@@ -21,8 +21,8 @@ from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import Annotations, FlowTracks, JointTracks, Preparation, Shots
+from keyrecon.shots.usable import part_of_preparation
 from keyrecon.timeline import join_frames, part_of_marks, take_frames
-from keyrecon.usable_shots import part_of_preparation
 
 MOST_FRAMES = 9000
 """Of a group, the annotated frames of others apart: three minutes at 50 frames a second, six at
