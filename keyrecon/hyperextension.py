@@ -44,9 +44,9 @@ class HyperextendedStretch:
         one = self.first == self.last
         where = f"Frame {self.first}" if one else f"Frames {self.first}-{self.last}"
         return (
-            f"{where}: in space the {self.side} knee bends forwards, by up to {self.angle:.0f} "
-            f"degrees, as no knee does; marking the legs of frame {self.frame}, and which ends of "
-            "their bones are nearer the camera, would help most."
+            f"{where}: the {self.side} knee bends forwards in space, by up to {self.angle:.0f} "
+            f"degrees; marking the legs of frame {self.frame}, and which ends of their bones are "
+            "nearer, would help most."
         )
 
 

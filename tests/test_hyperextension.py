@@ -69,7 +69,7 @@ def test_a_knee_that_bends_forwards_is_told_with_its_side_and_the_frame_to_mark(
     assert (stretch.first, stretch.last, stretch.side) == (30, 49, "left")
     assert 30 <= stretch.frame <= 49
     assert stretch.angle == pytest.approx(50, abs=12)  # the thigh is not quite across the hips
-    assert stretch.text.startswith("Frames 30-49: in space the left knee bends forwards")
+    assert stretch.text.startswith("Frames 30-49: the left knee bends forwards in space, by up to")
     assert f"frame {stretch.frame}" in stretch.text
 
 
