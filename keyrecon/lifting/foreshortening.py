@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import RectBivariateSpline
 
+from keyrecon.numerics.spline_tables import SplineTables
+
 _OUTLIER_SHARE = 0.03
 """Density of gross errors over log q: one observed length in thirty says nothing. Chosen on
 rendered sequences; see benchmarks/sensitivity.py."""
@@ -50,63 +52,58 @@ def _kernel() -> tuple[Float[np.ndarray, "..."], ...]:
 
 
 @cache
-def _density(inclination: float) -> RectBivariateSpline:
+def _densities() -> SplineTables:
+    """One table for each of `INCLINATIONS`."""
     foreshortening, noise, share, peak, kernel = _kernel()
-    weight = _inclination_weight(share, inclination)
-    density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
-    table = np.log(foreshortening[:, None] * density + _OUTLIER_SHARE)
-    return RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=2)
+    splines = []
+    for inclination in INCLINATIONS:
+        weight = _inclination_weight(share, inclination)
+        density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
+        table = np.log(foreshortening[:, None] * density + _OUTLIER_SHARE)
+        splines.append(RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=2))
+    return SplineTables(splines)
 
 
 @cache
-def _moments() -> tuple[RectBivariateSpline, RectBivariateSpline]:
+def _moments() -> SplineTables:
+    """Mean and standard deviation of the depth share."""
     foreshortening, noise, share, _, kernel = _kernel()
     total = kernel.sum(axis=-1)
     mean = kernel @ share / total
     variance = np.maximum(kernel @ share**2 / total - mean**2, 0.0)
     grid = (foreshortening, np.log(noise))
-    return (
-        RectBivariateSpline(*grid, mean, kx=1, ky=1),
-        RectBivariateSpline(*grid, np.sqrt(variance), kx=1, ky=1),
-    )
+    tables = mean, np.sqrt(variance)
+    return SplineTables([RectBivariateSpline(*grid, table, kx=1, ky=1) for table in tables])
 
 
-def log_density(
-    foreshortening: Float[np.ndarray, "*n"],
-    noise: Float[np.ndarray, "*n"],
-    inclination: float = 0.0,
-) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
-    """Logarithm of the density of log q, and what it loses per unit of the log full length.
+def log_densities(
+    foreshortening: Float[np.ndarray, "n"], noise: Float[np.ndarray, "n"]
+) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
+    """Logarithms of the density of log q, and what they lose per unit of the log full length.
 
-    A longer bone makes both the foreshortening and the relative noise smaller.
+    One row for each of `INCLINATIONS`. A longer bone makes both the foreshortening and the relative
+    noise smaller.
     """
     at = _grid(foreshortening, noise)
-    table = _density(inclination)
-    by_q = np.where(foreshortening < _MAX_FORESHORTENING, table.ev(*at, dx=1), 0.0)
+    value, by_q, by_noise = _densities().values_and_slopes(*at)
+    by_q = np.where(foreshortening < _MAX_FORESHORTENING, by_q, 0.0)
     tabulated = (noise > _MIN_NOISE) & (noise < _MAX_NOISE)
-    by_noise = np.where(tabulated, table.ev(*at, dy=1), 0.0)
-    return table.ev(*at), by_q * at[0] + by_noise
+    return value, by_q * at[0] + np.where(tabulated, by_noise, 0.0)
 
 
 def depth_share(
     foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
-) -> Float[np.ndarray, "*n"]:
-    """Expected |dz| / l of a bone of which the picture shows the share `foreshortening`."""
-    mean, _ = _moments()
-    return mean.ev(*_grid(foreshortening, noise))
-
-
-def depth_share_spread(
-    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
-) -> Float[np.ndarray, "*n"]:
-    """Standard deviation of |dz| / l about `depth_share`."""
-    _, deviation = _moments()
-    return deviation.ev(*_grid(foreshortening, noise))
+) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    """Expected |dz| / l of a bone of which the picture shows the share `foreshortening`, and its
+    standard deviation."""
+    at = _grid(foreshortening.ravel(), noise.ravel())
+    mean, deviation = _moments().values(*at)
+    return mean.reshape(foreshortening.shape), deviation.reshape(foreshortening.shape)
 
 
 def _grid(
-    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
-) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    foreshortening: Float[np.ndarray, "n"], noise: Float[np.ndarray, "n"]
+) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
     return np.clip(foreshortening, 0.0, _MAX_FORESHORTENING), np.log(
         np.clip(noise, _MIN_NOISE, _MAX_NOISE)
     )

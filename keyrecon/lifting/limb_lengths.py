@@ -21,7 +21,7 @@ from scipy.sparse import block_array, block_diag, csr_array, eye_array, vstack
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.foreshortening import INCLINATIONS, log_density
+from keyrecon.lifting.foreshortening import log_densities
 from keyrecon.ranges import within
 from keyrecon.records import Annotations, JointTracks, Shots
 
@@ -377,16 +377,12 @@ def _log_likelihood(
     the side never have their full breadth): all observations of a group share one unknown
     inclination.
     """
-    value = np.empty((len(INCLINATIONS), groups))
-    slopes = []
-    for row, inclination in enumerate(INCLINATIONS):
-        log_p, slope = log_density(foreshortening, noise, inclination)
-        value[row] = np.bincount(group, log_p, groups)
-        slopes.append(slope)
+    log_p, slopes = log_densities(foreshortening, noise)
+    value = np.array([np.bincount(group, row, groups) for row in log_p])
     best = value.max(axis=0)
     weight = np.exp(value - best)
     total = weight.sum(axis=0)
-    mean_slope = ((weight / total)[:, group] * np.array(slopes)).sum(axis=0)
+    mean_slope = ((weight / total)[:, group] * slopes).sum(axis=0)
     return float((best + np.log(total)).sum()), mean_slope
 
 

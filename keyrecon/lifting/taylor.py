@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSigns, ForeshortenedBones
-from keyrecon.lifting.foreshortening import depth_share, depth_share_spread
+from keyrecon.lifting.foreshortening import depth_share
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks
 from keyrecon.numerics.geometry import unit_vectors
@@ -78,12 +78,12 @@ def foreshorten_bones(
     foreshortening = np.linalg.norm(vectors, axis=-1) / lengths
     foreshortening = np.where(missing, _MISSING_FORESHORTENING, foreshortening)
     blur = np.where(missing, _MISSING_NOISE, blur)
-    share = depth_share(foreshortening, blur)
+    share, spread = depth_share(foreshortening, blur)
     in_plane = np.sqrt(1 - share**2)[..., None] * unit_vectors(np.nan_to_num(vectors))
     return ForeshortenedBones(
         in_plane=lengths[:, None] * in_plane,
         depth=lengths * share,
-        depth_spread=lengths * depth_share_spread(foreshortening, blur),
+        depth_spread=lengths * spread,
         expected_depth=np.full(share.shape, np.nan),
     )
 
