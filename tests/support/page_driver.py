@@ -23,6 +23,10 @@ BROWSER = Path(os.environ.get("KEYRECON_BROWSER", "/usr/bin/chromium"))
 """The program that shows the page; one with `firefox` in its name is driven as Firefox is."""
 SCREEN = {"width": 1366, "height": 768}
 SELECTED = "document.querySelector('.joint.selected')?.dataset.joint"
+OPEN_JOINTS = (
+    "[...document.querySelectorAll('.joint[data-joint]:not([hidden]):not(.marked)')]"
+    ".map((row) => row.dataset.joint)"
+)
 SOON = 60_000
 """How long the page may take for anything, ms."""
 
@@ -187,6 +191,19 @@ class Person:
         self.click(place_of(joint))
         self.page.wait_for_function(f"joint => {SELECTED} !== joint", arg=joint)
 
+    def have_marked(self, frame, place_of):
+        """Open a keyframe with every joint of it marked at one go, without a click."""
+        self.open(frame)
+        names = self.page.evaluate(OPEN_JOINTS)
+        places = {name: [float(x) for x in place_of(name)] for name in names}
+        edits = [
+            {"id": f"given-{frame}-{name}", "kind": "mark", "frame": frame, "joint": name}
+            | {"to": [*at, 2], "from": None}
+            for name, at in places.items()
+        ]
+        self._send(edits)
+        self.page.wait_for_function(f"() => {OPEN_JOINTS}.length === 0")
+
     def give_depths(self, signs, place_of):
         """Take the best of the poses offered and turn the limbs that are wrong in it.
 
@@ -206,10 +223,7 @@ class Person:
     def suggestion(self, frame):
         """What is suggested for the open joints of a keyframe, once the page shows it."""
         answer = self.page.evaluate(f"fetch('/api/suggestion/{frame}').then((a) => a.json())")
-        open_joints = self.page.evaluate(
-            "[...document.querySelectorAll('.joint[data-joint]:not([hidden]):not(.marked)')]"
-            ".map((row) => row.dataset.joint)"
-        )
+        open_joints = self.page.evaluate(OPEN_JOINTS)
         offered = {name: at for name, at in answer.get("joints", {}).items() if name in open_joints}
         if offered:
             self.await_text("#prompt-text", "suggestion|Which ends|done")
@@ -226,12 +240,15 @@ class Person:
             {"id": f"own-{n}", "kind": "own", "frame": n, "to": "both", "from": None}
             for n in frames
         ]
+        self._send(edits)
+        self.await_text("#done-count", "of")
+
+    def _send(self, edits):
         self.page.evaluate(
             "edits => fetch('/api/edits', {method: 'POST', body: JSON.stringify({edits}),"
             " headers: {'Content-Type': 'application/json'}})",
             edits,
         )
-        self.await_text("#done-count", "of")
 
     def durations(self, name):
         """How long what the page measures under a name took each time, ms."""

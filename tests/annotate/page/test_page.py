@@ -485,8 +485,7 @@ def test_a_keyframe_with_its_depths_is_fourteen_clicks_and_six_keys(context, fol
 def start_counting(context, server):
     """Somebody who has marked a frame and has the motion made, which takes its time."""
     person = Person(context, server.credentials.address)
-    person.open(40)
-    person.mark_joints(partial(place_of, 40))
+    person.have_marked(40, partial(place_of, 40))
     person.press("Alt+3")
     person.await_text("#motion-text", "Make the motion")
     person.press("Enter")
@@ -551,8 +550,7 @@ def test_what_is_uncertain_is_asked_for_anew_when_a_run_has_ended(context, folde
         person.page.click("[data-tab=next]")
         person.await_text("#explanation", "stored results are missing")
         assert person.text("#next-list") == ""
-        person.open(40)
-        person.mark_joints(partial(place_of, 40))
+        person.have_marked(40, partial(place_of, 40))
         person.await_saved()
         person.page.wait_for_timeout(1500)  # what edits set off has come to rest
         told.append(True)
@@ -568,8 +566,7 @@ def test_what_is_uncertain_is_asked_for_anew_when_a_run_has_ended(context, folde
 def test_the_end_of_work_that_was_never_seen_to_run_is_news(context, folder):
     with serving(folder, Assistant(), {"run": partial(follow_at_once, folder)}) as server:
         person = Person(context, server.credentials.address)
-        person.open(40)
-        person.mark_joints(partial(place_of, 40))
+        person.have_marked(40, partial(place_of, 40))
         person.await_saved()
         person.press("Alt+3")
         person.page.evaluate("() => { requestAnimationFrame = (draw) => setTimeout(draw, 3000); }")

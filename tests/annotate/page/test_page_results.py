@@ -72,9 +72,13 @@ def visit(chromium):
         assert person.complaints == []
 
 
+def place(joint):
+    """Where it is in frame 40."""
+    return POINTS2D[40, LSP14.index(joint)]
+
+
 def mark_and_run(person, height=""):
-    person.open(40)
-    person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+    person.have_marked(40, place)
     person.await_saved()
     person.press("Alt+3")
     person.await_text("#motion-text", "Make the motion")
@@ -188,8 +192,7 @@ def test_a_run_that_was_cancelled_is_not_taken_for_one_that_knows_the_marks(fold
         (folder / "cache").mkdir(exist_ok=True)
         note_run(workspace, RunNotes("of other marks", ()))
         person = visit(server)
-        person.open(40)
-        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.have_marked(40, place)
         person.await_saved()
         person.press("Alt+3")
         person.await_text("#motion-text", "Not yet in the motion")
@@ -239,8 +242,7 @@ def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
     write_true_motion(folder)
     with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
         person = visit(server)
-        person.open(40)
-        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.have_marked(40, place)
         person.press("Alt+3")
         for typed in ("18", "0", "1.8.0", "tall"):
             person.page.fill("#height", typed)
@@ -252,8 +254,7 @@ def test_a_field_of_view_is_remembered_told_to_the_run_and_cleared(folder, visit
     Workspace(folder).remember(with_field_of_view(Options(), 62.5), Options())
     with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
         person = visit(server)
-        person.open(40)
-        person.mark_joints(lambda joint: POINTS2D[40, LSP14.index(joint)])
+        person.have_marked(40, place)
         person.press("Alt+3")
         assert person.page.input_value("#fov") == "62.5"
         for typed in ("2", "180", "28 mm"):

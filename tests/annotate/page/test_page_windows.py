@@ -57,8 +57,7 @@ def test_what_is_said_of_a_motion_is_not_cut_off(chromium, tmp_path, server, wid
     with serving(folder) as served:
         context = chromium.new_context(viewport={"width": width, "height": 768})
         person = Person(context, served.credentials.address)
-        person.open(40)
-        person.mark_joints(lambda joint: truth()[1][40, LSP14.index(joint)])
+        person.have_marked(40, lambda joint: truth()[1][40, LSP14.index(joint)])
         person.await_saved()
         person.press("Alt+3")
         person.await_text("#motion-text", "Not yet in the motion")
