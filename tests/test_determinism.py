@@ -29,23 +29,26 @@ from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.records import Annotations
 
-video, folder = Path(sys.argv[1]), Path(sys.argv[2])
-project.start(video, folder)
-workspace = Workspace(folder)
-workspace.add_picks(picks(24, True))
-keyframing.find_keyframes(workspace, Options(), keyframing.KeyframeSettings(budget=0.2), silent)
-frames = read_keyframes(workspace.keyframes_file).frames
-places = (heads(24) - corners(24, True))[frames, None] + OFFSETS
-seen, nearer = np.ones(places.shape[:2], bool), np.zeros((len(frames), 13), np.int64)
-marks = Annotations(LSP14, frames, places, seen, nearer)
-write_coco(workspace.annotations_file, marks, (320, 180))
-running.run(workspace, running.settings(workspace, Options(), 1.8), silent)
-names = ["m.bvh", "m.trc", "m.csv", "m.glb", "m.json", "m.npz", "m.mp4", "m.c3d"]
-exporting.export(workspace, [folder / name for name in names], silent)
-few, assistant = Annotations(LSP14, frames[:2], places[:2], seen[:2], nearer[:2]), None
-assistant = make_assistant(workspace)
-told = [assistant.suggestion(few, int(frame)) for frame in (frames[2], 15)]
-(folder / "suggestions.json").write_text(repr([told, assistant.next_frames(few, frozenset())]))
+def make(video, folder):
+    project.start(video, folder)
+    workspace = Workspace(folder)
+    workspace.add_picks(picks(24, True))
+    keyframing.find_keyframes(workspace, Options(), keyframing.KeyframeSettings(budget=0.2), silent)
+    frames = read_keyframes(workspace.keyframes_file).frames
+    places = (heads(24) - corners(24, True))[frames, None] + OFFSETS
+    seen, nearer = np.ones(places.shape[:2], bool), np.zeros((len(frames), 13), np.int64)
+    marks = Annotations(LSP14, frames, places, seen, nearer)
+    write_coco(workspace.annotations_file, marks, (320, 180))
+    running.run(workspace, running.settings(workspace, Options(), 1.8), silent)
+    names = ["m.bvh", "m.trc", "m.csv", "m.glb", "m.json", "m.npz", "m.mp4", "m.c3d"]
+    exporting.export(workspace, [folder / name for name in names], silent)
+    few, assistant = Annotations(LSP14, frames[:2], places[:2], seen[:2], nearer[:2]), None
+    assistant = make_assistant(workspace)
+    told = [assistant.suggestion(few, int(frame)) for frame in (frames[2], 15)]
+    (folder / "suggestions.json").write_text(repr([told, assistant.next_frames(few, frozenset())]))
+
+for folder in sys.argv[2:]:
+    make(Path(sys.argv[1]), Path(folder))
 """
 SWING = """
 import sys
@@ -60,19 +63,19 @@ TIMED = ("report.html", "project.toml", "annotator.json")
 """Files that tell how long something took, or where the video lies from there."""
 
 
-def made_by(script: str, video: Path, folder: Path, cores: set[int]) -> dict[str, str]:
-    """Digests of all files that a script makes in a folder, on some cores."""
+def made_by(script: str, video: Path, folders: list[Path], cores: set[int]) -> list[dict[str, str]]:
+    """Digests of all files that a script makes in each of some folders, on some cores."""
     support = [path for path in sys.path if path]
     environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
     ran = subprocess.run(
-        [sys.executable, "-c", script, str(video), str(folder)],
+        [sys.executable, "-c", script, str(video), *map(str, folders)],
         capture_output=True,
         text=True,
         env={**environment, "PYTHONPATH": os.pathsep.join([*support, str(ASSIST)])},
         preexec_fn=lambda: os.sched_setaffinity(0, cores),
     )
     assert ran.returncode == 0, ran.stderr
-    return digests(folder)
+    return [digests(folder) for folder in folders]
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -98,10 +101,10 @@ several_cores = pytest.mark.skipif(
 def test_one_core_and_all_cores_make_the_same_files_and_so_does_a_second_time(tmp_path):
     film(tmp_path / "rally.mp4", 24, True)
     cores = os.sched_getaffinity(0)
-    one = made_by(RALLY, tmp_path / "rally.mp4", tmp_path / "one", {min(cores)})
+    (one,) = made_by(RALLY, tmp_path / "rally.mp4", [tmp_path / "one"], {min(cores)})
     assert len(one) > 5
-    for name in ("all", "again"):
-        other = made_by(RALLY, tmp_path / "rally.mp4", tmp_path / name, cores)
+    others = [tmp_path / "all", tmp_path / "again"]
+    for other in made_by(RALLY, tmp_path / "rally.mp4", others, cores):
         assert differing(one, other) == set()
 
 
@@ -110,7 +113,7 @@ def test_so_they_do_of_a_swing_and_so_does_another_program(fitted_swing, tmp_pat
     here, cores = digests(fitted_swing / "project"), os.sched_getaffinity(0)
     assert len(here) > 5
     for name, some in (("one", {min(cores)}), ("all", cores)):
-        other = made_by(SWING, fitted_swing / "video.mp4", tmp_path / name, some)
+        (other,) = made_by(SWING, fitted_swing / "video.mp4", [tmp_path / name], some)
         assert differing(here, other) == set()
 
 
