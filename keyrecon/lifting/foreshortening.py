@@ -8,13 +8,12 @@ depth share E[c | q]; the latter replaces Taylor's sqrt(1 - q^2), whose slope is
 and which has no value beyond (Taylor, CVIU 80, 2000).
 """
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import RectBivariateSpline
-
-from keyrecon.numerics.spline_tables import SplineTables
+from scipy.interpolate import NdBSpline, RectBivariateSpline
 
 _OUTLIER_SHARE = 0.03
 """Density of gross errors over log q: one observed length in thirty says nothing. Chosen on
@@ -52,28 +51,36 @@ def _kernel() -> tuple[Float[np.ndarray, "..."], ...]:
 
 
 @cache
-def _densities() -> SplineTables:
+def _densities() -> NdBSpline:
     """One table for each of `INCLINATIONS`."""
     foreshortening, noise, share, peak, kernel = _kernel()
-    splines = []
+    tables = []
     for inclination in INCLINATIONS:
         weight = _inclination_weight(share, inclination)
         density = (kernel @ weight) / len(share) * np.exp(peak) / (noise * np.sqrt(2 * np.pi))
-        table = np.log(foreshortening[:, None] * density + _OUTLIER_SHARE)
-        splines.append(RectBivariateSpline(foreshortening, np.log(noise), table, kx=2, ky=2))
-    return SplineTables(splines)
+        tables.append(np.log(foreshortening[:, None] * density + _OUTLIER_SHARE))
+    return _interpolated(tables, 2)
 
 
 @cache
-def _moments() -> SplineTables:
+def _moments() -> NdBSpline:
     """Mean and standard deviation of the depth share."""
-    foreshortening, noise, share, _, kernel = _kernel()
+    _, _, share, _, kernel = _kernel()
     total = kernel.sum(axis=-1)
     mean = kernel @ share / total
     variance = np.maximum(kernel @ share**2 / total - mean**2, 0.0)
+    return _interpolated([mean, np.sqrt(variance)], 1)
+
+
+def _interpolated(tables: Sequence[Float[np.ndarray, "q s"]], degree: int) -> NdBSpline:
+    """Splines through tables over foreshortening and the logarithm of noise, evaluated together."""
+    foreshortening, noise = _kernel()[:2]
     grid = (foreshortening, np.log(noise))
-    tables = mean, np.sqrt(variance)
-    return SplineTables([RectBivariateSpline(*grid, table, kx=1, ky=1) for table in tables])
+    splines = [RectBivariateSpline(*grid, table, kx=degree, ky=degree) for table in tables]
+    knots = splines[0].get_knots()
+    shape = [len(along) - degree - 1 for along in knots]
+    coefficients = [spline.get_coeffs().reshape(shape) for spline in splines]
+    return NdBSpline(knots, np.stack(coefficients, axis=-1), degree)
 
 
 def log_densities(
@@ -84,11 +91,11 @@ def log_densities(
     One row for each of `INCLINATIONS`. A longer bone makes both the foreshortening and the relative
     noise smaller.
     """
-    at = _grid(foreshortening, noise)
-    value, by_q, by_noise = _densities().values_and_slopes(*at)
+    at, tables = _grid(foreshortening, noise), _densities()
+    value, by_q, by_noise = (tables(at, nu=nu).T for nu in ((0, 0), (1, 0), (0, 1)))
     by_q = np.where(foreshortening < _MAX_FORESHORTENING, by_q, 0.0)
     tabulated = (noise > _MIN_NOISE) & (noise < _MAX_NOISE)
-    return value, by_q * at[0] + np.where(tabulated, by_noise, 0.0)
+    return value, by_q * at[:, 0] + np.where(tabulated, by_noise, 0.0)
 
 
 def depth_share(
@@ -96,14 +103,13 @@ def depth_share(
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
     """Expected |dz| / l of a bone of which the picture shows the share `foreshortening`, and its
     standard deviation."""
-    at = _grid(foreshortening.ravel(), noise.ravel())
-    mean, deviation = _moments().values(*at)
-    return mean.reshape(foreshortening.shape), deviation.reshape(foreshortening.shape)
+    mean, deviation = np.moveaxis(_moments()(_grid(foreshortening, noise)), -1, 0)
+    return mean, deviation
 
 
 def _grid(
-    foreshortening: Float[np.ndarray, "n"], noise: Float[np.ndarray, "n"]
-) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-    return np.clip(foreshortening, 0.0, _MAX_FORESHORTENING), np.log(
-        np.clip(noise, _MIN_NOISE, _MAX_NOISE)
-    )
+    foreshortening: Float[np.ndarray, "*n"], noise: Float[np.ndarray, "*n"]
+) -> Float[np.ndarray, "*n 2"]:
+    """Where in the tables to look."""
+    q = np.clip(foreshortening, 0.0, _MAX_FORESHORTENING)
+    return np.stack([q, np.log(np.clip(noise, _MIN_NOISE, _MAX_NOISE))], axis=-1)
