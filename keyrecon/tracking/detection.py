@@ -203,9 +203,10 @@ def _link(
     confidence = np.interp(np.arange(len(head)), numbers, np.sqrt(of_head * of_feet))
     unmeasured = np.full(len(head), np.nan), np.full((len(head), 4), np.nan)
     track = Track(head, feet, *unmeasured, confidence)
-    # Places that were missed are on the way between those that were not.
-    every = np.ones(len(head), dtype=bool)
-    return measured(track, evidence, frames, every)
+    # Places that were missed are on the way between those that were not, of head and feet each by
+    # itself: a head that jumps to somebody else and feet that stay are no body.
+    found = np.interp(np.arange(len(head)), numbers, (chosen >= 0) & (taken >= 0)) == 1
+    return measured(track, evidence, frames, found)
 
 
 def _pair(

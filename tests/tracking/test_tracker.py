@@ -1,9 +1,21 @@
 import numpy as np
 import pytest
-from drawn_player import HEIGHT, corners, film, heads, lifts, picks
+from drawn_player import (
+    HEIGHT,
+    SIZE,
+    corners,
+    draw_player,
+    film,
+    heads,
+    lifts,
+    picks,
+    scene,
+)
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.frame_reader import read_small
+from keyrecon.io.video import open_video
+from keyrecon.io.video_writer import write_video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import CameraPath, TrackAnchors
 from keyrecon.segmentation.background_model import build_background
@@ -146,6 +158,28 @@ def test_frames_that_do_not_show_the_player_tell_nothing_of_the_standing_height(
     seen = np.ones(200, dtype=bool)
     seen[unseen] = False
     assert standing_height(head, feet, np.ones(200), 150, seen) == pytest.approx(100)
+
+
+def test_who_leaves_and_somebody_behind_a_wall_do_not_make_the_player_larger(tmp_path):
+    there, count = 60, 100
+    corner = corners(1, False)[0].astype(int)
+
+    def frames():
+        for t in range(count):
+            picture = scene()
+            if t < there:
+                draw_player(picture, *heads(count)[0])
+            else:
+                draw_player(picture, 360, 60)
+                picture[60 + 45 :, 330:390] = scene()[60 + 45 :, 330:390]
+            yield picture[corner[1] : corner[1] + SIZE[0], corner[0] : corner[0] + SIZE[1]]
+
+    write_video(tmp_path / "leaves.mp4", frames(), 30.0, crf=18)
+    video = open_video(tmp_path / "leaves.mp4")
+    camera = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
+    rough = find_player(video, learn_colors(video, picks(count)), camera, NO_MARKS)
+    assert np.linalg.norm(rough.head[-1] - (280, 30)) < 0.2 * HEIGHT
+    assert rough.height[:there] == pytest.approx(HEIGHT, rel=0.1)
 
 
 def test_a_player_who_is_nowhere_is_reported_with_a_frame_to_pick_on(found, tmp_path):
