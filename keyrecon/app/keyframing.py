@@ -14,7 +14,7 @@ from keyrecon.app.preparing import (
     unlinked_stretches,
     with_chosen_shots,
 )
-from keyrecon.app.project import load_annotations
+from keyrecon.app.project import describe_unmarked, load_annotations
 from keyrecon.errors import counted, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
@@ -27,7 +27,7 @@ from keyrecon.keyframes.absence import absent_frames, list_stretches, listed_str
 from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
 from keyrecon.progress import Progress
-from keyrecon.records import HalfKeyframes, Keyframes, Preparation
+from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Preparation
 from keyrecon.report.drawing import point_out
 from keyrecon.shots.following import HELD
 from keyrecon.uncertainty import unsure_track
@@ -90,11 +90,14 @@ def find_keyframes(
     workspace.forget_shot_choices(choices)
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
-    return describe_keyframes(workspace, preparation, prepared.contradictions())
+    return describe_keyframes(workspace, preparation, marks, prepared.contradictions())
 
 
 def describe_keyframes(
-    workspace: Workspace, preparation: Preparation, contradictions: Sequence[str] = ()
+    workspace: Workspace,
+    preparation: Preparation,
+    marks: Annotations | None = None,
+    contradictions: Sequence[str] = (),
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     keyframes, frames = preparation.keyframes, len(preparation.video)
@@ -106,6 +109,7 @@ def describe_keyframes(
     ]
     folder, used = quoted(workspace.folder), preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
+    left = describe_unmarked(marks, keyframes)
     halves = [
         f"{name} body: {counted(len(half.frames), 'keyframe')}; {half.coverage:.1%} of the frames "
         f"look like one of them (outlines at most {half.beta:.1%} of the player's height apart; "
@@ -124,8 +128,11 @@ def describe_keyframes(
             f"Annotation cost {annotation_cost(keyframes, frames):.2%}: {len(keyframes.frames)} "
             f"different frames, listed in {workspace.keyframes_file}, pictures in "
             f"{workspace.pictures}.",
+            *([left] if marks is not None and left else []),
             f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
-            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE",
+            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE"
+            if left
+            else f"All of them are marked. Next: keyrecon run {folder}",
         ]
     )
 

@@ -163,23 +163,33 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
         [
             f"{workspace.annotations_file}: marks on {counted(len(merged.frames), 'frame')}.",
             *(f"Warning: {text}" for text in warnings),
-            _after_marks(workspace, far_outside(merged, size)),
+            _after_marks(workspace, video, merged),
         ]
     )
 
 
-def _after_marks(workspace: Workspace, spoilt: Sequence[int]) -> str:
-    """To mend what would spoil the rest, or the command that uses marks first."""
-    if spoilt:
+def _after_marks(workspace: Workspace, video: Video, marks: Annotations) -> str:
+    """To mend what would spoil the rest, what is left to mark, or the command that uses marks
+    first."""
+    folder = quoted(workspace.folder)
+    if spoilt := far_outside(marks, (video.width, video.height)):
         return (
             f"Next: mend the marks far outside the picture (frame "
             f"{', '.join(map(str, spoilt[:8]))}), then import them again with --replace."
         )
-    if workspace.keyframes_file.is_file():
-        verb = "run"
-    else:
-        verb = "golf fit" if workspace.is_golf else "keyframes"
-    return f"Next: keyrecon {verb} {quoted(workspace.folder)}"
+    if workspace.is_golf and not workspace.keyframes_file.is_file():
+        return f"Next: keyrecon golf fit {folder}"
+    try:
+        asked = asked_for(workspace, video)
+    except KeyreconError:  # none are chosen yet, or their file does not fit: they are chosen anew
+        return f"Next: keyrecon keyframes {folder}"
+    left = describe_unmarked(marks, asked)
+    if not left:
+        return f"Next: keyrecon run {folder}"
+    return (
+        f"{left}\nNext: mark these too and import them, or go on with what there is: keyrecon run "
+        f"{folder} --partial"
+    )
 
 
 def _conflict_error(conflicts: list[str]) -> KeyreconError:
@@ -232,17 +242,25 @@ def annotated(
     """The project's annotations; KeyreconError names the `asked` keyframes that lack theirs."""
     there = workspace.annotations_file.is_file()
     annotations = load_annotations(workspace, video) if there else None
-    missing = missing_marks(annotations, asked.upper.frames, asked.lower.frames)
-    if annotations is None or (missing and not partial):
+    left = describe_unmarked(annotations, asked)
+    if annotations is None or (left and not partial):
         folder = quoted(workspace.folder)
-        named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
-        listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
         raise KeyreconError(
-            f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame {listed}. "
+            f"{left} "
             f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
             f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
         )
     return annotations
+
+
+def describe_unmarked(annotations: Annotations | None, asked: Keyframes) -> str:
+    """Which keyframes lack marks, and of which half; empty where none does."""
+    missing = missing_marks(annotations, asked.upper.frames, asked.lower.frames)
+    if not missing:
+        return ""
+    named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
+    listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
+    return f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame {listed}."
 
 
 def load_motion(path: Path) -> Motion:

@@ -10,9 +10,10 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.records import SwingMarks
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.golf_marks import write_golf_marks
+from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
-from keyrecon.records import Annotations
+from keyrecon.records import Annotations, HalfKeyframes, Keyframes
 
 SIZE = 128, 96
 WRIST, HIP = LSP14.index("left_wrist"), LSP14.index("left_hip")
@@ -56,19 +57,42 @@ def test_a_mark_that_a_file_replaces_is_the_one_that_a_fit_holds(workspace):
     assert "[60" in (workspace.folder / "golf_marks.old-1.json").read_text()
 
 
-@pytest.mark.parametrize(
-    ("golf", "chosen", "step"),
-    [(False, False, "keyframes"), (False, True, "run"), (True, False, "golf fit")],
-)
-def test_what_comes_after_an_import_is_what_the_project_can_do(tmp_path, golf, chosen, step):
-    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * 12, 25.0)
-    start(tmp_path / "v.mp4", tmp_path / "p", golf=golf)
+def chosen_keyframes(frames):
+    """The file of keyframes of twelve frames, whole bodies."""
+    half = HalfKeyframes(
+        np.array(frames), np.full(12, frames[0]), np.ones(12, bool), 1.0, 0.1, np.zeros(12), 1
+    )
+    return keyframes_to_json(Keyframes(half, half, 2, 0.95))
+
+
+NEXT = {
+    "keyframes": (False, []),
+    "run": (False, [5]),
+    "golf fit": (True, []),
+}
+
+
+@pytest.mark.parametrize("step", NEXT)
+def test_what_comes_after_an_import_is_what_the_project_can_do(tmp_path, step):
+    text, workspace = import_body(tmp_path, *NEXT[step])
+    assert text.endswith(f"\nNext: keyrecon {step} {workspace.folder}")
+
+
+def test_an_import_that_leaves_keyframes_unmarked_names_them(tmp_path):
+    text, workspace = import_body(tmp_path, False, [5, 8])
+    assert "1 of 2 keyframes are not marked yet: frame 8 (upper body, lower body).\n" in text
+    assert text.endswith(f"keyrecon run {workspace.folder} --partial")
+
+
+def import_body(folder, golf, chosen):
+    """Import a whole body on frame 5 into a project in which keyframes are `chosen`."""
+    write_video(folder / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * 12, 25.0)
+    start(folder / "v.mp4", folder / "p", golf=golf)
     joints, nearer = np.full((1, len(LSP14.names), 2), 40.0), np.zeros((1, len(LSP14.bones)), int)
     joints += np.arange(len(LSP14.names))[None, :, None]
     body = Annotations(LSP14, np.array([5]), joints, np.isfinite(joints[..., 0]), nearer)
-    write_coco(tmp_path / "marks.json", body, SIZE)
-    workspace = Workspace(tmp_path / "p")
+    write_coco(folder / "marks.json", body, SIZE)
+    workspace = Workspace(folder / "p")
     if chosen:
-        workspace.keyframes_file.write_text("{}")
-    text = import_annotations(workspace, tmp_path / "marks.json", replacing=False)
-    assert text.endswith(f"\nNext: keyrecon {step} {workspace.folder}")
+        workspace.keyframes_file.write_text(chosen_keyframes(chosen))
+    return import_annotations(workspace, folder / "marks.json", replacing=False), workspace
