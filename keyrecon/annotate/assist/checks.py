@@ -17,7 +17,7 @@ about the same joints otherwise is put together as if independent, 1 - (1 - a)(1
 once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,6 +46,8 @@ DISTANCE_PER_USUAL = 4.6
 """How much farther that is, per distance that the pose's other joints have."""
 DISTANCE_PER_JOINT = 2.3
 """The same per distance that this joint has in the median of the other frames."""
+DISTANCE_PER_LIMB = 2.3
+"""The same per distance of the other end of forearm or shank."""
 EVEN_UNLIKE = 2.9
 """How much more a place beside a mark looks like the joint when the mark is as likely wrong as not:
 times what one mark in ten of this video exceeds (`USUAL_QUANTILE`).
@@ -151,9 +153,10 @@ def measure_residuals(
     stretch = _stretch_bones(annotations, size)
     excess = np.maximum(np.nan_to_num(measure_excess(stretch, size.lengths)), 0)
     far, distance = np.zeros((2, *annotations.joints.shape[:2]))
+    other_end = _other_ends(annotations.skeleton)
     for half in neighbours:
         cells = np.ix_(np.searchsorted(annotations.frames, half.frames), half.members)
-        far[cells], distance[cells] = _measure_distance(half)
+        far[cells], distance[cells] = _measure_distance(half, other_end)
     unlike = np.zeros_like(far)
     if appearance is not None:
         unlike = appearance.excess / (EVEN_UNLIKE * _usual_excess(annotations, appearance))
@@ -167,8 +170,18 @@ def _usual_excess(annotations: Annotations, appearance: MarkAppearance) -> float
     return max(float(np.quantile(excess, USUAL_QUANTILE)), LEAST_UNLIKE) if len(excess) else 1.0
 
 
+def _other_ends(skeleton: Skeleton) -> dict[int, int]:
+    """Elbow by wrist and wrist by elbow, knee by ankle and ankle by knee: both ends of the bones
+    that are turned by a joint of the same side."""
+    paired = skeleton.mirror != np.arange(len(skeleton.names))
+    outer = [
+        (a, b) for a, b in skeleton.bones.tolist() if paired[[a, b, skeleton.parents[a]]].all()
+    ]
+    return {one: other for pair in outer for one, other in (pair, pair[::-1])}
+
+
 def _measure_distance(
-    half: Neighbours,
+    half: Neighbours, other_end: Mapping[int, int]
 ) -> tuple[Float[np.ndarray, "K J"], Float[np.ndarray, "K J"]]:
     """Of marks from where the nearest of the similar poses has them: in units of what is usual, and
     in player heights."""
@@ -178,6 +191,12 @@ def _measure_distance(
     usual = np.nanmedian(distance, axis=1, keepdims=True)
     usual_of_joint = np.nanmedian(distance, axis=0, keepdims=True)
     even = EVEN_DISTANCE + DISTANCE_PER_USUAL * usual + DISTANCE_PER_JOINT * usual_of_joint
+    # nor does one that has the limb elsewhere: a slip moves one joint, a limb both
+    place = {int(joint): column for column, joint in enumerate(half.members)}
+    for joint, column in place.items():
+        if other_end.get(joint) in place:
+            of_limb = distance[:, place[other_end[joint]]]
+            even[:, column] += DISTANCE_PER_LIMB * np.nan_to_num(of_limb)
     return np.nan_to_num(distance / even), np.nan_to_num(distance)
 
 

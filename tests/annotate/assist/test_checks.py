@@ -82,6 +82,13 @@ def test_a_joint_that_is_elsewhere_is_told_by_the_other_frames(careful):
     assert "left ankle" in first.text
 
 
+def test_a_limb_that_one_frame_alone_has_elsewhere_is_no_mistake():
+    poses = stretching()
+    poses[ROW] = turned(poses[ROW], "left_shoulder", ("left_elbow", "left_wrist"), -2.6)
+    preparation, truth = scene(poses, (0, 6))
+    assert [c for c in checked(preparation, marks(truth, range(12))) if c.suspicion > 0.5] == []
+
+
 def test_a_forearm_twice_as_long_as_it_can_be_is_told(careful):
     preparation, annotations = careful
     elbow, wrist = place(annotations, "right_elbow"), place(annotations, "right_wrist")
