@@ -69,6 +69,37 @@ def test_a_leg_that_the_track_lacks_does_not_become_background(tmp_path):
     assert not background.known[left] or np.abs(off).max() < 12
 
 
+def test_a_player_in_dark_clothes_who_keeps_his_place_does_not_become_background(tmp_path):
+    count, dark = 40, (62, 64, 70)
+    nearness = np.linspace(1.0, 0.8, count)
+    head = np.stack([160 + 2 * np.sin(np.arange(count)), 160 - 110 * nearness], axis=1)
+    feet = head[:, None] + nearness[:, None, None] * [[-8, 110], [8, 110]]
+
+    def frames():
+        room = np.full((180, 320, 3), 75, np.uint8)
+        room[::12] = 85
+        for (x, y), pair, near in zip(head, feet, nearness, strict=True):
+            picture = room.copy()
+            hips = (x, y + 50 * near)
+            cv2.rectangle(
+                picture,
+                (round(x - 11 * near), round(y)),
+                (round(x + 11 * near), round(hips[1])),
+                dark,
+                -1,
+            )
+            for foot in pair.round().astype(int):
+                cv2.line(picture, (round(x), round(hips[1])), foot.tolist(), dark, 8)
+            yield picture
+
+    write_video(tmp_path / "dark.mp4", frames(), 30.0, crf=18)
+    track = Track(head, feet, 110 * nearness, np.zeros((count, 4)), np.ones(count))
+    still = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
+    background = build_background(open_video(tmp_path / "dark.mp4"), still, track)
+    trunk = np.s_[90:110, 156:165]
+    assert not background.known[trunk].any()
+
+
 def test_the_spread_is_the_distance_from_the_lower_quartile_to_the_median_as_a_deviation():
     lightness = [90, 92, 94, 96, 100, 100, 110, 120, 130]  # lower quartile 94
     pictures = [np.full((4, 4, 3), value, np.uint8) for value in lightness]
