@@ -48,6 +48,17 @@ def test_of_a_short_slip_only_the_slip_is_left_out():
     assert runs(linked) == [(0, 59), (75, 149)]
 
 
+def test_who_walks_does_not_move_aside_faster_than_a_sprinter_starts():
+    beside = WALK + np.where(np.arange(COUNT)[:, None] < 90, (0, 0), (50, 35))
+    linked = linked_to_player(track_of(beside), STILL, np.array([20]), WALK[[20]], FPS)
+    assert runs(linked) == [(0, 89)]
+
+
+def test_who_runs_is_no_other():
+    fast = np.stack([100 + 22.0 * np.arange(COUNT), np.full(COUNT, 80.0)], axis=1)
+    assert linked_to_player(track_of(fast), STILL, np.array([20]), fast[[20]], FPS).all()
+
+
 def test_who_is_found_again_beyond_what_a_person_can_go_is_somebody_else():
     track = track_of(with_other(90, COUNT), lost=range(80, 95))
     linked = linked_to_player(track, STILL, np.array([20]), WALK[[20]], FPS)
