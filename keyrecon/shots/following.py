@@ -230,7 +230,7 @@ def _follow(
     detected = shot.joined_part(detected, joined, options.find.envelope)
     video = hold_if_small(shot.video, HELD)
     background = keep(
-        f"background{shot.name}", build_background, video, shot.camera, detected,
+        f"background{shot.name}", build_background, video, shot.camera, detected, shot.colors,
         options=options.background, progress=progress,
     )  # fmt: skip
     track = keep(

@@ -5,9 +5,9 @@ from drawn_player import HEIGHT, draw_player, scene
 
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
-from keyrecon.records import CameraPath, Track
+from keyrecon.records import CameraPath, Colors, Track
 from keyrecon.segmentation.background_model import build_background, median_background
-from keyrecon.segmentation.color_model import to_lab
+from keyrecon.segmentation.color_model import color_bins, to_lab
 from keyrecon.segmentation.foreground_model import ForegroundModel
 
 
@@ -69,8 +69,13 @@ def test_a_leg_that_the_track_lacks_does_not_become_background(tmp_path):
     assert not background.known[left] or np.abs(off).max() < 12
 
 
-def test_a_player_in_dark_clothes_who_keeps_his_place_does_not_become_background(tmp_path):
-    count, dark = 40, (62, 64, 70)
+DARK = (62, 64, 70)
+
+
+def film_in_the_dark(path, aside=0.0):
+    """A player in dark clothes in a dark room who keeps the place, slowly going away; the track has
+    the player `aside` of there, px."""
+    count = 40
     nearness = np.linspace(1.0, 0.8, count)
     head = np.stack([160 + 2 * np.sin(np.arange(count)), 160 - 110 * nearness], axis=1)
     feet = head[:, None] + nearness[:, None, None] * [[-8, 110], [8, 110]]
@@ -80,24 +85,35 @@ def test_a_player_in_dark_clothes_who_keeps_his_place_does_not_become_background
         room[::12] = 85
         for (x, y), pair, near in zip(head, feet, nearness, strict=True):
             picture = room.copy()
-            hips = (x, y + 50 * near)
-            cv2.rectangle(
-                picture,
-                (round(x - 11 * near), round(y)),
-                (round(x + 11 * near), round(hips[1])),
-                dark,
-                -1,
-            )
+            hips = round(x), round(y + 50 * near)
+            corner = round(x - 11 * near), round(y)
+            cv2.rectangle(picture, corner, (round(x + 11 * near), hips[1]), DARK, -1)
             for foot in pair.round().astype(int):
-                cv2.line(picture, (round(x), round(hips[1])), foot.tolist(), dark, 8)
+                cv2.line(picture, hips, foot.tolist(), DARK, 8)
             yield picture
 
-    write_video(tmp_path / "dark.mp4", frames(), 30.0, crf=18)
-    track = Track(head, feet, 110 * nearness, np.zeros((count, 4)), np.ones(count))
+    write_video(path, frames(), 30.0, crf=18)
+    shift = np.array([aside, 0.0])
+    measures = 110 * nearness, np.zeros((count, 4)), np.ones(count)
+    track = Track(head + shift, feet + shift, *measures)
     still = CameraPath(np.tile(np.eye(3), (count, 1, 1)), np.ones(count))
-    background = build_background(open_video(tmp_path / "dark.mp4"), still, track)
-    trunk = np.s_[90:110, 156:165]
-    assert not background.known[trunk].any()
+    return open_video(path), still, track
+
+
+def test_a_player_in_dark_clothes_who_keeps_his_place_does_not_become_background(tmp_path):
+    background = build_background(*film_in_the_dark(tmp_path / "dark.mp4"))
+    assert not background.known[90:110, 156:165].any()
+
+
+def test_where_the_scene_is_seen_a_track_that_is_off_hides_nothing_of_it(tmp_path):
+    histogram = np.zeros(2**14)
+    histogram[color_bins(to_lab(np.full((1, 1, 3), DARK, np.uint8)))] = 1.0
+    room = np.full(2**14, 2.0**-14)
+    dark = Colors(("clothes",), histogram[None], room, 110.0)
+    video = film_in_the_dark(tmp_path / "dark.mp4", aside=40.0)
+    beside = np.s_[90:110, 196:205]
+    assert not build_background(*video).known[beside].any()
+    assert build_background(*video, dark).known[beside].all()
 
 
 def test_the_spread_is_the_distance_from_the_lower_quartile_to_the_median_as_a_deviation():
