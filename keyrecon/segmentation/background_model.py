@@ -42,7 +42,7 @@ TRUNK_CORE, LEG_CORE = 0.3, 0.2
 """Widths in heights within which what has a colour of the player is the player rather than the
 scene: breadth of the shoulders, and of a thigh (Drillis and Contini) with as much room for a track
 that is off. Means over three draws with it (and without): three golfers who stand before one place
-97.9 (94.8), 99.3 (98.2) and 100.0 (99.5); over six a player in a broadcast 94.3 (94.7), 93.4 where
+97.9 (97.6), 99.3 (98.2) and 100.0 (99.7); over six a player in a broadcast 94.3 (94.7), 93.4 where
 colours are not asked, and 93.5 with two thirds of the widths besides."""
 MIN_FEET_DISTANCE, STRIDE = 0.1, 0.45
 """Feet nearer than this may be one foot taken twice; the other is then up to a stride aside. A leg
