@@ -14,7 +14,7 @@ long the program took for the keyframes.
 import argparse
 import shutil
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -24,20 +24,16 @@ from real import DEVELOP, VIDEOS, Clip, choose_bodies, load_clip, nearest_rows, 
 
 from keyrecon.app import keyframing, project
 from keyrecon.app.console import show
-from keyrecon.body import LSP14
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
-from keyrecon.records import Annotations
 
 
 @dataclass(frozen=True)
 class Effort:
     """What the keyframes of one clip cost."""
 
-    halves: int
-    """Keyframe halves marked."""
     actions: list[float]
     """Per half, of every marked frame."""
     depth: float
@@ -46,21 +42,12 @@ class Effort:
     """For the keyframes, without a person."""
 
 
-def with_every_joint(clip: Clip) -> np.ndarray:
-    """Rows of the truth in which all joints were marked."""
-    return np.flatnonzero(np.isfinite(clip.truth.joints[..., 0]).all(axis=1))
-
-
-def part_of(clip: Clip, rows: np.ndarray) -> Clip:
-    """The clip with fewer marks by eye."""
-    kept = Annotations(
-        LSP14,
-        clip.truth.frames[rows],
-        clip.truth.joints[rows],
-        clip.truth.visible[rows],
-        clip.truth.nearer[rows],
-    )
-    return Clip(clip.name, clip.video, kept, clip.seen[rows], clip.action[rows], clip.torso)
+def with_every_joint(clip: Clip) -> Clip:
+    """The clip with those marks by eye alone that have all joints."""
+    rows = np.isfinite(clip.truth.joints[..., 0]).all(axis=1)
+    of_frames = ("frames", "joints", "visible", "nearer")
+    kept = replace(clip.truth, **{name: getattr(clip.truth, name)[rows] for name in of_frames})
+    return replace(clip, truth=kept, seen=clip.seen[rows], action=clip.action[rows])
 
 
 def begin(clip: Clip, work: Path) -> tuple[Path, np.ndarray, float]:
@@ -80,8 +67,7 @@ def begin(clip: Clip, work: Path) -> tuple[Path, np.ndarray, float]:
 
 def measure(name: str, work: Path) -> Effort:
     """Mark the keyframes of a clip on the page."""
-    clip = load_clip(name)
-    clip = part_of(clip, with_every_joint(clip))
+    clip = with_every_joint(load_clip(name))
     folder, rows, seconds = begin(clip, work)
     frames = clip.truth.frames[rows].tolist()
     tall = np.ptp(clip.truth.joints[..., 1], axis=1).max()
@@ -91,7 +77,7 @@ def measure(name: str, work: Path) -> Effort:
     done, _ = mark_all(folder, frames, way, own=frames)
     actions = [(one.placing + one.depth_keys) / 2 for one in done]
     depth = float(np.mean([one.depth_keys / 2 for one in done]))
-    return Effort(2 * len(done), actions, depth, seconds)
+    return Effort(actions, depth, seconds)
 
 
 def main() -> None:
@@ -106,7 +92,7 @@ def main() -> None:
         effort = measure(name, words.work)
         every += effort.actions
         print(
-            f"{name:<26}{effort.halves:>8}{np.median(effort.actions):>8.1f}"
+            f"{name:<26}{2 * len(effort.actions):>8}{np.median(effort.actions):>8.1f}"
             f"{max(effort.actions):>8.1f}{effort.depth:>8.1f}{effort.seconds:>8.0f}",
             flush=True,
         )

@@ -74,6 +74,11 @@ def test_the_page_is_told_of_a_lens_that_nobody_has_to_type(workspace, monkeypat
     assert told == {"degrees": pytest.approx(48.0), "told_by": "step 6 Ground"}
 
 
+def test_a_damaged_camera_file_does_not_keep_the_page_from_opening(workspace):
+    workspace.camera_file.write_bytes(b"PK no camera")
+    assert describe_settings(workspace, workspace.video())["lens"] is None
+
+
 def test_a_player_who_fills_the_picture_is_asked_for_the_lens(workspace):
     motion = seen(standing(steps=2))
     assert lens.describe_nearness(motion, workspace.video()) is None

@@ -76,8 +76,7 @@ def run(
     started = time.perf_counter()
     given, options = options, as_printed(options) if printed else options
     video = workspace.video()
-    lens = known_lens(workspace, video)
-    if options.lift.field_of_view is None and lens is not None:
+    if options.lift.field_of_view is None and (lens := known_lens(workspace, video)):
         options = with_field_of_view(options, degrees_across(lens, video))
     evidence = marks_evidence(workspace)
     asked = asked_for(workspace, video)

@@ -13,6 +13,7 @@ from keyrecon.annotate.store.journal import Entry, JournalState
 from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
 from keyrecon.annotation_budget import usual_budget
 from keyrecon.body import Skeleton
+from keyrecon.errors import KeyreconError
 from keyrecon.io.provenance import marks_evidence, read_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -152,16 +153,27 @@ def gains_of_frames(keyframes: Keyframes | None) -> dict[int, float]:
 def describe_settings(workspace: Workspace, video: Video) -> Json:
     """Options of earlier runs that the page asks for, None where none was set; and the angle across
     the picture that a run takes where none is, with what tells it."""
-    lens, typed = known_lens(workspace, video), workspace.ground_marks().field_of_view
-    told_by = "step 6 Ground" if typed is not None else lens and lens.told_by
     options = workspace.project.get("options", {})
     lift = options.get("lift", {})
     return {
         "budget": options.get("keyframes", {}).get("budget"),
         "height": lift.get("height"),
         "field_of_view": lift.get("field_of_view"),
-        "lens": lens and {"degrees": degrees_across(lens, video), "told_by": told_by},
+        "lens": _describe_lens(workspace, video),
     }
+
+
+def _describe_lens(workspace: Workspace, video: Video) -> Json | None:
+    """What is known of the lens; None where nothing is, or a damaged file holds it: the step that
+    needs the file says so."""
+    try:
+        lens, typed = known_lens(workspace, video), workspace.ground_marks().field_of_view
+    except KeyreconError:
+        return None
+    if lens is None:
+        return None
+    told_by = lens.told_by if typed is None else "step 6 Ground"
+    return {"degrees": degrees_across(lens, video), "told_by": told_by}
 
 
 def describe_run(workspace: Workspace, revision: int) -> Json:
