@@ -101,6 +101,21 @@ def test_similar_poses_tell_sides_after_limbs_were_in_one_place():
     assert not found.exchanged[:10].any()
 
 
+def test_a_likeness_that_misleads_for_a_while_does_not_outweigh_two_jumps():
+    wrong = list(range(30, 36))
+    told = np.where(np.isin(np.arange(41), wrong), 6.0, -0.0)
+    found = identify(exchange(CROSSING, wrong), [0, 40], told)
+    assert np.flatnonzero(found.exchanged).tolist() == wrong
+
+
+def test_a_likeness_that_lasts_tells_what_motion_leaves_open():
+    together = legs(0 * TIME, 0 * TIME)
+    together[:10] = together[30:] = CROSSING[0]
+    found = identify(together, [0], np.where(np.arange(41) < 25, 0.0, -2.0))
+    assert found.exchanged[31:].all()
+    assert found.probability[35] > 0.95
+
+
 def test_what_belongs_to_joints_follows_them_to_the_other_side():
     wrong = list(range(22, 33))
     found = identify(exchange(CROSSING, wrong), [0, 40])
