@@ -245,7 +245,7 @@ def _follow(
     )  # fmt: skip
     verification = keep(
         f"verify{shot.name}", verify_track, video, track, shot.camera, background,
-        shot.colors, progress=progress,
+        shot.colors, shot.anchors, progress=progress,
     )  # fmt: skip
     player = np.flatnonzero(linked & (joined | (track.confidence > 0)))
     if len(player) < len(edges):  # of somebody else nothing is carried

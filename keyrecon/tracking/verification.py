@@ -4,10 +4,12 @@ A path through candidates goes on wherever there are any, and is as sure of a kn
 as of a shoe, and of another player in the same clothes as of the one meant. Both show elsewhere.
 What is found here is told; neither the track nor the motion changes with it.
 Feet that are in the picture have ground beneath them; where they are cut off, the player's colours
-reach the last row. And another player of the same clothes looks like this one from head to feet:
-the mean of the player's own part maps is a template, its response away from the player, against
-that on the player, tells of a distractor, where the colours from top to bottom are the player's
-too (matched filter; a figure of other clothes responds as well, since back-projection is coarse).
+reach the last row. So does a shadow: where feet were marked, the size of the player tells whether
+the picture ends above them. And another player of the same clothes looks like this one from head to
+feet: the mean of the player's own part maps is a template, its response away from the player,
+against that on the player, tells of a distractor, where the colours from top to bottom are the
+player's too (matched filter; a figure of other clothes responds as well, since back-projection is
+coarse).
 """
 
 from collections.abc import Iterator
@@ -23,7 +25,14 @@ from keyrecon.io.frame_reader import read_small, shrinking
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Background, CameraPath, Colors, Track, TrackVerification
+from keyrecon.records import (
+    Background,
+    CameraPath,
+    Colors,
+    Track,
+    TrackAnchors,
+    TrackVerification,
+)
 from keyrecon.segmentation.color_model import color_bins, look_up, posterior_tables, to_lab
 from keyrecon.segmentation.foreground_model import ForegroundModel
 
@@ -41,6 +50,10 @@ what is found at least, player heights. Three rendered clips cut above the ankle
 real clips."""
 FEET_NEAR_EDGE = 0.5
 """Feet farther above the lower edge are in the picture, player heights: a knee is .25 up."""
+SOLES = 1.08
+"""How far the soles are below the centre of the head, in units of its height above the middle of
+the feet: a stride sets one shoe before the other, and soles lie .03 below ankles (Drillis and
+Contini: ankles .039 statures up)."""
 SCENE_ENDS = 0.9
 """Share of a row that no player covers: the picture was rounded beyond the background there. It
 decides only what is told of the track."""
@@ -72,9 +85,11 @@ def verify_track(
     camera: CameraPath,
     background: Background,
     colors: Colors,
+    anchors: TrackAnchors = TrackAnchors.none(),
     progress: Progress = silent,
 ) -> TrackVerification:
     """Look for cut-off feet and for distractors in a few frames per second."""
+    sized = bool((anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))).any())
     frames = np.arange(0, len(video), max(1, round(video.fps / RATE)))
     read = _read_views(video, track, frames, ForegroundModel(background, camera), colors, progress)
     truncated: list[bool] = []
@@ -82,7 +97,7 @@ def verify_track(
     while views := list(islice(read, MOST_VIEWS)):
         rows = slice(len(truncated), len(truncated) + len(views))
         distractors.append(_find_distractors(views, track.confidence[frames[rows]]))
-        truncated += [view.is_truncated() for view in views]
+        truncated += [view.is_truncated(sized) for view in views]
     hidden = hidden_shares(track, background)[frames] > HIDDEN_SHARE
     passing = _lasting(np.concatenate(distractors))
     return TrackVerification(frames, np.array(truncated), passing, hidden)
@@ -131,8 +146,11 @@ class _View:
         """Back-projection of each part where the scene is covered."""
         return look_up(self.tables, color_bins(self.colors)) * self.foreground
 
-    def is_truncated(self) -> bool:
-        """Whether the player's colours reach the last rows under the feet."""
+    def is_truncated(self, sized: bool) -> bool:
+        """Whether the player's colours reach the last rows under the feet.
+
+        Where the player is `sized` by marked feet, only where the picture ends above the soles.
+        """
         covered = self.covered
         rows, columns = covered.shape
         if rows - 1 - self.feet[:, 1].max() > FEET_NEAR_EDGE * self.height:
@@ -141,6 +159,8 @@ class _View:
         first, last = (round(np.clip(middle + s * reach, 0, columns - 1)) for s in (-1, 1))
         # a row that is covered from side to side lies beyond the scene's last one
         end = rows - int((covered.mean(axis=1) < SCENE_ENDS)[::-1].argmax())
+        if sized and self.head[1] + SOLES * self.height < end:
+            return False
         edge = max(1, round(EDGE_ROWS * self.height))
         player = self.parts[:, max(0, end - edge) : end, first : last + 1]
         return bool((player.max(axis=0).mean(axis=0) > 0.4).sum() > LEG_WIDTH * self.height)

@@ -3,13 +3,14 @@
 import tracemalloc
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
-from drawn_player import HEIGHT, SIZE, corners, draw_player, heads, picks, scene
+from drawn_player import HEIGHT, SHIRT, SIZE, corners, draw_player, heads, picks, scene
 
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
-from keyrecon.records import Background, CameraPath, Shots, Track
+from keyrecon.records import Background, CameraPath, Shots, Track, TrackAnchors
 from keyrecon.segmentation.background_model import build_background
 from keyrecon.segmentation.color_model import learn_colors
 from keyrecon.tracking import verification as verification_module
@@ -40,9 +41,10 @@ def track_along(head, rows=SIZE[0]):
 
 @pytest.fixture
 def verified(tmp_path):
-    """Verify the track of the player in a film, `rows` px high, maybe with another player."""
+    """Verify the track of the player in a film, `rows` px high, maybe with another player, with a
+    shadow of the colours of the clothes, or with both feet marked in one frame."""
 
-    def verify(rows=SIZE[0], other=None, recolored=False):
+    def verify(rows=SIZE[0], other=None, recolored=False, shadow=False, marked=False):
         def pictures():
             for number in range(COUNT):
                 picture = scene()
@@ -53,6 +55,9 @@ def verified(tmp_path):
                     drawn = (alone != picture).any(axis=2)
                     picture[drawn] = 255 - alone[drawn] if recolored else alone[drawn]
                 draw_player(picture, *heads(COUNT)[number])
+                if shadow:
+                    foot = np.rint(heads(COUNT)[number] + (12, HEIGHT)).astype(int)
+                    cv2.line(picture, foot.tolist(), np.add(foot, (20, 60)).tolist(), SHIRT, 7)
                 yield picture[y : y + rows, x : x + SIZE[1]]
 
         write_video(tmp_path / "film.mp4", pictures(), 30.0, crf=18)
@@ -61,9 +66,18 @@ def verified(tmp_path):
         colors = learn_colors(video, shown if rows == SIZE[0] else [*shown, *_shins(rows)])
         track = track_along(HEAD, rows)
         background = build_background(video, CAMERA, track)
-        return verify_track(video, track, CAMERA, background, colors), track
+        anchors = marks(track, [5]) if marked else TrackAnchors.none()
+        return verify_track(video, track, CAMERA, background, colors, anchors), track
 
     return verify
+
+
+def marks(track, frames):
+    """Head and feet marked where the track has them."""
+    every, unknown = np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
+    return TrackAnchors(
+        np.array(frames), track.head[frames], track.feet[frames], every, unknown, ~every
+    )
 
 
 def _shins(rows):
@@ -84,6 +98,15 @@ def test_feet_that_the_lower_edge_cuts_off_are_told(verified):
 
 def test_feet_just_above_the_lower_edge_are_in_the_picture(verified):
     assert verified(rows=152)[0].truncated.mean() < 0.1
+
+
+def test_a_shadow_on_the_ground_cuts_no_feet_off_that_were_marked_as_high_above_the_edge(verified):
+    assert verified(rows=158, shadow=True)[0].truncated.mean() > 0.6
+    assert not verified(rows=158, shadow=True, marked=True)[0].truncated.any()
+
+
+def test_feet_that_the_edge_cuts_off_elsewhere_are_told_though_some_were_marked(verified):
+    assert verified(rows=130, marked=True)[0].truncated.mean() > 0.6
 
 
 def test_another_player_in_the_same_clothes_is_told_where_the_two_meet(verified):
