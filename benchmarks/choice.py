@@ -35,6 +35,7 @@ from variant import cut
 from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.app.console import show
 from keyrecon.body import LSP14
+from keyrecon.io.formats.model_file import read_side_model
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
@@ -238,7 +239,7 @@ def collect(known: Known, weight: float) -> dict[str, Sample]:
 
     original = evidence.find_evidence
     with patch.object(selection, "find_evidence", record):
-        propagate_joints(known.preparation, known.marks, known.flow)
+        propagate_joints(known.preparation, known.marks, known.flow, read_side_model())
     return samples
 
 
@@ -326,7 +327,7 @@ def weighed(table: dict[str, dict[str, float]]) -> Iterator[None]:
 
 def pck(known: Known) -> tuple[float, float]:
     """PCK@0.2 of all joints that are judged, and within strokes and swings."""
-    tracks = propagate_joints(known.preparation, known.marks, known.flow)
+    tracks = propagate_joints(known.preparation, known.marks, known.flow, read_side_model())
     off = np.linalg.norm(tracks.joints[known.truth.frames] - known.truth.joints, axis=2)
     near, action = off < 0.2 * known.torso, known.judged & known.action[:, None]
     inside = float(near[action].mean()) if action.any() else np.nan

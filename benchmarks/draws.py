@@ -37,10 +37,9 @@ from keyrecon.body import LSP14
 from keyrecon.io import stages
 from keyrecon.io.stages import StageStore
 from keyrecon.keyframes.selection import choose_keyframes
-from keyrecon.library import reconstruct
+from keyrecon.library import carry_joints, reconstruct
 from keyrecon.pipeline import (
     Options,
-    carry_joints,
     frames_off_marks,
     frames_to_mark,
     prepare,

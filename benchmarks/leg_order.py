@@ -22,7 +22,7 @@ from draws import mark_draw, prepare_clip
 from keyrecon.app.console import show
 from keyrecon.body import LSP14
 from keyrecon.io import stages
-from keyrecon.pipeline import carry_joints
+from keyrecon.library import carry_joints
 from keyrecon.records import Annotations
 
 ORDER = real.TRUTH.parent / "leg_order.json"

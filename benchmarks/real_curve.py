@@ -17,7 +17,8 @@ from real import DEVELOP, TRUTH, Clip, hits, load_clip, take
 from keyrecon.app.console import show
 from keyrecon.errors import KeyreconError
 from keyrecon.io.stages import StageStore
-from keyrecon.pipeline import Options, carry_joints, prepare
+from keyrecon.library import carry_joints
+from keyrecon.pipeline import Options, prepare
 
 CURVE = (2, 5, 10, 20)
 """Whole bodies marked."""

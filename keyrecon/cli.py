@@ -58,6 +58,7 @@ COMMANDS: dict[str, Command | dict[str, Command]] = {
     "ground": Command("keyrecon.commands", "ground", "ground"),
     "relink": Command("keyrecon.commands", "projects", "relink"),
     "depths": Command("keyrecon.commands", "captures", "depths"),
+    "sides": Command("keyrecon.commands", "captures", "sides"),
     "golf": {
         "fit": Command("keyrecon.commands", "golf", "fit"),
         "compare": Command("keyrecon.commands", "golf", "compare"),

@@ -1,7 +1,7 @@
 """keyrecon as a library: the recipe with the learnt models that its options name.
 
-`pipeline` itself reads no files; here the depth model and the swing prior are read first, so that a
-wrong file is told of before minutes are spent.
+`pipeline` itself reads no files; here the models are read first, so that a wrong file is told of
+before minutes are spent.
 """
 
 from pathlib import Path
@@ -9,13 +9,15 @@ from pathlib import Path
 from keyrecon import pipeline
 from keyrecon.io.formats.model_file import (
     BUILT_IN_DEPTH_MODEL,
+    BUILT_IN_SIDE_MODEL,
     read_depth_model,
     read_motion_model,
+    read_side_model,
 )
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.pipeline import Models, Options
 from keyrecon.progress import Progress, silent
-from keyrecon.records import Annotations, Motion, Preparation
+from keyrecon.records import Annotations, JointTracks, Motion, Preparation
 
 
 def reconstruct(
@@ -35,10 +37,26 @@ def reconstruct(
     return pipeline.reconstruct(preparation, annotations, models, options, keep, progress)
 
 
+def carry_joints(
+    preparation: Preparation,
+    annotations: Annotations,
+    options: Options = Options(),
+    keep: Keep = call_stage,
+    progress: Progress = silent,
+) -> JointTracks:
+    """The annotated joints in every frame of the video, in 2D alone."""
+    models = read_models(options)
+    return pipeline.carry_joints(preparation, annotations, models, options, keep, progress)
+
+
 def read_models(options: Options) -> Models:
-    """The depth model and the swing prior that the options ask for."""
-    depth = None
+    """The models that the options ask for."""
+    depth, sides = None, None
     if options.depths != "none":
         built_in = options.depths == "built-in"
         depth = read_depth_model(BUILT_IN_DEPTH_MODEL if built_in else Path(options.depths))
-    return Models(depth, read_motion_model() if options.prior == "golf" else None)
+    if options.sides != "none":
+        built_in = options.sides == "built-in"
+        sides = read_side_model(BUILT_IN_SIDE_MODEL if built_in else Path(options.sides))
+    swing = read_motion_model() if options.prior == "golf" else None
+    return Models(depth, swing, sides)

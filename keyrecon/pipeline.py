@@ -32,6 +32,7 @@ from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.propagation.propagation import PropagateOptions
+from keyrecon.propagation.side_model import SideModel
 from keyrecon.records import (
     SOURCES,
     Annotations,
@@ -89,6 +90,9 @@ class Options:
     depths: str = "built-in"
     """What helps where nobody said which end of a limb is nearer: 'built-in', 'none', or a file of
     `keyrecon depths`."""
+    sides: str = "built-in"
+    """What tells left arms from right ones by the pose of the whole body: 'built-in', 'none', or a
+    file of `keyrecon sides`."""
     prior: Literal["none", "golf"] = "none"
     """'golf': a model of golf swings helps with depth and between the keyframes.
 
@@ -107,6 +111,8 @@ class Models:
     """Helps with depth signs that nobody gave."""
     swing: MotionModel | None = None
     """Golf's prior; needed where `Options.prior` asks for it."""
+    sides: SideModel | None = None
+    """Helps to tell left arms from right ones."""
 
 
 def prepare(
@@ -236,7 +242,7 @@ def reconstruct(
     if not all(shots.usable):
         annotations = marks_in_shots(annotations, shots)
     preparation = _with_annotated_keyframes(preparation, annotations, options, progress)
-    part, marks, tracks = _carry_usable(preparation, annotations, options, keep, progress)
+    part, marks, tracks = _carry_usable(preparation, annotations, models, options, keep, progress)
     lifted = _lift(part, tracks, marks, models, options, keep, progress)
     motion = assemble_motion(part.video, marks, tracks, lifted, options.lift.height, part.shots)
     if len(shots.parts) > 1:
@@ -293,19 +299,21 @@ def focal_length(options: LiftOptions, video: Video) -> float | None:
 def carry_joints(
     preparation: Preparation,
     annotations: Annotations,
+    models: Models,
     options: Options = Options(),
     keep: Keep = call_stage,
     progress: Progress = silent,
 ) -> JointTracks:
     """The annotated joints in every frame of the video."""
     shots = preparation.shots
-    _, _, tracks = _carry_usable(preparation, annotations, options, keep, progress)
+    _, _, tracks = _carry_usable(preparation, annotations, models, options, keep, progress)
     return tracks if all(shots.usable) else put_back(tracks, shots.usable_frames, shots.n_frames)
 
 
 def _carry_usable(
     preparation: Preparation,
     annotations: Annotations,
+    models: Models,
     options: Options,
     keep: Keep,
     progress: Progress,
@@ -318,7 +326,9 @@ def _carry_usable(
         flow = flow and take_frames(flow, shots.usable_frames)
         annotations = part_of_marks(annotations, shots.usable_frames)
     part = usable_part(preparation)
-    tracks = propagate_in_groups(part, annotations, flow, options.propagate, keep, progress)
+    tracks = propagate_in_groups(
+        part, annotations, flow, models.sides, options.propagate, keep, progress
+    )
     outside = legs_outside(part.track, part.video.height)
     return part, annotations, without_hidden_legs(tracks, annotations, outside)
 
@@ -389,6 +399,7 @@ def as_printed(options: Options = Options()) -> Options:
         keyframes=replace(options.keyframes, method="paper"),
         propagate=replace(options.propagate, method="paper"),
         depths="none",
+        sides="none",
         prior="none",
         lift=replace(options.lift, method="paper"),
     )

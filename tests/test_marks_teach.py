@@ -7,8 +7,9 @@ import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.io.video import open_video
+from keyrecon.library import carry_joints
 from keyrecon.metrics import read_truth
-from keyrecon.pipeline import Options, carry_joints, prepare
+from keyrecon.pipeline import Options, prepare
 from keyrecon.records import Annotations
 from keyrecon.synthetic.cameras import CameraPlanOptions, View
 from keyrecon.synthetic.clips import JoinOptions

@@ -42,12 +42,18 @@ def learn_from_files(
     progress: Progress = silent,
 ) -> DepthModel:
     """A depth model of the captures in files and folders, and of the built-in tennis."""
+    captures, provenance = gather_captures(paths)
+    return train_depth_model(captures, RATE, provenance, options, progress)
+
+
+def gather_captures(paths: Sequence[Path]) -> tuple[list[Float[np.ndarray, "_ 14 3"]], str]:
+    """Joints of the captures in files and folders and of the built-in tennis, `RATE` poses a
+    second, and what they are."""
     files = find_captures(paths)
     captures = [read_poses(file) for file in files]
     captures += [play_tennis(MotionOptions(fps=RATE, seed=seed)) for seed in range(PLAYED)]
     names = ", ".join(file.stem for file in files)
-    provenance = f"learnt from {len(files)} captures ({names}) and the built-in tennis"
-    return train_depth_model(captures, RATE, provenance, options, progress)
+    return captures, f"learnt from {len(files)} captures ({names}) and the built-in tennis"
 
 
 def read_poses(file: Path) -> Float[np.ndarray, "_ 14 3"]:

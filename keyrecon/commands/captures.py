@@ -6,9 +6,11 @@ from typing import Annotated
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from keyrecon.app import depth_training as depth_job
+from keyrecon.app import side_training as side_job
 from keyrecon.app.console import show
 from keyrecon.commands.arguments import Files
 from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
+from keyrecon.propagation.side_training import SideTrainingOptions
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
 
@@ -44,3 +46,20 @@ def depths(
         out: File to write.
     """
     print(depth_job.learn(captures, out, options, show))
+
+
+def sides(
+    captures: Files,
+    out: Annotated[Path, arg(metavar="FILE")] = Path("sides.npz"),
+    options: OmitArgPrefixes[Annotated[SideTrainingOptions, arg(name="")]] = SideTrainingOptions(),
+) -> None:
+    """Learn from motion capture how left arms and right ones go with the rest of a body.
+
+    It helps `keyrecon run` to keep them apart where they meet; a model comes with the program.
+    To use another: keyrecon run PROJECT --sides FILE.
+
+    Args:
+        captures: .bvh, .amc (with its .asf) or .c3d files, or folders of them.
+        out: File to write.
+    """
+    print(side_job.learn(captures, out, options, show))

@@ -9,7 +9,8 @@ First, exchanges that are themselves against the laws of motion are undone, so t
 threads without a name. Then a chain of two states (the one thread is left, or the other) with these
 prices is solved for the whole clip: marks fix the state, so that what a crossing leaves open is
 decided by the next mark; in between, the annotated poses that are most like a frame say which is
-which, and so does what the joints of either arm look like on the marked frames. A pose that no
+which, and so do what the joints of either arm look like on the marked frames and what a rule learnt
+from captures says of arms by the pose of the whole body (`side_model`). A pose that no
 mark is like can look the wrong way round for as long as it lasts, in one frame like in the next: so
 what likeness to marks says is believed or doubted, a second pair of states, and a run of frames
 counts no more than doubting it costs. The probability that the chain gives to its sides is small
@@ -22,15 +23,17 @@ either without it. On four real clips it changed nothing.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int, Shaped
 
+from keyrecon.body import Skeleton
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.limb_motion import exchange_price, foot_exchange_price
 from keyrecon.propagation.mark_sides import exchange_evidence
+from keyrecon.propagation.side_model import SideModel, arm_log_odds
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
 from keyrecon.records import Shots
 
@@ -47,6 +50,9 @@ little in a stroke. Legs are dressed alike, and what looks like the left one is 
 it was on the mark: of a run marked by eye in every frame 1.6 % of the frames have the legs
 exchanged with a tenth of this, .8 % without (in six choices of marks; with half of the marks 1.5
 and .8 %). A quarter more or less, others with it: at most 1.2 points, 2.1 mm on nine clips."""
+POSE_RATE = 20.0
+"""What the poses of whole bodies say of the arms counts so many times within a second: as much as
+independent looks at them would, which a learnt rule is not from frame to frame."""
 DISTINCTION = 0.1
 """Difference in distance at which a joint belongs to the one side for certain, player heights. A
 quarter more or less, others with it: at most 1.5 points, 2.1 mm on nine clips."""
@@ -106,26 +112,70 @@ class LimbIdentity:
 
     def apply(self, half: BodyHalf, values: Shaped[np.ndarray, "T J"]) -> Shaped[np.ndarray, "T J"]:
         """Values of joints, those of the sides exchanged where the sides are."""
-        mirror = np.arange(values.shape[1])
-        mirror[np.concatenate(half.sides)] = half.mirror[np.concatenate(half.sides)]
-        return np.where(self.exchanged[:, None], values[:, mirror], values)
+        return exchange_sides(half, values, self.exchanged)
+
+
+def exchange_sides(
+    half: BodyHalf, values: Shaped[np.ndarray, "T J"], where: Bool[np.ndarray, "T"]
+) -> Shaped[np.ndarray, "T J"]:
+    """Values of joints, those of the sides exchanged in some frames."""
+    mirror = np.arange(values.shape[1])
+    mirror[np.concatenate(half.sides)] = half.mirror[np.concatenate(half.sides)]
+    return np.where(where[:, None], values[:, mirror], values)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmEvidence:
+    """What the poses of whole bodies say of their arms, by a model learnt from captures."""
+
+    model: SideModel
+    skeleton: Skeleton
+    half: BodyHalf
+    """The upper one."""
+    others: Complex[np.ndarray, "T J"]
+    """Joints of the other half, in the skeleton's order."""
+
+    def part(self, frames: slice) -> "ArmEvidence":
+        """Of some frames."""
+        return replace(self, others=self.others[frames])
+
+    def gain(self, joints: Complex[np.ndarray, "T j"], fps: float) -> Float[np.ndarray, "T"]:
+        """What joints of the half say, with the others, for their sides as they are and against the
+        exchanged, nats."""
+        body = self.others.copy()
+        body[:, self.half.joints[self.half.free]] = joints[:, self.half.free]
+        return POSE_RATE / fps * arm_log_odds(self.model, self.skeleton, body, fps)
+
+
+@dataclass(frozen=True, eq=False)
+class LimbEvidence:
+    """What tells which limb is the left one, besides motion and marks."""
+
+    gain: Float[np.ndarray, "T"]
+    """What likeness to marks says for the sides as they are and against the exchanged, nats."""
+    ground: Complex[np.ndarray, "T"] | None = None
+    """Way of the origin of the joints over the ground, of limbs that stand on it."""
+    arms: ArmEvidence | None = None
+
+    def part(self, frames: slice) -> "LimbEvidence":
+        """Of some frames."""
+        ground = None if self.ground is None else self.ground[frames]
+        return LimbEvidence(self.gain[frames], ground, self.arms and self.arms.part(frames))
 
 
 def identify_in_shots(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
-    gain: Float[np.ndarray, "T"],
+    evidence: LimbEvidence,
     marked: Int[np.ndarray, "K"],
     shots: Shots,
     fps: float,
-    ground: Complex[np.ndarray, "T"] | None = None,
 ) -> LimbIdentity:
     """Where the sides of one half of the body are exchanged, in every shot by itself."""
     identities = []
     for part in shots.parts:
         inside = marked[(marked >= part.start) & (marked < part.stop)] - part.start
-        way = None if ground is None else ground[part]
-        identities.append(identify_limbs(half, joints[part], gain[part], inside, fps, way))
+        identities.append(identify_limbs(half, joints[part], evidence.part(part), inside, fps))
     return LimbIdentity(
         np.concatenate([one.exchanged for one in identities]),
         np.concatenate([one.probability for one in identities]),
@@ -136,23 +186,24 @@ def identify_in_shots(
 def identify_limbs(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
-    gain: Float[np.ndarray, "T"],
+    evidence: LimbEvidence,
     marked: Int[np.ndarray, "K"],
     fps: float,
-    ground: Complex[np.ndarray, "T"] | None = None,
 ) -> LimbIdentity:
     """Where the sides of one half of the body are exchanged in one shot.
 
-    In `marked` frames they are right. `gain` is what likeness to marks says for the sides as they
-    are and against the exchanged, nats. `ground` is the way of the origin of `joints` over the
-    ground, of limbs that stand on it.
+    In `marked` frames they are right.
     """
     pair = np.stack([joints[:, list(side)] for side in half.sides], axis=1)
 
     def price_of(pair: Complex[np.ndarray, "T 2 j"]) -> Float[np.ndarray, "S"]:
-        return motion_price(half, pair, fps, ground)
+        return motion_price(half, pair, fps, evidence.ground)
 
     crossed, price = untangle_threads(pair, price_of, round(MIN_THREAD_SECONDS * fps))
+    gain = evidence.gain
+    if evidence.arms is not None:  # moments around a frame are shown, which must be of one thread
+        threads = exchange_sides(half, joints, crossed)
+        gain = gain + np.where(crossed, -1, 1) * evidence.arms.gain(threads, fps)
     cost = _side_costs(crossed, gain, np.isin(np.arange(len(pair)), marked), fps)
     other_belief = DOUBT_COST * np.kron(1 - np.eye(2), np.ones((2, 2)))
 

@@ -60,6 +60,8 @@ from keyrecon.propagation.hypotheses import (
     track_from_keyframes,
 )
 from keyrecon.propagation.limb_identity import (
+    ArmEvidence,
+    LimbEvidence,
     appearance_gain,
     identify_in_shots,
     template_gain,
@@ -68,6 +70,7 @@ from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
 from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
+from keyrecon.propagation.side_model import SideModel
 from keyrecon.propagation.silhouette import (
     Silhouettes,
     gather_silhouettes,
@@ -145,6 +148,8 @@ class HalfStart:
     """Joints that the other half has estimated."""
     ways: MarkedWays
     """Where flow and straight lines lead from marks."""
+    arms: ArmEvidence | None = None
+    """What the whole body says of its arms, which are propagated after the legs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +170,14 @@ def propagate_joints(
     preparation: Preparation,
     annotations: Annotations,
     flow: FlowTracks | None = None,
+    sides: SideModel | None = None,
     options: PropagateOptions = PropagateOptions(),
     progress: Progress = silent,
 ) -> JointTracks:
     """Joints in px, confidence and source keyframe of every joint in every frame.
 
-    Where `flow` between two marks is surer of a joint than edges are, flow has it.
+    Where `flow` between two marks is surer of a joint than edges are, flow has it. `sides` helps to
+    tell the arms apart.
     Annotated joints come back as they were marked, with confidence 1; those said to be absent are
     missing there. Raises KeyreconError when a joint is marked nowhere.
     """
@@ -179,7 +186,7 @@ def propagate_joints(
     if options.method == "paper":
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
-    tracks = _propagate_fused(preparation, annotations, flow, options, progress)
+    tracks = _propagate_fused(preparation, annotations, flow, sides, options, progress)
     return _with_marks(annotations, marked, tracks)
 
 
@@ -197,6 +204,7 @@ def _propagate_fused(
     preparation: Preparation,
     annotations: Annotations,
     flow: FlowTracks | None,
+    sides: SideModel | None,
     options: PropagateOptions,
     progress: Progress,
 ) -> JointTracks:
@@ -214,6 +222,8 @@ def _propagate_fused(
         poses = gather_poses(player.marks, player.bounds, half, fixed)
         templates = _half_templates(player, poses, options.elements)
         start = _start_half(player, poses, fixed)
+        if sides is not None and half.name == "upper":
+            start = replace(start, arms=ArmEvidence(sides, annotations.skeleton, half, joints))
         result = propagate_half(templates, index, start, options.similar, options.rounds)
         free = half.joints[half.free]
         joints[:, free] = result.joints[:, half.free]
@@ -305,8 +315,8 @@ def propagate_half(
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     if half.name == "upper":
         gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    ground = player.ground if half.name == "lower" else None
-    identity = identify_in_shots(half, limbs_chosen.joints, gain, poses.frames, shots, fps, ground)
+    evidence = LimbEvidence(gain, player.ground if half.name == "lower" else None, start.arms)
+    identity = identify_in_shots(half, limbs_chosen.joints, evidence, poses.frames, shots, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)

@@ -20,6 +20,7 @@ from jaxtyping import Int
 from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
+from keyrecon.propagation.side_model import SideModel
 from keyrecon.records import Annotations, FlowTracks, JointTracks, Preparation, Shots
 from keyrecon.shots.usable import part_of_preparation
 from keyrecon.timeline import join_frames, part_of_marks, take_frames
@@ -91,6 +92,7 @@ def propagate_in_groups(
     preparation: Preparation,
     annotations: Annotations,
     flow: FlowTracks | None,
+    sides: SideModel | None,
     options: PropagateOptions,
     keep: Keep,
     progress: Progress,
@@ -106,7 +108,7 @@ def propagate_in_groups(
     groups = group_shots(preparation.shots, annotations.frames, fps, most)
     if len(groups) == 1:
         return keep(
-            "propagate", propagate_joints, preparation, annotations, flow,
+            "propagate", propagate_joints, preparation, annotations, flow, sides,
             options=options, progress=progress,
         )  # fmt: skip
 
@@ -117,6 +119,7 @@ def propagate_in_groups(
             part_of_preparation(preparation, group.frames),
             part_of_marks(annotations, group.frames),
             flow and take_frames(flow, group.frames),
+            sides,
             options=options,
         )
         span = np.searchsorted(group.frames, (group.own.start, group.own.stop)).tolist()

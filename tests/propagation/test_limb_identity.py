@@ -6,7 +6,11 @@ import pytest
 from keyrecon.body import LSP14
 from keyrecon.propagation.correspondence import side_confidence
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.limb_identity import identify_limbs, template_gain
+from keyrecon.propagation.limb_identity import (
+    LimbEvidence,
+    identify_limbs,
+    template_gain,
+)
 
 LEGS = split_body(LSP14)[0]
 ONE, OTHER = map(list, LEGS.sides)
@@ -36,8 +40,8 @@ def exchange(joints, frames):
 
 
 def identify(joints, marked, gain=None):
-    silent = np.zeros(len(joints))
-    return identify_limbs(LEGS, joints, silent if gain is None else gain, np.array(marked), FPS)
+    told = LimbEvidence(np.zeros(len(joints)) if gain is None else gain)
+    return identify_limbs(LEGS, joints, told, np.array(marked), FPS)
 
 
 TIME = np.linspace(-1, 1, 41)

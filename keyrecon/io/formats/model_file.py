@@ -1,7 +1,8 @@
 """Models learnt from captures, on disk: one compressed npz in single precision, no pickle.
 
-Two kinds: depth models (`keyrecon depths`) and swing priors (`keyrecon golf train`), whose version
-is that of segments and motion vectors. Single precision is .01 degrees.
+Three kinds: depth models (`keyrecon depths`), side models (`keyrecon sides`) and swing priors
+(`keyrecon golf train`), whose version is that of segments and motion vectors. Single precision is
+.01 degrees.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from keyrecon.golf.prior.training import SWING_PRIOR_VERSION
 from keyrecon.golf.records import MotionModel
 from keyrecon.io.durable import make_folder, replacing
 from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, DepthModel
+from keyrecon.propagation.side_model import SIDE_MODEL_VERSION, SideModel
 from keyrecon.reading import check_numbers, read_arrays, reading
 
 TURN_ERROR = 1e-4
@@ -85,6 +87,30 @@ def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
         return DepthModel(layers[:4], layers[4:], provenance)
     except KeyreconError as fault:
         raise KeyreconError(f"{path} is not a depth model: {fault}") from fault
+
+
+BUILT_IN_SIDE_MODEL = PACKAGE / "propagation" / "sides.npz"
+"""The model that ships with the package; `sides.md` beside it says how it was made."""
+
+_SIDE_MODEL = ModelKind("side model", "keyrecon sides", SIDE_MODEL_VERSION)
+_SIDE_LAYERS = tuple(f"{kind}{layer}" for kind in ("weights", "biases") for layer in range(3))
+"""Names of the arrays in the file; two layers of rectified units and the answer."""
+
+
+def write_side_model(path: Path, model: SideModel) -> None:
+    """Write a model; the folder is made if need be."""
+    layers = [*model.weights, *model.biases]
+    write_model(path, model.version, model.provenance, dict(zip(_SIDE_LAYERS, layers, strict=True)))
+
+
+def read_side_model(path: Path = BUILT_IN_SIDE_MODEL) -> SideModel:
+    """Read a model; raises KeyreconError for another kind of file, or one of another version."""
+    provenance, arrays = read_model(path, _SIDE_MODEL, _SIDE_LAYERS)
+    layers = tuple(arrays[name] for name in _SIDE_LAYERS)
+    try:
+        return SideModel(layers[:3], layers[3:], provenance)
+    except KeyreconError as fault:
+        raise KeyreconError(f"{path} is not a side model: {fault}") from fault
 
 
 BUILT_IN_SWING_PRIOR = PACKAGE / "golf" / "prior" / "prior.npz"

@@ -26,6 +26,7 @@ from jaxtyping import Float, Int
 
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
+from keyrecon.numerics.perceptron import apply_layers
 
 DEPTH_MODEL_VERSION = 3
 """Of the bones and inputs that a model has weights for."""
@@ -81,11 +82,7 @@ class DepthModel:
 
     def forward(self, shown: Float[np.ndarray, "n inputs"]) -> Float[np.ndarray, "n outputs"]:
         """Depth shares and errors of lengths from what the rule is shown, inputs of all moments."""
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            shown = shown @ weight + bias
-            if layer < len(self.weights) - 1:
-                shown = np.maximum(shown, 0.0)
-        return shown
+        return apply_layers(shown, self.weights, self.biases)
 
     def _of_frames(
         self, flat: Float[np.ndarray, "T 13 2"], fps: float
@@ -142,7 +139,7 @@ def length_errors(
     others look too long, and for bones that the model does not know, as in `expected_depth`.
     """
     errors = _expect(model.length_errors, vectors, lengths, skeleton, fps)
-    whole = np.isfinite(vectors[:, _places(skeleton) or []]).all(axis=(1, 2))
+    whole = np.isfinite(vectors[:, places_of_bones(skeleton) or []]).all(axis=(1, 2))
     return np.where(whole[frames_shown(len(whole), fps)].all(axis=1)[:, None], errors, np.nan)
 
 
@@ -155,7 +152,7 @@ def _expect(
 ) -> Float[np.ndarray, "T B"]:
     """What a rule for LSP14's bones expects of a skeleton's; NaN for those it does not know."""
     expected = np.full(vectors.shape[:2], np.nan)
-    places = _places(skeleton)
+    places = places_of_bones(skeleton)
     if places is not None:
         flat = np.nan_to_num(vectors[:, places] / lengths[places, None])
         expected[:, places] = rule(flat, fps)
@@ -188,7 +185,7 @@ _SPREAD = {
 `depth_spread` tells."""
 
 
-def _places(skeleton: Skeleton) -> list[int] | None:
+def places_of_bones(skeleton: Skeleton) -> list[int] | None:
     """Where LSP14's bones stand in a skeleton; None unless all do."""
     bones = {
         (skeleton.names[parent], skeleton.names[child]): place
