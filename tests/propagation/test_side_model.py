@@ -104,7 +104,7 @@ def test_whole_bodies_tell_arms_apart_that_were_in_one_place(model):
 
 def test_a_model_is_learnt_from_captures(tmp_path):
     captures = [play_tennis(MotionOptions(seconds=8.0, fps=50.0, seed=s)) for s in range(3)]
-    options = SideTrainingOptions(poses=60_000, units=16)
+    options = SideTrainingOptions(poses=120_000, units=32)
     learnt = train_side_model(captures, 50.0, "three players", options)
     write_side_model(tmp_path / "sides.npz", learnt)
     read = read_side_model(tmp_path / "sides.npz")
