@@ -26,14 +26,14 @@ from unseen import unseen_model
 
 from keyrecon.annotation_budget import LONG_SHARE
 from keyrecon.app.console import show
+from keyrecon.body_models.depth_model import DepthModel
 from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.lifting import lifting, motion_fitting
-from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSigns
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.limb_lengths import BodySize
-from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.metrics import acceleration_error, n_mpjpe, pa_mpjpe
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.pipeline import Options
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
 from keyrecon.records import Annotations, JointTracks, Keyframes

@@ -3,8 +3,8 @@
     python benchmarks/accuracy.py [--work DIR] [--mocap DIR] [--only NAME ...] [--second]
         [--other] [--mediapipe PYTHON]
 
-Renders what is missing in the work folder, annotates the chosen keyframes from the truth with
-click noise, reconstructs and prints a table. The depth model is learnt without the players of the
+Renders what is missing in the work folder, annotates the chosen keyframes from the truth with click
+noise, reconstructs and prints a table. Depth and side model are learnt without the players of the
 sequence. Nothing is asserted. `swaps` is the share of legs and arms that are exchanged before
 refinement, `run` the frames of the longest such run. The last columns are those of `posture.py`:
 peak speed of the hands over the true one (median and tenth percentile), errors of knees, elbows and
@@ -22,7 +22,7 @@ import numpy as np
 import posture
 from peer import score_mediapipe
 from sequences import DATA, OTHER, SECOND, TENNIS, Sequence, render
-from unseen import unseen_model
+from unseen import unseen_model, unseen_sides
 
 from keyrecon.annotation_budget import LONG_SHARE, annotation_cost
 from keyrecon.app.console import show
@@ -148,12 +148,12 @@ COLUMNS = (
 )
 
 
-def report(sequence: Sequence, folder: Path, depths: Path, forms: list[str]) -> None:
-    """Print the rows of one sequence; `depths` is a depth model."""
+def report(sequence: Sequence, folder: Path, learnt: dict[str, str], forms: list[str]) -> None:
+    """Print the rows of one sequence; `learnt` are files of models by their options' names."""
     for form in forms:
         options, signs = FORMS[form]
-        if options.depths != "none":
-            options = replace(options, depths=str(depths))
+        used = {name: file for name, file in learnt.items() if getattr(options, name) != "none"}
+        options = replace(options, **used)
         if sequence.seconds <= SHORT:
             budget = 2 * LONG_SHARE
             options = replace(options, keyframes=replace(options.keyframes, budget=budget))
@@ -202,7 +202,9 @@ def main() -> None:
         if not words.only or sequence.name in words.only:
             folder = render(sequence, words.work, words.mocap)
             depths, _ = unseen_model(sequence, words.work, words.mocap)
-            report(sequence, folder, depths, words.form)
+            sides = unseen_sides(sequence, words.work, words.mocap)
+            learnt = {"depths": str(depths), "sides": str(sides)}
+            report(sequence, folder, learnt, words.form)
             if words.mediapipe:
                 report_mediapipe(sequence, folder, words.mediapipe)
     print(f"Peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB.")

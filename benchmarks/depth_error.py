@@ -3,7 +3,7 @@
     python benchmarks/depth_error.py [--mocap DIR] [--without PLAYER ...] [--poses N]
 
 Learns from all captures but those of the players (jarua and adorozco unless told otherwise), films
-theirs from all around as `keyrecon.lifting.priors.depth_training` does, without turned limbs, and
+theirs from all around as `keyrecon.body_models.depth_training` does, without turned limbs, and
 prints the root mean square error of depth in lengths of the bone: what `depth_spread` holds.
 """
 
@@ -17,7 +17,7 @@ from unseen import captures_without
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import RATE, learn_from_files, read_poses
 from keyrecon.body import LSP14
-from keyrecon.lifting.priors.depth_training import DepthTrainingOptions, draw_windows, gather
+from keyrecon.body_models.depth_training import DepthTrainingOptions, draw_windows, gather
 
 FILMED = 20_000
 

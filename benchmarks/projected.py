@@ -27,8 +27,8 @@ from sequences import DATA, OTHER, TENNIS, Sequence, mocap_files, options_of
 from unseen import unseen_model
 
 from keyrecon.body import LSP14
+from keyrecon.body_models.depth_model import DepthModel
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, lift_motion
-from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.metrics import n_mpjpe, pa_mpjpe
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
 from keyrecon.synthetic.clips import join_clips

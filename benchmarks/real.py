@@ -23,7 +23,8 @@ may choose other keyframes and see other noise. How far a clip's two rows differ
 them can be trusted.
 
 The frames that are marked by a person are left out of every figure. The clips fall into two halves:
-`develop` may be looked at while the program is changed, `report` may not.
+those of `develop` were looked at while the program was changed, those of `report` were only
+measured until the halves were exchanged, once, at the end.
 """
 
 import argparse

@@ -94,7 +94,7 @@ TOGETHER = 1.0
 """Of what is much: the change that is expected of a group, at most. As large groups cost fewest
 runs as are mostly found to do nothing."""
 BEFORE_KEYFRAMES = ("tracking", "segmentation", "numerics")
-KINDS = (BEFORE_KEYFRAMES, ("keyframes",), ("propagation",), ("lifting",))
+KINDS = (BEFORE_KEYFRAMES, ("keyframes",), ("propagation",), ("lifting", "body_models"))
 """Folders whose numbers are changed together."""
 MOVE = 0.15
 """Of a head or a shin: how far picks are moved."""

@@ -19,7 +19,9 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "keyrecon"
-FOLDERS = ("tracking", "segmentation", "keyframes", "propagation", "lifting", "numerics")
+FOLDERS = (
+    "tracking", "segmentation", "keyframes", "propagation", "lifting", "body_models", "numerics",
+)  # fmt: skip
 APART = 4
 """Constants of up to as many numbers are varied number by number."""
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]*$")
@@ -34,8 +36,8 @@ ARITHMETIC = {
 FORMS = (
     "lifting/preprocessing.py:MAD_TO_SIGMA",
     "lifting/preprocessing.py:RAYLEIGH_MEDIAN",
-    "lifting/priors/depth_model.py:DEPTH_MODEL_VERSION",
-    "lifting/priors/depth_model.py:INPUTS",
+    "body_models/depth_model.py:DEPTH_MODEL_VERSION",
+    "body_models/depth_model.py:INPUTS",
     "numerics/banded_least_squares.py:STENCIL",
     "propagation/appearance.py:DIAGONAL",
     "propagation/bone_bounds.py:MIN_FRAMES",

@@ -1,8 +1,8 @@
-"""Depth models that have not seen the players of a sequence.
+"""Depth and side models that have not seen the players of a sequence.
 
-The model that comes with keyrecon is learnt from all captures at hand, those of the rendered
-sequences among them. Measured with it, a sequence would be one that it knows. So every sequence is
-lifted with a model learnt from all captures but those of its own players.
+The models that come with keyrecon are learnt from all captures at hand, those of the rendered
+sequences among them. Measured with them, a sequence would be one that they know. So every sequence
+is reconstructed with models learnt from all captures but those of its own players.
 """
 
 import hashlib
@@ -13,15 +13,39 @@ from sequences import OTHER, TENNIS, Sequence, mocap_files
 
 from keyrecon.app.console import show
 from keyrecon.app.depth_training import learn_from_files
+from keyrecon.app.side_training import learn_from_files as learn_sides
+from keyrecon.body_models.depth_model import DepthModel
+from keyrecon.body_models.depth_training import DepthTrainingOptions
+from keyrecon.body_models.side_training import SideTrainingOptions
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
-from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
-from keyrecon.lifting.priors.depth_model import DepthModel
-from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
+from keyrecon.io.formats.model_file import (
+    read_depth_model,
+    write_depth_model,
+    write_side_model,
+)
 
 
 def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, DepthModel]:
-    """A model learnt without the players of a sequence, and its file in the work folder.
+    """A depth model learnt without the players of a sequence, and its file in the work folder."""
+    path, others = _file_and_captures("depths", DepthTrainingOptions(), sequence, work, mocap)
+    if not path.is_file():
+        write_depth_model(path, learn_from_files(others, progress=show))
+    return path, read_depth_model(path)
+
+
+def unseen_sides(sequence: Sequence, work: Path, mocap: Path) -> Path:
+    """The file of a side model learnt likewise."""
+    path, others = _file_and_captures("sides", SideTrainingOptions(), sequence, work, mocap)
+    if not path.is_file():
+        write_side_model(path, learn_sides(others, progress=show))
+    return path
+
+
+def _file_and_captures(
+    kind: str, options: object, sequence: Sequence, work: Path, mocap: Path
+) -> tuple[Path, list[Path]]:
+    """Where a model without the players of a sequence is kept, and what it is learnt from.
 
     One model serves all sequences of the first table, and has seen none of their players; so it is
     with motion that is no tennis.
@@ -29,12 +53,9 @@ def unseen_model(sequence: Sequence, work: Path, mocap: Path) -> tuple[Path, Dep
     table = next((t for t in (TENNIS, OTHER) if sequence in t), (sequence,))
     players = {player(file) for member in table for file in mocap_files(member, mocap)}
     _, others = captures_without(players, mocap)
-    made_of = repr((DepthTrainingOptions(), [file.name for file in others]))
+    made_of = repr((options, [file.name for file in others]))
     tag = hashlib.sha256(made_of.encode()).hexdigest()[:8]
-    path = work / f"depths-without-{'-'.join(sorted(players))}-{tag}.npz"
-    if not path.is_file():
-        write_depth_model(path, learn_from_files(others, progress=show))
-    return path, read_depth_model(path)
+    return work / f"{kind}-without-{'-'.join(sorted(players))}-{tag}.npz", others
 
 
 def captures_without(players: set[str], mocap: Path) -> tuple[list[Path], list[Path]]:

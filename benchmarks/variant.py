@@ -14,7 +14,7 @@ import numpy as np
 from accuracy import SHORT, Case, solve
 from real import Clip, choose_bodies, hits, load_clip, take
 from sequences import OTHER, TENNIS, Sequence, render
-from unseen import unseen_model
+from unseen import unseen_model, unseen_sides
 from variant_store import Finished, Unchanged, VariantStore
 
 from keyrecon.annotation_budget import LONG_SHARE
@@ -110,7 +110,8 @@ def run_rendered(task: Task, sequence: Sequence, store: VariantStore) -> Outcome
     count = min(task.frames or len(truth["points3d"]), len(truth["points3d"]))
     truth = {name: cut(values, count, len(truth["points3d"])) for name, values in truth.items()}
     video = open_video(folder / "video.mp4", end=count)
-    options = replace(Options(), depths=str(depths))
+    sides = unseen_sides(sequence, Path(task.work), Path(task.mocap))
+    options = replace(Options(), depths=str(depths), sides=str(sides))
     if count / video.fps <= SHORT:
         budget = 2 * LONG_SHARE
         options = replace(options, keyframes=replace(options.keyframes, budget=budget))

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.priors.anatomy import anatomy_of, trunk_axes
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import HalfName, Motion
 from keyrecon.uncertainty import LEAST_SECONDS, MERGED_SECONDS, list_runs

@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Int
 
+from keyrecon.body_models.depth_model import DepthModel
+from keyrecon.body_models.side_model import SideModel
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.records import MotionModel
 from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
@@ -28,11 +30,9 @@ from keyrecon.keyframes.pose_time import pose_seconds
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes, count_labels
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.marked_sizes import marked_heights
-from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.progress import Progress, silent
 from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.propagation.propagation import PropagateOptions
-from keyrecon.propagation.side_model import SideModel
 from keyrecon.records import (
     SOURCES,
     Annotations,

@@ -81,6 +81,13 @@ def test_colours_and_scene_know_no_stage():
             assert {target[0] for target in imported(tree) if target} <= SHARED, name
 
 
+def test_rules_learnt_from_captures_know_no_stage():
+    for name, tree in modules():
+        if name[0] == "body_models":
+            known = {target[0] for target in imported(tree) if target}
+            assert known <= BASE | {"body_models"}, name
+
+
 def test_the_annotators_server_and_store_know_no_stage():
     for name, tree in modules():
         if name[:2] in (("annotate", "server"), ("annotate", "store")):

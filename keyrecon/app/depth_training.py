@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.body_models.depth_model import DepthModel
+from keyrecon.body_models.depth_training import DepthTrainingOptions, train_depth_model
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import find_captures, read_capture
 from keyrecon.io.formats.model_file import write_depth_model
 from keyrecon.io.option_tables import check_options
-from keyrecon.lifting.priors.depth_model import DepthModel
-from keyrecon.lifting.priors.depth_training import DepthTrainingOptions, train_depth_model
 from keyrecon.progress import Progress, silent
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from keyrecon.app.depth_training import RATE, gather_captures
+from keyrecon.body_models.side_model import SideModel
+from keyrecon.body_models.side_training import SideTrainingOptions, train_side_model
 from keyrecon.io.formats.model_file import write_side_model
 from keyrecon.io.option_tables import check_options
 from keyrecon.progress import Progress, silent
-from keyrecon.propagation.side_model import SideModel
-from keyrecon.propagation.side_training import SideTrainingOptions, train_side_model
 
 
 def learn(

@@ -8,9 +8,9 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 from keyrecon.app import depth_training as depth_job
 from keyrecon.app import side_training as side_job
 from keyrecon.app.console import show
+from keyrecon.body_models.depth_training import DepthTrainingOptions
+from keyrecon.body_models.side_training import SideTrainingOptions
 from keyrecon.commands.arguments import Files
-from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
-from keyrecon.propagation.side_training import SideTrainingOptions
 from keyrecon.synthetic.sequence import SynthOptions, synthesize
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import HalfKeyframes, Keyframes, Shots
 

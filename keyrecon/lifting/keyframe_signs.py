@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.lifting.bone_directions import bone_vectors
+from keyrecon.body_models.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.depth_evidence import DepthSignOptions, DepthSigns, at_rate
 from keyrecon.lifting.depth_signs import track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks, smooth_joints
-from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.taylor import foreshorten_bones
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.records import Shots
 
 _SMOOTHING_SECONDS = 0.03

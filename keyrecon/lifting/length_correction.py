@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.lifting.bone_directions import bone_vectors
+from keyrecon.body_models.depth_model import DepthModel, length_errors
 from keyrecon.lifting.limb_lengths import BodySize, standing_length
-from keyrecon.lifting.priors.depth_model import DepthModel, length_errors
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.records import Shots
 
 

@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from keyrecon.body_models.depth_model import DepthModel
 from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import DepthSignOptions
 from keyrecon.lifting.interpolation import Interpolation, interpolate_poses
 from keyrecon.lifting.keyframe_signs import infer_keyframe_signs
@@ -37,10 +37,10 @@ from keyrecon.lifting.preprocessing import (
     prepare_tracks,
     reject_spikes,
 )
-from keyrecon.lifting.priors.depth_model import DepthModel
 from keyrecon.lifting.refinement import RefineOptions, descend_motion
 from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import lift_keyframes
+from keyrecon.numerics.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.numerics.geometry import project_orthographic, unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import BODY_HEIGHTS, FIELDS_OF_VIEW

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from keyrecon.lifting.bone_directions import bone_vectors
+from keyrecon.body_models.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.depth_evidence import DepthSignOptions, ForeshortenedBones, at_rate
 from keyrecon.lifting.depth_signs import DepthSigns, track_depth_signs
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks, smooth_joints
-from keyrecon.lifting.priors.depth_model import DepthModel, expected_depth
 from keyrecon.lifting.priors.exemplars import ExemplarPrior
 from keyrecon.lifting.refinement import RefineOptions, refine_motion
 from keyrecon.lifting.solver import MotionState
 from keyrecon.lifting.taylor import KeyPoses, foreshorten_bones, lift_foreshortened
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Shots

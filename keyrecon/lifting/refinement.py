@@ -20,13 +20,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
+from keyrecon.body_models.depth_model import depth_spread
 from keyrecon.lifting import terms
-from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import MAD_TO_SIGMA, PreparedTracks
 from keyrecon.lifting.priors.anatomy import TILT, anatomy_of, sideways_spread, trunk_axes
-from keyrecon.lifting.priors.depth_model import depth_spread
 from keyrecon.lifting.solver import MotionState, Smoothness, solve
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass, sigma_at
 from keyrecon.ranges import within

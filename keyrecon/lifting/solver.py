@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Float
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.numerics.banded_least_squares import (
     STENCIL,
     add_second_differences,
@@ -23,6 +22,7 @@ from keyrecon.numerics.banded_least_squares import (
     second_difference_bands,
     solve_banded,
 )
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 

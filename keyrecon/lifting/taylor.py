@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import Skeleton
-from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.depth_evidence import DepthSigns, ForeshortenedBones
 from keyrecon.lifting.foreshortening import depth_share
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 
 _INFERRED_CONFIDENCE = 0.3

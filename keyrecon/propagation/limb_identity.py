@@ -29,11 +29,11 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int, Shaped
 
 from keyrecon.body import Skeleton
+from keyrecon.body_models.side_model import SideModel, arm_log_odds
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
 from keyrecon.propagation.limb_motion import exchange_price, foot_exchange_price
 from keyrecon.propagation.mark_sides import exchange_evidence
-from keyrecon.propagation.side_model import SideModel, arm_log_odds
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
 from keyrecon.records import Shots
 
@@ -148,7 +148,7 @@ class ArmEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class LimbEvidence:
+class IdentityEvidence:
     """What tells which limb is the left one, besides motion and marks."""
 
     gain: Float[np.ndarray, "T"]
@@ -157,16 +157,16 @@ class LimbEvidence:
     """Way of the origin of the joints over the ground, of limbs that stand on it."""
     arms: ArmEvidence | None = None
 
-    def part(self, frames: slice) -> "LimbEvidence":
+    def part(self, frames: slice) -> "IdentityEvidence":
         """Of some frames."""
         ground = None if self.ground is None else self.ground[frames]
-        return LimbEvidence(self.gain[frames], ground, self.arms and self.arms.part(frames))
+        return IdentityEvidence(self.gain[frames], ground, self.arms and self.arms.part(frames))
 
 
 def identify_in_shots(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
-    evidence: LimbEvidence,
+    evidence: IdentityEvidence,
     marked: Int[np.ndarray, "K"],
     shots: Shots,
     fps: float,
@@ -186,7 +186,7 @@ def identify_in_shots(
 def identify_limbs(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
-    evidence: LimbEvidence,
+    evidence: IdentityEvidence,
     marked: Int[np.ndarray, "K"],
     fps: float,
 ) -> LimbIdentity:

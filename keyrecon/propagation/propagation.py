@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from keyrecon.body import Skeleton
+from keyrecon.body_models.side_model import SideModel
 from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
 from keyrecon.progress import Progress, silent
@@ -61,7 +62,7 @@ from keyrecon.propagation.hypotheses import (
 )
 from keyrecon.propagation.limb_identity import (
     ArmEvidence,
-    LimbEvidence,
+    IdentityEvidence,
     appearance_gain,
     identify_in_shots,
     template_gain,
@@ -70,7 +71,6 @@ from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
 from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
-from keyrecon.propagation.side_model import SideModel
 from keyrecon.propagation.silhouette import (
     Silhouettes,
     gather_silhouettes,
@@ -315,7 +315,7 @@ def propagate_half(
     gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
     if half.name == "upper":
         gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    evidence = LimbEvidence(gain, player.ground if half.name == "lower" else None, start.arms)
+    evidence = IdentityEvidence(gain, player.ground if half.name == "lower" else None, start.arms)
     identity = identify_in_shots(half, limbs_chosen.joints, evidence, poses.frames, shots, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)

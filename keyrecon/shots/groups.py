@@ -17,10 +17,10 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Int
 
+from keyrecon.body_models.side_model import SideModel
 from keyrecon.keeping import Keep, work_on_each
 from keyrecon.progress import Progress
 from keyrecon.propagation.propagation import PropagateOptions, propagate_joints
-from keyrecon.propagation.side_model import SideModel
 from keyrecon.records import Annotations, FlowTracks, JointTracks, Preparation, Shots
 from keyrecon.shots.usable import part_of_preparation
 from keyrecon.timeline import join_frames, part_of_marks, take_frames

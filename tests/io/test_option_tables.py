@@ -5,10 +5,10 @@ from dataclasses import fields
 import pytest
 
 from keyrecon import KeyreconError
+from keyrecon.body_models.depth_training import DepthTrainingOptions
 from keyrecon.golf.prior.training import TrainOptions
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.option_tables import OptionRecord, changed_options, check_options, with_changes
-from keyrecon.lifting.priors.depth_training import DepthTrainingOptions
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.synthetic.sequence import SynthOptions
 

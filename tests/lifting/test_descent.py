@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import PreparedTracks
 from keyrecon.lifting.refinement import descend_motion
 from keyrecon.lifting.solver import MotionState
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Shots
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.keyframe_signs import infer_keyframe_signs
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import KeyframeMarks, PreparedTracks
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Shots
 

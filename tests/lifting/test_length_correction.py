@@ -7,9 +7,9 @@ import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.io.formats.model_file import read_depth_model
-from keyrecon.lifting.bone_directions import bone_vectors
 from keyrecon.lifting.length_correction import correct_lengths
 from keyrecon.lifting.limb_lengths import BodySize, standing_length
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.records import Shots
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 

@@ -11,7 +11,6 @@ from swinging_figure import BREADTHS, standing_directions, swinging_motion, turn
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting import limb_lengths
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.depth_evidence import (
     DepthSignOptions,
     ForeshortenedBones,
@@ -23,6 +22,7 @@ from keyrecon.lifting.lifting import LiftOptions, lift_motion
 from keyrecon.lifting.limb_lengths import estimate_lengths
 from keyrecon.lifting.priors import anatomy
 from keyrecon.lifting.taylor import foreshorten_bones, lift_foreshortened
+from keyrecon.numerics.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
 

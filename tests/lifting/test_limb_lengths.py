@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import estimate_lengths
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Annotations, JointTracks
 

@@ -5,10 +5,10 @@ import pytest
 from swinging_figure import swinging_motion
 
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.lifting import LiftPriors, LiftResult, lift_motion
 from keyrecon.lifting.perspective import relative_distance, without_perspective
 from keyrecon.metrics import pa_mpjpe
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
 
 DISTANCE, FOCAL = 2.2, 900.0

@@ -6,7 +6,6 @@ from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body import LSP14
 from keyrecon.lifting import terms
-from keyrecon.lifting.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.lifting.foreshortening import INCLINATIONS, depth_share, log_densities
 from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
 from keyrecon.lifting.limb_lengths import BodySize
@@ -15,6 +14,7 @@ from keyrecon.lifting.priors.anatomy import sideways_spread
 from keyrecon.lifting.refinement import refine_motion, tilted_as
 from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
 from keyrecon.lifting.terms import unseen_bend
+from keyrecon.numerics.bone_directions import bone_vectors, pose_from_directions
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.records import HalfKeyframes

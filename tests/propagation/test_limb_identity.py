@@ -7,7 +7,7 @@ from keyrecon.body import LSP14
 from keyrecon.propagation.correspondence import side_confidence
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import (
-    LimbEvidence,
+    IdentityEvidence,
     identify_limbs,
     template_gain,
 )
@@ -40,7 +40,7 @@ def exchange(joints, frames):
 
 
 def identify(joints, marked, gain=None):
-    told = LimbEvidence(np.zeros(len(joints)) if gain is None else gain)
+    told = IdentityEvidence(np.zeros(len(joints)) if gain is None else gain)
     return identify_limbs(LEGS, joints, told, np.array(marked), FPS)
 
 

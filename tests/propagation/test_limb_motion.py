@@ -5,7 +5,7 @@ import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.limb_identity import LimbEvidence, identify_limbs
+from keyrecon.propagation.limb_identity import IdentityEvidence, identify_limbs
 from keyrecon.propagation.limb_motion import (
     PLACE_SPREAD,
     exchange_price,
@@ -104,7 +104,9 @@ def test_a_runner_whose_steps_were_taken_for_bounces_gets_his_legs_back(seed):
     joints, ground = runner(60)
     apart = (joints[:, ONE[-1]] - joints[:, OTHER[-1]]).real
     wrong = with_legs_exchanged(as_found(joints, seed), np.flatnonzero(apart < 0))
-    found = identify_limbs(LEGS, wrong, LimbEvidence(np.zeros(60), ground), np.array([0, 59]), FPS)
+    found = identify_limbs(
+        LEGS, wrong, IdentityEvidence(np.zeros(60), ground), np.array([0, 59]), FPS
+    )
     clear = np.abs(apart) > 0.25
     np.testing.assert_array_equal(found.exchanged[clear], (apart < 0)[clear])
 

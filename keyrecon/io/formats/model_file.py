@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from keyrecon.body_models.depth_model import DEPTH_MODEL_VERSION, DepthModel
+from keyrecon.body_models.side_model import SIDE_MODEL_VERSION, SideModel
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.prior.skeleton import SEGMENTS
 from keyrecon.golf.prior.training import SWING_PRIOR_VERSION
 from keyrecon.golf.records import MotionModel
 from keyrecon.io.durable import make_folder, replacing
-from keyrecon.lifting.priors.depth_model import DEPTH_MODEL_VERSION, DepthModel
-from keyrecon.propagation.side_model import SIDE_MODEL_VERSION, SideModel
 from keyrecon.reading import check_numbers, read_arrays, reading
 
 TURN_ERROR = 1e-4
@@ -63,7 +63,7 @@ def read_model(
     return provenance, arrays
 
 
-BUILT_IN_DEPTH_MODEL = PACKAGE / "lifting" / "priors" / "depths.npz"
+BUILT_IN_DEPTH_MODEL = PACKAGE / "body_models" / "depths.npz"
 """The model that ships with the package; `depths.md` beside it says how it was made."""
 
 _DEPTH_MODEL = ModelKind("depth model", "keyrecon depths", DEPTH_MODEL_VERSION)
@@ -89,7 +89,7 @@ def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
         raise KeyreconError(f"{path} is not a depth model: {fault}") from fault
 
 
-BUILT_IN_SIDE_MODEL = PACKAGE / "propagation" / "sides.npz"
+BUILT_IN_SIDE_MODEL = PACKAGE / "body_models" / "sides.npz"
 """The model that ships with the package; `sides.md` beside it says how it was made."""
 
 _SIDE_MODEL = ModelKind("side model", "keyrecon sides", SIDE_MODEL_VERSION)

@@ -7,8 +7,8 @@ from swinging_figure import BREADTHS, swinging_motion
 from keyrecon.annotate.assist.body_estimate import estimate_body
 from keyrecon.annotate.assist.pose_estimate import MIN_DEPTH_CHANGE, FrameObservation, estimate_pose
 from keyrecon.body import LSP14
-from keyrecon.lifting.bone_directions import pose_from_directions
 from keyrecon.lifting.limb_lengths import BodySize
+from keyrecon.numerics.bone_directions import pose_from_directions
 from keyrecon.records import Annotations
 
 SIZE = BodySize(LSP14, LSP14.lengths, BREADTHS, np.full(240, 400.0))

@@ -8,17 +8,17 @@ import pytest
 
 from keyrecon import cli
 from keyrecon.body import LSP14, Skeleton
-from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
-from keyrecon.lifting.bone_directions import bone_vectors
-from keyrecon.lifting.priors import depth_training
-from keyrecon.lifting.priors.depth_model import INPUTS, DepthModel, expected_depth
-from keyrecon.lifting.priors.depth_training import (
+from keyrecon.body_models import depth_training
+from keyrecon.body_models.depth_model import INPUTS, DepthModel, expected_depth
+from keyrecon.body_models.depth_training import (
     DepthTrainingOptions,
     draw_windows,
     gather,
     train_depth_model,
 )
+from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.model_file import read_depth_model, write_depth_model
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
 FPS = 50.0

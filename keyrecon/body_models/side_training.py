@@ -1,6 +1,6 @@
 """How a side model is learnt: captured motion filmed from all around, arms exchanged or not.
 
-Windows are drawn as for a depth model (`lifting/priors/depth_training.py`), with errors of joints
+Windows are drawn as for a depth model (`body_models/depth_training.py`), with errors of joints
 and lengths as tracks have them; in half of them the arms are exchanged, and the perceptron,
 scikit-learn's, learns to tell which (logistic loss, Adam).
 """
@@ -13,16 +13,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from keyrecon.body import LSP14
-from keyrecon.errors import KeyreconError
-from keyrecon.lifting.priors.depth_model import OFFSETS, frame_inputs
-from keyrecon.lifting.priors.depth_training import (
+from keyrecon.body_models.depth_model import OFFSETS, frame_inputs
+from keyrecon.body_models.depth_training import (
     DepthTrainingOptions,
     Poses,
     draw_windows,
     gather,
 )
+from keyrecon.body_models.side_model import ARM_BONES, EXCHANGED, SideModel
+from keyrecon.errors import KeyreconError
 from keyrecon.progress import Progress, silent
-from keyrecon.propagation.side_model import ARM_BONES, EXCHANGED, SideModel
 from keyrecon.ranges import SEEDS, within
 
 _DRAWN = 20_000

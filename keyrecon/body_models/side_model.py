@@ -3,7 +3,7 @@
 Arms that were taken for one another make a body that hardly anybody makes: shoulders turned
 against hips, an arm that swings with the leg of its side, a club in front of a back. So a
 perceptron is shown the 13 bones at some moments around a frame, as the depth model is
-(`lifting/priors/depth_model.py`), and tells how probable it is that the arms are on the sides that
+(`body_models/depth_model.py`), and tells how probable it is that the arms are on the sides that
 they are said to be on, given that the legs are. It answers both ways round, and half of the
 difference counts, so that it cannot be for both. `side_training.py` learns it; `sides.md` tells
 from what, and how often it is right.
@@ -17,14 +17,14 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from keyrecon.body import LSP14, Skeleton
-from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors
-from keyrecon.lifting.priors.depth_model import (
+from keyrecon.body_models.depth_model import (
     INPUTS,
     frame_inputs,
     frames_shown,
     places_of_bones,
 )
+from keyrecon.errors import KeyreconError
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.perceptron import apply_layers
 
 SIDE_MODEL_VERSION = 1

@@ -5,6 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14, Skeleton
+from keyrecon.body_models.side_model import SideModel, arm_log_odds
+from keyrecon.body_models.side_training import SideTrainingOptions, train_side_model
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.model_file import (
     BUILT_IN_DEPTH_MODEL,
@@ -14,12 +16,10 @@ from keyrecon.io.formats.model_file import (
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import (
     ArmEvidence,
-    LimbEvidence,
+    IdentityEvidence,
     exchange_sides,
     identify_limbs,
 )
-from keyrecon.propagation.side_model import SideModel, arm_log_odds
-from keyrecon.propagation.side_training import SideTrainingOptions, train_side_model
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
 FPS = 25.0
@@ -96,7 +96,7 @@ def test_whole_bodies_tell_arms_apart_that_were_in_one_place(model):
     wrong = exchange_sides(UPPER, upper, np.arange(len(upper)) >= 28)
     nothing = np.zeros(len(body))
     arms = ArmEvidence(model, LSP14, UPPER, body)
-    told = identify_limbs(UPPER, wrong, LimbEvidence(nothing, arms=arms), np.array([0]), FPS)
+    told = identify_limbs(UPPER, wrong, IdentityEvidence(nothing, arms=arms), np.array([0]), FPS)
     assert told.exchanged[40:].all()
     assert not told.exchanged[:18].any()
     assert told.probability[60] > 0.95

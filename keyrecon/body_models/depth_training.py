@@ -18,9 +18,7 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from keyrecon.body import LSP14
-from keyrecon.errors import KeyreconError
-from keyrecon.lifting.bone_directions import bone_vectors
-from keyrecon.lifting.priors.depth_model import (
+from keyrecon.body_models.depth_model import (
     INPUTS,
     LENGTH_OF_BONE,
     LENGTH_UNIT,
@@ -29,6 +27,8 @@ from keyrecon.lifting.priors.depth_model import (
     DepthModel,
     frame_inputs,
 )
+from keyrecon.errors import KeyreconError
+from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import SEEDS, within
