@@ -10,11 +10,11 @@ threads without a name. Then a chain of two states (the one thread is left, or t
 prices is solved for the whole clip: marks fix the state, so that what a crossing leaves open is
 decided by the next mark; in between, the annotated poses that are most like a frame say which is
 which, and so do what the joints of either arm look like on the marked frames and what a rule learnt
-from captures says of arms by the pose of the whole body (`side_model`). A pose that no
-mark is like can look the wrong way round for as long as it lasts, in one frame like in the next: so
-what likeness to marks says is believed or doubted, a second pair of states, and a run of frames
-counts no more than doubting it costs. The probability that the chain gives to its sides is small
-where nothing decides.
+from captures says of arms by the pose of the whole body (`side_model`). A pose that no mark is like
+can look the wrong way round for as long as it lasts, in one frame like in the next: so what
+likeness to marks says is believed or doubted, a second pair of states, and a run of frames counts
+no more than doubting it costs. The probability that the chain gives to its sides is small where
+nothing decides.
 
 Marked joints that optical flow follows were tried as further evidence. A leg that passes the other
 hands its flow over, so that one mistake counts in every frame that follows: 3.3 % of the limbs of a
@@ -51,8 +51,9 @@ it was on the mark: of a run marked by eye in every frame 1.6 % of the frames ha
 exchanged with a tenth of this, .8 % without (in six choices of marks; with half of the marks 1.5
 and .8 %). A quarter more or less, others with it: at most 1.2 points, 2.1 mm on nine clips."""
 POSE_RATE = 20.0
-"""What the poses of whole bodies say of the arms counts so many times within a second: as much as
-independent looks at them would, which a learnt rule is not from frame to frame."""
+"""What the poses of whole bodies say of the arms counts so many times within a second. On eighteen
+real clips with two choices of marks each, in frames that nobody marked, 1.9 % of the pairs of arms
+were exchanged without it, 1.8 with 5 and 10, 1.4 with 20 and 1.3 with 40."""
 DISTINCTION = 0.1
 """Difference in distance at which a joint belongs to the one side for certain, player heights. A
 quarter more or less, others with it: at most 1.5 points, 2.1 mm on nine clips."""
