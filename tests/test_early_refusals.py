@@ -65,8 +65,9 @@ def test_a_format_whose_package_is_missing_is_told_before_any_file_is_written(
     assert not (tmp_path / "a.trc").exists()
 
 
-def test_a_depth_model_that_is_not_there_is_told_before_any_stage(keyrecon, project):
-    assert one_line(keyrecon("run", project, "--depths", "nope.npz"), "nope.npz")
+@pytest.mark.parametrize("model", ["--depths", "--sides"])
+def test_a_model_that_is_not_there_is_told_before_any_stage(keyrecon, project, model):
+    assert one_line(keyrecon("run", project, model, "nope.npz"), "nope.npz")
 
 
 @pytest.mark.parametrize("shots", [ShotOptions(use="7"), ShotOptions(skip="7")])

@@ -1,9 +1,13 @@
 """Left arms and right ones by the pose of the whole body."""
 
+import sys
+
 import numpy as np
 import pytest
+from bvh_files import bvh_text
 from scipy.spatial.transform import Rotation
 
+from keyrecon import cli
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.body_models.side_model import SideModel, arm_log_odds
 from keyrecon.body_models.side_training import SideTrainingOptions, train_side_model
@@ -118,3 +122,19 @@ def test_layers_that_lead_elsewhere_and_files_of_another_kind_are_refused():
         SideModel((np.zeros((273, 2)),), (np.zeros(2),), "")
     with pytest.raises(KeyreconError, match="side model"):
         read_side_model(BUILT_IN_DEPTH_MODEL)
+
+
+def test_the_command_learns_from_files_what_run_can_use(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "mine.npz"
+    call = ["keyrecon", "sides", str(tmp_path), "--out", str(out), "--poses", "2000"]
+    monkeypatch.setattr(sys, "argv", call)
+    (tmp_path / "walk.bvh").write_text(bvh_text(frames=200)[0])
+    cli.main()
+    assert "1 captures (walk)" in capsys.readouterr().out
+    assert "walk" in read_side_model(out).provenance
+
+
+def test_learning_without_scikit_learn_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
+    with pytest.raises(KeyreconError, match=r"pip install 'keyrecon\[learn\]'"):
+        train_side_model([play_tennis(MotionOptions(2.0))], 50.0, "")
