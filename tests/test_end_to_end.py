@@ -270,7 +270,8 @@ def whole_body(truth, *frames):
 
 
 def test_one_marked_body_serves_in_place_of_clicks(clip, tmp_path, capsys):
-    made, truth = new_project(clip, tmp_path / "marked"), read_truth(clip / "truth.npz")
+    made, truth = tmp_path / "marked", read_truth(clip / "truth.npz")
+    assert keyrecon("new", clip / "video.mp4", "--project", made) == 0
     assert keyrecon("keyframes", made) == 1
     assert "no picks yet, and no marked body" in capsys.readouterr().err
     write_coco(tmp_path / "body.json", whole_body(truth, 25, 70), SIZE)
