@@ -51,12 +51,17 @@ def carry_joints(
 
 def read_models(options: Options) -> Models:
     """The models that the options ask for."""
-    depth, sides = None, None
-    if options.depths != "none":
-        built_in = options.depths == "built-in"
-        depth = read_depth_model(BUILT_IN_DEPTH_MODEL if built_in else Path(options.depths))
-    if options.sides != "none":
-        built_in = options.sides == "built-in"
-        sides = read_side_model(BUILT_IN_SIDE_MODEL if built_in else Path(options.sides))
-    swing = read_motion_model() if options.prior == "golf" else None
-    return Models(depth, swing, sides)
+    depth = _file_named(options.depths, BUILT_IN_DEPTH_MODEL)
+    sides = _file_named(options.sides, BUILT_IN_SIDE_MODEL)
+    return Models(
+        None if depth is None else read_depth_model(depth),
+        read_motion_model() if options.prior == "golf" else None,
+        None if sides is None else read_side_model(sides),
+    )
+
+
+def _file_named(named: str, built_in: Path) -> Path | None:
+    """The file that an option names; None for 'none'."""
+    if named == "none":
+        return None
+    return built_in if named == "built-in" else Path(named)

@@ -19,14 +19,13 @@ little of it, a video more (`lifting/length_correction.py`).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from keyrecon.body import LSP14, Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.numerics.perceptron import apply_layers
+from keyrecon.numerics.perceptron import apply_layers, describe_layers, layers_lead
 
 DEPTH_MODEL_VERSION = 3
 """Of the bones and inputs that a model has weights for."""
@@ -56,13 +55,10 @@ class DepthModel:
 
     def __post_init__(self) -> None:
         """Raise KeyreconError for layers that do not fit one another, or these bones."""
-        sizes = [INPUTS, *(len(bias) for bias in self.biases)]
-        wanted = list(pairwise(sizes))
-        if [weight.shape for weight in self.weights] != wanted or sizes[-1] != OUTPUTS:
-            told = ", ".join("x".join(map(str, weight.shape)) for weight in self.weights)
+        if not layers_lead(self.weights, self.biases, INPUTS, OUTPUTS):
             raise KeyreconError(
                 f"A depth model leads from {INPUTS} inputs to {_BONES} depths and {LENGTHS} "
-                f"lengths; this one's layers are {told or 'missing'}."
+                f"lengths; this one's layers are {describe_layers(self.weights)}."
             )
 
     def depth_shares(

@@ -146,18 +146,23 @@ def _added(sums: Sequence[np.ndarray], layers: Sequence[np.ndarray]) -> list[np.
 
 def _network(options: DepthTrainingOptions) -> Any:  # scikit-learn has no types
     """The perceptron before it has learnt; raises KeyreconError without scikit-learn."""
-    try:
-        from sklearn.neural_network import MLPRegressor
-    except ImportError as fault:
-        raise KeyreconError(
-            "Learning depths needs scikit-learn: pip install 'keyrecon[learn]'."
-        ) from fault
-    return MLPRegressor(
+    return neural_networks("depths").MLPRegressor(
         hidden_layer_sizes=(options.units,) * 3,
         batch_size=min(_STEP, options.poses),
         alpha=_DECAY,
         random_state=options.seed,
     )
+
+
+def neural_networks(learnt: str) -> Any:
+    """scikit-learn's perceptrons; raises KeyreconError where it is not installed."""
+    try:
+        import sklearn.neural_network as networks
+    except ImportError as fault:
+        raise KeyreconError(
+            f"Learning {learnt} needs scikit-learn: pip install 'keyrecon[learn]'."
+        ) from fault
+    return networks
 
 
 class Poses(NamedTuple):

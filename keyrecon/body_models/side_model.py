@@ -11,7 +11,6 @@ from what, and how often it is right.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -25,7 +24,7 @@ from keyrecon.body_models.depth_model import (
 )
 from keyrecon.errors import KeyreconError
 from keyrecon.numerics.bone_directions import bone_vectors
-from keyrecon.numerics.perceptron import apply_layers
+from keyrecon.numerics.perceptron import apply_layers, describe_layers, layers_lead
 
 SIDE_MODEL_VERSION = 1
 """Of the bones and inputs that a model has weights for."""
@@ -65,13 +64,10 @@ class SideModel:
 
     def __post_init__(self) -> None:
         """Raise KeyreconError for layers that do not fit one another, or these bones."""
-        sizes = [INPUTS, *(len(bias) for bias in self.biases)]
-        wanted = list(pairwise(sizes))
-        if [weight.shape for weight in self.weights] != wanted or sizes[-1] != 1:
-            told = ", ".join("x".join(map(str, weight.shape)) for weight in self.weights)
+        if not layers_lead(self.weights, self.biases, INPUTS, 1):
             raise KeyreconError(
                 f"A side model leads from {INPUTS} inputs to one answer; this one's layers are "
-                f"{told or 'missing'}."
+                f"{describe_layers(self.weights)}."
             )
 
     def log_odds(self, flat: Float[np.ndarray, "T 13 2"], fps: float) -> Float[np.ndarray, "T"]:

@@ -19,9 +19,9 @@ from keyrecon.body_models.depth_training import (
     Poses,
     draw_windows,
     gather,
+    neural_networks,
 )
 from keyrecon.body_models.side_model import ARM_BONES, EXCHANGED, SideModel
-from keyrecon.errors import KeyreconError
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import SEEDS, within
 
@@ -88,13 +88,7 @@ def train_side_model(
 
 def _network(options: SideTrainingOptions) -> Any:  # scikit-learn has no types
     """The perceptron before it has learnt; raises KeyreconError without scikit-learn."""
-    try:
-        from sklearn.neural_network import MLPClassifier
-    except ImportError as fault:
-        raise KeyreconError(
-            "Learning sides needs scikit-learn: pip install 'keyrecon[learn]'."
-        ) from fault
-    return MLPClassifier(
+    return neural_networks("sides").MLPClassifier(
         hidden_layer_sizes=(options.units,) * 2,
         batch_size=min(_STEP, options.poses),
         alpha=_DECAY,

@@ -1,6 +1,7 @@
 """A multilayer perceptron that was learnt before: what it tells of what it is shown."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -17,3 +18,19 @@ def apply_layers(
         if layer < len(weights) - 1:
             shown = np.maximum(shown, 0.0)
     return shown
+
+
+def layers_lead(
+    weights: Sequence[Float[np.ndarray, "_ _"]],
+    biases: Sequence[Float[np.ndarray, "_"]],
+    inputs: int,
+    outputs: int,
+) -> bool:
+    """Whether layers fit one another and lead from so many inputs to so many outputs."""
+    sizes = [inputs, *(len(bias) for bias in biases)]
+    return [weight.shape for weight in weights] == list(pairwise(sizes)) and sizes[-1] == outputs
+
+
+def describe_layers(weights: Sequence[Float[np.ndarray, "_ _"]]) -> str:
+    """Sizes of layers, for a message."""
+    return ", ".join("x".join(map(str, weight.shape)) for weight in weights) or "missing"

@@ -7,7 +7,7 @@ Three kinds: depth models (`keyrecon depths`), side models (`keyrecon sides`) an
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -69,48 +69,56 @@ BUILT_IN_DEPTH_MODEL = PACKAGE / "body_models" / "depths.npz"
 _DEPTH_MODEL = ModelKind("depth model", "keyrecon depths", DEPTH_MODEL_VERSION)
 
 
-_LAYERS = tuple(f"{kind}{layer}" for kind in ("weights", "biases") for layer in range(4))
-"""Names of the arrays in the file; three layers of rectified units and the depths."""
-
-
 def write_depth_model(path: Path, model: DepthModel) -> None:
     """Write a model; the folder is made if need be."""
-    layers = [*model.weights, *model.biases]
-    write_model(path, model.version, model.provenance, dict(zip(_LAYERS, layers, strict=True)))
+    _write_perceptron(path, model)
 
 
 def read_depth_model(path: Path = BUILT_IN_DEPTH_MODEL) -> DepthModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
-    provenance, arrays = read_model(path, _DEPTH_MODEL, _LAYERS)
-    layers = tuple(arrays[name] for name in _LAYERS)
-    try:
-        return DepthModel(layers[:4], layers[4:], provenance)
-    except KeyreconError as fault:
-        raise KeyreconError(f"{path} is not a depth model: {fault}") from fault
+    return _read_perceptron(path, _DEPTH_MODEL, DepthModel, 4)
 
 
 BUILT_IN_SIDE_MODEL = PACKAGE / "body_models" / "sides.npz"
 """The model that ships with the package; `sides.md` beside it says how it was made."""
 
 _SIDE_MODEL = ModelKind("side model", "keyrecon sides", SIDE_MODEL_VERSION)
-_SIDE_LAYERS = tuple(f"{kind}{layer}" for kind in ("weights", "biases") for layer in range(3))
-"""Names of the arrays in the file; two layers of rectified units and the answer."""
 
 
 def write_side_model(path: Path, model: SideModel) -> None:
     """Write a model; the folder is made if need be."""
-    layers = [*model.weights, *model.biases]
-    write_model(path, model.version, model.provenance, dict(zip(_SIDE_LAYERS, layers, strict=True)))
+    _write_perceptron(path, model)
 
 
 def read_side_model(path: Path = BUILT_IN_SIDE_MODEL) -> SideModel:
     """Read a model; raises KeyreconError for another kind of file, or one of another version."""
-    provenance, arrays = read_model(path, _SIDE_MODEL, _SIDE_LAYERS)
-    layers = tuple(arrays[name] for name in _SIDE_LAYERS)
+    return _read_perceptron(path, _SIDE_MODEL, SideModel, 3)
+
+
+PerceptronModel = TypeVar("PerceptronModel", DepthModel, SideModel)
+
+
+def _layer_names(layers: int) -> list[str]:
+    """Names of the arrays in the file: weights of every layer, then biases."""
+    return [f"{kind}{layer}" for kind in ("weights", "biases") for layer in range(layers)]
+
+
+def _write_perceptron(path: Path, model: DepthModel | SideModel) -> None:
+    layers = [*model.weights, *model.biases]
+    names = _layer_names(len(model.weights))
+    write_model(path, model.version, model.provenance, dict(zip(names, layers, strict=True)))
+
+
+def _read_perceptron(
+    path: Path, kind: ModelKind, model: type[PerceptronModel], layers: int
+) -> PerceptronModel:
+    names = _layer_names(layers)
+    provenance, arrays = read_model(path, kind, names)
+    values = tuple(arrays[name] for name in names)
     try:
-        return SideModel(layers[:3], layers[3:], provenance)
+        return model(values[:layers], values[layers:], provenance)
     except KeyreconError as fault:
-        raise KeyreconError(f"{path} is not a side model: {fault}") from fault
+        raise KeyreconError(f"{path} is not a {kind.name}: {fault}") from fault
 
 
 BUILT_IN_SWING_PRIOR = PACKAGE / "golf" / "prior" / "prior.npz"
