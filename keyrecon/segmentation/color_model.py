@@ -178,8 +178,9 @@ def picked_height(picks: Sequence[Pick]) -> float:
             heights.append(np.linalg.norm(np.mean(heads, axis=0) - np.mean(feet, axis=0)))
     if not heights:
         raise KeyreconError(
-            "No frame has both a head and a foot picked, so the player's size is unknown; "
-            "pick the head and both feet in one frame where the player stands upright."
+            "No frame has both a head and a foot marked or picked, so the player's size is "
+            "unknown; mark one whole body, or pick the head and both feet, in one frame where the "
+            "player stands upright."
         )
     return float(np.median(heights))
 
