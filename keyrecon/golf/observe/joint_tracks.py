@@ -34,22 +34,23 @@ HIDDEN_SPREAD = 0.04
 """The same of a joint that was clicked behind something."""
 CLICK_SPREAD = 0.015
 """The same of any other click."""
-PLANTED_SPREAD = 0.045
-"""The same of the leading foot where it is not tracked: that of a click, three times, since it is
-one click in all frames of a swing, of which some nine count as independent. Known in the clicked
-frame alone, as it was, the foot came to lie .1 to .2 trunk lengths off through a whole real swing
-down the line, and its knee with it. With .03 or this, joints of that swing within a fifth of the
+REPEATED_CLICK = 3.0
+"""By so many times a click's deviation a foot is known that is not tracked and stays where it was
+clicked: it is one click in all frames of a swing, of which some nine count as independent. Known in
+the clicked frame alone, as it was, the leading foot came to lie .1 to .2 trunk lengths off through
+a whole real swing down the line, and its knee with it: joints of that swing within a fifth of the
 trunk rose from .89 to .96; of the three others down the line they were .97, .97 and .95 and got
-.96, .97 and .94."""
+.96, .97 and .94 (.045 player heights instead of three times a hidden click's .12: the same, and
+clubs of the first .87 instead of .91)."""
 TURN_SPREAD = 0.08
 """Standard deviation that a turn of one radian adds to the top of the head, player heights."""
 LARGEST_HEAD_SPREAD = 0.08
 """The same of a head's top at most, however it has turned and however unsure its track is: on two
 real swings tracks of up to .22 were right within .04 after the hit, where the fitted head hung .17
 to .25 trunk lengths below the marked one. Joints of three swings seen from the front within a fifth
-of the trunk rose from .94, .93 and .88 to .96, .94 and .89 (.97, .95 and .89 with .055, which cost
-a rendered swing 1.9 mm). It is more than what counts as known where a fit is doubted
-(`plausibility.TRACK_SPREAD`), so such a head alone makes no doubt."""
+of the trunk rose from .94, .93 and .88 to .96, .94 and .89 (.97, .95 and .89 with .055). It is
+more than what counts as known where a fit is doubted (`plausibility.TRACK_SPREAD`), so such a head
+alone makes no doubt."""
 LOST_HEAD = 0.3
 """Confidence up to which that does not hold: the head is lost. On ten real swings it is .31 and
 more wherever a head is marked, and right within .1 player heights; on a rendered swing whose head
@@ -117,7 +118,7 @@ def track_joints(
     for side in ("left", "right"):
         drop_slid_knees(joints, side, pose.frame)
     leading = "right" if pose.left_handed else "left"
-    hold_leading_foot(joints, spread, leading, pose.frame, foreground.height)
+    hold_leading_foot(joints, spread, leading, pose.frame)
     return TrackedJoints(joints, np.where(np.isfinite(joints[..., 0]), spread, np.inf))
 
 
@@ -167,7 +168,7 @@ def drop_slid_knees(joints: Joints, side: str, clicked: int) -> None:
 
 
 def hold_leading_foot(
-    joints: Joints, spread: Float[np.ndarray, "T 14"], side: str, clicked: int, height: float
+    joints: Joints, spread: Float[np.ndarray, "T 14"], side: str, clicked: int
 ) -> None:
     """The foot on the side of the target stays where it was clicked where it is not tracked.
 
@@ -179,7 +180,7 @@ def hold_leading_foot(
     moved = np.linalg.norm(joints[:, other] - joints[clicked, other], axis=1)
     held = np.isnan(joints[:, leading]).any(axis=1) & np.isfinite(moved)
     joints[held, leading] = joints[clicked, leading]
-    spread[held, leading] = np.hypot(PLANTED_SPREAD * height, moved[held])
+    spread[held, leading] = np.hypot(REPEATED_CLICK * spread[clicked, leading], moved[held])
 
 
 def _last_known(places: Float[np.ndarray, "T 2"], clicked: int) -> Float[np.ndarray, "T 2"]:

@@ -5,6 +5,7 @@ import numpy as np
 from keyrecon.body import LSP14
 from keyrecon.golf.observe.appearance_tracker import PointTrack
 from keyrecon.golf.observe.joint_tracks import (
+    REPEATED_CLICK,
     TRACK_SPREAD,
     drop_slid_knees,
     head_spread,
@@ -36,21 +37,28 @@ def test_a_knee_before_the_clicked_frame_is_held_against_the_foot_after_it():
     assert np.isnan(joints[0, KNEE]).all() and np.isfinite(joints[1:, KNEE]).all()
 
 
+def click_spreads():
+    """Of a click in frame 2, px."""
+    spread = np.full((10, 14), np.inf)
+    spread[2, ANKLE] = 3.0
+    return spread
+
+
 def test_a_leading_foot_that_is_not_tracked_stays_where_it_was_clicked():
-    joints, spread = legs(), np.full((10, 14), np.inf)
+    joints, spread = legs(), click_spreads()
     joints[:, LSP14.mirror[ANKLE]] = (60.0, 210.0)
     joints[np.arange(10) != 2, ANKLE] = np.nan
-    hold_leading_foot(joints, spread, "left", clicked=2, height=200.0)
+    hold_leading_foot(joints, spread, "left", clicked=2)
     assert (joints[:, ANKLE] == (100.0, 200.0)).all()
-    assert np.isfinite(spread[np.arange(10) != 2, ANKLE]).all()
+    assert (spread[np.arange(10) != 2, ANKLE] == REPEATED_CLICK * spread[2, ANKLE]).all()
 
 
 def test_a_foot_that_is_hidden_may_have_stepped_as_far_as_the_other_one():
-    joints, spread = legs(), np.full((10, 14), np.inf)
+    joints, spread = legs(), click_spreads()
     other = LSP14.mirror[ANKLE]
     joints[:, other], joints[6:, other], joints[9, other] = (60.0, 210.0), (90.0, 250.0), np.nan
     joints[np.arange(10) != 2, ANKLE] = np.nan
-    hold_leading_foot(joints, spread, "left", clicked=2, height=200.0)
+    hold_leading_foot(joints, spread, "left", clicked=2)
     assert (spread[6:9, ANKLE] > 50).all() and (spread[3:6, ANKLE] < 10).all()
     assert np.isnan(joints[9, ANKLE]).all()
 
@@ -58,7 +66,7 @@ def test_a_foot_that_is_hidden_may_have_stepped_as_far_as_the_other_one():
 def test_a_leading_foot_that_nobody_clicked_is_not_known():
     joints, spread = np.full((10, 14, 2), np.nan), np.full((10, 14), np.inf)
     joints[:, LSP14.mirror[ANKLE]] = (60.0, 210.0)
-    hold_leading_foot(joints, spread, "left", clicked=2, height=200.0)
+    hold_leading_foot(joints, spread, "left", clicked=2)
     assert np.isnan(joints[:, ANKLE]).all()
 
 
