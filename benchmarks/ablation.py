@@ -1,14 +1,15 @@
 """Where the error in space comes from: the lift with one thing after another made perfect.
 
-    python benchmarks/ablation.py [--work DIR] [--mocap DIR] [--only NAME ...]
+    python benchmarks/ablation.py [--work DIR] [--mocap DIR] [--only NAME ...] [--second]
 
-Rendered sequences as in accuracy.py; the mean over them is printed last. Perfect means taken from
-the truth: `2D` every joint in every frame; `signs` which end of a bone is nearer in every frame;
-`lengths` of bones and breadths; `scale` of every frame; `all of these` leaves the solver alone.
-Where it lies in the result as it is, tell the rows `bones`: the result with bones replaced by the
-true ones in one respect (true signs of depth, true size of depth, true depth, true place in the
-picture). Then what a person may leave out or get wrong: depth signs, half of the keyframes, 3 % of
-the carried joints thrown anywhere on the player. `signs` in the table: share of limb bones whose
+Rendered sequences as in accuracy.py, with `--second` those of other players; the mean over them is
+printed last. Perfect means taken from the truth: `2D` every joint in every frame, of arms alone, or
+of elbows and wrists alone where they are hidden; `signs` which end of a bone is nearer in every
+frame; `lengths` of bones and breadths; `scale` of every frame; `all of these` leaves the solver
+alone. Where it lies in the result as it is, tell the rows `bones`: the result with bones replaced
+by the true ones in one respect (true signs of depth, true size of depth, true depth, true place in
+the picture). Then what a person may leave out or get wrong: depth signs, half of the keyframes, 3 %
+of the carried joints thrown anywhere on the player. `signs` in the table: share of limb bones whose
 depth sign is right at the keyframes.
 """
 
@@ -21,7 +22,7 @@ from unittest.mock import patch
 
 import numpy as np
 from accuracy import HEIGHT_ERROR, Case, mark, prepare_case
-from sequences import DATA, TENNIS, render
+from sequences import DATA, SECOND, TENNIS, render
 from unseen import unseen_model
 
 from keyrecon.annotation_budget import LONG_SHARE
@@ -147,6 +148,15 @@ def with_true_joints(trial: Trial) -> Trial:
     return replace(trial, tracks=replace(trial.tracks, joints=joints.copy()))
 
 
+def with_true_arms(trial: Trial, hidden: bool) -> Trial:
+    """Elbows and wrists at their places, in all frames or where they are hidden."""
+    names = [name.split("_")[-1] for name in trial.marks.skeleton.names]
+    known = np.broadcast_to(np.isin(names, ("elbow", "wrist")), trial.tracks.confidence.shape)
+    known = known & ~trial.truth["visible"] if hidden else known
+    joints = np.where(known[..., None], trial.truth["points2d"], trial.tracks.joints)
+    return replace(trial, tracks=replace(trial.tracks, joints=joints))
+
+
 def with_outliers(trial: Trial) -> Trial:
     """Some carried joints thrown anywhere within the player's height of their place."""
     rng = np.random.default_rng(0)
@@ -167,6 +177,8 @@ def _under(trial: Trial, *perfect: object) -> LiftResult:
 
 CONDITIONS: dict[str, Callable[[Trial], LiftResult]] = {
     "perfect 2D": lambda t: lift_trial(with_true_joints(t)),
+    "perfect 2D of hidden arms": lambda t: lift_trial(with_true_arms(t, hidden=True)),
+    "perfect 2D of arms": lambda t: lift_trial(with_true_arms(t, hidden=False)),
     "perfect signs": lambda t: _under(t, perfect_signs(t)),
     "perfect lengths": lambda t: _under(t, perfect_size(t, scale=False)),
     "perfect scale": lambda t: _under(t, perfect_size(t, lengths=False)),
@@ -225,10 +237,11 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path("benchmarks/work"))
     parser.add_argument("--mocap", type=Path, default=DATA / "mocap")
     parser.add_argument("--only", nargs="*", help="names of sequences")
+    parser.add_argument("--second", action="store_true", help="other players, the second table")
     words = parser.parse_args()
     print(f"{'sequence':<22}{'condition':<28}{'PA':>7}{'N':>7}{'accel':>7}{'signs':>8}")
     every: dict[str, list[list[float]]] = {}
-    for sequence in TENNIS:
+    for sequence in SECOND if words.second else TENNIS:
         if not words.only or sequence.name in words.only:
             folder = render(sequence, words.work, words.mocap)
             _, model = unseen_model(sequence, words.work, words.mocap)
