@@ -42,22 +42,17 @@ class KeepWithWorkers(Keep, Protocol):
         """Whether there is anybody to hand it to."""
         ...
 
-    def each(
-        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
-    ) -> Iterator[Result]:
-        """`work`, which calls stages, done for every item, maybe side by side; in order.
-
-        Of `large` items two may take more memory than there is.
-        """
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """`work`, which calls stages, done for every item, maybe side by side; in order."""
         ...
 
 
 def work_on_each(
-    keep: Keep, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
+    keep: Keep, work: Callable[[Item], Result], items: Iterable[Item]
 ) -> Iterator[Result]:
     """`work`, which calls stages by `keep`, done for shots that do not hang on one another."""
     if isinstance(keep, KeepWithWorkers):
-        return keep.each(work, items, large)
+        return keep.each(work, items)
     return map(work, items)
 
 

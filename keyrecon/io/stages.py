@@ -161,15 +161,13 @@ class StageStore:
         finally:
             task.inputs.unlink(missing_ok=True)
 
-    def each(
-        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
-    ) -> Iterator[Result]:
+    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """`work`, which calls stages by this store, done for every item, in order.
 
         With workers several items are worked on at a time, so that all of them have something to
-        do; `large` ones only by workers that somebody has asked for, and so has the memory for.
+        do.
         """
-        if self.workers is None or (large and not self.workers.asked_for):
+        if self.workers is None:
             return map(work, items)
         return self.workers.each(work, items)
 

@@ -48,8 +48,6 @@ class Workers:
     """Within it a thread works on one shot."""
     takes_stage: Callable[[], bool] = lambda: True
     """Whether a stage that this thread calls is for them."""
-    asked_for: bool = True
-    """Whether somebody has said that there shall be so many."""
 
     def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
@@ -102,8 +100,9 @@ class Workers:
 def open_workers(where: str | None) -> Iterator[Workers | None]:
     """The workers at the address of a Dask scheduler, or so many processes.
 
-    Where nothing is said they are as many as there are cores, and work on nothing but shots; on one
-    core there are none. Raises KeyreconError where there are none at the address.
+    Where nothing is said they are as many as there are cores, and work on nothing but shots and
+    groups of shots; on one core there are none. Raises KeyreconError where there are none at the
+    address.
     """
     if where is None:
         count = min(MOST_PROCESSES, core_count())
@@ -117,7 +116,6 @@ def open_workers(where: str | None) -> Iterator[Workers | None]:
                 "this machine",
                 processes.turn,
                 lambda: processes.in_turn,
-                asked_for=False,
             )
     elif where.isdecimal():
         if (count := int(where)) == 0:

@@ -6,8 +6,9 @@ frames beside each that its place in the picture is smoothed over. A shot that i
 group is worked on in pieces that overlap. Each group is a stage result of its own: an interrupted
 run goes on with the next one.
 
-Memory: 125 kB per frame on looped videos of 1800 and 5400 frames of 640x360; a group takes 1.5 GB.
-That is why groups are worked on side by side only by workers that somebody has asked for.
+Memory: 125 kB per frame on looped videos of 1800 and 5400 frames of 640x360, 280 kB in matches of
+1280x720; a group takes about 1 GB, as much as a shot may, and groups are worked on side by side as
+shots are.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,9 +26,9 @@ from keyrecon.records import Annotations, FlowTracks, JointTracks, Preparation, 
 from keyrecon.shots.usable import part_of_preparation
 from keyrecon.timeline import join_frames, part_of_marks, take_frames
 
-MOST_FRAMES = 9000
-"""Of a group, the annotated frames of others apart: three minutes at 50 frames a second, six at
-25. What is shorter is worked on as a whole."""
+MOST_FRAMES = 4500
+"""Of a group, the annotated frames of others apart: a minute and a half at 50 frames a second,
+three at 25. What is shorter is worked on as a whole."""
 BESIDE_SECONDS = 0.125
 """Before and after an annotated frame of another group: 2.5 standard deviations of the smoothing of
 the place in the picture (`propagation.body_frame`)."""
@@ -126,5 +127,5 @@ def propagate_in_groups(
         tracks = take_frames(tracks, slice(*span))
         return replace(tracks, keyframe=group.frames[tracks.keyframe])
 
-    carried = work_on_each(keep, carry, groups, large=True)
+    carried = work_on_each(keep, carry, groups)
     return join_frames([*progress(carried, "Propagating joints", len(groups))])

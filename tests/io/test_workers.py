@@ -94,8 +94,6 @@ def test_where_nothing_is_said_only_shots_are_given_away(tmp_path, monkeypatch):
         assert multiprocessing.active_children() == before
         [of_shot] = store.each(lambda n: store.keep(f"p@{n}", own_process, n), [1])
         assert of_shot != os.getpid()
-        of_group = store.each(lambda n: store.keep(f"g@{n}", own_process, n), [1, 2], large=True)
-        assert {*of_group} == {os.getpid()}
     assert not still_there([of_shot])
 
 
