@@ -1,5 +1,6 @@
 """A video of two points with a close-up, a replay and black between: from the file to exports."""
 
+import multiprocessing
 import os
 import shutil
 import signal
@@ -17,12 +18,18 @@ from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.keyframes import keyframes_from_json
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.picks import read_picks
+from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
+from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
+from keyrecon.keeping import call_stage
 from keyrecon.library import reconstruct
 from keyrecon.metrics import pa_mpjpe, read_truth
 from keyrecon.pipeline import Options, prepare, with_height
+from keyrecon.progress import silent
+from keyrecon.propagation.propagation import PropagateOptions
+from keyrecon.shots.groups import propagate_in_groups
 from keyrecon.synthetic.cameras import CameraPlanOptions
 from keyrecon.synthetic.clips import JoinOptions
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
@@ -131,6 +138,34 @@ def test_points_are_as_good_as_when_each_is_run_by_itself(solved):
         errors.append([pa_mpjpe(points, own["points3d"]) for points in found])
     together, apart = np.mean(errors, axis=0)
     assert together < apart + 0.003
+
+
+def test_groups_carried_by_processes_of_this_machine_are_the_same_to_the_digit(
+    solved, tmp_path, monkeypatch
+):
+    _, _, truth, folder = solved
+    monkeypatch.setattr("keyrecon.io.workers.core_count", lambda: 2)
+    options = replace(Options(), keyframes=replace(Options().keyframes, budget=BUDGET))
+    preparation = prepare(
+        open_video(folder / "video.mp4"), read_picks(folder / "picks.json"), options
+    )
+    points = (truth[name] for name in ("points2d", "points3d", "visible"))
+    marks = mark_from_truth(preparation.keyframes, *points, MarkOptions(noise=1.0))
+
+    def carry(keep):
+        given = preparation, marks, None, None, PropagateOptions()
+        return propagate_in_groups(*given, keep, silent, most=60)
+
+    with open_workers(None) as workers:
+        others = multiprocessing.active_children()
+        beside = carry(StageStore(tmp_path, workers=workers))
+        assert len({*multiprocessing.active_children()} - {*others}) == 2
+    alone = carry(call_stage)
+    assert len([*tmp_path.glob("propagate@*.npz")]) == 2
+    for name in ("joints", "confidence", "keyframe", "elsewhere"):
+        np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
+    off = np.linalg.norm(alone.joints - truth["points2d"], axis=2)
+    assert np.median(off) < 0.02 * np.median(preparation.track.height)
 
 
 def test_exports_hold_nothing_where_nobody_is(solved, tmp_path):
