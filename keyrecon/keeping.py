@@ -42,17 +42,22 @@ class KeepWithWorkers(Keep, Protocol):
         """Whether there is anybody to hand it to."""
         ...
 
-    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """`work`, which calls stages, done for every item, maybe side by side; in order."""
+    def each(
+        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
+    ) -> Iterator[Result]:
+        """`work`, which calls stages, done for every item, maybe side by side; in order.
+
+        Of `large` items more than two may take more memory than there is.
+        """
         ...
 
 
 def work_on_each(
-    keep: Keep, work: Callable[[Item], Result], items: Iterable[Item]
+    keep: Keep, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
 ) -> Iterator[Result]:
     """`work`, which calls stages by `keep`, done for shots that do not hang on one another."""
     if isinstance(keep, KeepWithWorkers):
-        return keep.each(work, items)
+        return keep.each(work, items, large)
     return map(work, items)
 
 

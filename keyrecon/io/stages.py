@@ -161,15 +161,17 @@ class StageStore:
         finally:
             task.inputs.unlink(missing_ok=True)
 
-    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    def each(
+        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
+    ) -> Iterator[Result]:
         """`work`, which calls stages by this store, done for every item, in order.
 
         With workers several items are worked on at a time, so that all of them have something to
-        do.
+        do; of `large` ones as many as `Workers` allows.
         """
         if self.workers is None:
             return map(work, items)
-        return self.workers.each(work, items)
+        return self.workers.each(work, items, large)
 
     @property
     def has_workers(self) -> bool:

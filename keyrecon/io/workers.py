@@ -32,6 +32,8 @@ IN_ORDER = 8
 not wait for a long one before it."""
 MOST_PROCESSES = 8
 """That are begun where nobody says how many: each may hold a shot of 1 GB."""
+MOST_GROUPS = 2
+"""Groups of shots that they work on at a time, each of 1.3 GB where shots seldom have half."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,8 @@ class Workers:
     """Within it a thread works on one shot."""
     takes_stage: Callable[[], bool] = lambda: True
     """Whether a stage that this thread calls is for them."""
+    large_at_once: int | None = None
+    """Groups of shots that are worked on at a time; as many as shots where nothing is said."""
 
     def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
@@ -57,19 +61,22 @@ class Workers:
         with self._naming_loss():
             return self.do(task)
 
-    def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    def each(
+        self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
+    ) -> Iterator[Result]:
         """`work`, which calls stages, done for every item side by side; results in order."""
+        at_once = self.large_at_once if large and self.large_at_once else self.at_once
 
         def work_in_turn(item: Item) -> Result:
             with self.turn():
                 return work(item)
 
-        pool = ThreadPoolExecutor(self.at_once)
+        pool = ThreadPoolExecutor(at_once)
         pending: deque[Future[Result]] = deque()
         try:
             for item in items:
                 pending.append(pool.submit(work_in_turn, item))
-                if len(pending) > IN_ORDER * self.at_once:
+                if len(pending) > IN_ORDER * at_once:
                     yield pending.popleft().result()
             while pending:
                 yield pending.popleft().result()
@@ -116,6 +123,7 @@ def open_workers(where: str | None) -> Iterator[Workers | None]:
                 "this machine",
                 processes.turn,
                 lambda: processes.in_turn,
+                min(MOST_GROUPS, count),
             )
     elif where.isdecimal():
         if (count := int(where)) == 0:

@@ -7,8 +7,8 @@ group is worked on in pieces that overlap. Each group is a stage result of its o
 run goes on with the next one.
 
 Memory: 125 kB per frame on looped videos of 1800 and 5400 frames of 640x360, 280 kB in matches of
-1280x720; a group takes about 1 GB, as much as a shot may, and groups are worked on side by side as
-shots are.
+1280x720; a group takes 1.3 GB, and groups are worked on side by side, as shots are, but no more
+than two at a time unless somebody asks for more workers.
 """
 
 from collections.abc import Iterator, Sequence
@@ -127,5 +127,5 @@ def propagate_in_groups(
         tracks = take_frames(tracks, slice(*span))
         return replace(tracks, keyframe=group.frames[tracks.keyframe])
 
-    carried = work_on_each(keep, carry, groups)
+    carried = work_on_each(keep, carry, groups, large=True)
     return join_frames([*progress(carried, "Propagating joints", len(groups))])

@@ -97,6 +97,26 @@ def test_where_nothing_is_said_only_shots_are_given_away(tmp_path, monkeypatch):
     assert not still_there([of_shot])
 
 
+def test_of_what_takes_much_memory_two_are_worked_on_at_a_time(monkeypatch):
+    monkeypatch.setattr(io_workers, "core_count", lambda: 6)
+    at_work, most = [0], []
+
+    def work(number):
+        at_work[0] += 1
+        most.append(at_work[0])
+        time.sleep(0.05)
+        at_work[0] -= 1
+        return number
+
+    with open_workers(None) as workers:
+        assert [*workers.each(work, range(6), large=True)] == [*range(6)]
+        assert max(most) <= 2
+        assert [*workers.each(work, range(12))] == [*range(12)]
+        assert max(most) > 2
+    with open_workers("6") as workers:
+        assert workers.large_at_once is None
+
+
 def test_on_one_core_there_are_no_workers(monkeypatch):
     monkeypatch.setattr(io_workers, "core_count", lambda: 1)
     with open_workers(None) as workers:
