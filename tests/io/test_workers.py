@@ -99,13 +99,13 @@ def test_where_nothing_is_said_only_shots_are_given_away(tmp_path, monkeypatch):
 
 def test_of_what_takes_much_memory_two_are_worked_on_at_a_time(monkeypatch):
     monkeypatch.setattr(io_workers, "core_count", lambda: 6)
-    at_work, most = [0], []
+    at_work, most = set(), []
 
     def work(number):
-        at_work[0] += 1
-        most.append(at_work[0])
+        at_work.add(number)
+        most.append(len(at_work))
         time.sleep(0.05)
-        at_work[0] -= 1
+        at_work.remove(number)
         return number
 
     with open_workers(None) as workers:
