@@ -7,8 +7,9 @@ the left and the right one come to lie at the same place, a tracker cannot but h
 one: the one that had moved less before counts as hidden from then on. And a knee that slips along
 the thigh changes the length of the shank.
 
-The leading foot stands where it is through the whole swing. Down the line it is the farther one, so
-where it is not tracked it counts as where it was clicked.
+The leading foot stands where it is through the whole swing. A track that climbs from it has slid up
+the leg. Down the line it is the farther one, so where it is not tracked it counts as where it was
+clicked.
 """
 
 from collections.abc import Sequence
@@ -44,6 +45,10 @@ trunk rose from .89 to .96; of the three others down the line they were .97, .97
 clubs of the first .87 instead of .91)."""
 TURN_SPREAD = 0.08
 """Standard deviation that a turn of one radian adds to the top of the head, player heights."""
+HIGHEST_CLIMB = 0.1
+"""The leading foot's rise in the picture at most, player heights: of ten marked swings it moves by
+.09 at most, its camera's movement included, of one whose shank had become part of the scene its
+track rose by .45, as sure of itself as ever."""
 LARGEST_HEAD_SPREAD = 0.08
 """The same of a head's top at most, however it has turned and however unsure its track is: on two
 real swings tracks of up to .22 were right within .04 after the hit, where the fitted head hung .17
@@ -115,9 +120,10 @@ def track_joints(
         spread[pose.frame, index] = base * foreground.height
     for pair in LSP14.mirrored:
         _hide_dragged(joints, pair, pose.frame, foreground.height, fps)
+    leading = "right" if pose.left_handed else "left"
+    drop_climbing_foot(joints, leading, pose.frame, foreground.height)
     for side in ("left", "right"):
         drop_slid_knees(joints, side, pose.frame)
-    leading = "right" if pose.left_handed else "left"
     hold_leading_foot(joints, spread, leading, pose.frame)
     return TrackedJoints(joints, np.where(np.isfinite(joints[..., 0]), spread, np.inf))
 
@@ -165,6 +171,21 @@ def drop_slid_knees(joints: Joints, side: str, clicked: int) -> None:
     length = np.linalg.norm(joints[:, knee] - foot, axis=1)
     share = length / length[clicked]
     joints[(share < SHANK_LENGTHS[0]) | (share > SHANK_LENGTHS[1]), knee] = np.nan
+
+
+def drop_climbing_foot(joints: Joints, side: str, clicked: int, height: float) -> None:
+    """Forget the foot on the side of the target once its track climbs up the leg.
+
+    Who walks away from the camera lifts both feet in the picture, and counts as standing.
+    """
+    leading = LSP14.index(f"{side}_ankle")
+    rise = joints[clicked, :, 1] - joints[..., 1]
+    together = np.fmax(rise[:, LSP14.mirror[leading]], 0.0)
+    climbed = rise[:, leading] - together > HIGHEST_CLIMB * height
+    for way in (1, -1):
+        order = np.arange(len(joints))[clicked::way]
+        gone = np.maximum.accumulate(climbed[order])
+        joints[order[gone], leading] = np.nan
 
 
 def hold_leading_foot(

@@ -91,7 +91,13 @@ def refine_key_frames(
     fps: float,
     options: TimingOptions = TimingOptions(),
 ) -> Float[np.ndarray, "4"]:
-    """Key postures by the club, near those of a hypothesis about the swing."""
+    """Key postures by the club, near those of a hypothesis about the swing.
+
+    Where the club was hardly detected on the way to the hit, they are those of the hypothesis.
+    """
+    on_the_way = club.detected[max(0, round(keys[0])) : max(0, round(keys[2])) + 1]
+    if not len(on_the_way) or on_the_way.mean() < LEAST_DETECTED:
+        return order_keys(keys)
     ends = gaussian_filter1d(_fill(club.ends), options.smooth * fps, axis=0)
     hands, last = ends[:, 0] / height, len(ends) - 1
     top, hit = keys[1:3]
@@ -114,6 +120,11 @@ def refine_key_frames(
     return order_keys(np.array([begin, top, hit, finish], float))
 
 
+LEAST_DETECTED = 0.25
+"""Share of the frames from start to hit in which the club was detected, at least: .47 to .96 in ten
+real swings. In one with .14, thirtyfold slow motion of 374 lines, shafts that were none moved the
+top by three tenths of the downswing and the finish from frame 787 to 500; joints within a fifth of
+the trunk rose from .41 to .68 without them."""
 TOP_WINDOW = (1.7, 0.4)
 """The top lies so many downswings before the hit, at most and at least, whatever was supposed."""
 HIT_SHARE = 0.35

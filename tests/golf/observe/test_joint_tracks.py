@@ -7,6 +7,7 @@ from keyrecon.golf.observe.appearance_tracker import PointTrack
 from keyrecon.golf.observe.joint_tracks import (
     REPEATED_CLICK,
     TRACK_SPREAD,
+    drop_climbing_foot,
     drop_slid_knees,
     head_spread,
     hold_leading_foot,
@@ -68,6 +69,23 @@ def test_a_leading_foot_that_nobody_clicked_is_not_known():
     joints[:, LSP14.mirror[ANKLE]] = (60.0, 210.0)
     hold_leading_foot(joints, spread, "left", clicked=2)
     assert np.isnan(joints[:, ANKLE]).all()
+
+
+def test_a_leading_foot_that_climbs_the_leg_is_lost_for_good():
+    joints = legs()
+    joints[:, LSP14.mirror[ANKLE]] = (60.0, 210.0)
+    joints[6:, ANKLE] = (104.0, 150.0)
+    joints[9, ANKLE] = (100.0, 190.0)
+    drop_climbing_foot(joints, "left", clicked=2, height=400.0)
+    assert np.isfinite(joints[:6, ANKLE]).all() and np.isnan(joints[6:, ANKLE]).all()
+
+
+def test_a_leading_foot_that_steps_back_with_the_other_one_is_not_lost():
+    joints = legs()
+    joints[:2, ANKLE], joints[:, LSP14.mirror[ANKLE]] = (104.0, 150.0), (60.0, 210.0)
+    joints[:2, LSP14.mirror[ANKLE]] = (64.0, 160.0)
+    drop_climbing_foot(joints, "left", clicked=2, height=400.0)
+    assert np.isfinite(joints[:, ANKLE]).all()
 
 
 def test_a_head_that_turns_is_known_while_it_is_seen_and_not_once_it_is_lost():

@@ -4,7 +4,12 @@ from scipy.interpolate import CubicHermiteSpline
 
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.club import Club
-from keyrecon.golf.observe.swing_timing import find_key_frames, interpolate_times, keep_order
+from keyrecon.golf.observe.swing_timing import (
+    find_key_frames,
+    interpolate_times,
+    keep_order,
+    refine_key_frames,
+)
 
 HEIGHT, FPS = 200.0, 60.0
 TRUE = np.array([30, 78, 96, 130])
@@ -41,6 +46,15 @@ def test_a_rest_with_the_hands_up_is_no_address():
     ends[60:78] = ends[78]
     keys = find_key_frames(Club(ends, club.detected, club.tip), HEIGHT, FPS)
     assert abs(keys[0] - 30) <= 4
+
+
+def test_a_club_that_was_hardly_detected_moves_no_key_posture():
+    club, supposed = filmed(), TRUE + [-6.0, 3, -3, 5]
+    rarely = club.detected & (np.arange(160) % 5 == 0)
+    refined = refine_key_frames(club, supposed, HEIGHT, FPS)
+    assert np.abs(refined[:3] - TRUE[:3]).max() <= 2
+    kept = refine_key_frames(Club(club.ends, rarely, club.tip), supposed, HEIGHT, FPS)
+    assert (kept == supposed).all()
 
 
 def test_someone_who_stands_still_makes_no_swing():
