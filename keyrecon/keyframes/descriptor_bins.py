@@ -10,7 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Complex64, Float, Float32, Int
 
-from keyrecon.keyframes.edge_distance import MAX_DIRECTION_DIFFERENCE, align_edges
+from keyrecon.keyframes.edge_distance import (
+    MAX_DIRECTION_DIFFERENCE,
+    half_of,
+    half_origins,
+)
 from keyrecon.numerics.ragged import ranges
 from keyrecon.records import Edges, HalfName, Track
 
@@ -48,14 +52,19 @@ class DescriptorBins:
 
 def gather_elements(edges: Sequence[Edges], track: Track, half: HalfName) -> BinnedElements:
     """Align and join the elements of one half of the body."""
-    aligned = [align_edges(e, track, t, half) for t, e in enumerate(edges)]
-    tangent = np.concatenate([e.tangent for e in aligned])
+    inside = np.concatenate([half_of(e, half) for e in edges])
+    points, tangent, color = (
+        np.concatenate([getattr(e, name) for e in edges])[inside]
+        for name in ("points", "tangent", "color")
+    )
+    frame = np.repeat(np.arange(len(edges)), [len(e.points) for e in edges])[inside]
+    aligned = (points - half_origins(track, half)[frame]) / track.height[frame, None]
     return BinnedElements(
-        frame=np.repeat(np.arange(len(aligned)), [len(e.points) for e in aligned]),
-        points=np.concatenate([e.points for e in aligned]).astype(np.float32),
+        frame=frame,
+        points=aligned.astype(np.float32),
         angle=np.arctan2(tangent[:, 1], tangent[:, 0]).astype(np.float32),
-        color=np.concatenate([e.color for e in aligned]),
-        n_frames=len(aligned),
+        color=color,
+        n_frames=len(edges),
     )
 
 

@@ -45,12 +45,21 @@ class EdgeDistance:
         return self.matched * self.mean + (1 - self.matched) * largest
 
 
+def half_of(edges: Edges, half: HalfName) -> Bool[np.ndarray, "E"]:
+    """Which elements of a frame count for one half of the body."""
+    return edges.upper if half == "upper" else edges.lower
+
+
+def half_origins(track: Track, half: HalfName) -> Float[np.ndarray, "T 2"]:
+    """What the elements of a half are seen from in every frame, px: the head, or mid-feet."""
+    return track.head if half == "upper" else track.mid_feet
+
+
 def align_edges(edges: Edges, track: Track, frame: int, half: HalfName) -> Edges:
     """One half of the body's elements, in player heights from the head or from mid-feet."""
-    inside = edges.upper if half == "upper" else edges.lower
-    anchor = track.head[frame] if half == "upper" else track.mid_feet[frame]
+    inside = half_of(edges, half)
     return Edges(
-        points=(edges.points[inside] - anchor) / track.height[frame],
+        points=(edges.points[inside] - half_origins(track, half)[frame]) / track.height[frame],
         tangent=edges.tangent[inside],
         color=edges.color[inside],
         upper=edges.upper[inside],

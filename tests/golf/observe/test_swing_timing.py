@@ -49,7 +49,7 @@ def test_a_rest_with_the_hands_up_is_no_address():
 
 
 def test_a_club_that_was_hardly_detected_moves_no_key_posture():
-    club, supposed = filmed(), TRUE + [-6.0, 3, -3, 5]
+    club, supposed = filmed(), TRUE + np.array([-6.0, 3, -3, 5])
     rarely = club.detected & (np.arange(160) % 5 == 0)
     refined = refine_key_frames(club, supposed, HEIGHT, FPS)
     assert np.abs(refined[:3] - TRUE[:3]).max() <= 2
