@@ -42,6 +42,11 @@ class KeepWithWorkers(Keep, Protocol):
         """Whether there is anybody to hand it to."""
         ...
 
+    @property
+    def has_far_workers(self) -> bool:
+        """Whether these are other machines."""
+        ...
+
     def each(
         self, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
     ) -> Iterator[Result]:
@@ -61,9 +66,14 @@ def work_on_each(
     return map(work, items)
 
 
-def spread_of(keep: Keep, here: Spread = one_by_one) -> Spread:
-    """Who does pieces of a stage's work; `here` where there are no workers."""
-    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_workers else here
+def spread_of(keep: Keep) -> Spread:
+    """Who does pieces of a stage's work: workers, or nobody but the stage itself."""
+    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_workers else one_by_one
+
+
+def spread_far(keep: Keep, here: Spread) -> Spread:
+    """The same for pieces of what is at hand here: other machines do them, or `here`."""
+    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_far_workers else here
 
 
 def call_stage(

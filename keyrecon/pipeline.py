@@ -22,7 +22,7 @@ from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.frame_reader import in_threads
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
-from keyrecon.keeping import Keep, call_stage, spread_of
+from keyrecon.keeping import Keep, call_stage, spread_far, spread_of
 from keyrecon.keyframes.absence import legs_outside, without_legs
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
@@ -134,7 +134,7 @@ def prepare(
     count_labels(options.keyframes, len(video), video.fps)
     camera = keep(
         "camera", estimate_camera_motion, video,
-        options=options.camera, progress=progress, spread=spread_of(keep, in_threads),
+        options=options.camera, progress=progress, spread=spread_far(keep, in_threads),
     )  # fmt: skip
     video = with_exposure(video, camera.exposure)
     clicks, anchors = tuple(picks), TrackAnchors.none()

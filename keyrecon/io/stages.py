@@ -178,6 +178,11 @@ class StageStore:
         """Whether anybody makes stages elsewhere."""
         return self.workers is not None
 
+    @property
+    def has_far_workers(self) -> bool:
+        """Whether other machines do."""
+        return self.workers is not None and self.workers.far
+
     def spread(
         self, work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]
     ) -> Iterator[Result]:

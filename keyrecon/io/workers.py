@@ -52,6 +52,8 @@ class Workers:
     """Whether a stage that this thread calls is for them."""
     large_at_once: int | None = None
     """Groups of shots that are worked on at a time; as many as shots where nothing is said."""
+    far: bool = False
+    """Whether they are other machines, which had better read a video themselves than be sent it."""
 
     def carry_out(self, task: StageTask) -> float:
         """What the function of that name gives, done elsewhere; waits for it.
@@ -165,6 +167,7 @@ def _cluster(address: str) -> Iterator[Workers]:
             lambda task: executor.submit(carry_out, task).result(),
             min(MOST_AT_ONCE, IN_QUEUE * count),
             address,
+            far=True,
         )
     finally:
         with dask.config.set({"distributed.comm.retry.count": 0}):
