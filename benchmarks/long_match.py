@@ -55,14 +55,15 @@ def measure(folder: Path, other: Path, out: Path, minutes: float, kills: int) ->
     begin, project = time.perf_counter(), out / "project"
     for name, told in run_all(project, file, pieces, folder, run_measured).items():
         show_command(name, told, frames)
-    print(f"all commands {time.perf_counter() - begin:.0f} s for {frames / FPS:.0f} s of video")
+    seconds = time.perf_counter() - begin
+    print(f"all commands {seconds:.0f} s for {frames / FPS:.0f} s of video")
     cache = sum(path.stat().st_size for path in (project / "cache").iterdir())
     report = (project / "report.html").stat().st_size
     print(f"cache {cache / frames / 1000:.1f} kB per frame, report {report / 1e6:.1f} MB")
     score_shots(project, pieces)
     score_motion(project, pieces, folder)
     if kills:
-        compare_killed(out, file, pieces, folder, kills)
+        compare_killed(out, file, pieces, folder, kills, seconds)
 
 
 Command = Callable[..., dict[str, Any]]
@@ -250,19 +251,20 @@ def score_motion(project: Path, pieces: Sequence[Piece], folder: Path) -> None:
 
 
 def compare_killed(
-    out: Path, file: Path, pieces: Sequence[Piece], folder: Path, kills: int
+    out: Path, file: Path, pieces: Sequence[Piece], folder: Path, kills: int, seconds: float
 ) -> None:
-    """The same by commands that are killed at random and given again."""
+    """The same by commands that are killed at random and given again.
+
+    Undisturbed they took so many seconds, over which the kills are spread.
+    """
     rng, left = random.Random(0), [kills]
 
     def run_killed(*words: object) -> dict[str, Any]:
         command = [sys.executable, "-m", "keyrecon", *map(str, words)]
-        longest = 20.0
         while True:
-            began = time.perf_counter()
             kill = left[0] > 0 and words[0] in ("keyframes", "run")
-            ended = run_for(command, rng.uniform(3.0, 2 * longest) if kill else None)
-            longest = max(longest, time.perf_counter() - began)
+            after = rng.uniform(3.0, max(6.0, 2 * seconds / kills)) if kill else None
+            ended = run_for(command, after)
             if ended == 0:
                 return {}
             if ended != -signal.SIGKILL:
