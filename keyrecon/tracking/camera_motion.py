@@ -177,11 +177,13 @@ def estimate_camera_motion(
     for.
     """
     detector = CutDetector.at_rate(video.fps)
-    watched = detector.watch(_read_reduced(video, options, progress))
+    # what is at hand here is not sent elsewhere, where decoding it again is cheaper
+    recent = _RecentPictures(MOST_HELD if spread is in_threads else 0)
+    watched = recent.watch(detector.watch(_read_reduced(video, options, progress)))
     path = _estimate_motion(video, options, progress, _first_shot(watched, detector), detector)
     if not detector.cuts and not video.joints:
         return path
-    return _estimate_shots(video, options, watched, detector, spread)
+    return _estimate_shots(video, options, watched, recent, detector, spread)
 
 
 def _join_exposures(paths: Sequence[CameraPath]) -> Float[np.ndarray, "T"] | None:
@@ -284,16 +286,15 @@ def _estimate_shots(
     video: Video,
     options: CameraMotionOptions,
     watched: Iterator[Grey],
+    recent: "_RecentPictures",
     detector: CutDetector,
     spread: Spread,
 ) -> CameraPath:
     """The motion in each shot, while the next ones are looked for in what is to be watched yet."""
     parts: list[slice] = []
-    # what is at hand here is not sent elsewhere, where decoding it again is cheaper
-    recent = _RecentPictures(detector.count, MOST_HELD if spread is in_threads else 0)
 
     def begun() -> Iterator[tuple[Video, CameraMotionOptions, list[Grey] | None]]:
-        for part in _find_shots(recent.watch(watched), detector, video):
+        for part in _find_shots(watched, detector, video):
             parts.append(part)
             yield video.part(part), options, recent.take(part)
 
@@ -318,9 +319,10 @@ def _estimate_shots(
 class _RecentPictures:
     """Pictures that were watched since the last shot, unless they are too many to be held."""
 
-    def __init__(self, first: int, most: int) -> None:
-        """Of frames from the `first` on, at most so many bytes."""
-        self._first, self._most = first, most
+    def __init__(self, most: int) -> None:
+        """At most so many bytes."""
+        self._most = most
+        self._first = 0
         self._pictures: list[Grey] = []
 
     def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:

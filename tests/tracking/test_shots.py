@@ -9,6 +9,7 @@ import pytest
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.spreading import one_by_one
+from keyrecon.tracking import camera_motion
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.tracking.shots import FLASH_FRAMES, CutDetector
 
@@ -113,12 +114,20 @@ def test_a_dissolve_that_is_all_of_a_video_leaves_no_frame_without_a_camera(
     assert len(estimate_camera_motion(video).to_reference) == len(video)
 
 
-def test_pictures_at_hand_give_the_same_motion_as_decoding_every_shot_again(tmp_path):
+def test_pictures_at_hand_give_the_same_motion_as_decoding_every_shot_again(monkeypatch, tmp_path):
     views = [view(scene(k), shift=3 * t) for k in range(3) for t in range(40)]
     write_video(tmp_path / "cuts.mp4", (np.repeat(v[..., None], 3, axis=2) for v in views), 25.0)
-    video = open_video(tmp_path / "cuts.mp4")
-    here = estimate_camera_motion(video)
+    video, decoded, read = open_video(tmp_path / "cuts.mp4"), [], camera_motion._read_reduced
+    monkeypatch.setattr(
+        camera_motion,
+        "_read_reduced",
+        lambda shot, *more: decoded.append(len(shot)) or read(shot, *more),
+    )
     elsewhere = estimate_camera_motion(video, spread=one_by_one)
+    assert decoded == [120, 40, 40, 40]
+    decoded.clear()
+    here = estimate_camera_motion(video)
+    assert decoded == [120]
     assert here.cuts == elsewhere.cuts == (40, 80)
     assert np.ptp(here.to_reference[80:, 0, 2]) > 50
     assert (here.to_reference == elsewhere.to_reference).all()
