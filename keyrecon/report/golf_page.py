@@ -29,7 +29,7 @@ from keyrecon.report.golf_measures import KEY_NAMES, SwingMeasures, measure_swin
 from keyrecon.report.golf_pictures import key_pictures, overlay_strip, path_picture
 from keyrecon.report.golf_player import cut_clip, player
 from keyrecon.report.golf_tables import DOUBT_NOTE, cards, measure_table, warning
-from keyrecon.report.markup import note, section, text
+from keyrecon.report.markup import note, section, sentence, text
 from keyrecon.report.page import POLICY
 from keyrecon.report.scripts import bundle_scripts
 
@@ -127,7 +127,7 @@ def _headline(swing: RecordedSwing, measures: SwingMeasures, video: Video) -> st
         f'<header><p class="kicker">keyrecon swing report</p><h1>{text(video.path.name)}</h1>'
         f'<p class="lead">{video.width} &times; {video.height} px, {len(video)} frames, '
         f"{video.fps:.4g} per second, {hand}</p>"
-        f"{''.join(note(f'{text(t[0].upper() + t[1:])}.') for t in swing.notes)}</header>"
+        f"{''.join(note(f'{sentence(t[0].upper() + t[1:])}.') for t in swing.notes)}</header>"
         f"{warning(swing.doubts)}{'' if swing.doubts else cards(measures)}"
     )
 

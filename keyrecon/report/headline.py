@@ -4,7 +4,7 @@ import numpy as np
 
 from keyrecon.metrics import Scores, evaluate_motion
 from keyrecon.records import Annotations, Motion
-from keyrecon.report.markup import ReportMaterial, note, table, text
+from keyrecon.report.markup import ReportMaterial, note, sentence, table, text
 from keyrecon.report.summary import expected_length, missing_shares
 from keyrecon.uncertainty import uncertain_share
 
@@ -23,7 +23,7 @@ def opening(material: ReportMaterial) -> str:
         f'<header><p class="kicker">keyrecon motion report</p><h1>{text(video.name)}</h1>'
         f'<p class="lead">{video.width} &times; {video.height} px, {motion.time[-1]:.1f} s, '
         f"{len(motion.time):,} frames, {len(marked_frames(material.annotations))} of them marked "
-        f"by a person{sure}</p>{''.join(note(text(line)) for line in material.shots)}</header>"
+        f"by a person{sure}</p>{''.join(note(sentence(line)) for line in material.shots)}</header>"
     )
 
 
@@ -130,7 +130,7 @@ def accuracy(scores: Scores) -> str:
 def _lens(material: ReportMaterial) -> str:
     if material.lens is None:
         return ""
-    return note(f"<strong>The lens is not known.</strong> {text(material.lens)}")
+    return note(f"<strong>The lens is not known.</strong> {sentence(material.lens)}")
 
 
 def _conventions(motion: Motion) -> str:

@@ -6,6 +6,7 @@ Small pieces of HTML; every text that comes from outside passes through `text`.
 import base64
 import html
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +18,9 @@ from keyrecon.io.video import Video
 from keyrecon.records import Annotations, Keyframes, Motion, PoseDistances, Track
 from keyrecon.report.summary import Truth, arrange_truth
 from keyrecon.world.records import WorldCamera, WorldMotion
+
+OPTION = re.compile(r"(?<![\w-])--[a-z][\w.-]*\w")
+"""A name of an option in a text."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,11 @@ def text(value: object) -> str:
     return html.escape(str(value), quote=True)
 
 
+def sentence(line: str) -> str:
+    """A line of a command's output as text, names of options set as code so that none is broken."""
+    return OPTION.sub(r"<code>\g<0></code>", text(line))
+
+
 def number(value: float, form: str) -> str:
     """A number, or a dash where it is unknown."""
     return format(value, form) if np.isfinite(value) else "\u2013"
@@ -66,9 +75,9 @@ def section(name: str, title: str, *parts: str) -> str:
     return f'<section id="{name}"><h2>{text(title)}</h2>{"".join(parts)}</section>'
 
 
-def note(sentence: str) -> str:
-    """A caption; the sentence may hold markup and must be safe."""
-    return f'<p class="note">{sentence}</p>'
+def note(caption: str) -> str:
+    """A caption; it may hold markup and must be safe."""
+    return f'<p class="note">{caption}</p>'
 
 
 def table(

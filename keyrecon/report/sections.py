@@ -11,7 +11,16 @@ from keyrecon.io.formats.conventions import stature
 from keyrecon.records import HalfKeyframes, Motion
 from keyrecon.report.headline import in_words, marked_frames
 from keyrecon.report.instants import instant_angles, key_instants
-from keyrecon.report.markup import ReportMaterial, note, number, section, table, text, to_json
+from keyrecon.report.markup import (
+    ReportMaterial,
+    note,
+    number,
+    section,
+    sentence,
+    table,
+    text,
+    to_json,
+)
 from keyrecon.report.pictures import Pictures, png_uri
 from keyrecon.report.summary import center_on_root, scale_truth
 from keyrecon.report.views import VIEWS, pose_drawing
@@ -41,7 +50,7 @@ def contradictions(material: ReportMaterial) -> str:
     """What cannot be overlooked; empty where everything fits together."""
     if not material.contradictions:
         return ""
-    lines = "".join(f"<li>{text(line)}</li>" for line in material.contradictions)
+    lines = "".join(f"<li>{sentence(line)}</li>" for line in material.contradictions)
     return (
         '<section class="warning" role="alert"><h2>Not everything fits together</h2>'
         f"<ul>{lines}</ul></section>"

@@ -19,7 +19,7 @@ from keyrecon.hyperextension import HyperextendedStretch
 from keyrecon.io.video import open_video
 from keyrecon.report import sections, summary
 from keyrecon.report.headline import in_words, marked_share
-from keyrecon.report.markup import MOST_FRAMES, pack, thinning
+from keyrecon.report.markup import MOST_FRAMES, pack, sentence, thinning
 from keyrecon.report.page import build_page
 from keyrecon.report.pictures import LEAST_SIDE, SIDE, Windows, clip_side, cut_pictures
 from keyrecon.report.sections import MATRIX_SIDE, reduce_matrix, stands_for
@@ -498,3 +498,10 @@ def test_the_report_tells_of_a_knee_that_bends_forwards(material, pictures, monk
     for motion in (material.motion, replace(material.motion, expected_error=None)):
         written = build_page(replace(material, motion=motion), pictures)
         assert f'class="goes" data-frame="6">{backward.text}<' in written
+
+
+def test_names_of_options_are_not_broken_in_two_and_nothing_else_is_touched():
+    assert sentence("give --slowmo <2>, or --shots.use.") == (
+        "give <code>--slowmo</code> &lt;2&gt;, or <code>--shots.use</code>."
+    )
+    assert sentence("frames 3--5, well-known") == "frames 3--5, well-known"
