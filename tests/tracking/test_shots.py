@@ -6,8 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
+from keyrecon.io.workers import open_workers
 from keyrecon.spreading import one_by_one
 from keyrecon.tracking import camera_motion
 from keyrecon.tracking.camera_motion import estimate_camera_motion
@@ -132,3 +134,13 @@ def test_pictures_at_hand_give_the_same_motion_as_decoding_every_shot_again(monk
     assert np.ptp(here.to_reference[80:, 0, 2]) > 50
     assert (here.to_reference == elsewhere.to_reference).all()
     assert (here.confidence == elsewhere.confidence).all()
+
+
+def test_shots_are_handed_to_workers_as_what_can_be_sent(tmp_path):
+    views = [view(scene(k), shift=3 * t) for k in range(2) for t in range(20)]
+    write_video(tmp_path / "cut.mp4", (np.repeat(v[..., None], 3, axis=2) for v in views), 25.0)
+    video = open_video(tmp_path / "cut.mp4")
+    with open_workers("1") as workers:
+        store = StageStore(tmp_path / "cache", workers=workers)
+        elsewhere = estimate_camera_motion(video, spread=store.spread)
+    assert (elsewhere.to_reference == estimate_camera_motion(video).to_reference).all()
