@@ -21,6 +21,7 @@ from keyrecon.golf.fit.residuals import (
 )
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import UNKNOWN_SHIFT, TimeShift
+from keyrecon.golf.observe.swing_timing import LEAST_DETECTED
 from keyrecon.golf.records import FittedSwing, Observations
 
 DOWNSWING_SECONDS = (0.15, 0.5)
@@ -50,9 +51,9 @@ one is farther from the fit than this: .012 to .037 in those right fits, .06 to 
 made wrong but where time alone was shifted."""
 CLUB_ANGLE = np.radians(15)
 """A fitted club this far from the detected one is another one."""
-LEAST_CLUB_AGREED, LEAST_CLUB_SEEN = 0.8, 0.25
-"""Share of the first detections between start and hit that the fitted club agrees with, .95 to 1 in
-right fits of five real swings, and share of these frames that have one, .58 to .92, at least."""
+LEAST_CLUB_AGREED = 0.8
+"""Share of the first detections between start and hit that the fitted club agrees with, at least:
+.95 to 1 in right fits of five real swings."""
 FARTHEST_CLICK = 0.1
 """Mean distance of fitted joints from those that a person placed, body heights, at most."""
 FARTHEST_MARK = 0.1
@@ -243,7 +244,7 @@ def _doubt_club(fitted: FittedSwing, observations: Observations) -> list[SwingDo
         ends[during, 1] - ends[during, 0] for ends in (observations.club, fitted.club2d)
     )
     seen = np.isfinite(detected).all(axis=1)
-    if seen.mean() < LEAST_CLUB_SEEN:
+    if seen.mean() < LEAST_DETECTED:
         text = f"the club was detected in {seen.mean():.0%} of the frames of the swing"
         return [SwingDoubt(text, during.start)]
     cross = detected[:, 0] * expected[:, 1] - detected[:, 1] * expected[:, 0]

@@ -31,7 +31,7 @@ from keyrecon.keyframes.descriptor_bins import (
     gather_elements,
     group_elements,
 )
-from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE
+from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE, half_of
 from keyrecon.keyframes.exemplars import find_exemplars
 from keyrecon.numerics.ragged import ranges
 from keyrecon.numerics.threads import core_count
@@ -101,7 +101,7 @@ def compare_frames(
     Raises KeyreconError where no frame has edge elements of one half.
     """
     for half in HALVES:
-        if not any(getattr(e, half).any() for e in edges):
+        if not any(half_of(e, half).any() for e in edges):
             raise KeyreconError(
                 f"No frame shows edges of the {half} body; pick the colours of its clothes or "
                 "skin in one more frame."
@@ -142,7 +142,7 @@ def _compare_exemplars(
         )
         return _compare_halves(inputs, spread)
 
-    shown = np.array([[getattr(e, half).any() for half in HALVES] for e in edges])
+    shown = np.array([[half_of(e, half).any() for half in HALVES] for e in edges])
     may_lead = np.asarray(shown.all(axis=1) if shown.all(axis=1).any() else shown.any(axis=1))
     found = find_exemplars(compare, may_lead, options.most, progress)
     kept, track_kept = tuple(edges[t] for t in found.frames), take_frames(track, found.frames)
@@ -208,7 +208,7 @@ def score_visibility(edges: tuple[Edges, ...], track: Track) -> Float[np.ndarray
 
 def measure_seen(edges: tuple[Edges, ...]) -> Float[np.ndarray, "2 T"]:
     """Elements of each half of the body in each frame as a share of their median, at most 1."""
-    count = np.array([[getattr(e, half).sum() for e in edges] for half in HALVES])
+    count = np.array([[half_of(e, half).sum() for e in edges] for half in HALVES])
     usual = np.maximum(1.0, np.median(count, axis=1, keepdims=True))
     return np.minimum(count / usual, 1.0)
 

@@ -32,7 +32,7 @@ from keyrecon.segmentation.static_overlay import StaticOverlay
 from keyrecon.spreading import Spread
 from keyrecon.tracking.exposure import ExposureMeter
 from keyrecon.tracking.key_pictures import Grey, KeyPicture, Match, find_corners, match_key
-from keyrecon.tracking.shots import CutDetector
+from keyrecon.tracking.shots import CutDetector, RecentPictures, find_shots
 
 Matrix = Float[np.ndarray, "3 3"]
 
@@ -178,7 +178,7 @@ def estimate_camera_motion(
     """
     detector = CutDetector.at_rate(video.fps)
     # what is at hand here is not sent elsewhere, where decoding it again is cheaper
-    recent = _RecentPictures(MOST_HELD if spread is in_threads else 0)
+    recent = RecentPictures(MOST_HELD if spread is in_threads else 0)
     watched = recent.watch(detector.watch(_read_reduced(video, options, progress)))
     path = _estimate_motion(video, options, progress, _first_shot(watched, detector), detector)
     if not detector.cuts and not video.joints:
@@ -286,7 +286,7 @@ def _estimate_shots(
     video: Video,
     options: CameraMotionOptions,
     watched: Iterator[Grey],
-    recent: "_RecentPictures",
+    recent: RecentPictures,
     detector: CutDetector,
     spread: Spread,
 ) -> CameraPath:
@@ -294,7 +294,7 @@ def _estimate_shots(
     parts: list[slice] = []
 
     def begun() -> Iterator[tuple[Video, CameraMotionOptions, list[Grey] | None]]:
-        for part in _find_shots(watched, detector, video):
+        for part in find_shots(watched, detector, video):
             parts.append(part)
             yield video.part(part), options, recent.take(part)
 
@@ -314,53 +314,6 @@ def _estimate_shots(
         tuple(detector.dissolves),
         _join_exposures(paths),
     )
-
-
-class _RecentPictures:
-    """Pictures that were watched since the last shot, unless they are too many to be held."""
-
-    def __init__(self, most: int) -> None:
-        """At most so many bytes."""
-        self._most = most
-        self._first = 0
-        self._pictures: list[Grey] = []
-
-    def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:
-        """Pass the pictures on, and hold them."""
-        for grey in pictures:
-            self._pictures.append(grey)
-            if grey.nbytes * len(self._pictures) > self._most:
-                self._drop(len(self._pictures))
-            yield grey
-
-    def take(self, part: slice) -> list[Grey] | None:
-        """Those of a shot, or None if not all of them are held; what lies before is let go."""
-        start, stop = part.start - self._first, part.stop - self._first
-        shot = self._pictures[max(0, start) : max(0, stop)]
-        self._drop(max(0, min(stop, len(self._pictures))))
-        return shot if start >= 0 and len(shot) == stop - start else None
-
-    def _drop(self, count: int) -> None:
-        del self._pictures[:count]
-        self._first += count
-
-
-def _find_shots(watched: Iterator[Grey], detector: CutDetector, video: Video) -> Iterator[slice]:
-    """Shots of the video as soon as their ends are known, while the pictures are watched."""
-    start, cuts = 0, 0
-    for _ in watched:
-        if len(detector.cuts) == cuts or detector.cuts[-1] >= detector.count:
-            continue
-        cuts, last = len(detector.cuts), detector.cuts[-1]
-        joints = [joint for joint in video.joints if joint < last]
-        for end in sorted({*detector.cuts, *joints}):
-            if end > start:
-                yield slice(start, end)
-                start = end
-    for end in sorted({*detector.cuts, *video.joints, len(video)}):
-        if end > start:
-            yield slice(start, end)
-            start = end
 
 
 def _holding(pictures: Iterable[Grey], held: list[Grey] | None) -> Iterator[Grey]:

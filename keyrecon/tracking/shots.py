@@ -18,6 +18,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from keyrecon.io.video import Video
+
 Grey = UInt8[np.ndarray, "y x"]
 
 WIDTH = 64
@@ -167,6 +169,53 @@ class CutDetector:
         self.cuts.append(end)
         self._recent.clear()
         self._blend = None
+
+
+class RecentPictures:
+    """Pictures that were watched since the last shot, unless they are too many to be held."""
+
+    def __init__(self, most: int) -> None:
+        """At most so many bytes."""
+        self._most = most
+        self._first = 0
+        self._pictures: list[Grey] = []
+
+    def watch(self, pictures: Iterable[Grey]) -> Iterator[Grey]:
+        """Pass the pictures on, and hold them."""
+        for grey in pictures:
+            self._pictures.append(grey)
+            if grey.nbytes * len(self._pictures) > self._most:
+                self._drop(len(self._pictures))
+            yield grey
+
+    def take(self, part: slice) -> list[Grey] | None:
+        """Those of a shot, or None if not all of them are held; what lies before is let go."""
+        start, stop = part.start - self._first, part.stop - self._first
+        shot = self._pictures[max(0, start) : max(0, stop)]
+        self._drop(max(0, min(stop, len(self._pictures))))
+        return shot if start >= 0 and len(shot) == stop - start else None
+
+    def _drop(self, count: int) -> None:
+        del self._pictures[:count]
+        self._first += count
+
+
+def find_shots(watched: Iterator[Grey], detector: CutDetector, video: Video) -> Iterator[slice]:
+    """Shots of the video as soon as their ends are known, while the pictures are watched."""
+    start, cuts = 0, 0
+    for _ in watched:
+        if len(detector.cuts) == cuts or detector.cuts[-1] >= detector.count:
+            continue
+        cuts, last = len(detector.cuts), detector.cuts[-1]
+        joints = [joint for joint in video.joints if joint < last]
+        for end in sorted({*detector.cuts, *joints}):
+            if end > start:
+                yield slice(start, end)
+                start = end
+    for end in sorted({*detector.cuts, *video.joints, len(video)}):
+        if end > start:
+            yield slice(start, end)
+            start = end
 
 
 @dataclass(frozen=True)

@@ -121,10 +121,11 @@ def refine_key_frames(
 
 
 LEAST_DETECTED = 0.25
-"""Share of the frames from start to hit in which the club was detected, at least: .47 to .96 in ten
-real swings. In one with .14, thirtyfold slow motion of 374 lines, shafts that were none moved the
-top by three tenths of the downswing and the finish from frame 787 to 500; joints within a fifth of
-the trunk rose from .41 to .68 without them."""
+"""Share of the frames from start to hit in which the club was detected, at least, for it to tell
+the key postures, and for a fit not to be doubted: .47 to .96 in ten real swings. In one with .14,
+thirtyfold slow motion of 374 lines, shafts that were none moved the top by three tenths of the
+downswing and the finish from frame 787 to 500; joints within a fifth of the trunk rose from .41 to
+.68 without them."""
 TOP_WINDOW = (1.7, 0.4)
 """The top lies so many downswings before the hit, at most and at least, whatever was supposed."""
 HIT_SHARE = 0.35
