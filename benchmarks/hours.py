@@ -110,7 +110,7 @@ def measure_real(names: Sequence[str], out: Path) -> None:
             Piece("black", 20),
             Piece("other", len(clip.video), clip.video.path),
             Piece("black", 20),
-            Piece("close-up", 40, first.video.path, 10, (0.5, 0.5)),
+            Piece("close-up", 40, first.video.path, 10, focus=(0.5, 0.5)),
         ]
     pieces.append(Piece(PLAYER, len(first.video) // 2, first.video.path))
     size = first.video.width, first.video.height
