@@ -48,6 +48,8 @@ OPEN_GROUND = ("The focal length cannot", "Mark two", "Tell the camera's", "No w
 """How lines begin that say what is open, and what would tell it."""
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
+SETTLING_SECONDS = 0.05
+"""How long a connection that was just accepted may take to get its protocol."""
 IDLE_SECONDS = 75
 """How long a connection may rest: a person looks at a picture longer than a program would."""
 
@@ -73,7 +75,7 @@ def serve_annotator(
             if open_browser:
                 webbrowser.open(credentials.address)
             with suppress(KeyboardInterrupt):
-                asyncio.run(_Server(session, credentials).serve(sockets=[listener]))
+                asyncio.run(PageServer(session, credentials).serve(sockets=[listener]))
             say("Stopped. Everything that was marked is kept.")
         finally:
             watch.close()
@@ -91,18 +93,22 @@ def announce(folder: Path, address: str, host: str) -> str:
     )
 
 
-class _Server(uvicorn.Server):
-    """Ends the streams of news when it is stopped; they would keep it waiting."""
+class PageServer(uvicorn.Server):
+    """Leaves no connection open when it is stopped. Streams of news would keep it waiting; and a
+    connection just accepted has no protocol yet: asyncio would lose it if it closed the server."""
 
-    def __init__(self, session: Session, credentials: Credentials) -> None:
-        """Serve a project; the address with its token appears in no log."""
+    def __init__(
+        self, session: Session, credentials: Credentials, grace: int = GRACE_SECONDS
+    ) -> None:
+        """Serve a project; the address with its token appears in no log. Open connections may take
+        `grace` seconds to end."""
         config = uvicorn.Config(
             make_app(session, credentials),
             log_level="warning",
             access_log=False,
             server_header=False,
             timeout_keep_alive=IDLE_SECONDS,
-            timeout_graceful_shutdown=GRACE_SECONDS,
+            timeout_graceful_shutdown=grace,
         )
         super().__init__(config)
         self._events = session.events
@@ -110,6 +116,9 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop; called in the server's own loop."""
         self._events.close()
+        for listener in sockets or ():
+            asyncio.get_running_loop().remove_reader(listener)
+        await asyncio.sleep(SETTLING_SECONDS)
         await super().shutdown(sockets)
 
 

@@ -10,12 +10,9 @@ from pathlib import Path
 from threading import Thread
 from urllib.request import Request, urlopen
 
-import uvicorn
-
 from keyrecon.annotate.assistant import Assistant
-from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.session import open_session
-from keyrecon.app.annotator import listen, make_credentials
+from keyrecon.app.annotator import PageServer, listen, make_credentials
 from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
 
@@ -43,12 +40,7 @@ class Serving:
         listener = listen("127.0.0.1", self.credentials.port if self.credentials else 0)
         self.credentials = self.credentials or make_credentials(listener, "127.0.0.1")
         self.session = open_session(Workspace(self.folder), self.assistant, self.commands)
-        config = uvicorn.Config(
-            make_app(self.session, self.credentials),
-            log_level="critical",
-            timeout_graceful_shutdown=0,
-        )
-        self._server = uvicorn.Server(config)
+        self._server = PageServer(self.session, self.credentials, grace=0)
         self._thread = Thread(target=asyncio.run, args=(self._server.serve(sockets=[listener]),))
         self._thread.start()
 

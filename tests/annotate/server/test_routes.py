@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import socket
 import threading
 from dataclasses import replace
 
@@ -11,11 +12,13 @@ from annotator_edits import edit, mark, submit
 from small_motion import make_motion
 
 from keyrecon.annotate.assistant import Assistant
+from keyrecon.annotate.server.address import listen, make_credentials
 from keyrecon.annotate.server.descriptions import marking_order
 from keyrecon.annotate.server.events import Events
 from keyrecon.annotate.server.routes import make_app
 from keyrecon.annotate.server.session import ProjectWatch
 from keyrecon.annotate.store.cells import by_frame
+from keyrecon.app.annotator import PageServer
 from keyrecon.body import LSP14
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.formats.motion_file import write_motion
@@ -259,3 +262,22 @@ def test_the_watching_thread_outlives_bad_bytes(opened, folder):
         assert watch._thread.is_alive()
     finally:
         watch.close()
+
+
+def test_a_connection_that_is_accepted_while_the_server_stops_is_closed(opened):
+    session = opened()
+
+    async def stop_while_one_comes():
+        with listen("127.0.0.1", 0) as listener, socket.socket() as browser:
+            server = PageServer(session, make_credentials(listener, "127.0.0.1"), grace=0)
+            server.config.load()
+            server.lifespan = server.config.lifespan_class(server.config)
+            await server.startup([listener])
+            browser.connect(listener.getsockname())
+            for _ in range(2):  # the listener is read; what was accepted has no protocol yet
+                await asyncio.sleep(0)
+            assert not server.server_state.connections
+            await server.shutdown([listener])
+            return len(server.server_state.connections), browser.recv(1)
+
+    assert run_apart(stop_while_one_comes()) == (0, b"")
