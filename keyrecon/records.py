@@ -228,6 +228,8 @@ class Background:
     later: tuple["Background", ...] = ()
     """Those that hold from later frames on, where one does not do for all: ascending, and without
     others in them."""
+    sure: float = 3.0
+    """A pixel that differs by this many standard deviations is as likely the player as not."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -278,16 +278,15 @@ def prepare_project(
 ) -> ProjectPreparation:
     """The automatic part; made with the marks where there are no picks, or where it was off.
 
-    What was made before is found again while no mark contradicts its track. The printed forms know
-    picks alone, where there are any.
+    What was made before is found again while no mark contradicts its track and none that taught it
+    was taken back. The printed forms know picks alone, where there are any.
     """
     if marks is not None and not np.isfinite(marks.joints).any():
         marks = None  # a file without a mark tells nothing
     if options.track.method == "paper" and workspace.picks_file.is_file():
         return _without_misplaced(workspace, video, options, None, progress)
-    used, file = None, workspace.prepared_marks_file
-    if file.is_file() and not workspace.stages.force:
-        used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+    file = workspace.prepared_marks_file
+    used = _marks_used_before(workspace, video, marks)
     if used is None and marks is not None and not workspace.picks_file.is_file():
         used = marks
     prepared = _without_misplaced(workspace, video, options, used, progress)
@@ -298,6 +297,30 @@ def prepare_project(
         size = (video.width, video.height)
         write_durably(file, coco_text(used, size).encode())
     return _with_told(workspace, prepared, marks)
+
+
+def _marks_used_before(
+    workspace: Workspace, video: Video, marks: Annotations | None
+) -> Annotations | None:
+    """The marks that the last preparation was made with, or those there are now where a head or
+    feet that taught it are no longer marked; None without any."""
+    file = workspace.prepared_marks_file
+    if workspace.stages.force or not file.is_file():
+        return None
+    used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+    still_marked = set() if marks is None else _marked_parts(marks)
+    return used if _marked_parts(used) <= still_marked else marks
+
+
+def _marked_parts(marks: Annotations) -> set[tuple[str, int]]:
+    """The heads and the pairs of feet that are marked, with their frames."""
+    anchors = anchors_from_bodies(marks)
+    places = {"head": anchors.head, "feet": anchors.feet.reshape(-1, 4)}
+    return {
+        (part, frame)
+        for part, place in places.items()
+        for frame in anchors.frames[np.isfinite(place).all(axis=1)].tolist()
+    }
 
 
 def _with_told(

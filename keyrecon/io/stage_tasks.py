@@ -10,6 +10,7 @@ is done again by another, and nobody holds in memory what waits.
 import hashlib
 import inspect
 import platform
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -25,18 +26,10 @@ from keyrecon.io.storage import load_record, save_record
 from keyrecon.numerics.threads import one_order_of_sums
 
 PACKAGE = Path(__file__).parent.parent
-SHARED_CODE = (
-    "body.py",
-    "records.py",
-    "timeline.py",
-    "io/evening.py",
-    "io/frame_reader.py",
-    "io/*video.py",
-    "numerics/*.py",
-    "paper/*.py",
-    "segmentation/*.py",
-)
-"""Modules whose change makes the results of every stage anew."""
+IMPORT = re.compile(rf"^\s*from ({PACKAGE.name}[.\w]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+"""What a module of the package takes from another one."""
+VIDEOS = "io/*video.py"
+"""Modules of what a stage is given as its video, whichever of them it names."""
 PATIENCE = 60.0
 """Seconds until a file that another machine has written must be seen: network drives may go on
 telling for so long that there is none (the attribute cache of NFS: acdirmax)."""
@@ -126,13 +119,38 @@ def read_when_there(path: Path) -> Any:
 
 
 def hash_code(stage: Callable[..., Any]) -> str:
-    """Hash of the stage's folder and of what all stages share: new code makes new results."""
-    return _hash_folder(Path(inspect.getfile(sys.modules[stage.__module__])).parent)
+    """Hash of the stage's module, all that it imports, and videos: new code makes new results."""
+    return _hash_sources(Path(inspect.getfile(sys.modules[stage.__module__])))
 
 
 @cache
-def _hash_folder(folder: Path) -> str:
-    """Of a folder of stages, with what all stages share, as this process has read it."""
-    shared = (file for pattern in SHARED_CODE for file in PACKAGE.glob(pattern))
-    sources = sorted({*folder.rglob("*.py"), *shared})
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
+def _hash_sources(module: Path) -> str:
+    """Of a module of stages, with what it imports, as this process has read it."""
+    files = set[Path]().union(*map(imported_files, (module, *PACKAGE.glob(VIDEOS))))
+    return hashlib.sha256(b"".join(map(_source, sorted(files)))).hexdigest()
+
+
+def imported_files(module: Path) -> set[Path]:
+    """A module's file and those of all modules of the package that it imports, and they import."""
+    found, open_ones = {module}, [module]
+    while open_ones:
+        new = _imports(open_ones.pop()) - found
+        found |= new
+        open_ones += new
+    return found
+
+
+@cache
+def _source(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+@cache
+def _imports(file: Path) -> frozenset[Path]:
+    """Files of the package that a file names."""
+    named: set[Path] = set()
+    for package, names in IMPORT.findall(_source(file).decode()):
+        place = PACKAGE.parent.joinpath(*package.split("."))
+        inside = (place / name for name in re.findall(r"\w+", names))
+        named |= {place.with_suffix(".py"), *(path.with_suffix(".py") for path in inside)}
+    return frozenset(path for path in named if path.is_file())

@@ -144,6 +144,8 @@ class _SceneSamples:
     to_own: Float[np.ndarray, "3 3"]
     """From the reference frame to that."""
     shrink: float
+    sure: float
+    """As `Background` has it."""
 
     def background(self, overlay: Bool[np.ndarray, "h w"]) -> Background:
         """Their median, in coordinates of the reference frame."""
@@ -156,7 +158,8 @@ class _SceneSamples:
             overlay=overlay,
             player=self.player,
         )
-        return replace(own, from_reference=own.from_reference @ self.to_own, first=self.first)
+        to_own = own.from_reference @ self.to_own
+        return replace(own, from_reference=to_own, first=self.first, sure=self.sure)
 
 
 def _sample_scene(
@@ -186,9 +189,8 @@ def _sample_scene(
     to_own = np.eye(3)
     if count < len(video):
         to_own = np.linalg.inv(camera.to_reference[part.start + count // 2])
-    return _SceneSamples(
-        part.start, lab, free, on_player, to_own @ camera.to_reference[frames], to_own, shrink
-    )
+    paths = to_own @ camera.to_reference[frames]
+    return _SceneSamples(part.start, lab, free, on_player, paths, to_own, shrink, options.sure)
 
 
 def complete_background(first: Background, other: Background) -> Background:

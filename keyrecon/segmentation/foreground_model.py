@@ -15,7 +15,6 @@ from jaxtyping import Float, Float32, UInt8
 
 from keyrecon.io.frame_reader import shrinking
 from keyrecon.records import Background, CameraPath
-from keyrecon.segmentation.background_model import BackgroundOptions
 
 MIN_SPREAD = 4
 """Deviation of video noise and compression, grey levels; the least that is assumed. A quarter more
@@ -48,7 +47,6 @@ class ForegroundModel:
 
     background: Background
     camera: CameraPath
-    sure: float = BackgroundOptions.sure
 
     @cached_property
     def _later(self) -> tuple["ForegroundModel", ...]:
@@ -77,7 +75,7 @@ class ForegroundModel:
     @cached_property
     def _even_odds(self) -> Float32[np.ndarray, "256"]:
         """Square of the difference that is as likely the player as not, by `_spread`."""
-        return np.square(np.arange(256, dtype=np.float32) * np.float32(self.sure / 8))
+        return np.square(np.arange(256, dtype=np.float32) * np.float32(self.background.sure / 8))
 
     def foreground(
         self,

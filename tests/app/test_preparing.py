@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+from page_project import write_numbered_video
 
+from keyrecon.app import preparing, project
 from keyrecon.app.annotator import _contradictions
 from keyrecon.app.preparing import (
     describe_hiding,
@@ -12,7 +14,20 @@ from keyrecon.app.preparing import (
     describe_shots,
     describe_truncation,
 )
-from keyrecon.records import PLAYER, CameraPath, Shots, Track, TrackVerification
+from keyrecon.body import LSP14
+from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
+from keyrecon.progress import silent
+from keyrecon.records import (
+    PLAYER,
+    Annotations,
+    CameraPath,
+    Preparation,
+    Shots,
+    Track,
+    TrackVerification,
+)
+from keyrecon.segmentation.marked_bodies import anchors_from_bodies
 
 
 def test_every_shot_is_told_with_its_frames_and_what_it_shows():
@@ -108,3 +123,49 @@ def test_frames_beyond_a_hop_that_nothing_joins_to_the_player_are_told_once():
 def test_what_speaks_against_the_track_is_shown_on_the_page():
     lines = [*describe_truncation(verified(truncated=range(100))), *identity(range(90, 111))]
     assert _contradictions("\n".join(["Player found.", *lines])) == "\n".join(lines)
+
+
+def standing_bodies(places):
+    """Bodies marked in frames, each at a place across the picture."""
+    heights = {"head": 40, "neck": 60, "shoulder": 62, "elbow": 80, "wrist": 95, "hip": 100}
+    heights |= {"knee": 130, "ankle": 160}
+    sides = {"left": 4, "right": -4}
+    body = [
+        (sides.get(name.split("_")[0], 0), heights.get(name.split("_")[-1], 40))
+        for name in LSP14.names
+    ]
+    joints = np.array([[(x + beside, y) for beside, y in body] for x in places.values()], float)
+    seen, sides_of_bones = np.ones(joints.shape[:2], bool), np.zeros((len(joints), 13), int)
+    return Annotations(LSP14, np.array([*places]), joints, seen, sides_of_bones)
+
+
+def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypatch):
+    project.start(write_numbered_video(tmp_path / "v.mp4"), tmp_path / "p")
+    workspace, used = Workspace(tmp_path / "p"), []
+    workspace.prepared_marks_file.parent.mkdir()
+    video = workspace.video()
+
+    def follow(_workspace, video, _options, marks, _progress):
+        """A track through the marks that it is given, and straight on between them."""
+        used.append(marks.frames.tolist())
+        times = np.arange(len(video))
+        across = np.interp(times, marks.frames, marks.joints[:, LSP14.index("neck"), 0])
+        bodies = standing_bodies(dict(zip(times.tolist(), across.tolist(), strict=True)))
+        anchors = anchors_from_bodies(bodies)
+        even = np.ones(len(video))
+        track = Track(anchors.head, anchors.feet, 120 * even, np.zeros((len(video), 4)), even)
+        made = object.__new__(Preparation)  # nothing but its track is looked at
+        object.__setattr__(made, "track", track)
+        return preparing.ProjectPreparation(made)
+
+    monkeypatch.setattr(preparing, "_without_misplaced", follow)
+
+    def prepare_with(places):
+        marks = standing_bodies(places)
+        made = preparing.prepare_project(workspace, video, marks, Options(), silent)
+        return made.preparation.track.head[6, 0]
+
+    assert prepare_with({2: 50, 6: 120, 9: 60}) == 120  # somebody else was marked in frame 6
+    assert abs(prepare_with({2: 50, 9: 60}) - 55) < 5
+    prepare_with({2: 50, 5: 54, 9: 60})
+    assert used == [[2, 6, 9], [2, 9], [2, 9]]  # what is added in place changes nothing

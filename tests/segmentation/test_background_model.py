@@ -6,7 +6,11 @@ from drawn_player import HEIGHT, draw_player, scene
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath, Colors, Track
-from keyrecon.segmentation.background_model import build_background, median_background
+from keyrecon.segmentation.background_model import (
+    BackgroundOptions,
+    build_background,
+    median_background,
+)
 from keyrecon.segmentation.color_model import color_bins, to_lab
 from keyrecon.segmentation.foreground_model import ForegroundModel
 
@@ -176,6 +180,12 @@ def test_a_player_is_told_from_a_scene_that_a_carried_camera_shows_from_ever_oth
         ground.append(foreground[:, :100].mean())
     assert np.mean(legs) > 0.6
     assert np.mean(ground) < 0.2
+    surer = build_background(video, camera, track, options=BackgroundOptions(sure=12.0))
+    assert surer.sure == 12.0 and {part.sure for part in surer.later} == {12.0}
+    parts = (ForegroundModel(b, camera) for b in (background, surer))
+    picture = to_lab(video.frame(150))
+    one, other = (p.foreground(picture, 150, np.eye(3)).mean() for p in parts)
+    assert other < 0.5 * one
 
 
 def test_one_background_does_for_a_camera_that_only_turns(tmp_path):

@@ -34,9 +34,10 @@ LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 LEAN_SPREAD = 0.06
 """Radians by which a camera is usually off the level. Chosen on rendered swings; see
 benchmarks/golf.py."""
-JOINT_SPREAD = 8.0
-"""px by which a click, or the mean player's joint, is usually off: a click by 2 to 3, a player's
-proportions by 4 % of a limb. Chosen on rendered swings; see benchmarks/golf.py."""
+JOINT_SPREAD = 0.0465
+"""Metres by which a click, or the mean player's joint, is usually off: a click by 2 to 3 px of a
+player 310 px tall, a player's proportions by 4 % of a limb. Chosen on rendered swings of that
+height (8 px); see benchmarks/golf.py."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,7 @@ def estimate_initial_pose(
     tall = np.ptp(pixels[:, 1]) / max(np.ptp(points[:, 1]), 1e-6)
     depth = camera.focal / max(tall, 1e-6)
     middle = (pixels.mean(axis=0) - camera.principal) * depth / camera.focal
+    spread = JOINT_SPREAD * max(tall, 1e-6)
 
     def turned(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
         there: np.ndarray = Rotation.from_rotvec(unknown[:3]).as_matrix() @ base
@@ -71,7 +73,7 @@ def estimate_initial_pose(
     def errors(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
         turn = turned(unknown, base)
         projected, _ = project(points @ turn.T + unknown[3:], camera)
-        off = ((projected - pixels) / JOINT_SPREAD).ravel()
+        off = ((projected - pixels) / spread).ravel()
         return np.concatenate([off, turn[[0, 2], 1] / LEAN_SPREAD])
 
     def slopes(unknown: np.ndarray, base: np.ndarray) -> np.ndarray:
@@ -84,7 +86,7 @@ def estimate_initial_pose(
         lean = np.zeros((2, 6))
         lean[:, :3] = -(cross_matrix(turn[:, 1]) @ rate)[[0, 2]]
         off = (slope @ moved).reshape(-1, 6)
-        return np.concatenate([off / JOINT_SPREAD, lean / LEAN_SPREAD])
+        return np.concatenate([off / spread, lean / LEAN_SPREAD])
 
     placements: list[tuple[float, Placement]] = []
     for heading in np.linspace(0, 2 * np.pi, HEADINGS, endpoint=False):

@@ -12,7 +12,7 @@ every frame anew.
 Arms and the club move too fast to be in any background, whether GrabCut cut them out or not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
 
@@ -187,7 +187,7 @@ def separate_player(
     clicked = reduce_picture(video.frame(pose.frame), width)
     cutter = learn_cutter(clicked, pose)
     background = _learn_background(video, clicked, cutter, options, progress)
-    scene = ForegroundModel(background, _still(len(video)), options.sure)
+    scene = ForegroundModel(replace(background, sure=options.sure), _still(len(video)))
     compare = partial(_likely, scene, cutter)
     pictures = progress(read_small(video, width), "Separating the player", len(video))
     likely = np.stack(list(side_by_side(compare, pictures)))

@@ -57,8 +57,11 @@ SAME_ENDS = 0.02
 """Distance between the ends of two segments that are one, player heights."""
 STATIC_SHARE = 0.3
 """Share of the active frames in which a static segment is detected: players hide it at times."""
+DETECTION_ERROR = 2.0
+"""Distance by which pieces of one shaft may lie beside one another, px of the pictures in which
+they are detected: the sides of a shaft that is three wide."""
 COLLINEAR_OFFSET = 0.008
-"""Distance from their common line at which two segments are one shaft, lengths of the segment."""
+"""The same in addition, lengths of the segment: one that is turned by half a degree."""
 
 
 @dataclass(frozen=True)
@@ -245,6 +248,7 @@ def _grow(
     """The segments in the line of one, which grows by the nearest ones first."""
     whole, members = segments[start], np.arange(len(segments)) == start
     limit = options.bridge * foreground.height
+    beside = DETECTION_ERROR * max(1.0, foreground.height / DETECTED_HEIGHT)
     while True:
         length = float(np.linalg.norm(whole[1] - whole[0]))
         axis = (whole[1] - whole[0]) / length
@@ -254,9 +258,8 @@ def _grow(
         turn = segments[:, 1] - segments[:, 0]
         turn = np.abs(turn @ normal) / np.linalg.norm(turn, axis=1)
         off = np.abs((segments - whole[0]) @ normal).max(axis=1)
-        near = (off < 2.0 + COLLINEAR_OFFSET * (length + np.maximum(gap, 0))) & (
-            turn < np.sin(COLLINEAR)
-        )
+        near = off < beside + COLLINEAR_OFFSET * (length + np.maximum(gap, 0))
+        near &= turn < np.sin(COLLINEAR)
         near &= ~members & (gap < limit)
         inside = near & (place[:, 0] > 0) & (place[:, 1] < length)
         members = members | inside
