@@ -199,7 +199,7 @@ def foot_exchange_price(
     chance = one[:, :, None, None] * motion.change.T * other[:, None, :, :, None]
     square = np.einsum("...a,...ab,...b->...", gap.conj(), np.linalg.inv(total), gap).real
     fit = np.log(np.maximum(chance, LEAST)) - _tail(square) - np.log(np.linalg.det(total))
-    likely = np.logaddexp.reduce(fit.reshape(*fit.shape[:3], -1), axis=3)
+    likely = np.logaddexp.reduce(fit, axis=(3, 4))
     straight, crossed = likely[:, 0, 0] + likely[:, 1, 1], likely[:, 0, 1] + likely[:, 1, 0]
     return MOTION_WEIGHT * (straight - crossed)
 

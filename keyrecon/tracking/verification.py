@@ -54,6 +54,9 @@ SOLES = 1.08
 """How far the soles are below the centre of the head, in units of its height above the middle of
 the feet: a stride sets one shoe before the other, and soles lie .03 below ankles (Drillis and
 Contini: ankles .039 statures up)."""
+SHOWN_SECONDS = 0.25
+"""So long before and after both feet were marked they are in the picture: a step takes twice that.
+It decides only what is told of the track."""
 SCENE_ENDS = 0.9
 """Share of a row that no player covers: the picture was rounded beyond the background there. It
 decides only what is told of the track."""
@@ -92,15 +95,29 @@ def verify_track(
     sized = bool((anchors.marked & np.isfinite(anchors.feet).all(axis=(1, 2))).any())
     frames = np.arange(0, len(video), max(1, round(video.fps / RATE)))
     read = _read_views(video, track, frames, ForegroundModel(background, camera), colors, progress)
+    shown = _feet_shown(frames, anchors, video.fps)
     truncated: list[bool] = []
     distractors: list[np.ndarray] = []
     while views := list(islice(read, MOST_VIEWS)):
         rows = slice(len(truncated), len(truncated) + len(views))
         distractors.append(_find_distractors(views, track.confidence[frames[rows]]))
-        truncated += [view.is_truncated(sized) for view in views]
+        truncated += [
+            not known and view.is_truncated(sized)
+            for view, known in zip(views, shown[rows], strict=True)
+        ]
     hidden = hidden_shares(track, background)[frames] > HIDDEN_SHARE
     passing = _lasting(np.concatenate(distractors))
     return TrackVerification(frames, np.array(truncated), passing, hidden)
+
+
+def _feet_shown(
+    frames: Int[np.ndarray, "n"], anchors: TrackAnchors, fps: float
+) -> Bool[np.ndarray, "n"]:
+    """Whether both feet were marked about then, or followed from a mark: who crouches has his head
+    as low as one whose feet the edge cuts off."""
+    known = anchors.frames[np.isfinite(anchors.feet).all(axis=(1, 2))]
+    apart = np.abs(frames[:, None] - known).min(axis=1, initial=len(frames) * fps)
+    return np.asarray(apart <= SHOWN_SECONDS * fps)
 
 
 def hidden_shares(track: Track, background: Background) -> Float[np.ndarray, "T"]:

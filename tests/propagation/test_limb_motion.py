@@ -70,6 +70,12 @@ def feet_that_meet():
     return np.stack([standing, passing], axis=1) + 0j
 
 
+def test_one_frame_has_nothing_to_exchange_between():
+    limbs = np.zeros((1, 2, 3), complex)
+    assert exchange_price(limbs, np.array([0.016, 0.032, 0.064])).shape == (0,)
+    assert foot_exchange_price(limbs[:, :, 2], ANKLE_SPREAD, FPS).shape == (0,)
+
+
 def test_a_foot_that_stands_goes_on_standing_while_the_other_passes():
     feet = feet_that_meet()
     for gap in (9, 10):

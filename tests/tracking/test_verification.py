@@ -106,7 +106,10 @@ def test_a_shadow_on_the_ground_cuts_no_feet_off_that_were_marked_as_high_above_
 
 
 def test_feet_that_the_edge_cuts_off_elsewhere_are_told_though_some_were_marked(verified):
-    assert verified(rows=130, marked=True)[0].truncated.mean() > 0.6
+    verification = verified(rows=130, marked=True)[0]
+    about_then = np.abs(verification.frames - 5) <= 0.25 * 30
+    assert not verification.truncated[about_then].any()  # a person saw them there
+    assert verification.truncated[~about_then].mean() > 0.6
 
 
 def test_another_player_in_the_same_clothes_is_told_where_the_two_meet(verified):
