@@ -13,7 +13,7 @@ The tables were fitted to joints marked by eye on real clips. `python benchmarks
 --draws 2` makes them and prints what they are worth, every clip predicted from the others alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -232,6 +232,12 @@ def uncertain_stretches(
     return sorted((stretch for _, stretch in worst), key=lambda s: s.first)
 
 
+def uncertain_parts(motion: Motion, frames: Sequence[int]) -> list[str]:
+    """What is uncertain in each of some frames, such as 'arms and legs'; '' where nothing is."""
+    stretches = uncertain_stretches(motion, count=len(motion.time))
+    return [next((s.what for s in stretches if s.first <= f <= s.last), "") for f in frames]
+
+
 def uncertain_share(motion: Motion) -> float:
     """Share of the frames in which arms, legs or head are uncertain."""
     if motion.expected_error is None:
@@ -319,11 +325,11 @@ def unsure_track(track: Track, shots: Shots, reach: int, count: int = 3) -> list
 
 
 def worst_frames(motion: Motion, count: int = 10) -> list[tuple[int, list[tuple[str, float]]]]:
-    """Frames with the largest expected errors, at least half a second apart: the number of each
-    and its three worst joints with their expected errors, px."""
+    """Frames whose three worst joints have the largest expected errors by the player's size, at
+    least half a second apart: the number of each and these joints with their errors, px."""
     if motion.expected_error is None:
         return []
-    left = motion.expected_error.mean(axis=1)
+    left = np.sort(motion.expected_error, axis=1)[:, -3:].mean(axis=1) / motion.scale
     apart = round(TAUGHT_SECONDS * motion.fps)
     asked: list[tuple[int, list[tuple[str, float]]]] = []
     while len(asked) < count and np.isfinite(left).any():

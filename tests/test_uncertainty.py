@@ -13,6 +13,7 @@ from keyrecon.uncertainty import (
     expected_error,
     measure_correction,
     player_height,
+    uncertain_parts,
     uncertain_share,
     uncertain_stretches,
     unsure_track,
@@ -114,6 +115,10 @@ def test_a_stretch_is_told_with_its_part_its_size_and_the_frame_to_mark():
     )
 
 
+def test_frames_within_a_stretch_are_told_as_uncertain_and_others_are_not():
+    assert uncertain_parts(with_lost_arms(41, 50), [20, 41, 46, 51]) == ["", "arms", "arms", ""]
+
+
 def test_no_line_covers_more_than_one_mark_can_help():
     stretches = uncertain_stretches(with_lost_arms(5, 94), count=9)
     reach = round(uncertainty.TAUGHT_SECONDS * 25)
@@ -185,6 +190,8 @@ def test_worst_frames_lie_apart_and_name_the_joints_that_are_lost():
     names = {name for name, _ in frames[0][1]}
     assert names <= set(LSP14.names[ARMS])
     assert min(np.diff(sorted(frame for frame, _ in frames))) > 10
+    shown = [np.mean([error for _, error in joints]) for _, joints in frames]
+    assert shown == sorted(shown, reverse=True)  # the reader sees what they are ordered by
 
 
 def test_a_track_that_is_a_guess_for_long_asks_for_the_body_in_its_middle():

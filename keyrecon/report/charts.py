@@ -125,7 +125,7 @@ def joint_chart(frames: int, has_truth: bool) -> go.Figure:
             figure.add_scatter(
                 x=[], y=[], showlegend=shown, legendgroup=trace["name"], row=row, col=1, **trace
             )
-        figure.update_yaxes(autorange="reversed", row=row, col=1)
+    figure.update_yaxes(autorange="reversed", row=2, col=1)  # down the picture is down here
     return _names_below(style_chart(figure, 460))
 
 

@@ -24,7 +24,12 @@ from keyrecon.report.markup import (
 from keyrecon.report.pictures import Pictures, png_uri
 from keyrecon.report.summary import center_on_root, scale_truth
 from keyrecon.report.views import VIEWS, pose_drawing
-from keyrecon.uncertainty import UncertainStretch, uncertain_stretches, worst_frames
+from keyrecon.uncertainty import (
+    UncertainStretch,
+    uncertain_parts,
+    uncertain_stretches,
+    worst_frames,
+)
 
 MATRIX_SIDE = 600
 """Largest side of a distance matrix in the page, px."""
@@ -64,12 +69,14 @@ def instants(material: ReportMaterial, pictures: Pictures) -> str:
     if not pictured:
         return ""
     unit = "m/s" if motion.units == "m" else "heights/s"
+    doubtful = uncertain_parts(motion, [instant.frame for instant in pictured])
     stills = "".join(
         f'<button type="button" class="still" data-frame="{instant.frame}">'
         f'<img src="{pictures.instants[instant.frame]}" alt="Frame {instant.frame}, the '
         f'{instant.hand} hand is fastest">'
-        f"<span>{instant.frame} <small>{motion.time[instant.frame]:.2f} s</small></span></button>"
-        for instant in pictured
+        f"<span>{instant.frame} <small>{motion.time[instant.frame]:.2f} s"
+        f"{f', {parts} uncertain' if parts else ''}</small></span></button>"
+        for instant, parts in zip(pictured, doubtful, strict=True)
     )
     angles = instant_angles(motion)
     rows = [
@@ -78,16 +85,22 @@ def instants(material: ReportMaterial, pictures: Pictures) -> str:
             f"{motion.time[instant.frame]:.2f} s",
             f"{instant.hand}, {instant.speed:.1f} {unit}",
             *(number(float(values[instant.frame]), ".0f") + "°" for values in angles.values()),
+            f"{parts} uncertain" if parts else "",
         )
-        for instant in pictured
+        for instant, parts in zip(pictured, doubtful, strict=True)
     ]
     about = note(
         "The frames in which a hand is fastest, relative to the body: strokes, throws, swings. A "
         "knee or elbow is straight at 180°; shoulders to hips is the angle between both lines as "
         "seen from above. On rendered strokes whose truth is known, hands lose a fifth of their "
-        "speed and angles are off by 8 to 15°."
+        "speed and angles are off by 8 to 15°"
+        + (
+            "; where joints are uncertain, by far more: mark these frames."
+            if any(doubtful)
+            else "."
+        )
     )
-    listed = table(("frame", "time", "fastest hand", *angles), rows, "Key instants")
+    listed = table(("frame", "time", "fastest hand", *angles, ""), rows, "Key instants")
     shown = f'<div class="strip four">{stills}</div>'
     return section("instants", "Key instants", about, shown, listed)
 

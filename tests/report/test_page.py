@@ -18,7 +18,9 @@ from keyrecon.body import LSP14
 from keyrecon.hyperextension import HyperextendedStretch
 from keyrecon.io.video import open_video
 from keyrecon.report import sections, summary
+from keyrecon.report.charts import joint_chart
 from keyrecon.report.headline import in_words, marked_share
+from keyrecon.report.instants import KeyInstant
 from keyrecon.report.markup import MOST_FRAMES, pack, sentence, thinning
 from keyrecon.report.page import build_page
 from keyrecon.report.pictures import LEAST_SIDE, SIDE, Windows, clip_side, cut_pictures
@@ -490,6 +492,25 @@ def test_the_report_tells_where_it_is_least_sure_and_each_line_goes_there(materi
     former = build_page(replace(material, motion=replace(motion, expected_error=None)), pictures)
     assert 'id="doubts"' not in former
     assert 'href="#doubts"' not in former
+
+
+def test_a_fastest_hand_that_is_uncertain_is_told_as_such(material, pictures, monkeypatch):
+    monkeypatch.setattr(sections, "key_instants", lambda _: [KeyInstant(17, "right", 9.0)])
+    motion = material.motion
+    errors = np.full(motion.confidence.shape, 1.0)
+    with_errors = replace(material, motion=replace(motion, expected_error=errors))
+    assert "uncertain" not in sections.instants(with_errors, pictures)
+    errors[12:25, 6:12] = 0.3 * player_height(motion)[:1]
+    written = sections.instants(with_errors, pictures)
+    assert "<td>arms uncertain</td>" in written
+    assert "s, arms uncertain</small>" in written
+    assert "mark these frames" in written
+
+
+def test_the_way_across_the_picture_grows_upwards_and_the_one_down_it_downwards():
+    axes = joint_chart(10, has_truth=False).layout
+    assert (axes.yaxis.autorange, axes.yaxis2.autorange) != ("reversed", "reversed")
+    assert axes.yaxis2.autorange == "reversed"
 
 
 def test_the_report_tells_of_a_knee_that_bends_forwards(material, pictures, monkeypatch):
