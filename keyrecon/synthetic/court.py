@@ -1,9 +1,10 @@
 """The surroundings of the player, drawn once per sequence by casting a ray per pixel.
 
 A tennis court of regulation size (ITF Rules of Tennis, rule 1: 23.77 m by 10.97 m, net 0.914 m at
-the middle) inside four walls with boards, trees and sky above them. The near baseline lies at
-z = 0 and the net at negative z. The result is a picture on the plane of a reference view, from
-which every frame of a turning camera is looked up by a homography.
+the middle; here to the middles of its lines, where the rule has their outer edges) inside four
+walls with boards, trees and sky above them. The near baseline lies at z = 0 and the net at negative
+z. The result is a picture on the plane of a reference view, from which every frame of a turning
+camera is looked up by a homography.
 """
 
 from dataclasses import dataclass
