@@ -44,11 +44,11 @@ def marked_heights(
     apart = np.minimum(np.diff(annotations.frames), round(APART_SECONDS * fps))
     cut = np.diff(shots.number[annotations.frames]) > 0
     apart = np.where(cut, round(OTHER_SHOT_SECONDS * fps), apart)
-    nearer = replace(annotations, frames=np.append(0, np.cumsum(apart)))
-    count = int(nearer.frames[-1]) + 1
+    retimed = replace(annotations, frames=np.append(0, np.cumsum(apart)))
+    count = int(retimed.frames[-1]) + 1
     nothing = np.full((count, len(skeleton.names), 2), np.nan)
     nowhere = np.zeros(nothing.shape[:2])
     tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))
     free = LengthOptions(scale_spread=SIZE_SPREAD)
-    size = estimate_lengths(tracks, nearer, np.full(count, usual), fps, free)
-    return np.where(known, HEAD_TO_FEET * size.scale[nearer.frames], np.nan)
+    size = estimate_lengths(tracks, retimed, np.full(count, usual), fps, free)
+    return np.where(known, HEAD_TO_FEET * size.scale[retimed.frames], np.nan)

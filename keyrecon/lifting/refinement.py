@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.body_models.depth_model import depth_spread
@@ -55,7 +55,7 @@ _COHERENCE = 0.02
 speed for 0.1 s; a track that trembles does not. A quarter more or less, others with it: at most 2.8
 mm on eight clips."""
 
-_CALM = 8
+_JUMP_FREE_POWER = 8
 """Power of the share of frames around in which a bone does not jump: a track that jumps is not
 asked how fast the body is. Where one frame in ten jumps, 0.43 of its acceleration is believed. A
 quarter more or less, others with it: at most 2.8 mm on eight clips."""
@@ -291,30 +291,39 @@ def _smoothness(
     """
     lengths, step = size.lengths, RATE / fps
     usual = (options.acceleration * step**2) ** 2
-    seen = np.diff(bone_vectors(observed.joints, size.skeleton), 2, axis=0)
-    jump = np.linalg.norm(seen, axis=-1, keepdims=True) > MAX_ACCELERATION * step**2
-    known = np.isfinite(seen).all(axis=-1, keepdims=True) & ~jump
-    share = gaussian_filter1d(known.astype(float), _COHERENCE * fps, axis=0, mode="nearest")
-    seen = gaussian_filter1d(np.where(known, seen, 0.0), _COHERENCE * fps, axis=0, mode="nearest")
-    seen /= np.maximum(share, 1e-9)
+    seen, known, jump = _seen_accelerations(bone_vectors(observed.joints, size.skeleton), fps)
     noise = _median_size(np.where(known, seen, np.nan)) ** 2
     window = options.acceleration_window * fps
-    around, calm = (
-        gaussian_filter1d(values, width, axis=0, mode="nearest")
-        for values, width in (
-            ((seen**2).mean(axis=-1, keepdims=True), window),
-            (1.0 - jump, 3 * window),
-        )
-    )
-    excess = calm**_CALM * np.maximum(around - noise, 0.0)
+    around = _mean_around((seen**2).mean(axis=-1, keepdims=True), window)
+    jump_free = _mean_around(1.0 - jump, 3 * window)
+    excess = jump_free**_JUMP_FREE_POWER * np.maximum(around - noise, 0.0)
     trust = np.where(known, excess / np.maximum(excess + noise, 1e-12), 0.0)
     flat = usual + (1 - trust) * excess
     variance = np.concatenate([flat, flat, usual + options.depth_freedom * excess], axis=-1)
     expected = np.concatenate([trust * seen, np.zeros_like(excess)], axis=-1)
-    share = _frame_weight(fps)
-    root = share / (options.root_acceleration * step**2) ** 2
-    weight = share * lengths[:, None] ** 2 / variance
+    frame_weight = _frame_weight(fps)
+    root = frame_weight / (options.root_acceleration * step**2) ** 2
+    weight = frame_weight * lengths[:, None] ** 2 / variance
     return Smoothness(root, weight, expected / lengths[:, None])
+
+
+def _seen_accelerations(
+    bones: Float[np.ndarray, "T B 2"], fps: float
+) -> tuple[Float[np.ndarray, "S B 2"], Bool[np.ndarray, "S B 1"], Bool[np.ndarray, "S B 1"]]:
+    """Second differences of bones in the picture, the mean of those known around; where they are
+    known, and where a track jumps instead."""
+    seen = np.diff(bones, 2, axis=0)
+    jump = np.linalg.norm(seen, axis=-1, keepdims=True) > MAX_ACCELERATION * (RATE / fps) ** 2
+    known = np.isfinite(seen).all(axis=-1, keepdims=True) & ~jump
+    share = _mean_around(known.astype(float), _COHERENCE * fps)
+    total = _mean_around(np.where(known, seen, 0.0), _COHERENCE * fps)
+    return total / np.maximum(share, 1e-9), known, jump
+
+
+def _mean_around(values: Float[np.ndarray, "S B n"], frames: float) -> Float[np.ndarray, "S B n"]:
+    """Mean of the frames around each, weighed by a normal distribution that wide."""
+    blurred: np.ndarray = gaussian_filter1d(values, frames, axis=0, mode="nearest")
+    return blurred
 
 
 def _median_size(seen: Float[np.ndarray, "S B 2"]) -> Float[np.ndarray, "B 1"]:
