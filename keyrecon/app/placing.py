@@ -17,7 +17,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_way, write_court_picture
 from keyrecon.world.lean import TILT_ERROR, USUAL_TILT
-from keyrecon.world.placement import place_motion
+from keyrecon.world.placement import place_motion, stature_change
 from keyrecon.world.records import COURT, WorldCamera, WorldMotion
 from keyrecon.world.run_measures import measure_run
 
@@ -69,8 +69,9 @@ def write_placed_motion(
     if not workspace.camera_file.is_file():
         write_motion(workspace.motion_file, motion, more=more)
         return PlacedMotion()
-    camera, world = read_camera(workspace.camera_file), None
-    where = camera.origin
+    found, world = read_camera(workspace.camera_file), None
+    change = stature_change(motion, found)
+    camera, where = found.scaled(change), found.origin
     doubt = _camera_doubt(motion, camera)
     if not doubt:
         world = place_motion(motion, camera)
@@ -81,13 +82,26 @@ def write_placed_motion(
     write_motion(workspace.motion_file, motion, (world, camera), more)
     way = measure_run(world, motion)
     if way is None:
-        return PlacedMotion(court=(world, camera))
+        return PlacedMotion(tuple(_describe_change(workspace, found, change)), (world, camera))
     picture = workspace.folder / "way.jpg"
     title = f"{way.length.value:.1f} m run, top speed {way.top_speed.value:.1f} m/s"
     write_court_picture(picture, draw_way(world, motion, way.speed, title, where))
     height = f" The player is {world.height_ratio:.2f} m tall by the {where}."
     line = f"On the {where}: {title}; {picture} shows the way."
-    return PlacedMotion((line + (height if motion.units != "m" else ""),), (world, camera))
+    line += height if motion.units != "m" else ""
+    return PlacedMotion((line, *_describe_change(workspace, found, change)), (world, camera))
+
+
+def _describe_change(workspace: Workspace, camera: WorldCamera, change: float) -> list[str]:
+    """That the camera was found with a player of another height."""
+    if change == 1 or camera.stature is None:
+        return []
+    return [
+        f"The camera was found with a player {camera.stature:.2f} m tall who is "
+        f"{change * camera.stature:.2f} m now, and its distances were scaled with him; for "
+        f"camera.npz and {camera.origin}.jpg anew: keyrecon {camera.origin} "
+        f"{quoted(workspace.folder)}"
+    ]
 
 
 def most_tilt_error(camera: WorldCamera) -> float:

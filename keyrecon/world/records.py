@@ -39,6 +39,8 @@ class WorldCamera:
     origin: Origin = COURT
     elsewhere: tuple[int, ...] = ()
     """First frames of shots that show the court from another place: they have no camera."""
+    stature: float | None = None
+    """Metres of the player where his height alone told what a metre is; None where another did."""
 
     @property
     def centre(self) -> Float[np.ndarray, "T 3"]:
@@ -49,6 +51,11 @@ class WorldCamera:
     def focal(self) -> Float[np.ndarray, "T"]:
         """px"""
         return self.K[:, 0, 0]
+
+    def scaled(self, factor: float) -> "WorldCamera":
+        """The same pictures of a world that is larger by `factor`."""
+        stature = None if self.stature is None else factor * self.stature
+        return replace(self, t=factor * self.t, sd_centre=factor * self.sd_centre, stature=stature)
 
     def part(self, frames: slice | Int[np.ndarray, "n"]) -> "WorldCamera":
         """Some of its frames, which are no shots any more."""

@@ -1,9 +1,11 @@
 """What keyrecon ground does to a project, and what it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from court_walker import court_camera
-from ground_walker import CAMERA, SIZE, posts, seen, standing, walks
+from ground_walker import CAMERA, SIZE, mark, posts, seen, standing, walks
 
 from keyrecon import lens
 from keyrecon.annotate.assist.ground_views import describe_ground
@@ -18,6 +20,7 @@ from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
 from keyrecon.world.ground_calibration import calibrate_ground
+from keyrecon.world.placement import stature_in_units
 from keyrecon.world.records import GROUND, GroundMark, GroundMarks
 
 
@@ -65,6 +68,55 @@ def test_the_motion_comes_to_stand_on_the_ground(walked):
     assert (walked / "ground.jpg").is_file() and (walked / "way.jpg").is_file()
     assert "On the ground: " in text
     assert "On the ground: " in write_placed_motion(workspace, seen(WAY)).lines[0]  # run again
+
+
+def test_a_player_of_another_height_takes_the_cameras_metres_with_him(walked):
+    workspace, motion = Workspace(walked), seen(WAY)
+    write_motion(workspace.motion_file, motion)
+    told(walked, posts(), 60.4)
+    assert not describe_ground(workspace)["changed"]
+    taller = replace(motion, points3d=1.12 * motion.points3d, scale=motion.scale / 1.12)
+    placed = write_placed_motion(workspace, taller)
+    assert "with a player 1.86 m tall who is 2.08 m now" in placed.lines[1]
+    world, camera = read_on_court(workspace.motion_file)
+    size = stature_in_units(replace(motion, points3d=world.points))
+    assert size == pytest.approx(stature_in_units(taller), rel=0.02)
+    assert camera.centre[0] == pytest.approx(
+        1.12 * read_camera(workspace.camera_file).centre[0], rel=1e-6
+    )
+    assert describe_ground(workspace)["changed"]
+    told(walked)
+    assert not describe_ground(workspace)["changed"]
+    assert len(write_placed_motion(workspace, taller).lines) == 1
+    write_motion(workspace.motion_file, motion)
+
+
+def test_metres_of_a_marked_length_stay_when_the_player_grows(walked):
+    length = mark("length", [(-1.0, 8, 0), (2.0, 8, 0)], 3.0)
+    told(walked, [length])
+    workspace = Workspace(walked)
+    camera = read_camera(workspace.camera_file)
+    assert camera.stature is None
+    taller = replace(seen(WAY), points3d=1.05 * seen(WAY).points3d, scale=seen(WAY).scale / 1.05)
+    _, used = write_placed_motion(workspace, taller).court
+    assert np.array_equal(used.t, camera.t)
+    told(walked, forget=["length-1"])
+
+
+def test_a_camera_file_that_does_not_say_what_told_its_metres_is_read(walked):
+    told(walked, posts(), 60.4)
+    file = Workspace(walked).camera_file
+    kept = file.read_bytes()
+    with np.load(file) as data:
+        former = {name: data[name] for name in data.files if name != "stature"}
+    assert len(former) == len(data.files) - 1
+    np.savez(file, **former)
+    assert read_camera(file).stature is None
+    assert len(write_placed_motion(Workspace(walked), seen(WAY)).lines) == 1
+    np.savez(file, **former, stature=np.nan)
+    with pytest.raises(KeyreconError, match="stature is nan"):
+        read_camera(file)
+    file.write_bytes(kept)
 
 
 def test_one_spot_is_told_and_the_motion_stays_as_it_is(stood):

@@ -3,6 +3,8 @@
 Marks are in ground_marks.json before the page hears of them.
 """
 
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,12 @@ from jaxtyping import Float
 
 from keyrecon.annotate.assist.court_views import drawn_lines
 from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.workspace import Workspace
+from keyrecon.records import Motion
 from keyrecon.report.court_drawing import metre_grid
 from keyrecon.world.ground_marks import check_field_of_view, check_mark, mark_names
+from keyrecon.world.placement import stature_change
 from keyrecon.world.records import COURT, GroundMark, GroundMarks, Kind, WorldCamera
 
 Json = dict[str, Any]
@@ -39,7 +44,7 @@ def describe_ground(workspace: Workspace) -> Json:
         "motion": workspace.motion_file.is_file(),
         "court": camera is not None and camera.origin == COURT,
         "camera": None if camera is None or camera.origin == COURT else _in_words(camera),
-        "changed": _changed(workspace),
+        "changed": _changed(workspace) or _is_of_another_height(workspace, camera),
     }
 
 
@@ -108,6 +113,20 @@ def _changed(workspace: Workspace) -> bool:
     if not marks.is_file():
         return False
     return not camera.is_file() or marks.stat().st_mtime_ns > camera.stat().st_mtime_ns
+
+
+def _is_of_another_height(workspace: Workspace, camera: WorldCamera | None) -> bool:
+    """Whether the camera's metres are those of a height that the player has no more."""
+    file = workspace.motion_file
+    if camera is None or camera.stature is None or not file.is_file():
+        return False
+    return stature_change(_read_motion(file, file.stat().st_mtime_ns), camera) != 1
+
+
+@lru_cache(maxsize=1)
+def _read_motion(file: Path, changed: int) -> Motion:
+    """The motion; read again when the file has changed."""
+    return read_motion(file)
 
 
 def _camera(workspace: Workspace) -> WorldCamera | None:

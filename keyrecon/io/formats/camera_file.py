@@ -28,6 +28,8 @@ ARRAYS = {
 """Arrays of a `WorldCamera` and their shape in one frame."""
 TILT = "sd_tilt"
 """Another, NaN where nobody told; files of former versions lack it."""
+STATURE = "stature"
+"""One number, in files of cameras whose metres are those of the player's height."""
 WORLDS = {
     COURT: "origin on the ground at the middle of the net, x along it, y up the court, z up",
     GROUND: "origin on the ground under the player's first stance, x right, y away, z up",
@@ -42,6 +44,7 @@ def write_camera(path: Path, camera: WorldCamera) -> None:
         buffer,
         **{name: getattr(camera, name) for name in (*ARRAYS, TILT)},
         origin=np.array(camera.origin),
+        **({} if camera.stature is None else {STATURE: np.array(camera.stature)}),
         keyrecon_version=np.array(__version__),
     )
     write_durably(path, buffer.getvalue())
@@ -66,7 +69,18 @@ def read_camera(path: Path | str) -> WorldCamera:
             raise ValueError(f"{TILT} has shape {tilt.shape}")
         check_numbers(TILT, tilt[found], gaps=origin == COURT)
         inner, turn, shift, centre, focal = (numbers[name] for name in ARRAYS if name != "found")
-        return WorldCamera(inner, turn, shift, found, centre, focal, tilt, origin)
+        stature = _read_stature(data)
+        return WorldCamera(inner, turn, shift, found, centre, focal, tilt, origin, stature=stature)
+
+
+def _read_stature(data: Mapping[str, np.ndarray]) -> float | None:
+    """None where it told no metres; files of former versions do not say whether it did."""
+    if STATURE not in data:
+        return None
+    stature = float(data[STATURE])
+    if not 0 < stature < np.inf:
+        raise ValueError(f"{STATURE} is {stature}")
+    return stature
 
 
 def read_origin(data: Mapping[str, np.ndarray]) -> Origin:
