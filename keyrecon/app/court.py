@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool
 
-from keyrecon.app.placing import old_report, place_again
+from keyrecon.app.placing import date_after, old_report, place_again
 from keyrecon.errors import KeyreconError, quoted
+from keyrecon.io.durable import put_aside
 from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
 from keyrecon.io.formats.court_points import merge_clicks
 from keyrecon.io.video import Video
@@ -20,7 +21,7 @@ from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.clicked_points import ContradictoryClicks, check_click
 from keyrecon.world.court import tennis_court
-from keyrecon.world.records import CourtClick, WorldCamera
+from keyrecon.world.records import GROUND, CourtClick, WorldCamera
 
 
 def court_click(text: str) -> CourtClick:
@@ -47,7 +48,8 @@ def calibrate(
 
     Options `told` by dotted names count also where they are as usual.
     The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
-    clicks are taken out first. New clicks that contradict the rest are not kept.
+    clicks are taken out first. New clicks that contradict the rest are not kept. Where no court is
+    found without clicks that were taken out, the camera that they told is set aside.
     """
     video = workspace.video()
     options = workspace.options(options, CalibrationOptions(), COURT, told)
@@ -62,10 +64,13 @@ def calibrate(
         raise KeyreconError(f"{fault}{_whose(clicks, kept)}") from fault
     except KeyreconError as fault:
         workspace.change_court_clicks(clicks, dropped)
-        raise KeyreconError(f"{fault}{_how_many(together)}") from fault
+        aside = _set_aside_camera(workspace) if dropped or _lost_all_clicks(workspace) else ""
+        raise KeyreconError(f"{fault}{_how_many(together)}{aside}") from fault
     workspace.change_court_clicks(clicks, dropped)
     workspace.remember(options, CalibrationOptions(), COURT)
     write_camera(workspace.camera_file, camera)
+    if workspace.court_clicks() != together:
+        date_after(workspace.court_points_file, workspace.camera_file)
     seen = np.flatnonzero(camera.found)
     frame = int(seen[len(seen) // 2])
     drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
@@ -82,6 +87,31 @@ def calibrate(
             *([f"By {len(together)} clicked points; they are kept."] if together else []),
             *placed.lines,
             *old_report(workspace, placed),
+        ]
+    )
+
+
+def _lost_all_clicks(workspace: Workspace) -> bool:
+    """Whether the last click was taken away since the camera was found."""
+    points, camera = workspace.court_points_file, workspace.camera_file
+    if not (points.is_file() and camera.is_file()) or workspace.court_clicks():
+        return False
+    return points.stat().st_mtime_ns > camera.stat().st_mtime_ns
+
+
+def _set_aside_camera(workspace: Workspace) -> str:
+    """Take a court's camera out of the project, and the motion off the court; says so."""
+    file = workspace.camera_file
+    if not file.is_file() or read_camera(file).origin == GROUND:
+        return ""
+    copy = put_aside(file)
+    file.unlink()
+    lines = old_report(workspace, place_again(workspace))
+    return " ".join(
+        [
+            f" The camera found with clicks that were taken out was set aside as {copy.name}; "
+            "nothing is placed on the court by it any more.",
+            *lines,
         ]
     )
 

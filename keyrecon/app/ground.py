@@ -1,12 +1,10 @@
 """`keyrecon ground`: the camera over level ground, where there is no court."""
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.placing import most_tilt_error, old_report, place_again
+from keyrecon.app.placing import date_after, most_tilt_error, old_report, place_again
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.ground_marks import merge_marks
@@ -88,7 +86,7 @@ def find_ground(
     workspace.change_ground_marks(told, dropped)
     write_camera(workspace.camera_file, found.camera)
     if workspace.ground_marks() != together:
-        _date_after(workspace.ground_marks_file, workspace.camera_file)
+        date_after(workspace.ground_marks_file, workspace.camera_file)
     picture = workspace.folder / "ground.jpg"
     drawn = draw_grid(video.frame(found.reference), found.camera, found.reference, _height(found))
     write_court_picture(picture, drawn)
@@ -105,12 +103,6 @@ def find_ground(
             *old_report(workspace, placed),
         ]
     )
-
-
-def _date_after(file: Path, other: Path) -> None:
-    """Let marks that were changed while a camera was made count as newer than it."""
-    time = other.stat().st_mtime_ns + 1_000_000
-    os.utime(file, ns=(time, time))
 
 
 def _check_told(told: GroundMarks, video: Video) -> None:

@@ -1,12 +1,14 @@
 """A project's motion in the world of its camera: what `run`, `court` and `ground` do with it."""
 
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from keyrecon.errors import quoted
-from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.formats.camera_file import read_camera, read_origin
 from keyrecon.io.formats.motion_file import (
     OF_WORLD,
     read_further_arrays,
@@ -18,7 +20,7 @@ from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_way, write_court_picture
 from keyrecon.world.lean import TILT_ERROR, USUAL_TILT
 from keyrecon.world.placement import place_motion, stature_change
-from keyrecon.world.records import COURT, WorldCamera, WorldMotion
+from keyrecon.world.records import COURT, Origin, WorldCamera, WorldMotion
 from keyrecon.world.run_measures import measure_run
 
 MAX_MISFIT = 0.2
@@ -42,6 +44,8 @@ class PlacedMotion:
 
     lines: tuple[str, ...] = ()
     court: tuple[WorldMotion, WorldCamera] | None = None
+    before: Origin | None = None
+    """The world that the motion was in until now."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -55,7 +59,8 @@ def place_again(workspace: Workspace) -> PlacedMotion:
         return PlacedMotion()
     further = read_further_arrays(workspace.motion_file)
     more = {name: values for name, values in further.items() if name not in OF_WORLD}
-    return write_placed_motion(workspace, read_motion(workspace.motion_file), more)
+    placed = write_placed_motion(workspace, read_motion(workspace.motion_file), more)
+    return replace(placed, before=read_origin(further) if "points3d_world" in further else None)
 
 
 def write_placed_motion(
@@ -66,42 +71,49 @@ def write_placed_motion(
     What the motion is without one is written the same in any case; `more` are further arrays of
     the file.
     """
-    if not workspace.camera_file.is_file():
-        write_motion(workspace.motion_file, motion, more=more)
-        return PlacedMotion()
-    found, world = read_camera(workspace.camera_file), None
-    change = stature_change(motion, found)
-    camera, where = found.scaled(change), found.origin
-    doubt = _camera_doubt(motion, camera)
-    if not doubt:
-        world = place_motion(motion, camera)
-        doubt = _doubt(world, motion, camera)
-    if world is None or doubt:
-        write_motion(workspace.motion_file, motion, more=more)
-        return PlacedMotion((f"No way on the {where}: {doubt}",))
-    write_motion(workspace.motion_file, motion, (world, camera), more)
-    way = measure_run(world, motion)
-    if way is None:
-        return PlacedMotion(tuple(_describe_change(workspace, found, change)), (world, camera))
+    placed = _place_motion(workspace, motion)
+    write_motion(workspace.motion_file, motion, placed.court, more)
     picture = workspace.folder / "way.jpg"
+    picture.unlink(missing_ok=True)
+    if placed.court is None:
+        return placed
+    world, camera = placed.court
+    way, where = measure_run(world, motion), camera.origin
+    if way is None:
+        return placed
     title = f"{way.length.value:.1f} m run, top speed {way.top_speed.value:.1f} m/s"
     write_court_picture(picture, draw_way(world, motion, way.speed, title, where))
     height = f" The player is {world.height_ratio:.2f} m tall by the {where}."
     line = f"On the {where}: {title}; {picture} shows the way."
     line += height if motion.units != "m" else ""
-    return PlacedMotion((line, *_describe_change(workspace, found, change)), (world, camera))
+    return replace(placed, lines=(line, *placed.lines))
 
 
-def _describe_change(workspace: Workspace, camera: WorldCamera, change: float) -> list[str]:
+def _place_motion(workspace: Workspace, motion: Motion) -> PlacedMotion:
+    """The motion in the world of the project's camera, or why it is in none."""
+    if not workspace.camera_file.is_file():
+        return PlacedMotion()
+    found = read_camera(workspace.camera_file)
+    change = stature_change(motion, found)
+    camera = found.scaled(change)
+    doubt = _camera_doubt(motion, camera)
+    world = None if doubt else place_motion(motion, camera)
+    doubt = doubt or _doubt(world, motion, camera)
+    if world is None or doubt:
+        return PlacedMotion((f"No way on the {camera.origin}: {doubt}",))
+    return PlacedMotion(_describe_change(workspace, found, change), (world, camera))
+
+
+def _describe_change(workspace: Workspace, camera: WorldCamera, change: float) -> tuple[str, ...]:
     """That the camera was found with a player of another height."""
     if change == 1 or camera.stature is None:
-        return []
-    return [
+        return ()
+    return (
         f"The camera was found with a player {camera.stature:.2f} m tall who is "
         f"{change * camera.stature:.2f} m now, and its distances were scaled with him; for "
         f"camera.npz and {camera.origin}.jpg anew: keyrecon {camera.origin} "
-        f"{quoted(workspace.folder)}"
-    ]
+        f"{quoted(workspace.folder)}",
+    )
 
 
 def most_tilt_error(camera: WorldCamera) -> float:
@@ -120,9 +132,12 @@ def most_tilt_error(camera: WorldCamera) -> float:
 def _camera_doubt(motion: Motion, camera: WorldCamera) -> str:
     """Why a camera is not used for a motion; empty where it is."""
     if len(camera.found) != len(motion.time):
+        remedy = f"run keyrecon {camera.origin} again."
+        if len(camera.found) > len(motion.time):  # the video has grown since the motion was made
+            remedy = "make the motion anew with keyrecon run."
         return (
             f"camera.npz was made for {len(camera.found)} frames and the motion has "
-            f"{len(motion.time)}; run keyrecon {camera.origin} again."
+            f"{len(motion.time)}; {remedy}"
         )
     tilt = float(np.nanmax(np.append(camera.sd_tilt, -1)))
     most = most_tilt_error(camera)
@@ -152,8 +167,16 @@ def _doubt(world: WorldMotion | None, motion: Motion, camera: WorldCamera) -> st
 
 
 def old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
-    """The way to a report with the motion in the world."""
-    if placed.court is None or not workspace.report_file.is_file():
+    """The way to a report with the motion in the world, or in none any more."""
+    if not workspace.report_file.is_file():
         return []
-    where = placed.court[1].origin
-    return [f"For a report with the {where}: keyrecon run {quoted(workspace.folder)}"]
+    command = f"keyrecon run {quoted(workspace.folder)}"
+    if placed.court is not None:
+        return [f"For a report with the {placed.court[1].origin}: {command}"]
+    return [f"For a report without the {placed.before}: {command}"] if placed.before else []
+
+
+def date_after(file: Path, other: Path) -> None:
+    """Let clicks and marks that were changed while a camera was made count as newer than it."""
+    time = other.stat().st_mtime_ns + 1_000_000
+    os.utime(file, ns=(time, time))

@@ -45,15 +45,17 @@ def write_quickly(path: Path, content: bytes) -> None:
         file.write(content)
 
 
-def put_aside(path: Path) -> None:
+def put_aside(path: Path) -> Path:
     """Keep a copy of a file that a person made, before it changes: annotations.old-3.json.
 
-    Copies are numbered on from the latest one that is there; none is ever replaced.
+    Copies are numbered on from the latest one that is there; none is ever replaced. Returns the
+    copy's path.
     """
     numbers = (f.stem.rpartition(".old-")[2] for f in path.parent.glob(f"{path.stem}.old-*"))
     latest = max((int(number) for number in numbers if number.isdecimal()), default=0)
     copy = path.with_name(f"{path.stem}.old-{latest + 1}{path.suffix}")
     write_durably(copy, path.read_bytes())
+    return copy
 
 
 @contextmanager

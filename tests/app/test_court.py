@@ -8,10 +8,12 @@ from court_walker import court_camera, lifted, walk
 from painted_court import camera_at, paint
 
 from keyrecon import cli
+from keyrecon.annotate.assist.court_views import describe_court
 from keyrecon.annotate.server.page_words import in_page_words
+from keyrecon.app import court as appcourt
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.court import calibrate, court_click, describe_camera
-from keyrecon.app.placing import write_placed_motion
+from keyrecon.app.placing import old_report, place_again, write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
@@ -168,6 +170,78 @@ def test_a_width_that_is_typed_counts_also_where_it_is_the_usual_one(bare, monke
     monkeypatch.setattr("sys.argv", ["keyrecon", "court", str(bare), "--line-width", "0.05"])
     cli.main()
     assert counted == [CalibrationOptions(CourtOptions(line_width=0.05, baseline_width=0.05))]
+
+
+@pytest.fixture
+def grey(tmp_path, motion):
+    """A project of a film without a court, with a camera that clicks told and a motion there."""
+    pictures = [np.full((64, 128, 3), 90, np.uint8)] * len(motion.time)
+    write_video(tmp_path / "v.mp4", pictures, 50.0)
+    start(tmp_path / "v.mp4", tmp_path / "p")
+    workspace = Workspace(tmp_path / "p")
+    workspace.change_court_clicks(ON_GREY)
+    write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
+    write_placed_motion(workspace, motion)
+    workspace.report_file.write_text("with the court")
+    return workspace
+
+
+ON_GREY = [CourtClick("near-left", 0, 20.0, 30.0), CourtClick("net-middle", 0, 60.0, 20.0)]
+
+
+def test_the_camera_of_clicks_that_were_taken_away_is_set_aside_where_no_other_is_found(grey):
+    with pytest.raises(KeyreconError, match=r"set aside as camera.old-1.npz.*without the court"):
+        calibrated(grey.folder, forget=["net-middle"])
+    assert not grey.camera_file.exists() and not (grey.folder / "way.jpg").exists()
+    assert read_camera(grey.folder / "camera.old-1.npz").found.all()
+    assert "points3d_world" not in stored(grey)
+    with pytest.raises(KeyreconError) as told:
+        calibrated(grey.folder, forget=["all"])
+    assert "set aside" not in str(told.value)
+
+
+def test_clicks_that_were_taken_away_on_the_page_count_no_more_either(grey):
+    with pytest.raises(KeyreconError) as told:
+        calibrated(grey.folder)
+    assert "set aside" not in str(told.value) and grey.camera_file.is_file()
+    grey.change_court_clicks(dropped=ON_GREY)
+    with pytest.raises(KeyreconError, match=r"set aside as camera.old-1.npz"):
+        job_commands(grey.folder)["court"]({}, silent)
+    assert not grey.camera_file.exists()
+
+
+def test_a_click_made_while_the_court_is_looked_for_is_newer_than_the_camera(grey, monkeypatch):
+    def find(*_):
+        Workspace(grey.folder).change_court_clicks([CourtClick("net-middle", 0, 64.0, 30.0)])
+        return court_camera(PINHOLE, 150), ()
+
+    monkeypatch.setattr(appcourt, "_find_camera", find)
+    calibrated(grey.folder)
+    assert describe_court(grey)["changed"]
+    monkeypatch.setattr(appcourt, "_find_camera", lambda *_: (court_camera(PINHOLE, 150), ()))
+    calibrated(grey.folder)
+    assert not describe_court(grey)["changed"]
+
+
+def test_a_motion_that_comes_off_the_court_leaves_no_way_and_an_old_report(grey):
+    assert (grey.folder / "way.jpg").is_file()
+    far = replace(PINHOLE, centre=PINHOLE.centre * [1, 1, 2.0])
+    write_camera(grey.camera_file, court_camera(far, 150))
+    placed = place_again(grey)
+    assert not (grey.folder / "way.jpg").exists()
+    assert old_report(grey, placed) == [
+        f"For a report without the court: keyrecon run {grey.folder}"
+    ]
+    assert old_report(grey, place_again(grey)) == []
+    grey.camera_file.unlink()
+    assert old_report(grey, place_again(grey)) == []
+
+
+def test_a_camera_of_more_frames_than_the_motion_asks_for_the_motion(bare, motion):
+    workspace = Workspace(bare)
+    write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time) + 60))
+    (line,) = write_placed_motion(workspace, motion).doubts
+    assert "made for 210 frames and the motion has 150; make the motion anew with key" in line
 
 
 def test_a_click_that_contradicts_the_lines_is_named_and_not_kept(filmed):

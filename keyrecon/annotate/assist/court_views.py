@@ -89,11 +89,13 @@ def _state(workspace: Workspace) -> Json:
 
 
 def _changed(workspace: Workspace) -> bool:
-    """Whether clicks are newer than the camera."""
+    """Whether clicks were made, or taken away, since the camera was found."""
     points, camera = workspace.court_points_file, workspace.camera_file
-    if not points.is_file() or not workspace.court_clicks():
+    if not points.is_file():
         return False
-    return _camera(workspace) is None or points.stat().st_mtime_ns > camera.stat().st_mtime_ns
+    if _camera(workspace) is None:
+        return bool(workspace.court_clicks())
+    return points.stat().st_mtime_ns > camera.stat().st_mtime_ns
 
 
 def _camera(workspace: Workspace) -> WorldCamera | None:

@@ -29,6 +29,7 @@ PHRASES = (
     ),
     (r"[Mm]ake it again with `?keyrecon keyframes`?", "choose the keyframes (1 Body)"),
     (rf"make it with:? keyrecon run(?: {_NAME})?", "make the motion (3 Motion)"),
+    (r"make the motion anew with keyrecon run", "make the motion anew (3 Motion)"),
     (rf"make one with: keyrecon new VIDEO --project {_NAME}", "start a new project"),
     (r"start a new project for it with: keyrecon new", "start a new project for it"),
     (rf"tell where it is now with: keyrecon relink {_NAME} VIDEO", "put it back there"),

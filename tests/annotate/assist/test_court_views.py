@@ -49,6 +49,17 @@ def test_four_clicks_of_a_frame_show_where_they_put_the_court(opened, folder):
     assert "contradict" in ask(session, "GET", "/api/court/3").json()["fault"]
 
 
+def test_a_camera_of_clicks_that_were_all_taken_away_is_to_be_found_again(opened, folder):
+    session = opened(make_assistant(Workspace(folder)))
+    assert not put(session, "net-middle", (60, 30)).json()["found"]
+    write_camera(Workspace(folder).camera_file, court_camera(CAMERA, 50))
+    assert not ask(session, "GET", "/api/court").json()["changed"]
+    gone = ask(session, "POST", "/api/court", {"name": "net-middle", "frame": 3}).json()
+    assert gone["clicks"] == [] and gone["changed"]
+    Workspace(folder).camera_file.unlink()
+    assert not ask(session, "GET", "/api/court").json()["changed"]
+
+
 def test_a_click_is_on_disk_when_it_is_answered_and_can_be_taken_away(opened, folder):
     session = opened(make_assistant(Workspace(folder)))
     put(session, "net-middle", (60, 30))
