@@ -90,7 +90,8 @@ def _beside(path: Path) -> Iterator[IO[bytes]]:
         dir=path.parent, prefix=f".{path.name}.{writer}.", suffix=".part", delete=False
     ) as file:
         try:
-            os.fchmod(file.fileno(), mode)
+            if hasattr(os, "fchmod"):  # not on Windows before Python 3.13
+                os.fchmod(file.fileno(), mode)
             yield file
         except BaseException:
             Path(file.name).unlink(missing_ok=True)

@@ -27,6 +27,14 @@ def test_permissions_are_those_of_the_old_file_or_the_usual_ones(tmp_path):
     assert (tmp_path / "plain.txt").stat().st_mode & 0o777 == 0o600
 
 
+def test_files_are_written_where_the_system_sets_no_permissions_of_an_open_file(
+    tmp_path, monkeypatch
+):
+    monkeypatch.delattr(os, "fchmod")  # Python before 3.13 on Windows
+    write_durably(tmp_path / "a.txt", "a")
+    assert (tmp_path / "a.txt").read_text() == "a"
+
+
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     with pytest.raises(KeyreconError, match="could not be written"):
         write_durably(tmp_path / "none" / "a.txt", "a")
