@@ -3,9 +3,10 @@
 from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Int, UInt8
 
 from keyrecon.annotation_budget import annotation_cost, check_budget
 from keyrecon.app.preparing import (
@@ -192,7 +193,7 @@ def _told_to_be_unlinked(preparation: Preparation) -> Bool[np.ndarray, "T"]:
 def write_keyframe_pictures(
     workspace: Workspace, preparation: Preparation, progress: Progress
 ) -> None:
-    """One PNG per keyframe, named by frame number as labelling tools keep it.
+    """One PNG per keyframe, named by frame number as labelling tools keep it, and no others.
 
     The video is read once from the first to the last: to seek each by itself decodes as many
     frames before it as lie between two that stand alone, 250 in most files. Brackets and an
@@ -209,3 +210,12 @@ def write_keyframe_pictures(
         write_picture(path, point_out(picture, track.box[frame], track.head[frame]))
 
     deque(side_by_side(write, zip(frames.tolist(), shown, strict=True)), maxlen=0)
+    delete_other_pictures(workspace.pictures, frames)
+
+
+def delete_other_pictures(folder: Path, frames: Int[np.ndarray, "K"]) -> None:
+    """Delete pictures of frames that are no keyframes any more; a person's own files stay."""
+    for path in folder.glob("frame_??????.png"):
+        number = path.stem.removeprefix("frame_")
+        if number.isdecimal() and int(number) not in frames:
+            path.unlink()
