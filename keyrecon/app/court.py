@@ -1,7 +1,6 @@
 """`keyrecon court`: the camera of every frame from the tennis court in the picture."""
 
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -9,7 +8,7 @@ from jaxtyping import Bool
 from keyrecon.app.placing import date_after, old_report, place_again
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import put_aside
-from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
+from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.court_points import merge_clicks
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import COURT, Workspace
@@ -156,16 +155,14 @@ def _how_many(clicks: Sequence[CourtClick]) -> str:
     return f" Clicked so far, and kept: {names}." if clicks else ""
 
 
-def export_calibration(workspace: Workspace, file: Path) -> str:
-    """Write the camera as Pose2Sim reads it; returns the line to show."""
+def load_camera(workspace: Workspace) -> WorldCamera:
+    """The project's camera."""
     if not workspace.camera_file.is_file():
         raise KeyreconError(
             f"{workspace.folder} has no camera yet; run: keyrecon court {quoted(workspace.folder)} "
             f"(where there is no court: keyrecon ground {quoted(workspace.folder)})"
         )
-    video = workspace.video()
-    camera = read_camera(workspace.camera_file)
-    return f"Wrote {file}{write_calibration(file, camera, (video.width, video.height), file.stem)}."
+    return read_camera(workspace.camera_file)
 
 
 def describe_camera(camera: WorldCamera, cuts: Sequence[int] = ()) -> list[str]:

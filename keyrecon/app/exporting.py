@@ -7,18 +7,20 @@ place of what a person marked, nor an overlay in the place of the video it is dr
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from keyrecon.app.court import export_calibration
-from keyrecon.app.project import load_motion
+from keyrecon.app.court import load_camera
+from keyrecon.app.project import load_whole_motion
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.camera_file import write_calibration
+from keyrecon.io.formats.conventions import NO_MOTION
 from keyrecon.io.formats.export import check_packages, check_suffix, export_motion
 from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
-    read_further_arrays,
-    read_on_court,
+    motion_on_court,
 )
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
@@ -55,32 +57,40 @@ def export(
             "an .mp4 file, or leave them out."
         )
     cameras = [file for file in files if file.suffix.lower() == CALIBRATION]
-    done = [export_calibration(workspace, file) for file in cameras]
-    if len(cameras) == len(files):
-        return done
-    motion = load_motion(workspace.folder)
-    first, last = chosen_frames(frames, len(motion.time))
-    cut = cut_motion(motion, slice(first, last + 1))
-    further = cut_further_arrays(read_further_arrays(workspace.motion_file), first, last)
-    lines = done
-    for file in files:
-        if file in cameras:
-            continue
+    motions = [file for file in files if file not in cameras]
+    chosen = _read_motion(workspace, frames) if motions else None
+    lines = [_write_calibration(file, workspace, frames) for file in cameras]
+    if chosen is None:
+        return lines
+    for file in motions:
         if file.suffix.lower() == OVERLAY:
-            shown = None if frames is None else (first, last)
-            court = read_on_court(workspace.motion_file)
-            club = read_further_arrays(workspace.motion_file).get("club2d")
-            write_overlay(file, workspace.video(), motion, progress, overlay, shown, court, club)
-            lines.append(f"Wrote {file}.")
+            lines.append(_write_overlay(file, chosen, workspace, progress, overlay))
         else:
-            lines.append(_write(file, cut, workspace, first, further))
+            lines.append(_write(file, chosen, workspace))
     return lines
 
 
-def chosen_frames(text: str | None, count: int) -> tuple[int, int]:
-    """First and last frame of "A-B"; all `count` of them where nothing is said."""
-    if text is None:
-        return 0, count - 1
+@dataclass(frozen=True, eq=False)
+class _ChosenMotion:
+    """The motion of all frames, what else its file holds, and which frames are written."""
+
+    motion: Motion
+    further: Mapping[str, np.ndarray]
+    frames: tuple[int, int] | None
+    """First and last; None where none were named."""
+
+
+def _read_motion(workspace: Workspace, frames: str | None) -> _ChosenMotion:
+    """All that is written, read at once: a run that ends meanwhile puts another in its place."""
+    motion, further = load_whole_motion(workspace.folder)
+    chosen = None if frames is None else chosen_frames(frames, len(motion.time))
+    if chosen is not None and not motion.known[chosen[0] : chosen[1] + 1].any():
+        raise KeyreconError(NO_MOTION)
+    return _ChosenMotion(motion, further, chosen)
+
+
+def chosen_frames(text: str, count: int, whose: str = "the motion") -> tuple[int, int]:
+    """First and last frame of "A-B", of `count` frames."""
     match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
     if not match:
         raise KeyreconError(
@@ -89,7 +99,7 @@ def chosen_frames(text: str | None, count: int) -> tuple[int, int]:
     first, last = int(match[1]), int(match[2])
     if not first <= last < count:
         raise KeyreconError(
-            f"--frames {text} cannot be: the motion has frames 0 to {count - 1}, and the first "
+            f"--frames {text} cannot be: {whose} has frames 0 to {count - 1}, and the first "
             "comes before the last."
         )
     return first, last
@@ -104,13 +114,31 @@ def _check_place(file: Path, workspace: Workspace) -> None:
         )
 
 
-def _write(
-    file: Path,
-    motion: Motion,
-    workspace: Workspace,
-    first_frame: int,
-    further: Mapping[str, np.ndarray],
-) -> str:
+def _write(file: Path, chosen: _ChosenMotion, workspace: Workspace) -> str:
     video = workspace.video() if file.suffix.lower() in WITH_VIDEO else None
     size = (video.width, video.height) if video else None
-    return f"Wrote {file}: {export_motion(file, motion, size, first_frame, further)}."
+    first, last = chosen.frames or (0, len(chosen.motion.time) - 1)
+    motion = cut_motion(chosen.motion, slice(first, last + 1))
+    further = cut_further_arrays(chosen.further, first, last)
+    return f"Wrote {file}: {export_motion(file, motion, size, first, further)}."
+
+
+def _write_overlay(
+    file: Path,
+    chosen: _ChosenMotion,
+    workspace: Workspace,
+    progress: Progress,
+    overlay: OverlayOptions,
+) -> str:
+    court = motion_on_court(chosen.further, workspace.motion_file)
+    video, club = workspace.video(), chosen.further.get("club2d")
+    write_overlay(file, video, chosen.motion, progress, overlay, chosen.frames, court, club)
+    return f"Wrote {file}."
+
+
+def _write_calibration(file: Path, workspace: Workspace, frames: str | None) -> str:
+    """The camera as Pose2Sim reads it."""
+    video, camera = workspace.video(), load_camera(workspace)
+    chosen = None if frames is None else chosen_frames(frames, len(camera.found), "camera.npz")
+    done = write_calibration(file, camera, (video.width, video.height), file.stem, chosen)
+    return f"Wrote {file}{done}."

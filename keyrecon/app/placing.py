@@ -11,8 +11,7 @@ from keyrecon.errors import quoted
 from keyrecon.io.formats.camera_file import read_camera, read_origin
 from keyrecon.io.formats.motion_file import (
     OF_WORLD,
-    read_further_arrays,
-    read_motion,
+    read_whole_motion,
     write_motion,
 )
 from keyrecon.io.workspace import Workspace
@@ -57,9 +56,9 @@ def place_again(workspace: Workspace) -> PlacedMotion:
     """The motion that there is in the world of a new camera; what else its file holds stays."""
     if not workspace.motion_file.is_file():
         return PlacedMotion()
-    further = read_further_arrays(workspace.motion_file)
+    motion, further = read_whole_motion(workspace.motion_file)
     more = {name: values for name, values in further.items() if name not in OF_WORLD}
-    placed = write_placed_motion(workspace, read_motion(workspace.motion_file), more)
+    placed = write_placed_motion(workspace, motion, more)
     return replace(placed, before=read_origin(further) if "points3d_world" in further else None)
 
 

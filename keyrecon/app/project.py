@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from keyrecon.annotate.store.cells import (
     Cells,
     annotations_from_cells,
@@ -19,7 +21,7 @@ from keyrecon.io.formats.annotation_checks import far_outside, implausible_bones
 from keyrecon.io.formats.annotations import missing_marks, read_annotations
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import read_keyframes
-from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.motion_file import read_whole_motion
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
@@ -265,12 +267,17 @@ def describe_unmarked(annotations: Annotations | None, asked: Keyframes) -> str:
 
 def load_motion(path: Path) -> Motion:
     """The motion of a project folder or file."""
+    return load_whole_motion(path)[0]
+
+
+def load_whole_motion(path: Path) -> tuple[Motion, dict[str, np.ndarray]]:
+    """The same, and what else its file holds."""
     file = path / "motion.npz" if path.is_dir() else path
     if not file.is_file():
         raise KeyreconError(
             f"There is no motion at {file}; make it with: keyrecon run {quoted(path)}"
         )
-    return read_motion(file)
+    return read_whole_motion(file)
 
 
 def evaluate(path: Path, truth: Path) -> str:

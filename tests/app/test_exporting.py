@@ -3,22 +3,28 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import av
 import numpy as np
 import pytest
+from court_walker import court_camera
+from painted_court import camera_at
 from small_motion import make_motion
 
+from keyrecon.app import exporting
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
 from keyrecon.report.overlay import OverlayOptions
 from keyrecon.timeline import cut_motion
+from keyrecon.world.records import WorldMotion
 
 
 @pytest.fixture
@@ -116,6 +122,79 @@ def test_slow_motion_plays_the_same_frames_slower(project):
     usual, slow = open_video(folder / "a.mp4"), open_video(folder / "b.mp4")
     assert len(usual) == len(slow)
     assert slow.fps == pytest.approx(usual.fps / 4, rel=1e-3)
+
+
+def on_the_court(project):
+    """The project's motion, written with its joints in the world."""
+    motion = read_motion(project.motion_file)
+    world = motion.points3d[..., [0, 2, 1]] * [1, 1, -1]
+    count = len(motion.time)
+    camera = court_camera(camera_at((2, -20, 3), (0, -9, 0.8), 1.6), count)
+    roots, contact = world.mean(axis=1), np.zeros((count, 2), bool)
+    write_motion(project.motion_file, motion, (WorldMotion(world, roots, contact, 1.0), camera))
+    return motion
+
+
+def test_files_of_one_export_are_of_one_run(project, monkeypatch):
+    folder, motion = project.folder.parent, on_the_court(project)
+    courts = []
+
+    def overlay(file, video, motion, progress, options, shown, court, club):
+        courts.append(court)
+        write_motion(project.motion_file, motion)  # a run without the court ends meanwhile
+
+    monkeypatch.setattr(exporting, "write_overlay", overlay)
+    export(project, [folder / "a.mp4", folder / "b.mp4", folder / "a.csv"], silent)
+    assert all(court is not None for court in courts) and len(courts) == 2
+    assert "neck_world_y" in (folder / "a.csv").read_text()
+    on_the_court(project)
+    read = exporting.load_whole_motion
+
+    def then_replaced(path):
+        whole = read(path)
+        write_motion(project.motion_file, motion)
+        return whole
+
+    monkeypatch.setattr(exporting, "load_whole_motion", then_replaced)
+    export(project, [folder / "b.csv"], silent)
+    assert "neck_world_y" in (folder / "b.csv").read_text()
+
+
+NAMES = ["a.bvh", "a.glb", "a.trc", "a.c3d", "a.csv", "a.nc", "a.npz", "a.json", "a.mp4"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_frames_of_a_shot_that_is_left_out_are_refused_alike(project, name):
+    motion, gone = make_motion(20), np.arange(20) < 8
+    arrays = {
+        key: np.where(gone.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
+        for key in ("points3d", "points2d", "points2d_propagated", "scale")
+        if (values := getattr(motion, key)) is not None
+    }
+    confidence = np.where(gone[:, None], 0, motion.confidence)
+    motion = replace(motion, **arrays, confidence=confidence, cuts=np.array([8]))
+    write_motion(project.motion_file, motion)
+    file = project.folder.parent / name
+    with pytest.raises(KeyreconError, match="No usable shot is among these frames"):
+        export(project, [file], silent, "2-6")
+    assert not file.exists()
+    assert len(export(project, [file], silent, "5-12")) == 1
+
+
+def test_a_calibration_is_of_the_frames_asked_for(project):
+    file = project.folder.parent / "a.toml"
+    camera = court_camera(camera_at((2, -20, 3), (0, -9, 0.8), 1.6), 20)
+    found = np.arange(20) > 4
+    zoom = camera.K * np.linspace(1, 2, 20)[:, None, None]
+    write_camera(project.camera_file, replace(camera, K=zoom, found=found))
+    assert "of frame 12: the camera moves" in export(project, [file], silent)[0]
+    assert "of frame 9: the camera moves" in export(project, [file], silent, "8-10")[0]
+    kept = file.read_bytes()
+    with pytest.raises(KeyreconError, match=r"no camera in frames 1-3"):
+        export(project, [file], silent, "1-3")
+    with pytest.raises(KeyreconError, match=r"such as 120-180; got '9000-nonsense'"):
+        export(project, [file], silent, "9000-nonsense")
+    assert file.read_bytes() == kept
 
 
 @pytest.mark.parametrize("slowmo", [0.0, -1.0, float("nan"), float("inf"), 1e6])

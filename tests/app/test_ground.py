@@ -15,7 +15,7 @@ from keyrecon.app.placing import write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera
-from keyrecon.io.formats.motion_file import read_further_arrays, read_on_court, write_motion
+from keyrecon.io.formats.motion_file import motion_on_court, read_further_arrays, write_motion
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
@@ -49,6 +49,11 @@ WAY = walks(((-1.0, 6.5, 75),), 12, 0.6)
 """Away from the camera, from 6.5 to 13.5 m."""
 
 
+def on_ground(workspace):
+    """The motion in the world and the camera, as they are stored."""
+    return motion_on_court(read_further_arrays(workspace.motion_file), workspace.motion_file)
+
+
 def told(folder, marks=(), fov=None, forget=()):
     return find_ground(Workspace(folder), GroundMarks(tuple(marks), fov), silent, forget)
 
@@ -60,7 +65,7 @@ def test_the_motion_comes_to_stand_on_the_ground(walked):
     camera = read_camera(workspace.camera_file)
     assert camera.origin == GROUND
     assert abs(camera.centre[0, 2] - CAMERA.centre[2]) < 0.15
-    world, stored = read_on_court(workspace.motion_file)
+    world, stored = on_ground(workspace)
     assert stored.origin == GROUND
     feet = world.points[:, [0, 5]][world.contact]
     assert np.abs(feet[:, 2]).max() < 0.2
@@ -78,7 +83,7 @@ def test_a_player_of_another_height_takes_the_cameras_metres_with_him(walked):
     taller = replace(motion, points3d=1.12 * motion.points3d, scale=motion.scale / 1.12)
     placed = write_placed_motion(workspace, taller)
     assert "with a player 1.86 m tall who is 2.08 m now" in placed.lines[1]
-    world, camera = read_on_court(workspace.motion_file)
+    world, camera = on_ground(workspace)
     size = stature_in_units(replace(motion, points3d=world.points))
     assert size == pytest.approx(stature_in_units(taller), rel=0.02)
     assert camera.centre[0] == pytest.approx(

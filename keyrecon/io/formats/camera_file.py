@@ -8,11 +8,13 @@ camera: size, matrix, distortions, rotation (a rotation vector from world to cam
 import io
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from keyrecon import __version__
+from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import check_numbers, read_arrays, reading
 from keyrecon.world.records import COURT, GROUND, Origin, WorldCamera
@@ -39,12 +41,13 @@ WORLDS = {
 
 def write_camera(path: Path, camera: WorldCamera) -> None:
     """Write camera.npz; names and axes as in `WorldCamera`."""
+    told: dict[str, Any] = {} if camera.stature is None else {STATURE: np.array(camera.stature)}
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
         **{name: getattr(camera, name) for name in (*ARRAYS, TILT)},
         origin=np.array(camera.origin),
-        **({} if camera.stature is None else {STATURE: np.array(camera.stature)}),
+        **told,
         keyrecon_version=np.array(__version__),
     )
     write_durably(path, buffer.getvalue())
@@ -92,12 +95,24 @@ def read_origin(data: Mapping[str, np.ndarray]) -> Origin:
     raise ValueError(f"'{named}' is no origin of a world")
 
 
-def write_calibration(path: Path, camera: WorldCamera, size: tuple[int, int], name: str) -> str:
+def write_calibration(
+    path: Path,
+    camera: WorldCamera,
+    size: tuple[int, int],
+    name: str,
+    frames: tuple[int, int] | None = None,
+) -> str:
     """Write a calibration TOML of one camera; returns what was done to it.
 
-    Of a camera that moves, that of the middle one of the frames in which it was found.
+    Of a camera that moves, that of the middle one of the frames in which it was found; `frames` are
+    the first and the last that count. Raises KeyreconError where it was found in none of them.
     """
     seen = np.flatnonzero(camera.found)
+    if frames is not None:
+        seen = seen[(seen >= frames[0]) & (seen <= frames[1])]
+    if not len(seen):
+        where = "any frame" if frames is None else f"frames {frames[0]}-{frames[1]}"
+        raise KeyreconError(f"There is no camera in {where}; export others.")
     frame = int(seen[len(seen) // 2])
     turn = cv2.Rodrigues(camera.R[frame])[0].ravel()
     moves = bool(np.ptp(camera.R[seen], axis=0).max() > 0 or np.ptp(camera.focal[seen]) > 0)

@@ -68,6 +68,7 @@ class WorldJoints:
 
 World = WorldJoints | None
 """None where no camera has put the motion into the world."""
+NO_MOTION = "No usable shot is among these frames: there is no motion to write."
 IN_WORLD = {
     COURT: "on the court: origin on the ground at the middle of the net, x along the net to the "
     "right, feet where the court's lines put them",
@@ -248,7 +249,7 @@ def _check_whole(motion: Motion) -> None:
     finite = np.isfinite(motion.points3d).all(axis=2)
     missing = np.argwhere(~finite & finite.any(axis=1, keepdims=True))
     if not finite.any():
-        raise KeyreconError("No usable shot is among these frames: there is no motion to write.")
+        raise KeyreconError(NO_MOTION)
     if len(missing):
         frame, joint = missing[0]
         raise KeyreconError(

@@ -102,49 +102,61 @@ def _known(motion: Motion) -> list[str]:
 
 def read_motion(path: Path | str) -> Motion:
     """Read what `write_motion` wrote; raises KeyreconError for any other file."""
-    path = Path(path)
-    with reading(path, "a motion", "make it with keyrecon run"):
-        data = read_arrays(path)
-        _check_shapes(data)
-        _check_values(data)
-        return Motion(
-            skeleton=check_skeleton(_skeleton(data)),
-            **{name: data[name].astype(KINDS.get(name, np.float64)) for name in ARRAYS},
-            **{
-                name: data[name].astype(KINDS.get(name, np.float64))
-                for name in OPTIONAL
-                if name in data
-            },
-            fps=float(data["fps"]),
-            units=str(data["units"]),
-        )
+    with reading(Path(path), "a motion", "make it with keyrecon run"):
+        return _motion(read_arrays(Path(path)))
 
 
 def read_further_arrays(path: Path | str) -> dict[str, np.ndarray]:
     """What a file holds besides a `Motion`: the motion on the court, a swing's club and keys."""
-    path = Path(path)
+    with reading(Path(path), "a motion", "make it with keyrecon run"):
+        return _further_arrays(read_arrays(Path(path)))
+
+
+def read_whole_motion(path: Path) -> tuple[Motion, dict[str, np.ndarray]]:
+    """The motion and what else the file holds, of one run even where another replaces the file."""
     with reading(path, "a motion", "make it with keyrecon run"):
         data = read_arrays(path)
-        known = (*ARRAYS, *OPTIONAL, *ABOUT)
-        further = {name: values for name, values in data.items() if name not in known}
-        for name, values in further.items():
-            per_frame = name not in (*FRAME_NUMBERS, *NOT_BY_FRAME)
-            if per_frame and values.shape[:1] != data["time"].shape:
-                raise ValueError(f"{name} has shape {values.shape}")
-        read_origin(further)
-        world = further.get("points3d_world", data["points3d"])
-        if world.shape != data["points3d"].shape:
-            raise ValueError(f"points3d_world has shape {world.shape}")
-        return further
+        return _motion(data), _further_arrays(data)
 
 
-def read_on_court(path: Path | str) -> tuple[WorldMotion, WorldCamera] | None:
-    """The motion on the court and the camera, as `write_motion` wrote them; None without them.
+def _motion(data: dict[str, np.ndarray]) -> Motion:
+    _check_shapes(data)
+    _check_values(data)
+    return Motion(
+        skeleton=check_skeleton(_skeleton(data)),
+        **{name: data[name].astype(KINDS.get(name, np.float64)) for name in ARRAYS},
+        **{
+            name: data[name].astype(KINDS.get(name, np.float64))
+            for name in OPTIONAL
+            if name in data
+        },
+        fps=float(data["fps"]),
+        units=str(data["units"]),
+    )
 
-    How sure the camera is, and the size by the court, are not in the file: they are NaN.
+
+def _further_arrays(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    known = (*ARRAYS, *OPTIONAL, *ABOUT)
+    further = {name: values for name, values in data.items() if name not in known}
+    for name, values in further.items():
+        per_frame = name not in (*FRAME_NUMBERS, *NOT_BY_FRAME)
+        if per_frame and values.shape[:1] != data["time"].shape:
+            raise ValueError(f"{name} has shape {values.shape}")
+    read_origin(further)
+    world = further.get("points3d_world", data["points3d"])
+    if world.shape != data["points3d"].shape:
+        raise ValueError(f"points3d_world has shape {world.shape}")
+    return further
+
+
+def motion_on_court(
+    data: Mapping[str, np.ndarray], path: Path
+) -> tuple[WorldMotion, WorldCamera] | None:
+    """The motion on the court and the camera, of a file's further arrays; None without them.
+
+    How sure the camera is, and the size by the court, are not in the file: they are NaN. `path` is
+    named where they are damaged.
     """
-    path = Path(path)
-    data = read_further_arrays(path)
     if "points3d_world" not in data:
         return None
     with reading(path, "a motion on the court", "make it with keyrecon court"):
