@@ -35,19 +35,15 @@ def motion():
         np.isfinite(placed[..., 0]),
         np.zeros((1, len(LSP14.bones)), dtype=np.int64),
     )
-    space, none = np.random.default_rng(1).normal(size=(T, J, 3)), np.zeros(0, dtype=np.int64)
+    space = np.random.default_rng(1).normal(size=(T, J, 3))
     bones = np.zeros((1, len(LSP14.bones)))
     lifted = LiftResult(
         points3d=space,
         points2d=np.nan_to_num(joints, nan=150.0),
         scale=np.full(T, 100.0),
         lengths=LSP14.lengths,
-        key_poses=space[:1],
         signs=bones.astype(np.int64),
-        sign_margin=bones,
         rejected=rejected,
-        upper_controls=none,
-        lower_controls=none,
     )
     frames = np.arange(T)
     video = Video(Path("v.mp4"), 640, 480, frames, frames / 25, 25.0, 0, False, None)

@@ -9,7 +9,6 @@ points of their own.
 """
 
 import heapq
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,17 +19,6 @@ from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import HalfKeyframes, Keyframes, Shots
 
 
-@dataclass(frozen=True, eq=False)
-class Interpolation:
-    """Slerped key poses and where they are anchored."""
-
-    directions: Float[np.ndarray, "T B 3"]
-    upper: Int[np.ndarray, "u"]
-    """Control frames of the upper body."""
-    lower: Int[np.ndarray, "l"]
-    """Control frames of the lower body."""
-
-
 def interpolate_poses(
     key_directions: Float[np.ndarray, "K B 3"],
     key_frames: Int[np.ndarray, "K"],
@@ -38,7 +26,7 @@ def interpolate_poses(
     joints: Float[np.ndarray, "T J 2"],
     size: BodySize,
     shots: Shots,
-) -> Interpolation:
+) -> Float[np.ndarray, "T B 3"]:
     """Bone directions in every frame from those of the keyframes; slerped within each shot.
 
     `joints` in units of length; `key_frames` are the annotated frames, sorted.
@@ -47,22 +35,18 @@ def interpolate_poses(
     flat = pose_from_directions(key_directions, size.lengths, skeleton)[..., :2]
     lower_bone = skeleton.is_lower[skeleton.bones[:, 1]]
     directions = np.empty((len(joints), *key_directions.shape[1:]))
-    controls = []
     for half, member, bones in (
         (keyframes.upper, ~skeleton.is_lower, ~lower_bone),
         (keyframes.lower, skeleton.is_lower, lower_bone),
     ):
         key = _key_index(half, key_frames)
         residual = reprojection_residual(flat[key][:, member], joints[:, member])
-        of_shots: list[Int[np.ndarray, "_"]] = []
         for shot in shots.parts:
             control = drop_controls(half, residual, keyframes.reach, shot)
             poses = key_directions[key[control]][:, bones]
             count = shot.stop - shot.start
             directions[shot, bones] = slerp_between(poses, control - shot.start, count)
-            of_shots.append(control)
-        controls.append(np.concatenate(of_shots))
-    return Interpolation(directions, *controls)
+    return directions
 
 
 def reprojection_residual(

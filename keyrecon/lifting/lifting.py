@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body_models.depth_model import DepthModel
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.depth_evidence import DepthSignOptions
-from keyrecon.lifting.interpolation import Interpolation, interpolate_poses
+from keyrecon.lifting.interpolation import interpolate_poses
 from keyrecon.lifting.keyframe_signs import infer_keyframe_signs
 from keyrecon.lifting.length_correction import correct_lengths
 from keyrecon.lifting.limb_lengths import (
@@ -92,17 +92,10 @@ class LiftResult:
     """px per unit"""
     lengths: Float[np.ndarray, "B"]
     """Bone lengths, metres or body heights."""
-    key_poses: Float[np.ndarray, "K J 3"]
-    """Poses of the keyframes relative to the root, metres or body heights."""
     signs: Int[np.ndarray, "K B"]
     """As `Annotations.nearer`, decided for every bone."""
-    sign_margin: Float[np.ndarray, "K B"]
-    """Probability of each sign, 0.5-1."""
     rejected: Bool[np.ndarray, "T J"]
     """Tracked joints that were taken for outliers."""
-    upper_controls: Int[np.ndarray, "u"]
-    """Control frames of the upper body (Section 6.1)."""
-    lower_controls: Int[np.ndarray, "l"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,10 +171,9 @@ def _lift_from_afar(
         observed, marks, size, shots, fps, options.depth_signs, priors.depth_model
     )
     keys = lift_keyframes(observed, marks, size, signs)
-    slerped = interpolate_poses(
+    directions = interpolate_poses(
         keys.directions, keys.frames, keyframes, observed.joints, size, shots
     )
-    directions = slerped.directions
     if priors.motion is not None:
         directions = unit_vectors(bone_vectors(priors.motion, size.skeleton))
     initial = _align_translation(directions, observed, size, shots)
@@ -197,32 +189,26 @@ def _lift_from_afar(
         state = fit_motion(
             initial, clean, player, shots, fps, options.depth_signs, options.refine, progress
         )
-    return _in_space(state, player, slerped, outliers, options.height)
+    return _in_space(state, player, outliers, options.height)
 
 
 def _in_space(
     state: MotionState,
     player: PlayerModel,
-    slerped: Interpolation,
     outliers: Bool[np.ndarray, "T J"],
     height: float | None,
 ) -> LiftResult:
     """The motion in metres where the height is known, else in body heights."""
     size, keys = player.size, player.keys
     points = state.points(size.lengths, size.skeleton)
-    key_poses = pose_from_directions(keys.directions, size.lengths, size.skeleton)
     metres = 1.0 if height is None else height
     return LiftResult(
         points3d=points * metres,
         points2d=project_orthographic(points, size.scale),
         scale=size.scale / metres,
         lengths=size.lengths * metres,
-        key_poses=key_poses * metres,
         signs=np.where(keys.directions[..., 2] > 0, -1, 1),
-        sign_margin=keys.probability,
         rejected=outliers,
-        upper_controls=slerped.upper,
-        lower_controls=slerped.lower,
     )
 
 

@@ -33,8 +33,6 @@ class KeyPoses:
     frames: Int[np.ndarray, "K"]
     directions: Float[np.ndarray, "K B 3"]
     """Unit bone directions."""
-    probability: Float[np.ndarray, "K B"]
-    """How likely the depth sign of each bone is, 0.5-1."""
     confidence: Float[np.ndarray, "K B"]
     """0-1: weight of each bone when other frames are compared with this pose."""
     nearer: Int[np.ndarray, "K B"]
@@ -54,7 +52,6 @@ def lift_keyframes(
     return KeyPoses(
         frames=marks.frames,
         directions=lift_foreshortened(bones, signs.sign),
-        probability=signs.probability,
         confidence=np.where(sure, 1.0, _INFERRED_CONFIDENCE * (2 * signs.probability - 1)),
         nearer=marks.nearer,
     )

@@ -75,7 +75,6 @@ class SwingHypothesis:
     """Frames of start, top, hit and finish."""
     cost: float
     """How badly it explains the film; lower is better."""
-    placement: Placement
     club: Float[np.ndarray, "T 2 2"]
     """Where it expects the club, px."""
 
@@ -135,7 +134,7 @@ def search_swing(
             costs[t] += MARKED_SECONDS * evidence.fps * _mark_costs(marks, row, drawn, evidence)
         for path in best_paths(costs, model.keys, phases, evidence.fps, limits, marks.keys):
             club = drawn.club[_phase_rows(path.keys, phases, model.keys, len(costs))]
-            hypotheses.append((path, SwingHypothesis(path.keys, path.cost, placement, club)))
+            hypotheses.append((path, SwingHypothesis(path.keys, path.cost, club)))
     return [hypothesis for _, hypothesis in distinct_paths(hypotheses, limits.most)]
 
 
