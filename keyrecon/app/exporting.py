@@ -138,7 +138,7 @@ def _write_overlay(
 
 def _write_calibration(file: Path, workspace: Workspace, frames: str | None) -> str:
     """The camera as Pose2Sim reads it."""
-    video, camera = workspace.video(), load_camera(workspace)
+    camera, video = load_camera(workspace), workspace.video()
     chosen = None if frames is None else chosen_frames(frames, len(camera.found), "camera.npz")
     done = write_calibration(file, camera, (video.width, video.height), file.stem, chosen)
     return f"Wrote {file}{done}."
