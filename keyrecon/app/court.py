@@ -1,6 +1,7 @@
 """`keyrecon court`: the camera of every frame from the tennis court in the picture."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import asdict
 
 import numpy as np
 from jaxtyping import Bool
@@ -10,6 +11,7 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import put_aside
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.court_points import merge_clicks
+from keyrecon.io.option_tables import changed_options, check_options
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
@@ -19,7 +21,7 @@ from keyrecon.report.court_drawing import draw_court, write_court_picture
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.clicked_points import ContradictoryClicks, check_click
-from keyrecon.world.court import tennis_court
+from keyrecon.world.court import CourtOptions, tennis_court
 from keyrecon.world.records import GROUND, CourtClick, WorldCamera
 
 
@@ -50,8 +52,10 @@ def calibrate(
     clicks are taken out first. New clicks that contradict the rest are not kept. Where no court is
     found without clicks that were taken out, the camera that they told is set aside.
     """
-    video = workspace.video()
+    check_options(options.court, "--")
     options = workspace.options(options, CalibrationOptions(), COURT, told)
+    widths = _unusual_widths(options.court)
+    video = workspace.video()
     dropped = _forgotten(workspace.court_clicks(), forget)
     kept = [click for click in workspace.court_clicks() if click not in dropped]
     for click in clicks:
@@ -64,7 +68,8 @@ def calibrate(
     except KeyreconError as fault:
         workspace.change_court_clicks(clicks, dropped)
         aside = _set_aside_camera(workspace) if dropped or _lost_all_clicks(workspace) else ""
-        raise KeyreconError(f"{fault}{_how_many(together)}{aside}") from fault
+        painted = f" Looked for with {widths}." if widths else ""
+        raise KeyreconError(f"{fault}{_how_many(together)}{painted}{aside}") from fault
     workspace.change_court_clicks(clicks, dropped)
     workspace.remember(options, CalibrationOptions(), COURT)
     write_camera(workspace.camera_file, camera)
@@ -80,6 +85,7 @@ def calibrate(
         [
             *describe_camera(camera, cuts),
             *_describe_cuts(cuts),
+            *([f"project.toml remembers {widths}."] if widths else []),
             f"{workspace.camera_file}: the camera of every frame. {picture}: the court's lines "
             f"drawn on frame {frame}; look whether they lie on the painted ones. If not, keyrecon "
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
@@ -137,6 +143,15 @@ def _forgotten(kept: Sequence[CourtClick], names: Sequence[str]) -> list[CourtCl
         there = f"it has {', '.join(sorted(known))}" if known else "it has none"
         raise KeyreconError(f"The project has no click on {unknown[0]} to forget; {there}.")
     return [click for click in kept if "all" in names or click.name in names]
+
+
+def _unusual_widths(options: CourtOptions) -> str:
+    """Widths of lines that are not the usual ones, as they are typed; empty where all are."""
+    usual = asdict(CourtOptions())
+    return " and ".join(
+        f"--{name.replace('_', '-')} {value:g} (usual: {usual[name]:g})"
+        for name, value in changed_options(options, CourtOptions()).items()
+    )
 
 
 def _whose(new: Sequence[CourtClick], kept: Sequence[CourtClick]) -> str:

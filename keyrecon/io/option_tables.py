@@ -180,7 +180,8 @@ def check_options(options: OptionRecord, prefix: str = "") -> None:
         if isinstance(value, OptionRecord):
             check_options(value, f"{name}.")
         elif isinstance(value, int | float | tuple):
-            _checked(value, allowed[field.name], name if prefix == "--" else f"The option {name}")
+            flag = name.replace("_", "-")
+            _checked(value, allowed[field.name], flag if prefix == "--" else f"The option {name}")
 
 
 def _checked(value: object, allowed: Any, where: str) -> Any:

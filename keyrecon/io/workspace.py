@@ -378,7 +378,8 @@ class Workspace:
         """
         check_options(given)
         table = with_current_names(self.project.get("options", {}))
-        kept = with_changes(defaults, table_of(table, section, SECTIONS))
+        where = f"options.{section}" if section else "options"
+        kept = with_changes(defaults, table_of(table, section, SECTIONS), where)
         return with_changes(kept, nested_tables(changed_options(given, defaults, told=told)))
 
     def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:

@@ -12,9 +12,12 @@ court looks the same from both ends, so which half is the near one is told by th
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
+
+from keyrecon.ranges import within
 
 HALF_LENGTH, HALF_DOUBLES, HALF_SINGLES, SERVICE = 11.885, 5.485, 4.115, 6.40
 NET_MIDDLE, NET_POST, POST_BEYOND = 0.914, 1.07, 0.914
@@ -28,10 +31,10 @@ SPACING = 0.1
 class CourtOptions:
     """How the lines are painted."""
 
-    line_width: float = 0.05
+    line_width: Annotated[float, within(0, 0.3)] = 0.05
     """Width of all lines but the baselines, metres. Courts are laid out to the outside of the
     lines; 0 where to their middles."""
-    baseline_width: float = 0.10
+    baseline_width: Annotated[float, within(0, 0.3)] = 0.10
     """Width of the baselines, metres: up to 0.10 by the rules, and so on most courts."""
 
 

@@ -158,6 +158,34 @@ def test_how_lines_are_painted_is_remembered(filmed):
     assert workspace.options(Options(), Options()) == Options()
 
 
+@pytest.mark.parametrize("typed", ["5", "1e9", "-1", "nan", "0.31"])
+def test_a_width_that_no_line_has_is_refused_and_not_remembered(bare, monkeypatch, capsys, typed):
+    before = (bare / "project.toml").read_text()
+    for flag in ("--line-width", "--baseline-width"):
+        monkeypatch.setattr("sys.argv", ["keyrecon", "court", str(bare), flag, typed])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        assert ended.value.code == 1
+        told = capsys.readouterr().err
+        assert f"{flag} cannot be {float(typed)}; it is a number from 0 to 0.3." in told
+        assert (bare / "project.toml").read_text() == before
+
+
+def test_a_width_that_the_project_remembers_is_told(filmed):
+    assert "project.toml" not in calibrated(filmed)
+    kept = CalibrationOptions(CourtOptions(baseline_width=0.05))
+    calibrate(Workspace(filmed), (), kept, silent)
+    told = calibrated(filmed)
+    assert "project.toml remembers --baseline-width 0.05 (usual: 0.1)" in told
+
+
+def test_a_remembered_width_that_no_line_has_is_named_as_it_stands_in_the_file(bare):
+    with (bare / "project.toml").open("a") as file:
+        file.write("\n[options]\ncourt.court.baseline_width = 5.0\n")
+    with pytest.raises(KeyreconError, match=r"options\.court\.court\.baseline_width cannot be 5\.0"):
+        calibrated(bare)
+
+
 def test_a_width_that_is_typed_counts_also_where_it_is_the_usual_one(bare, monkeypatch):
     counted, usual = [], CalibrationOptions()
     narrow = CalibrationOptions(CourtOptions(line_width=0.03, baseline_width=0.05))

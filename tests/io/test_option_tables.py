@@ -11,8 +11,12 @@ from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.option_tables import OptionRecord, changed_options, check_options, with_changes
 from keyrecon.pipeline import Options, as_printed
 from keyrecon.synthetic.sequence import SynthOptions
+from keyrecon.world.calibration import CalibrationOptions
 
-RECORDS = (Options(), GolfOptions(), TrainOptions(), SynthOptions(), DepthTrainingOptions())
+RECORDS = (
+    *(Options(), GolfOptions(), TrainOptions(), SynthOptions(), DepthTrainingOptions()),
+    CalibrationOptions(),
+)
 
 
 def numbers(options, prefix=""):
