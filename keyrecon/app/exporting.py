@@ -2,7 +2,8 @@
 
 All files are looked at before the first is written, and none may be one that the project or its
 owner needs: `keyrecon export rally rally/annotations.json` must not put a computed motion in the
-place of what a person marked, nor an overlay in the place of the video it is drawn on.
+place of what a person marked, nor an overlay in the place of the video it is drawn on. The same
+holds for other projects, and for marks and tables in any folder that no export has written.
 """
 
 import re
@@ -16,13 +17,14 @@ from keyrecon.app.court import load_camera
 from keyrecon.app.project import load_whole_motion
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import write_calibration
+from keyrecon.io.formats.coco import is_coco_motion
 from keyrecon.io.formats.conventions import NO_MOTION
 from keyrecon.io.formats.export import check_packages, check_suffix, export_motion
 from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     motion_on_court,
 )
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.workspace import Workspace, another_projects_file
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
 from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
@@ -31,6 +33,8 @@ from keyrecon.timeline import cut_motion
 OVERLAY, CALIBRATION = ".mp4", ".toml"
 WITH_VIDEO = (OVERLAY, ".json")
 """Suffixes of files that need the video: its pictures, or their size."""
+SIGN = b"# keyrecon "
+"""Tables and calibrations that were exported begin with it."""
 
 
 def export(
@@ -108,10 +112,31 @@ def chosen_frames(text: str, count: int, whose: str = "the motion") -> tuple[int
 def _check_place(file: Path, workspace: Workspace) -> None:
     if not file.parent.is_dir():
         raise KeyreconError(f"There is no folder {file.parent} to write {file.name} into; make it.")
-    if workspace.needs(file):
+    others = another_projects_file(file) and not file.parent.samefile(workspace.folder)
+    if others or workspace.needs(file):
+        owner = f"the project in {file.parent}" if others else "the project"
         raise KeyreconError(
-            f"{file} belongs to the project and would be lost; export to another name or folder."
+            f"{file} belongs to {owner} and would be lost; export to another name or folder."
         )
+    if file.is_file() and not _is_export(file):
+        raise KeyreconError(
+            f"{file} is there already and no export has written it; delete it or choose another "
+            "name."
+        )
+
+
+def _is_export(file: Path) -> bool:
+    """Whether a file that is there holds nothing, or what an export has written.
+
+    Of what people write by hand or mark: whatever has another suffix is taken for a result.
+    """
+    suffix = file.suffix.lower()
+    if suffix not in (".json", ".csv", CALIBRATION) or file.stat().st_size == 0:
+        return True
+    if suffix == ".json":
+        return is_coco_motion(file)
+    with file.open("rb") as opened:
+        return opened.read(len(SIGN)) == SIGN
 
 
 def _write(file: Path, chosen: _ChosenMotion, workspace: Workspace) -> str:

@@ -24,7 +24,7 @@ def export(
 
     Args:
         project: Project folder.
-        files: One file or several; existing ones are replaced.
+        files: One file or several; exports that are there are replaced.
         frames: First and last frame to write, such as 120-180; all by default.
         overlay: How the overlay video shows the motion.
     """

@@ -82,6 +82,8 @@ OWN_NAMES = (
     *("camera.npz", "court_points.json", "ground_marks.json", "shots.json"),
 )
 """Files that a project has or may come to have."""
+KEPT = ("*.toml", "*.json", "*.sqlite*", "motion.npz", "report.html")
+"""Files there are that hold a person's work, or from which the rest is made."""
 GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
 COURT = "court"
@@ -348,9 +350,8 @@ class Workspace:
             pass
 
     def kept_files(self) -> list[Path]:
-        """Files there are that hold a person's work, or from which the rest is made."""
-        names = ("*.toml", "*.json", "*.sqlite*", self.motion_file.name, self.report_file.name)
-        files = [file for name in names for file in self.folder.glob(name)]
+        """Files of `KEPT`, and the videos."""
+        files = [file for name in KEPT for file in self.folder.glob(name)]
         places = possible_places(self.folder, self._videos)
         return files + [file for file in places if file.is_file()]
 
@@ -399,3 +400,11 @@ class Workspace:
         with self.exclusive():
             write_durably(self.project_file, with_options(self.project_file, changed))
         self.project = read_project(self.project_file)
+
+
+def another_projects_file(file: Path) -> bool:
+    """Whether a file's place is one of those that the project in its folder needs."""
+    if not (file.parent / "project.toml").is_file():
+        return False
+    kept = file.exists() and any(file.match(name) for name in KEPT)
+    return kept or file.name.lower() in OWN_NAMES

@@ -182,7 +182,9 @@ def test_a_width_that_the_project_remembers_is_told(filmed):
 def test_a_remembered_width_that_no_line_has_is_named_as_it_stands_in_the_file(bare):
     with (bare / "project.toml").open("a") as file:
         file.write("\n[options]\ncourt.court.baseline_width = 5.0\n")
-    with pytest.raises(KeyreconError, match=r"options\.court\.court\.baseline_width cannot be 5\.0"):
+    with pytest.raises(
+        KeyreconError, match=r"options\.court\.court\.baseline_width cannot be 5\.0"
+    ):
         calibrated(bare)
 
 

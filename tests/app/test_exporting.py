@@ -16,12 +16,15 @@ from keyrecon.app import exporting
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.exporting import export
 from keyrecon.app.project import start
+from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import write_camera
+from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
+from keyrecon.records import Annotations
 from keyrecon.report.overlay import OverlayOptions
 from keyrecon.timeline import cut_motion
 from keyrecon.world.records import WorldMotion
@@ -76,6 +79,50 @@ def test_a_place_that_the_project_may_come_to_need_is_kept_free(project):
     assert_refused(project, "p/annotations.json", match="belongs to the project")
     (project.folder.parent / "rally.mp4").unlink()
     assert_refused(project, "rally.mp4", match="belongs to the project")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["annotations.json", "picks.json", "keyframes.JSON", "motion.npz", "camera.npz", "kept.json"],
+)
+def test_what_another_project_needs_is_not_written_over(project, name):
+    other = project.folder.parent / "other"
+    other.mkdir()
+    (other / "project.toml").write_text("of whatever version")
+    (other / "kept.json").write_text("{}")
+    assert_refused(project, f"other/{name}", match="belongs to the project in .*other and would be")
+    export(project, [other / "rally.json", other / "rally.csv"], silent)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("marks.json", '{"info": {}, "images": [], "annotations": [], "categories": []}'),
+        ("notes.json", "what somebody wrote"),
+        ("CollectedData.csv", "scorer,me\nbodyparts,head\ncoords,x\n"),
+        ("Config.toml", "[project]\n"),
+    ],
+)
+def test_a_file_that_no_export_has_written_is_not_replaced(project, name, text):
+    (project.folder.parent / name).write_text(text)
+    match = f"{name} is there already and no export has written it; delete it or choose another"
+    assert_refused(project, "a.bvh", name, match=match)
+
+
+def test_marks_are_told_from_an_export_and_an_export_is_replaced(project):
+    folder = project.folder.parent
+    marks = Annotations(
+        LSP14, np.array([3]), np.full((1, 14, 2), 9.0), np.ones((1, 14), bool),
+        np.zeros((1, 13), np.int64),
+    )  # fmt: skip
+    write_coco(folder / "marks.json", marks, (128, 64))
+    assert_refused(project, "marks.json", match="no export has written it")
+    (folder / "empty.json").touch()
+    files = [folder / name for name in ("a.json", "a.csv", "empty.json")]
+    export(project, files, silent)
+    whole = (folder / "a.json").read_bytes()
+    export(project, files, silent, "5-11")
+    assert len((folder / "a.json").read_bytes()) < len(whole)
 
 
 def test_fbx_is_refused_with_the_way_there(project):

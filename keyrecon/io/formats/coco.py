@@ -271,3 +271,12 @@ def write_coco_motion(
             "source": [SOURCES[s] for s in motion.source[frame]],
         }
     write_durably(path, json.dumps(data, allow_nan=False))
+
+
+def is_coco_motion(path: Path) -> bool:
+    """Whether a file is one of `write_coco_motion`; a mark has no `source`."""
+    try:
+        annotations = parse_json(read_text(path))["annotations"]
+        return bool(annotations) and all("source" in row["attributes"] for row in annotations)
+    except (ValueError, KeyError, TypeError):
+        return False
