@@ -1,6 +1,6 @@
 """What the commands do to a project folder; each returns the text to show."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from keyrecon.body import read_skeleton
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.durable import put_aside, write_durably
 from keyrecon.io.formats.annotation_checks import far_outside, implausible_bones, joints_outside
-from keyrecon.io.formats.annotations import missing_marks, read_annotations
+from keyrecon.io.formats.annotations import missing_marks, read_marks_file
 from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.formats.motion_file import read_whole_motion
@@ -140,7 +140,10 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
 
     video, skeleton = workspace.video(), workspace.skeleton
     size = (video.width, video.height)
-    imported = read_annotations(file, skeleton, len(video), size)
+    read = read_marks_file(file, skeleton, len(video), size)
+    found = cells_from_annotations(read.marks)
+    if not found:
+        raise KeyreconError(f"{file} holds no marks; nothing was changed.")
     swing = marks_form(workspace, Limits(skeleton, len(video), size))
     with workspace.exclusive():
         files = [f for f in (workspace.annotations_file, swing.path) if f.is_file()]
@@ -149,7 +152,7 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
             cells = cells_from_annotations(load_annotations(workspace, video))
         if swing.path in files:
             cells |= swing.read(cells)
-        comparison = compare_marks(cells, cells_from_annotations(imported))
+        comparison = compare_marks(cells, found)
         if comparison.conflicts and not replacing:
             raise _conflict_error(name_conflicts(comparison))
         if comparison.conflicts:
@@ -164,10 +167,45 @@ def import_annotations(workspace: Workspace, file: Path, replacing: bool) -> str
     return "\n".join(
         [
             f"{workspace.annotations_file}: marks on {counted(len(merged.frames), 'frame')}.",
+            *_describe_names(read.pictures),
+            *_describe_unasked(workspace, video, read.marks),
             *(f"Warning: {text}" for text in warnings),
             _after_marks(workspace, video, merged),
         ]
     )
+
+
+def _describe_names(pictures: Mapping[int, str]) -> list[str]:
+    """Which frames only the names of pictures tell; nothing where the file says all."""
+    if not pictures:
+        return []
+    named = _first_few([f"{frame} ({name[:60]})" for frame, name in sorted(pictures.items())])
+    return [
+        f"{counted(len(pictures), 'frame')} {'was' if len(pictures) == 1 else 'were'} taken from "
+        f"the pictures' names: {named}."
+    ]
+
+
+def _describe_unasked(workspace: Workspace, video: Video, marks: Annotations) -> list[str]:
+    """A warning where most frames are no keyframes: they may be counted in another way."""
+    try:
+        asked = asked_for(workspace, video).frames
+    except KeyreconError:  # none are chosen yet, or for another video
+        return []
+    others = np.setdiff1d(marks.frames, asked).tolist()
+    if 2 * len(others) <= len(marks.frames):
+        return []
+    return [
+        f"Warning: {len(others)} of {counted(len(marks.frames), 'marked frame')} "
+        f"{'is no keyframe that was' if len(others) == 1 else 'are no keyframes that were'} asked "
+        f"for: {_first_few([str(frame) for frame in others])}; if the file counts frames otherwise "
+        "than the video (from 0, all of them), take these marks out on the page of keyrecon "
+        f"annotate {quoted(workspace.folder)}, mend the file and import it again."
+    ]
+
+
+def _first_few(words: Sequence[str]) -> str:
+    return ", ".join(words[:8]) + (f" and {len(words) - 8} more" if len(words) > 8 else "")
 
 
 def _after_marks(workspace: Workspace, video: Video, marks: Annotations) -> str:
@@ -261,8 +299,10 @@ def describe_unmarked(annotations: Annotations | None, asked: Keyframes) -> str:
     if not missing:
         return ""
     named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
-    listed = ", ".join(named[:8]) + (f" and {len(named) - 8} more" if len(named) > 8 else "")
-    return f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame {listed}."
+    return (
+        f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame "
+        f"{_first_few(named)}."
+    )
 
 
 def load_motion(path: Path) -> Motion:

@@ -84,14 +84,48 @@ def test_an_import_that_leaves_keyframes_unmarked_names_them(tmp_path):
     assert text.endswith(f"keyrecon run {workspace.folder} --partial")
 
 
-def import_body(folder, golf, chosen):
-    """Import a whole body on frame 5 into a project in which keyframes are `chosen`."""
+def test_frames_that_were_taken_from_names_of_pictures_are_told(tmp_path):
+    text, _ = import_body(tmp_path, False, [5], names="shot_{}.png")
+    assert "1 frame was taken from the pictures' names: 5 (shot_5.png).\n" in text
+    assert "Warning" not in text
+    text, _ = import_body(tmp_path / "x", False, [5])
+    assert "names" not in text
+
+
+def test_marks_on_frames_that_nobody_asked_for_are_warned_of(tmp_path):
+    text, _ = import_body(tmp_path, False, [8], names="shot_{}.png")
+    assert "\nWarning: 1 of 1 marked frame is no keyframe that was asked for: 5; if" in text
+    assert "Warning" not in import_body(tmp_path / "x", False, [])[0]
+
+
+def test_a_file_without_marks_is_refused_and_changes_nothing(workspace):
+    file = workspace.folder.parent / "none.json"
+    nobody = Annotations(
+        LSP14, np.zeros(0, int), np.zeros((0, 14, 2)), np.zeros((0, 14), bool),
+        np.zeros((0, 13), int),
+    )  # fmt: skip
+    write_coco(file, nobody, SIZE)
+    with pytest.raises(KeyreconError, match=r"none\.json holds no marks; nothing was changed"):
+        import_annotations(workspace, file, replacing=True)
+    assert not workspace.annotations_file.exists()
+
+
+def import_body(folder, golf, chosen, names=None):
+    """Import a whole body on frame 5 into a project in which keyframes are `chosen`.
+
+    With `names` the file tells frames by names of pictures alone.
+    """
+    folder.mkdir(exist_ok=True)
     write_video(folder / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * 12, 25.0)
     start(folder / "v.mp4", folder / "p", golf=golf)
     joints, nearer = np.full((1, len(LSP14.names), 2), 40.0), np.zeros((1, len(LSP14.bones)), int)
     joints += np.arange(len(LSP14.names))[None, :, None]
     body = Annotations(LSP14, np.array([5]), joints, np.isfinite(joints[..., 0]), nearer)
     write_coco(folder / "marks.json", body, SIZE)
+    if names:
+        text = (folder / "marks.json").read_text()
+        text = text.replace("frame_000005.png", names.format(5)).replace(', "frame": 5', "")
+        (folder / "marks.json").write_text(text)
     workspace = Workspace(folder / "p")
     if chosen:
         workspace.keyframes_file.write_text(chosen_keyframes(chosen))

@@ -32,6 +32,17 @@ class Mark:
     x: float
     y: float
     visible: bool
+    picture: str = ""
+    """Name of the picture, where only that tells the frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarksFile:
+    """What a file of marks holds."""
+
+    marks: Annotations
+    pictures: Mapping[int, str]
+    """Of frames that only the pictures' names tell, these names."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +55,12 @@ class MarkSheet:
     size: tuple[int, int]
     """Width and height of the picture, px."""
 
-    def check_frame(self, frame: int) -> None:
-        """Raise KeyreconError for a frame that the video does not have."""
+    def check_frame(self, frame: int, picture: str = "") -> None:
+        """Raise KeyreconError for a frame that the video does not have; a `picture` told it."""
         if not 0 <= frame < self.n_frames:
+            source = f" (so says '{picture[:60]}')" if picture else ""
             raise KeyreconError(
-                f"{self.path}: frame {frame} is outside the video, which has frames 0 to "
+                f"{self.path}: frame {frame}{source} is outside the video, which has frames 0 to "
                 f"{self.n_frames - 1}; check that the marks belong to this video and its trim."
             )
 
@@ -81,9 +93,13 @@ def canonical_name(name: str) -> str:
 
 
 def frame_of_picture(name: str, path: Path) -> int:
-    """The frame number with which a picture's name ends: 'img0123.png' is frame 123."""
-    stem = re.split(r"[/\\]", name)[-1].rsplit(".", 1)[0]
-    number = re.search(r"(\d+)$", stem)
+    """The frame number with which a picture's name ends: 'img0123.png' is frame 123.
+
+    Where the name has it as keyframes' pictures do, frame_000123, that counts, whatever a person
+    or a program put behind it. Roboflow puts '_png.rf.' and a hash there.
+    """
+    stem = re.sub(r"([._](png|jpe?g|bmp|tiff?|webp))?(\.rf\.\w+)?\.\w+$", "", _last_part(name))
+    number = re.search(r"(?<![a-z])frame[_ -]?(\d+)", stem, re.I) or re.search(r"(\d+)$", stem)
     if not number:
         raise KeyreconError(
             f"{path}: the picture '{name[:60]}' does not say which frame it shows; its name must "
@@ -92,18 +108,25 @@ def frame_of_picture(name: str, path: Path) -> int:
     return int(number[1])
 
 
-def annotations_from_marks(
+def _last_part(name: str) -> str:
+    return re.split(r"[/\\]", name)[-1]
+
+
+def checked_marks(
     marks: Iterable[Mark],
     sheet: MarkSheet,
     nearer: Mapping[int, Int[np.ndarray, "B"]] | None = None,
     absent: Collection[tuple[int, str]] = (),
-) -> Annotations:
+) -> MarksFile:
     """Marks in frame order; `nearer` holds the signs of the frames that have them.
 
     Joints said to be `absent` on a frame (in the skeleton's spelling) are so where not marked.
     Raises KeyreconError for frames outside the video, joints that the skeleton does not have,
-    coordinates that are not numbers or a whole picture off, and two different marks of one joint.
+    coordinates that are not numbers or a whole picture off, two pictures
+    whose names tell one frame, and two different marks of one joint.
     """
+    marks = list(marks)
+    pictures = _pictures(marks, sheet)
     placed: dict[tuple[int, int], Mark] = {}
     for mark in marks:
         sheet.check_frame(mark.frame)
@@ -127,7 +150,25 @@ def annotations_from_marks(
     rows = [signs.get(frame, unknown) for frame in frames.tolist()]
     stacked = np.array(rows, dtype=np.int64).reshape(len(frames), len(unknown))
     open_ = {*absent} - {(frame, sheet.skeleton.names[joint]) for frame, joint in placed}
-    return Annotations(sheet.skeleton, frames, joints, visible, stacked, tuple(sorted(open_)))
+    read = Annotations(sheet.skeleton, frames, joints, visible, stacked, tuple(sorted(open_)))
+    return MarksFile(read, pictures)
+
+
+def _pictures(marks: Iterable[Mark], sheet: MarkSheet) -> dict[int, str]:
+    """Names of pictures by the frame that only they tell; KeyreconError where two tell the same."""
+    pictures: dict[int, str] = {}
+    for mark in marks:
+        if not mark.picture:
+            continue
+        sheet.check_frame(mark.frame, mark.picture)
+        name = _last_part(mark.picture)
+        other = pictures.setdefault(mark.frame, name)
+        if other != name:
+            raise KeyreconError(
+                f"{sheet.path}: the pictures '{other[:60]}' and '{name[:60]}' both say frame "
+                f"{mark.frame} by their names; name each by its frame, as in frame_000123.png."
+            )
+    return pictures
 
 
 def _check_place(mark: Mark, sheet: MarkSheet) -> None:

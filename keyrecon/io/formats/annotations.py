@@ -9,7 +9,8 @@ import numpy as np
 
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.coco import read_coco
+from keyrecon.io.formats.annotation_checks import MarksFile
+from keyrecon.io.formats.coco import read_coco_file
 from keyrecon.io.formats.cvat import read_cvat
 from keyrecon.io.formats.dlc import read_dlc
 from keyrecon.reading import reading
@@ -24,12 +25,18 @@ def read_annotations(
     `size` is the width and height of the video's pictures, px. Raises KeyreconError for files of
     another kind and for marks that do not fit the video or the skeleton.
     """
-    path = Path(path)
+    return read_marks_file(Path(path), skeleton, n_frames, size).marks
+
+
+def read_marks_file(
+    path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+) -> MarksFile:
+    """The same, with the pictures whose names tell their frames."""
     with reading(path, "a file that can be read", "check the path"), path.open("rb") as file:
         start = file.read(4096)
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if text.startswith(b"{"):
-        return read_coco(path, skeleton, n_frames, size)
+        return read_coco_file(path, skeleton, n_frames, size)
     if text.startswith(b"<"):
         return read_cvat(path, skeleton, n_frames, size)
     if text.split(b",", 1)[0] in (b"scorer", b"bodyparts"):

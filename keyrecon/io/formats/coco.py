@@ -1,7 +1,7 @@
 """COCO keypoints JSON, the format of annotations.json.
 
 `images[]` carry id, file_name, width, height and `frame`, the frame number (where another
-program left it out, the number at the end of the file name). `annotations[]` carry `keypoints`,
+program left it out, the number in the file name). `annotations[]` carry `keypoints`,
 x, y, v for every joint of the category (v = 0 not labelled, 1 placed though hidden, 2 visible),
 and `attributes.nearer`, one number per limb of the category's skeleton (1-based pairs of joints,
 parent first): 1 the child end is nearer the camera, -1 farther, 0 unknown. `attributes.absent`,
@@ -25,9 +25,10 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.annotation_checks import (
     Mark,
+    MarksFile,
     MarkSheet,
-    annotations_from_marks,
     canonical_name,
+    checked_marks,
     frame_of_picture,
 )
 from keyrecon.reading import parse_json, read_text, reading, real, whole
@@ -48,7 +49,13 @@ def read_coco(
     Raises KeyreconError for a file that does not parse or does not fit the video, naming the
     frame and the joint.
     """
-    path = Path(path)
+    return read_coco_file(Path(path), skeleton, n_frames, size).marks
+
+
+def read_coco_file(
+    path: Path, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
+) -> MarksFile:
+    """The same, with the pictures whose names tell their frames."""
     sheet = MarkSheet(path, skeleton, n_frames, size)
     remedy = "it needs images, annotations with keypoints, and categories with the joints' names"
     with reading(path, "a COCO keypoints file", remedy):
@@ -61,16 +68,16 @@ def read_coco(
         for annotation in data["annotations"]:
             if annotation.get("category_id") in categories and "keypoints" in annotation:
                 category = categories[annotation["category_id"]]
-                frame = _frame(annotation, images, sheet)
-                marks += _marks(annotation, category, frame, sheet)
+                frame, picture = _frame(annotation, images, sheet)
+                marks += _marks(annotation, category, frame, picture, sheet)
                 signs = _nearer(annotation, category, frame, sheet)
                 nearer[frame] = np.where(signs, signs, nearer.get(frame, 0))
                 absent |= _absent(annotation, frame, sheet)
-        return annotations_from_marks(marks, sheet, nearer, absent)
+        return checked_marks(marks, sheet, nearer, absent)
 
 
-def _frame(annotation: Json, images: dict[Any, Json], sheet: MarkSheet) -> int:
-    """The frame that an annotation belongs to, checked."""
+def _frame(annotation: Json, images: dict[Any, Json], sheet: MarkSheet) -> tuple[int, str]:
+    """The frame that an annotation belongs to, checked; with the picture if only that tells it."""
     if annotation["image_id"] not in images:
         raise KeyreconError(
             f"{sheet.path}: annotation {annotation.get('id')} belongs to image "
@@ -79,15 +86,18 @@ def _frame(annotation: Json, images: dict[Any, Json], sheet: MarkSheet) -> int:
     image = images[annotation["image_id"]]
     sheet.check_size(whole(image.get("width") or 0), whole(image.get("height") or 0))
     frame = image.get("frame")
+    picture = image["file_name"] if frame is None else ""
     if frame is None:
-        frame = frame_of_picture(image["file_name"], sheet.path)
+        frame = frame_of_picture(picture, sheet.path)
     if not isinstance(frame, int) or isinstance(frame, bool):
         raise KeyreconError(f"{sheet.path}: {frame!r} is not a frame number.")
-    sheet.check_frame(frame)
-    return frame
+    sheet.check_frame(frame, picture)
+    return frame, picture
 
 
-def _marks(annotation: Json, category: Json, frame: int, sheet: MarkSheet) -> Iterator[Mark]:
+def _marks(
+    annotation: Json, category: Json, frame: int, picture: str, sheet: MarkSheet
+) -> Iterator[Mark]:
     """The labelled joints of one annotation."""
     names, values = category["keypoints"], annotation["keypoints"]
     if len(values) != 3 * len(names):
@@ -102,7 +112,7 @@ def _marks(annotation: Json, category: Json, frame: int, sheet: MarkSheet) -> It
                 "labelled), 1 (hidden) or 2 (visible)."
             )
         if v:
-            yield Mark(frame, name, real(x), real(y), v == 2)
+            yield Mark(frame, name, real(x), real(y), v == 2, picture)
 
 
 def _absent(annotation: Json, frame: int, sheet: MarkSheet) -> set[tuple[int, str]]:

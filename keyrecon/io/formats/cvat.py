@@ -16,8 +16,9 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.annotation_checks import (
     Mark,
+    MarksFile,
     MarkSheet,
-    annotations_from_marks,
+    checked_marks,
     frame_of_picture,
 )
 from keyrecon.reading import reading
@@ -26,7 +27,7 @@ from keyrecon.records import Annotations
 
 def read_cvat(
     path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
-) -> Annotations:
+) -> MarksFile:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
     path = Path(path)
     sheet = MarkSheet(path, skeleton, n_frames, size)
@@ -40,7 +41,7 @@ def read_cvat(
             raise KeyreconError(
                 f"{path} has no skeletons with marked joints; annotate with a skeleton label."
             )
-        return annotations_from_marks(marks, sheet)
+        return checked_marks(marks, sheet)
 
 
 def _from_tracks(root: Element, sheet: MarkSheet) -> Iterator[Mark]:
@@ -58,10 +59,11 @@ def _from_images(root: Element, sheet: MarkSheet) -> Iterator[Mark]:
     for image in root.iter("image"):
         sheet.check_size(int(image.get("width", 0)), int(image.get("height", 0)))
         for figure in image.iter("skeleton"):
-            yield from _marks(figure, frame_of_picture(image.attrib["name"], sheet.path), sheet)
+            name = image.attrib["name"]
+            yield from _marks(figure, frame_of_picture(name, sheet.path), sheet, name)
 
 
-def _marks(figure: Element, frame: int, sheet: MarkSheet) -> Iterator[Mark]:
+def _marks(figure: Element, frame: int, sheet: MarkSheet, picture: str = "") -> Iterator[Mark]:
     for point in figure.iter("points"):
         if point.get("outside", "0") == "1":
             continue
@@ -72,7 +74,7 @@ def _marks(figure: Element, frame: int, sheet: MarkSheet) -> Iterator[Mark]:
                 f"'{point.attrib['points']}', which is not x,y."
             )
         hidden = point.get("occluded", "0") == "1"
-        yield Mark(frame, point.attrib["label"], float(x), float(y), not hidden)
+        yield Mark(frame, point.attrib["label"], float(x), float(y), not hidden, picture)
 
 
 def cvat_text(annotations: Annotations, size: tuple[int, int]) -> str:

@@ -18,8 +18,9 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.annotation_checks import (
     Mark,
+    MarksFile,
     MarkSheet,
-    annotations_from_marks,
+    checked_marks,
     frame_of_picture,
 )
 from keyrecon.reading import read_text, reading
@@ -34,7 +35,7 @@ Columns = dict[str, dict[str, int]]
 
 def read_dlc(
     path: Path | str, skeleton: Skeleton, n_frames: int, size: tuple[int, int]
-) -> Annotations:
+) -> MarksFile:
     """Read and check marks; raises KeyreconError for a broken file, naming frame and joint."""
     path = Path(path)
     sheet = MarkSheet(path, skeleton, n_frames, size)
@@ -48,7 +49,7 @@ def read_dlc(
         first = min(column for part in columns.values() for column in part.values())
         body = rows[len(head) :]
         marks = [mark for row in body for mark in _marks(row, first, columns, path)]
-        return annotations_from_marks(marks, sheet)
+        return checked_marks(marks, sheet)
 
 
 def _heading(rows: list[list[str]], path: Path) -> dict[str, list[str]]:
@@ -85,12 +86,13 @@ def _marks(row: list[str], first: int, columns: Columns, path: Path) -> Iterator
     name = next((word for word in reversed(row[:first]) if word), None)
     if name is None:
         raise ValueError(f"the row {','.join(row)} names no picture")
-    frame = int(name) if name.isdecimal() else frame_of_picture(name, path)
+    picture = "" if name.isdecimal() else name
+    frame = frame_of_picture(picture, path) if picture else int(name)
     for part, column in columns.items():
         x, y = row[column["x"]].strip(), row[column["y"]].strip()
         sure = float(row[column["likelihood"]] or 0) if "likelihood" in column else 1.0
         if (x and y and x.lower() != "nan" and y.lower() != "nan") and sure >= SURE:
-            yield Mark(frame, part, float(x), float(y), True)
+            yield Mark(frame, part, float(x), float(y), True, picture)
 
 
 def dlc_text(annotations: Annotations, _: tuple[int, int]) -> str:

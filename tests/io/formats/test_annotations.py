@@ -1,14 +1,20 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.io.formats.annotation_checks import canonical_name, implausible_bones, joints_outside
-from keyrecon.io.formats.annotations import read_annotations
+from keyrecon.io.formats.annotation_checks import (
+    canonical_name,
+    frame_of_picture,
+    implausible_bones,
+    joints_outside,
+)
+from keyrecon.io.formats.annotations import read_annotations, read_marks_file
 from keyrecon.io.formats.coco import annotations_to_coco, read_coco, write_coco
 from keyrecon.records import Annotations
 
@@ -153,6 +159,59 @@ def test_the_end_of_the_picture_name_is_the_frame_where_none_is_given(tmp_path, 
             image["file_name"] = f"somewhere/img{image.pop('frame'):04d}.png"
 
     assert_same(read(spoilt(marked, tmp_path / "a.json", rename)), marked)
+
+
+@pytest.mark.parametrize(
+    ("name", "frame"),
+    [
+        ("somewhere/img0123.png", 123),
+        ("frame_22_v2.png", 22),
+        ("frame_000022 (1).png", 22),
+        ("frame_000022_png.rf.7f3a9b12.jpg", 22),
+        ("22.png.rf.7f3a9b12.jpg", 22),
+        ("IMG_20240512_22.jpeg", 22),
+        ("rally_1280x720_3.png", 3),
+        (r"C:\marks\keyframe_7.PNG", 7),
+    ],
+)
+def test_a_pictures_name_tells_its_frame(name, frame):
+    assert frame_of_picture(name, Path("a.json")) == frame
+
+
+def renamed(marked, path, *names):
+    def rename(data):
+        for image, name in zip(data["images"], names, strict=True):
+            del image["frame"]
+            image["file_name"] = name
+
+    return spoilt(marked, path, rename)
+
+
+def test_names_of_pictures_that_tell_one_frame_are_blamed(tmp_path, marked):
+    path = renamed(marked, tmp_path / "a.json", "rally_3_v2.png", "rally_50_v2.png", "x_3.png")
+    with pytest.raises(
+        KeyreconError, match=r"'rally_3_v2\.png' and 'rally_50_v2\.png' both say frame 2"
+    ):
+        read(path)
+    extra = [["labeled-data", "vid", "003.png", *["5.0"] * 28]]
+    with pytest.raises(KeyreconError, match=r"'img0003\.png' and '003\.png' both say frame 3"):
+        read(write_dlc(tmp_path / "c.csv", marked, extra=extra))
+
+
+def test_a_frame_that_the_video_lacks_is_named_with_the_picture_that_says_it(tmp_path, marked):
+    path = renamed(marked, tmp_path / "a.json", "a_3.png", "IMG_20240512.png", "a_4.png")
+    with pytest.raises(
+        KeyreconError, match=r"frame 20240512 \(so says 'IMG_20240512\.png'\) is outside the video"
+    ):
+        read(path)
+
+
+def test_frames_that_the_file_itself_tells_are_not_from_names(tmp_path, marked):
+    write_coco(tmp_path / "a.json", marked, SIZE)
+    assert read_marks_file(tmp_path / "a.json", LSP14, FRAMES, SIZE).pictures == {}
+    path = renamed(marked, tmp_path / "b.json", "x/a3.png", "x/a50.png", "a121.png")
+    pictures = read_marks_file(path, LSP14, FRAMES, SIZE).pictures
+    assert pictures == {3: "a3.png", 50: "a50.png", 121: "a121.png"}
 
 
 def test_signs_follow_their_limb_when_the_file_names_it_child_first(tmp_path, marked):
