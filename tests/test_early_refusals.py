@@ -190,3 +190,31 @@ def test_an_option_that_the_printed_forms_replace_is_refused_beside_them(
     assert one_line(told, f"--{option} {value}", "--method paper", "leave out one of the two")
     told = keyrecon(verb, project, "--method", "paper", "--depths", "none")
     assert one_line(told, "no picks yet" if verb == "keyframes" else "keyrecon pick")
+
+
+VERBS = {
+    "run": ("keyrecon.app.running.prepare_project", ("--height", "1.75", "--fov", "60")),
+    "keyframes": ("keyrecon.app.keyframing.prepare_project", ("--budget", "0.05")),
+    "court": ("keyrecon.app.court.estimate_camera_motion", ("--line-width", "0.04")),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize(("ending", "code"), [(KeyboardInterrupt, 130), (KeyreconError, 1)])
+def test_options_of_a_command_that_was_interrupted_are_kept_and_of_a_refused_one_not(
+    keyrecon, project, monkeypatch, verb, ending, code
+):
+    def end(*_, **__):
+        raise ending("in the middle of it")
+
+    work, words = VERBS[verb]
+    before = (project / "project.toml").read_text()
+    monkeypatch.setattr(work, end)
+    monkeypatch.setattr("keyrecon.app.running.asked_for", lambda *_: None)
+    monkeypatch.setattr("keyrecon.app.running.annotated", lambda *_: None)
+    assert keyrecon(verb, project, *words)[0] == code
+    after = (project / "project.toml").read_text()
+    if ending is KeyreconError:
+        assert after == before
+    else:
+        assert all(value in after for value in words if value[0] != "-")

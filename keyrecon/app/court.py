@@ -62,7 +62,8 @@ def calibrate(
         check_click(click, len(video), (video.width, video.height))
     together = merge_clicks(kept, clicks)
     try:
-        camera, cuts = _find_camera(workspace, video, together, options, progress)
+        with workspace.remembering(options, CalibrationOptions(), COURT):
+            camera, cuts = _find_camera(workspace, video, together, options, progress)
     except ContradictoryClicks as fault:
         raise KeyreconError(f"{fault}{_whose(clicks, kept)}") from fault
     except KeyreconError as fault:
@@ -71,7 +72,6 @@ def calibrate(
         painted = f" Looked for with {widths}." if widths else ""
         raise KeyreconError(f"{fault}{_how_many(together)}{painted}{aside}") from fault
     workspace.change_court_clicks(clicks, dropped)
-    workspace.remember(options, CalibrationOptions(), COURT)
     write_camera(workspace.camera_file, camera)
     if workspace.court_clicks() != together:
         date_after(workspace.court_points_file, workspace.camera_file)

@@ -164,8 +164,8 @@ def fit_project(
     video = hold_frames(video)
     marks = kept_marks(workspace, video)
     fitting = replace(options, prior="")  # stages know the prior by its content
-    fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
-    workspace.remember(options, GolfOptions(), GOLF)
+    with workspace.remembering(options, GolfOptions(), GOLF):
+        fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
     note_fitted(workspace, evidence)

@@ -83,11 +83,11 @@ def find_keyframes(
     forms = as_printed(options) if printed else options
     video = hold_if_small(workspace.video(), HELD)  # camera, player and pictures read it
     marks = load_annotations(workspace, video) if workspace.annotations_file.is_file() else None
-    prepared = prepare_project(workspace, video, marks, forms, progress)
-    preparation = prepared.preparation
-    if marks is not None and not printed:
-        preparation = with_marked_keyframes(preparation, marks, options, progress)
-    workspace.remember(options, Options())
+    with workspace.remembering(options, Options()):
+        prepared = prepare_project(workspace, video, marks, forms, progress)
+        preparation = prepared.preparation
+        if marks is not None and not printed:
+            preparation = with_marked_keyframes(preparation, marks, options, progress)
     workspace.forget_shot_choices(choices)
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)

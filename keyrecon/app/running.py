@@ -68,8 +68,8 @@ def run(
     """Everything after annotation; writes motion.npz and report.html.
 
     `partial` goes on with what is annotated, `truth` is for the report, `printed` takes the forms
-    that the paper prints. The project remembers its options, without those forms, when all is
-    done: what is refused on the way leaves no trace.
+    that the paper prints. The project remembers its options, without those forms, from the first
+    stage on: what is interrupted goes on with them, what is refused on the way leaves no trace.
     """
     workspace.check_writable()
     read_models(options)  # a file that is none is told of before any stage
@@ -81,9 +81,10 @@ def run(
     evidence = marks_evidence(workspace)
     asked = asked_for(workspace, video)
     annotations = annotated(workspace, video, asked, partial)
-    automatic = prepare_project(workspace, video, annotations, options, progress)
-    preparation = replace(automatic.preparation, keyframes=asked)
-    motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
+    with workspace.remembering(given, Options()):
+        automatic = prepare_project(workspace, video, annotations, options, progress)
+        preparation = replace(automatic.preparation, keyframes=asked)
+        motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
@@ -106,7 +107,6 @@ def run(
     )
     wrong = _write_report(workspace.report_file, preparation, material, doubts, progress)
     note_run(workspace, RunNotes(evidence, tuple(doubts), advice))
-    workspace.remember(given, Options())
     seconds = time.perf_counter() - started
     unsure = [*(one.text for one in hyperextended_stretches(motion)), *describe_uncertainty(motion)]
     lines = [*placed.lines, *shots, *doubts, *wrong, *unsure, *advice]

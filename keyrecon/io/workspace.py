@@ -401,6 +401,27 @@ class Workspace:
             write_durably(self.project_file, with_options(self.project_file, changed))
         self.project = read_project(self.project_file)
 
+    @contextmanager
+    def remembering(
+        self, options: Record, defaults: Record, section: str | None = None
+    ) -> Iterator[None]:
+        """Keep options, as `remember` does, from the beginning of the work that they are for.
+
+        Whoever interrupts it goes on with them; where it is refused, the file is as it was before.
+        """
+        file, before = self.project_file, self.project_file.read_bytes()
+        options_before = flat_options(with_current_names(self.project.get("options", {})))
+        self.remember(options, defaults, section)
+        kept = file.read_bytes()
+        try:
+            yield
+        except KeyreconError:
+            with self.exclusive():
+                alone = file.read_bytes() == kept
+                write_durably(file, before if alone else with_options(file, options_before))
+            self.project = read_project(file)
+            raise
+
 
 def another_projects_file(file: Path) -> bool:
     """Whether a file's place is one of those that the project in its folder needs."""

@@ -9,7 +9,7 @@ from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.selection import KeyframeOptions
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, with_height
 from keyrecon.records import Pick
 
 
@@ -154,6 +154,39 @@ def test_the_athletes_height_is_remembered(project):
     for height in (1.7, 0.5, 2.6):
         project.remember(settings(project, Options(), height), Options())
         assert settings(Workspace(project.folder), Options()).lift.height == height
+
+
+def test_options_are_remembered_while_they_are_worked_with_and_not_when_refused(project):
+    file = project.project_file
+    file.write_text(file.read_text() + "\n[options]\nkeyframes.budget = 0.05  # mine\n")
+    workspace, before = Workspace(project.folder), file.read_text()
+    with (
+        pytest.raises(KeyreconError, match="refused"),
+        workspace.remembering(with_height(Options(), 1.7), Options()),
+    ):
+        assert settings(Workspace(project.folder), Options()) == with_height(Options(), 1.7)
+        raise KeyreconError("refused")
+    assert file.read_text() == before
+    assert settings(workspace, Options()).keyframes.budget == 0.05
+    with (
+        pytest.raises(KeyboardInterrupt),
+        workspace.remembering(with_height(Options(), 1.7), Options()),
+    ):
+        raise KeyboardInterrupt
+    assert settings(workspace, Options()).lift.height == 1.7
+
+
+def test_what_somebody_writes_meanwhile_is_kept_where_options_are_refused(
+    project,
+):
+    file = project.project_file
+    with (
+        pytest.raises(KeyreconError, match="refused"),
+        project.remembering(with_height(Options(), 1.7), Options()),
+    ):
+        file.write_text(file.read_text() + "# mine\n")
+        raise KeyreconError("refused")
+    assert "# mine" in file.read_text()
 
 
 @pytest.mark.parametrize("height", [0.2, 170.0])
