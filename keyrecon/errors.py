@@ -1,12 +1,16 @@
 """The one exception for what a user can mend, and words that its messages share."""
 
 import json
+import re
 import shlex
 from pathlib import Path
 from zipfile import BadZipFile
 
 MAX_WORDS = 160
 """Characters of a library's own message that are shown; some quote the file."""
+
+_PYTHONS_WORDS = re.compile(r"object (is|does|has) n|indices must be|has no attribute|has no len")
+"""In what Python says of a null, or of a list where a table belongs."""
 
 
 class KeyreconError(Exception):
@@ -26,6 +30,8 @@ def explain(fault: Exception) -> str:
             words = "nested too deeply"
         case MemoryError():
             words = "it asks for more memory than there is"
+        case TypeError() | AttributeError() if _PYTHONS_WORDS.search(str(fault)):
+            words = "a value is missing or of another kind than it has to be"
         case OSError() if fault.strerror:
             words = fault.strerror
         case ValueError() if "allow_pickle" in str(fault):  # numpy's advice would be unsafe

@@ -349,6 +349,12 @@ class Annotations:
     """Sorted frames and names of joints of which the person said that they cannot be seen or
     placed: nothing is missing there, and nothing is carried there. Such a frame needs no row."""
 
+    @property
+    def never_marked(self) -> tuple[str, ...]:
+        """Names of the joints that are marked on no frame."""
+        marked = np.isfinite(self.joints).all(axis=2).any(axis=0)
+        return tuple(np.array(self.skeleton.names)[~marked].tolist())
+
 
 @dataclass(frozen=True, eq=False)
 class JointTracks:

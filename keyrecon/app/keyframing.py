@@ -15,7 +15,7 @@ from keyrecon.app.preparing import (
     unlinked_stretches,
     with_chosen_shots,
 )
-from keyrecon.app.project import describe_unmarked, load_annotations
+from keyrecon.app.project import describe_never_marked, describe_unmarked, load_annotations
 from keyrecon.errors import counted, quoted
 from keyrecon.io.durable import make_folder, write_durably
 from keyrecon.io.formats.keyframes import keyframes_to_json
@@ -26,12 +26,15 @@ from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import absent_frames, list_stretches, listed_stretches
 from keyrecon.keyframes.selection import KeyframeOptions
-from keyrecon.pipeline import Options, as_printed, with_marked_keyframes
+from keyrecon.pipeline import Options, as_printed, marked_frames, with_marked_keyframes
 from keyrecon.progress import Progress
-from keyrecon.records import Annotations, HalfKeyframes, Keyframes, Preparation
+from keyrecon.records import Annotations, HalfKeyframes, Keyframes, MarkGains, Preparation
 from keyrecon.report.drawing import point_out
 from keyrecon.shots.following import HELD
 from keyrecon.uncertainty import unsure_track
+
+MOST_USEFUL = 3
+"""Keyframes that are named in the order of what they bring; keyframes.json has all."""
 
 
 @dataclass(frozen=True)
@@ -108,9 +111,8 @@ def describe_keyframes(
         for stretch in unsure_track(preparation.track, preparation.shots, keyframes.reach)
         if not told[stretch.frame]
     ]
-    folder, used = quoted(workspace.folder), preparation.shots.usable_frames
+    used = preparation.shots.usable_frames
     seen = float((preparation.track.confidence[used] > 0).mean())
-    left = describe_unmarked(marks, keyframes)
     halves = [
         f"{name} body: {counted(len(half.frames), 'keyframe')}; {half.coverage:.1%} of the frames "
         f"look like one of them (outlines at most {half.beta:.1%} of the player's height apart; "
@@ -119,23 +121,47 @@ def describe_keyframes(
     ]
     return "\n".join(
         [
-            f"Player found in {seen:.1%} of {len(used)} frames.",
+            f"Player found in {seen:.1%} of {counted(len(used), 'frame')}.",
             *describe_shots(preparation.shots),
             *contradictions,
             *_describe_absence(preparation),
             *(stretch.text for stretch in unsure),
             *halves,
-            *_describe_gains(keyframes),
-            f"Annotation cost {annotation_cost(keyframes, frames):.2%}: {len(keyframes.frames)} "
-            f"different frames, listed in {workspace.keyframes_file}, pictures in "
-            f"{workspace.pictures}.",
-            *([left] if marks is not None and left else []),
-            f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO "
-            f"keypoints, DeepLabCut or CVAT) and keyrecon import {folder} FILE"
-            if left
-            else f"All of them are marked. Next: keyrecon run {folder}",
+            *describe_gains(keyframes),
+            f"Annotation cost {annotation_cost(keyframes, frames):.2%}: "
+            f"{count_different(keyframes, marks)}, listed in {workspace.keyframes_file}, pictures "
+            f"in {workspace.pictures}.",
+            *describe_next(workspace, keyframes, marks),
         ]
     )
+
+
+def describe_next(
+    workspace: Workspace, keyframes: Keyframes, marks: Annotations | None
+) -> list[str]:
+    """What is left to mark before there can be a run, and the command for it."""
+    folder, left = quoted(workspace.folder), describe_unmarked(marks, keyframes)
+    nowhere = "" if marks is None else describe_never_marked(marks)
+    if not left and not nowhere:
+        return [f"All of them are marked. Next: keyrecon run {folder}"]
+    return [
+        *([left] if left and marks is not None else []),
+        *([f"All of them are marked. {nowhere}"] if nowhere and not left else []),
+        f"Next: keyrecon annotate {folder}, or mark the joints in another tool (COCO keypoints, "
+        f"DeepLabCut or CVAT) and keyrecon import {folder} FILE",
+    ]
+
+
+def count_different(keyframes: Keyframes, marks: Annotations | None) -> str:
+    """How many frames there are to mark; those marked before they were asked for exceed the
+    budget."""
+    frames = counted(len(keyframes.frames), "different frame")
+    before = () if marks is None else np.concatenate(marked_frames(marks))
+    count = len(np.intersect1d(keyframes.frames, before))
+    if count == 0:
+        return frames
+    marked = "is marked already and comes" if count == 1 else "are marked already and come"
+    return f"{frames} ({count} of them {marked} on top of the budget)"
 
 
 def _compare_with_printed(keyframes: Keyframes, half: HalfKeyframes) -> str:
@@ -144,22 +170,41 @@ def _compare_with_printed(keyframes: Keyframes, half: HalfKeyframes) -> str:
     return f"the choice printed in the paper would take {half.printed_count}"
 
 
-def _describe_gains(keyframes: Keyframes) -> list[str]:
+def describe_gains(keyframes: Keyframes) -> list[str]:
     """What a person who stops early has, and what one mark more would bring."""
     lines = []
     for name, half in (("Upper", keyframes.upper), ("Lower", keyframes.lower)):
         gains = half.gains
         if gains is None:
             continue
-        first, middle = gains.order[:3].tolist(), (len(gains.order) + 1) // 2
-        lines.append(
-            f"{name} body, most useful first: {', '.join(map(str, first))}, ... (the whole order "
-            f"is in keyframes.json). The first {counted(middle, 'mark')} will show the pose of "
-            f"{gains.coverage[middle - 1]:.0%} of the frames to within {gains.beta:.1%} of the "
-            f"height, all {len(gains.order)} of {gains.coverage[-1]:.0%}; one more would add "
-            f"{gains.next_gain:.1%}."
-        )
+        lines.append(f"{name} body, {_describe_order(half, gains)}")
     return lines
+
+
+def _describe_order(half: HalfKeyframes, gains: MarkGains) -> str:
+    """The most useful marks first, and what they cover at the distance that is near enough.
+
+    Keyframes of a small budget are chosen for a larger distance and spread over all poses: one
+    chosen for the smaller alone may bring more than any of them.
+    """
+    count, middle = len(gains.order), (len(gains.order) + 1) // 2
+    some = "mark" if middle == 1 else f"{middle} marks"
+    first = ", ".join(map(str, gains.order[:MOST_USEFUL].tolist()))
+    more = ", ..." if count > MOST_USEFUL else ""
+    within = f"of the frames to within {gains.beta:.1%} of the height"
+    shown = (
+        f"most useful first: {first}{more} (the whole order is in keyframes.json). The first "
+        f"{some} will show the pose of {gains.coverage[middle - 1]:.0%} {within}, all {count} of "
+        f"{gains.coverage[-1]:.0%}"
+    )
+    if count == 1:
+        shown = f"frame {first} alone will show the pose of {gains.coverage[0]:.0%} {within}"
+    if half.beta <= gains.beta:
+        return f"{shown}; one more would add {gains.next_gain:.1%}."
+    return (
+        f"{shown} (to within {half.beta:.1%}, for which they are chosen, of {half.coverage:.0%}); "
+        f"one more, chosen for {gains.beta:.1%} alone, would add {gains.next_gain:.1%}."
+    )
 
 
 def _describe_absence(preparation: Preparation) -> list[str]:

@@ -223,9 +223,11 @@ def _after_marks(workspace: Workspace, video: Video, marks: Annotations) -> str:
         asked = asked_for(workspace, video)
     except KeyreconError:  # none are chosen yet, or their file does not fit: they are chosen anew
         return f"Next: keyrecon keyframes {folder}"
-    left = describe_unmarked(marks, asked)
-    if not left:
+    left, nowhere = describe_unmarked(marks, asked), describe_never_marked(marks)
+    if not left and not nowhere:
         return f"Next: keyrecon run {folder}"
+    if nowhere:  # not even --partial can do without
+        return "\n".join([*([left] if left else []), nowhere, "Next: mark these and import them"])
     return (
         f"{left}\nNext: mark these too and import them, or go on with what there is: keyrecon run "
         f"{folder} --partial"
@@ -290,7 +292,19 @@ def annotated(
             f"Mark them on the page of keyrecon annotate {folder}, or in another tool and keyrecon "
             f"import {folder} FILE, or go on with what there is: keyrecon run {folder} --partial"
         )
+    if nowhere := describe_never_marked(annotations):
+        raise KeyreconError(nowhere)
     return annotations
+
+
+def describe_never_marked(annotations: Annotations) -> str:
+    """Joints that cannot be carried anywhere; empty where there are none."""
+    if not annotations.never_marked:
+        return ""
+    return (
+        f"No marked frame has {', '.join(annotations.never_marked)}; mark each joint on at least "
+        "one keyframe, where it is hidden by the best guess."
+    )
 
 
 def describe_unmarked(annotations: Annotations | None, asked: Keyframes) -> str:
@@ -300,7 +314,8 @@ def describe_unmarked(annotations: Annotations | None, asked: Keyframes) -> str:
         return ""
     named = [f"{frame} ({', '.join(halves)})" for frame, halves in missing.items()]
     return (
-        f"{len(missing)} of {len(asked.frames)} keyframes are not marked yet: frame "
+        f"{len(missing)} of {counted(len(asked.frames), 'keyframe')} "
+        f"{'is' if len(missing) == 1 else 'are'} not marked yet: frame "
         f"{_first_few(named)}."
     )
 

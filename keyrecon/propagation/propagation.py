@@ -20,7 +20,6 @@ from typing import Annotated, Literal
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from keyrecon.body import Skeleton
 from keyrecon.body_models.side_model import SideModel
 from keyrecon.errors import KeyreconError
 from keyrecon.paper.joint_transfer import transfer_joints
@@ -182,7 +181,7 @@ def propagate_joints(
     missing there. Raises KeyreconError when a joint is marked nowhere.
     """
     marked = np.isfinite(annotations.joints).all(axis=2)
-    _require_marks(annotations.skeleton, marked)
+    _require_marks(annotations)
     if options.method == "paper":
         tracks = transfer_joints(preparation, annotations, progress)
         return _with_marks(annotations, annotations.visible, tracks)
@@ -190,13 +189,11 @@ def propagate_joints(
     return _with_marks(annotations, marked, tracks)
 
 
-def _require_marks(skeleton: Skeleton, marked: Bool[np.ndarray, "K J"]) -> None:
-    missing = np.flatnonzero(~marked.any(axis=0))
-    if len(missing):
-        names = ", ".join(skeleton.names[joint] for joint in missing)
+def _require_marks(annotations: Annotations) -> None:
+    if annotations.never_marked:
         raise KeyreconError(
-            f"No marked frame has {names}; mark each joint on at least one keyframe, "
-            "where it is hidden by the best guess."
+            f"No marked frame has {', '.join(annotations.never_marked)}; mark each joint on at "
+            "least one keyframe, where it is hidden by the best guess."
         )
 
 

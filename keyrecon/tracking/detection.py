@@ -186,7 +186,7 @@ def _link(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
     if not (chosen >= 0).any() or (chosen >= 0).mean() < options.detected:
-        raise _missed_head(chosen, numbers)
+        raise missed_head(chosen, numbers, anchors.frames[anchors.marked])
     head = fill_gaps(taken_states(stable, chosen), numbers, from_reference)[:, 0]
     pairs, costs = _pair(candidates, head[numbers], height)
     stable = to_reference_frame([c.feet for c in candidates], searched)
@@ -238,15 +238,23 @@ def head_costs(
     return [head + trunk for head, trunk in zip(round_and_coloured, above_trunk, strict=True)]
 
 
-def _missed_head(chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"]) -> KeyreconError:
-    """The error that says where a head was missed."""
+def missed_head(
+    chosen: Int[np.ndarray, "n"], numbers: Int[np.ndarray, "n"], marked: Int[np.ndarray, "A"]
+) -> KeyreconError:
+    """The error that says where a head was missed; `marked` are the frames of marked bodies."""
     detected = chosen >= 0
     gaps = numbers[~detected]
     middle = int(gaps[len(gaps) // 2])
+    listed = ", ".join(map(str, marked[:8].tolist())) + (" ..." if len(marked) > 8 else "")
+    remedy = (
+        f"look whether the marks on frame {listed} are the player's, and mark another body"
+        if len(marked)
+        else "pick its colour again"
+    )
     return KeyreconError(
-        f"The head was found in only {detected.sum()} of {len(detected)} frames; pick its colour "
-        f"again on a frame where it was missed, for instance frame {middle}. Where the player is "
-        "out of the picture most of the time, lower --find.detected."
+        f"The head was found in only {detected.sum()} of {len(detected)} frames; {remedy} on a "
+        f"frame where it was missed, for instance frame {middle}. Where the player is out of the "
+        "picture most of the time, lower --find.detected."
     )
 
 

@@ -84,9 +84,14 @@ def test_an_address_answers_only_under_the_names_it_is_reached_by():
             credentials = address.make_credentials(listener, host)
             assert credentials.hosts[0] == f"{first}:{port}"
             assert f"localhost:{port}" in credentials.hosts
-            for taken in (port, 99_999):
-                with pytest.raises(KeyreconError, match="choose another --port"):
-                    address.listen(host, taken)
+            with pytest.raises(KeyreconError, match="choose another --port"):
+                address.listen(host, port)
+
+
+@pytest.mark.parametrize("port", [-1, 65_536, 99_999])
+def test_a_port_that_there_is_not_is_told_with_those_there_are(port):
+    with pytest.raises(KeyreconError, match=f"--port cannot be {port}; .* from 1 to 65535, or non"):
+        address.listen("127.0.0.1", port)
 
 
 @pytest.mark.parametrize(

@@ -349,6 +349,10 @@ def test_a_link_to_the_video_is_the_video(project):
     assert_refused(project, "p/overlay.mp4", match="belongs to the project")
 
 
+def test_a_name_without_a_suffix_is_told_in_plain_words(project):
+    assert_refused(project, "motion", match=r"motion has no suffix, .* add one of \.bvh, .*\.trc\.")
+
+
 def test_one_name_that_cannot_be_keeps_all_from_being_written(project):
     assert_refused(project, "a.bvh", "b.xyz", match=r"no export to '.xyz'; use .*\.mp4")
     assert_refused(project, "a.bvh", "nowhere/b.trc", match="There is no folder .*nowhere")

@@ -80,7 +80,7 @@ def test_what_comes_after_an_import_is_what_the_project_can_do(tmp_path, step):
 
 def test_an_import_that_leaves_keyframes_unmarked_names_them(tmp_path):
     text, workspace = import_body(tmp_path, False, [5, 8])
-    assert "1 of 2 keyframes are not marked yet: frame 8 (upper body, lower body).\n" in text
+    assert "1 of 2 keyframes is not marked yet: frame 8 (upper body, lower body).\n" in text
     assert text.endswith(f"keyrecon run {workspace.folder} --partial")
 
 

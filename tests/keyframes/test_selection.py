@@ -13,6 +13,7 @@ from keyrecon.keyframes.selection import (
     KeyframeOptions,
     choose_keyframes,
     count_labels,
+    half_distances,
 )
 from keyrecon.keyframes.swaps import CoverageGoal, swap_for_coverage
 
@@ -178,6 +179,10 @@ def test_a_damaged_keyframes_json_says_what_is_wrong(comparison, tmp_path):
         ({"n_frames": 12}, "outside"),
         ({"T": -5}, "'T' cannot be -5"),
         ({"T": 2.5}, "2.5 is not a whole number"),
+        ({"beta": None}, "'beta' tells nothing of upper"),
+        ({"coverage": {"upper": 1.0, "lower": None}}, "'coverage' tells nothing of lower"),
+        ({"upper": None}, "a value is missing or of another kind"),
+        ({"gains": [1]}, "a value is missing or of another kind"),
         ({"alpha": float("nan")}, "NaN is not a number"),
         ({"represented": {"upper": [[0, 900]], "lower": []}}, "frames 0 to 900"),
     ):
@@ -284,6 +289,22 @@ def test_the_next_mark_brings_what_one_more_keyframe_adds(comparison):
     every = choose_keyframes(comparison, 50.0, KeyframeOptions(beta_upper=0.0005, beta_lower=0.05))
     assert every.upper.gains is not None
     assert every.upper.gains.next_gain < few.gains.next_gain
+
+
+def test_the_next_mark_is_the_best_of_all_tried_one_by_one(comparison):
+    half = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.01)).upper
+    options = KeyframeOptions()
+    goal = half_distances(comparison, comparison.upper, 0, 10, options).sufficient_goal
+    rows = comparison.row[half.frames].tolist()
+
+    def covered(chosen):
+        represented = goal.hoods.union(chosen)
+        represented[comparison.frames[chosen]] = True
+        return 1 - goal.left_over(represented) / len(represented)
+
+    tried = [covered([*rows, row]) for row in range(len(comparison.frames))]
+    assert half.gains.next_gain == pytest.approx(max(tried) - covered(rows))
+    assert half.gains.coverage[-1] == pytest.approx(covered(rows))
 
 
 def test_a_video_of_a_few_frames_can_be_marked_without_naming_a_budget():

@@ -18,6 +18,7 @@ from keyrecon.io.durable import write_durably
 from keyrecon.reading import parse_json, read_text
 
 SECRET_LENGTH = 40
+LAST_PORT = 65_535
 """Secrets shorter than this were not made here."""
 
 
@@ -49,10 +50,15 @@ def remember(file: Path, credentials: Credentials) -> None:
 
 
 def listen(host: str, port: int, memory: LastAddress = LastAddress()) -> socket.socket:
-    """A listening socket; KeyreconError where the port is taken.
+    """A listening socket; KeyreconError where the port is taken, or there is no such port.
 
     Without a port the last one is used again if it is free.
     """
+    if not 0 <= port <= LAST_PORT:
+        raise KeyreconError(
+            f"--port cannot be {port}; it is a whole number from 1 to {LAST_PORT}, or none for any "
+            "that is free."
+        )
     if not port and memory.port:
         with suppress(KeyreconError):
             return _bind(host, memory.port)

@@ -63,6 +63,11 @@ def check_suffix(path: Path, more: tuple[str, ...] = ()) -> None:
     """Raise KeyreconError for a file whose suffix is neither ours nor one of `more`."""
     known, suffix = (*SUFFIXES, *more), path.suffix.lower()
     if suffix not in known:
+        if not suffix:
+            raise KeyreconError(
+                f"{path} has no suffix, which would tell the format; add one of "
+                f"{', '.join(sorted(known))}."
+            )
         way = ELSEWHERE.get(suffix, f"use {', '.join(sorted(known))}")
         raise KeyreconError(f"{path}: there is no export to '{path.suffix}'; {way}.")
 

@@ -111,8 +111,8 @@ def _method(data: dict[str, Any]) -> str:
 def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
     n_frames = _at_least(1, whole(data["n_frames"]), "n_frames")
     frames = np.array([whole(frame) for frame in data[name]], dtype=np.int64)
-    nearest = np.array([whole(frame) for frame in data["nearest"][name]], dtype=np.int64)
-    distance = np.array([inf if v is None else real(v) for v in data["distance"][name]])
+    nearest = np.array([whole(frame) for frame in _of_half(data, "nearest", name)], dtype=np.int64)
+    distance = np.array([inf if v is None else real(v) for v in _of_half(data, "distance", name)])
     if not len(frames) or (np.diff(frames) <= 0).any():
         raise ValueError(f"'{name}' must list frame numbers in ascending order")
     if frames[0] < 0 or frames[-1] >= n_frames:
@@ -124,13 +124,20 @@ def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
     return HalfKeyframes(
         frames=frames,
         nearest=nearest,
-        represented=_from_stretches(data["represented"][name], n_frames),
-        coverage=_share(data["coverage"][name], "coverage"),
-        beta=real(data["beta"][name]),
+        represented=_from_stretches(_of_half(data, "represented", name), n_frames),
+        coverage=_share(_of_half(data, "coverage", name), "coverage"),
+        beta=real(_of_half(data, "beta", name)),
         distance=distance,
-        printed_count=_at_least(0, whole(data["printed_count"][name]), "printed_count"),
+        printed_count=_at_least(0, whole(_of_half(data, "printed_count", name)), "printed_count"),
         gains=_gains(data.get("gains", {}).get(name), frames, name),
     )
+
+
+def _of_half(data: dict[str, Any], key: str, name: str) -> Any:
+    """What is told of one half under a key."""
+    if not isinstance(data[key], dict) or data[key].get(name) is None:
+        raise ValueError(f"'{key}' tells nothing of {name}")
+    return data[key][name]
 
 
 def _gains(
