@@ -9,10 +9,10 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from queue import LifoQueue
-from threading import Event, Thread, local
+from threading import Lock, Thread, local
 
 from keyrecon.io.stage_tasks import StageTask, carry_out
 from keyrecon.numerics.threads import share_cores
@@ -23,12 +23,25 @@ class LocalProcesses:
 
     def __init__(self, count: int) -> None:
         """So many at most."""
-        self.closed = Event()
-        self._count = count
+        self._all = [_Process(count) for _ in range(count)]
         self._idle: LifoQueue[_Process] = LifoQueue()  # the last one has its libraries read
-        for _ in range(count):
-            self._idle.put(_Process(count, self.closed))
+        for process in self._all:
+            self._idle.put(process)
         self._own = local()
+
+    def close(self) -> None:
+        """Begin none any more."""
+        for process in self._all:
+            process.close()
+
+    def wait(self) -> None:
+        """Return when all have ended, and what kept watch over them.
+
+        Python wakes such watches when the program ends, without a look at whether one is just about
+        to close what it is woken by: then a traceback would follow what the program said last.
+        """
+        for process in self._all:
+            process.let_go()
 
     @contextmanager
     def turn(self) -> Iterator[None]:
@@ -58,31 +71,45 @@ class LocalProcesses:
 class _Process:
     """One process, or none yet."""
 
-    def __init__(self, count: int, closed: Event) -> None:
-        """One of so many; none is begun any more when they are closed."""
-        self._count, self._closed = count, closed
+    def __init__(self, count: int) -> None:
+        """One of so many."""
+        self._count, self._closed = count, False
         self._pool: ProcessPoolExecutor | None = None
+        self._changing = Lock()
 
     def carry_out(self, task: StageTask) -> float:
         """Have a task done, a second time where the process is lost on the way."""
         try:
-            return self._begun().submit(carry_out, task).result()
+            return self._submit(task).result()
         except BrokenExecutor:
-            self._pool = None
+            self.let_go()
         try:
-            return self._begun().submit(carry_out, task).result()
+            return self._submit(task).result()
         except BrokenExecutor:
-            self._pool = None
+            self.let_go()
             raise
 
-    def _begun(self) -> ProcessPoolExecutor:
-        if self._closed.is_set():
-            raise BrokenExecutor("closed")
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                1, multiprocessing.get_context("spawn"), _begin, (self._count,)
-            )
-        return self._pool
+    def _submit(self, task: StageTask) -> Future[float]:
+        with self._changing:
+            if self._closed:
+                raise BrokenExecutor("closed")
+            if self._pool is None:
+                self._pool = ProcessPoolExecutor(
+                    1, multiprocessing.get_context("spawn"), _begin, (self._count,)
+                )
+            return self._pool.submit(carry_out, task)
+
+    def close(self) -> None:
+        """Begin it no more."""
+        with self._changing:
+            self._closed = True
+
+    def let_go(self) -> None:
+        """Wait until the process, which has been ended, is gone."""
+        with self._changing:
+            if self._pool is not None:
+                self._pool.shutdown()
+            self._pool = None
 
 
 def _begin(count: int) -> None:
@@ -112,7 +139,8 @@ def local_processes(count: int) -> Iterator[LocalProcesses]:
     try:
         yield processes
     finally:
-        processes.closed.set()
+        processes.close()
         for process in multiprocessing.active_children():
             if process not in others:
                 process.terminate()  # what it does nobody waits for any more
+        processes.wait()

@@ -3,7 +3,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from processes import is_running, needs_proc
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io import workers as io_workers
+from keyrecon.io.local_workers import local_processes
 from keyrecon.io.stages import StageStore
 from keyrecon.io.workers import open_workers
 from keyrecon.keyframes.selection import KeyframeOptions, count_labels
@@ -95,6 +98,35 @@ def test_where_nothing_is_said_only_shots_are_given_away(tmp_path, monkeypatch):
         [of_shot] = store.each(lambda n: store.keep(f"p@{n}", own_process, n), [1])
         assert of_shot != os.getpid()
     assert not still_there([of_shot])
+
+
+def test_nothing_of_a_pool_is_left_when_a_refusal_leaves_the_program(tmp_path):
+    """What is left would be woken at the end of the program, maybe as it closes what wakes it."""
+    before = {*threading.enumerate()}
+    with (
+        pytest.raises(KeyreconError, match="--budget is a share"),
+        open_workers("1") as workers,
+    ):
+        store = StageStore(tmp_path, workers=workers)
+        store.keep("labels", count_labels, KeyframeOptions(budget=2.0), 100, 25.0)
+    assert {*threading.enumerate()} <= before
+
+
+def test_nothing_is_left_of_a_pool_whose_process_was_lost(tmp_path):
+    before = {*threading.enumerate()}
+    with open_workers("1") as workers:
+        StageStore(tmp_path / "c", workers=workers).keep("l", die_once, str(tmp_path / "trace"))
+    assert {*threading.enumerate()} <= before
+
+
+def test_no_process_is_begun_any_more_when_they_are_closed(tmp_path):
+    task = StageStore(tmp_path)._task(tmp_path / "a.npz", frames_before, (FRAMES, 12), {})
+    before = multiprocessing.active_children()
+    with local_processes(1) as processes:
+        pass
+    with pytest.raises(BrokenExecutor):
+        processes.carry_out(task)
+    assert multiprocessing.active_children() == before
 
 
 def test_of_what_takes_much_memory_two_are_worked_on_at_a_time(monkeypatch):
