@@ -46,7 +46,7 @@ from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.project_videos import relative_path
-from keyrecon.io.provenance import golf_evidence, note_fitted
+from keyrecon.io.provenance import forget_run, golf_evidence, note_fitted
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.work_lock import hold_folder
 from keyrecon.io.workspace import GOLF, Workspace
@@ -319,6 +319,7 @@ def write_results(
         workspace.report_file, swing, fit.fitted, fit.observations, model, video, progress
     )
     write_golf_table(folder / TABLE_FILE, swing)
+    forget_run(workspace)
     write_swing(workspace.motion_file, swing)
 
 

@@ -15,7 +15,7 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.hyperextension import hyperextended_stretches
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
-from keyrecon.io.provenance import RunNotes, marks_evidence, note_run
+from keyrecon.io.provenance import RunNotes, motion_evidence, note_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import list_stretches, listed_stretches
@@ -78,7 +78,7 @@ def run(
     video = workspace.video()
     if options.lift.field_of_view is None and (lens := known_lens(workspace, video)):
         options = with_field_of_view(options, degrees_across(lens, video))
-    evidence = marks_evidence(workspace)
+    evidence = motion_evidence(workspace, given, Options())
     asked = asked_for(workspace, video)
     annotations = annotated(workspace, video, asked, partial)
     with workspace.remembering(given, Options()):

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from keyrecon.io.durable import write_durably
+from keyrecon.io.option_tables import OptionRecord, changed_options
 from keyrecon.io.workspace import Workspace
 from keyrecon.reading import parse_json, read_text
 
@@ -25,7 +26,7 @@ class RunNotes:
     """What is kept of the run that made the motion."""
 
     evidence: str
-    """Digest of the marks that it was made from."""
+    """Digest of what it was made from."""
     doubts: tuple[str, ...]
     """What spoke against the track, line by line."""
     advice: tuple[str, ...] = ()
@@ -33,8 +34,28 @@ class RunNotes:
 
 
 def marks_evidence(workspace: Workspace) -> str:
-    """A digest of all joints that a person marked."""
+    """A digest of all joints that a person marked: what older versions noted of a run."""
     return _digest([_parts_of(workspace.annotations_file, ("annotations",))])
+
+
+def motion_evidence(workspace: Workspace, options: OptionRecord, defaults: OptionRecord) -> str:
+    """A digest of all that a person told a run: marks, keyframes, picks, frames of videos, and the
+    options that are not as usual.
+
+    Where a video lies tells nothing, nor does the order of clicks.
+    """
+    (picks,) = _parts_of(workspace.picks_file, ("picks",))
+    videos = [{n: v for n, v in table.items() if n != "path"} for table in workspace.videos]
+    changed = changed_options(options, defaults)
+    return _digest(
+        [
+            _parts_of(workspace.annotations_file, ("annotations",)),
+            _parts_of(workspace.keyframes_file, ("upper", "lower")),
+            sorted(_digest([pick]) for pick in picks) if isinstance(picks, list) else [],
+            videos,
+            {name: float(v) if type(v) is int else v for name, v in changed.items()},
+        ]
+    )
 
 
 def golf_evidence(workspace: Workspace) -> str:
@@ -62,6 +83,11 @@ def read_run(workspace: Workspace) -> RunNotes | None:
         return RunNotes(str(noted["evidence"]), *lines)
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None
+
+
+def forget_run(workspace: Workspace) -> None:
+    """Drop what was kept of the run, whose motion gives place to another."""
+    _run_file(workspace).unlink(missing_ok=True)
 
 
 def note_fitted(workspace: Workspace, evidence: str) -> None:

@@ -216,7 +216,7 @@ class Workspace:
         return cls(folder)
 
     @property
-    def _videos(self) -> list[dict]:
+    def videos(self) -> list[dict]:
         """What project.toml tells of each video."""
         return [self.project["video"], *self.project.get("added", [])]
 
@@ -225,7 +225,7 @@ class Workspace:
 
         Raises KeyreconError where one is gone, or has changed since.
         """
-        return open_project_video(self.folder, self._videos)
+        return open_project_video(self.folder, self.videos)
 
     def add_video(self, file: Path, trim: dict) -> Video:
         """Go on with another file behind those that are there; returns all together.
@@ -236,7 +236,7 @@ class Workspace:
             file, trim.get("start", 0), trim.get("end"), trim.get("slow_motion", 1.0)
         )
         table = describe_video(alone, file, self.folder, trim)
-        if any(shares_frames(table, present) for present in self._videos):
+        if any(shares_frames(table, present) for present in self.videos):
             raise KeyreconError(f"Frames of {file} are in the project already.")
         together = join_videos([self.video(), alone])
         with self.exclusive():
@@ -246,7 +246,7 @@ class Workspace:
 
     def relink(self, video_file: Path) -> None:
         """Point the project at the place that a video of it has moved to."""
-        number = which_video(self._videos, video_file)
+        number = which_video(self.videos, video_file)
         with self.exclusive():
             place = relative_path(video_file, self.folder)
             write_durably(self.project_file, with_video_path(self.project_file, place, number))
@@ -352,13 +352,13 @@ class Workspace:
     def kept_files(self) -> list[Path]:
         """Files of `KEPT`, and the videos."""
         files = [file for name in KEPT for file in self.folder.glob(name)]
-        places = possible_places(self.folder, self._videos)
+        places = possible_places(self.folder, self.videos)
         return files + [file for file in places if file.is_file()]
 
     def needs(self, file: Path) -> bool:
         """Whether a file's place is one of the project's own, whether there is a file or not."""
         inside = file.parent.exists() and file.parent.samefile(self.folder)
-        videos = [(self.folder / table["path"]).resolve() for table in self._videos]
+        videos = [(self.folder / table["path"]).resolve() for table in self.videos]
         return (
             (inside and file.name.lower() in OWN_NAMES)
             or file.resolve() in videos

@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -11,12 +12,12 @@ from small_swing import QUICK, count_decoded, fit
 
 from keyrecon.app import golf as app
 from keyrecon.app.exporting import export
-from keyrecon.app.golf import fit_file, fit_video
+from keyrecon.app.golf import GolfFit, fit_file, fit_video
 from keyrecon.app.golf_comparing import compare
 from keyrecon.app.project import start
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.records import NO_MARKS, SwingMarks
+from keyrecon.golf.records import NO_MARKS, MotionModel, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.clicks import read_clicks
 from keyrecon.io.formats.golf_marks import write_golf_marks
@@ -24,8 +25,9 @@ from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import read_swing
 from keyrecon.io.held_video import mirror_video
+from keyrecon.io.provenance import RunNotes, note_run, read_run
 from keyrecon.io.stages import StageStore
-from keyrecon.io.video import open_video
+from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.lifting.lifting import LiftOptions
@@ -145,6 +147,19 @@ def test_an_interrupted_fit_goes_on_where_it_stopped(swing, tmp_path):
     assert result.is_file() and all(f.stat().st_mtime_ns == at for f, at in before.items())
     ours, theirs = (read_motion(f / "motion.npz") for f in (project, swing / "project"))
     assert np.array_equal(ours.points3d, theirs.points3d)
+
+
+def test_a_fit_forgets_what_was_noted_of_the_run_whose_motion_it_replaces(bare, monkeypatch):
+    (bare / "cache").mkdir()
+    note_run(Workspace(bare), RunNotes("of another motion", ("The player found jumps",)))
+    writers = ("record_swing", "write_golf_overlay", "write_golf_report", "write_golf_table")
+    for name in (*writers, "write_swing"):
+        monkeypatch.setattr(app, name, lambda *_: None)
+    inputs = [MagicMock() for _ in range(3)]
+    for made_up, kind in zip(inputs, (Video, GolfFit, MotionModel), strict=True):
+        made_up.__class__ = kind
+    app.write_results(Workspace(bare), *inputs, silent)
+    assert read_run(Workspace(bare)) is None
 
 
 def test_a_project_of_another_video_is_left_alone(swing, tmp_path):

@@ -8,11 +8,13 @@ from keyrecon.io.provenance import (
     RunNotes,
     is_fitted,
     marks_evidence,
+    motion_evidence,
     note_fitted,
     note_run,
     read_run,
 )
 from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options
 
 
 @pytest.fixture
@@ -33,6 +35,68 @@ def test_marks_written_anew_in_other_bytes_are_the_same_evidence(workspace):
     assert marks_evidence(workspace) == before
     write_marks(workspace, [{"id": 1, "keypoints": [1, 3, 2]}])
     assert marks_evidence(workspace) != before
+
+
+PROJECT = """[video]
+path = "v.mp4"
+fingerprint = "x"
+
+[options]
+lift.height = 2
+"""
+FILES = {
+    "project.toml": PROJECT,
+    "keyframes.json": '{"upper": [3], "lower": [3, 9], "nearest": {}}',
+    "picks.json": '{"picks": [{"frame": 0, "part": "head"}, {"frame": 3, "part": "foot"}]}',
+}
+
+
+def evidence(folder, name="project.toml", text=PROJECT):
+    """What a run of a project is made from, with one of its files written so."""
+    for file in FILES:
+        (folder / file).write_text(text if file == name else FILES[file])
+    workspace = Workspace(folder)
+    return motion_evidence(workspace, workspace.options(Options(), Options()), Options())
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("keyframes.json", '"upper": [3]', '"upper": [4]'),
+        ("keyframes.json", '"lower": [3, 9]', '"lower": [9]'),
+        ("picks.json", '"frame": 3', '"frame": 4'),
+        ("project.toml", "[options]", '[[added]]\npath = "w.mp4"\nfingerprint = "y"\n[options]'),
+        ("project.toml", "\n\n", "\nend = 20\n\n"),
+        ("project.toml", "height = 2", "height = 1.9"),
+        ("project.toml", "[options]", '[options]\nshots.skip = "2"'),
+    ],
+)
+def test_whatever_a_motion_is_made_of_is_its_evidence(bare, name, old, new):
+    assert evidence(bare, name, FILES[name].replace(old, new)) != evidence(bare)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("keyframes.json", '"nearest": {}', '"T": 10'),
+        (
+            "picks.json",
+            FILES["picks.json"],
+            json.dumps(
+                {
+                    "picks": [
+                        {"frame": 3, "part": "foot"},
+                        {"frame": 0, "part": "head"},
+                    ]
+                }
+            ),
+        ),
+        ("project.toml", "v.mp4", "elsewhere/v.mp4"),
+        ("project.toml", "height = 2", "height = 2.0\ngolf.candidates = 2"),
+    ],
+)
+def test_what_changes_no_motion_is_no_evidence(bare, name, old, new):
+    assert evidence(bare, name, FILES[name].replace(old, new)) == evidence(bare)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"[" * 100_000, b"1e999", b"{"])

@@ -7,6 +7,7 @@ is left out, and points in space have the camera's axes in body heights.
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,9 +45,11 @@ from keyrecon.annotate.assist.shot_strip import choose_shot, describe_shots
 from keyrecon.annotate.assist.side_checks import evidence_of_motion
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
+from keyrecon.errors import KeyreconError
 from keyrecon.hyperextension import HyperextendedStretch, hyperextended_stretches
+from keyrecon.io.provenance import motion_evidence
 from keyrecon.io.workspace import Workspace
-from keyrecon.pipeline import frames_to_mark, marked_frames
+from keyrecon.pipeline import Options, frames_to_mark, marked_frames
 from keyrecon.records import Annotations, Pick
 from keyrecon.uncertainty import UncertainStretch, uncertain_stretches, unsure_track
 
@@ -60,6 +63,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
     return Assistant(
         keyframes=partial(describe_keyframes, cache),
         bodies=partial(describe_bodies, cache),
+        evidence=partial(evidence_of_project, workspace.folder),
         suggestion=partial(describe_suggestion, cache),
         pose=partial(describe_pose, cache),
         checks=partial(describe_checks, cache),
@@ -126,6 +130,16 @@ def describe_bodies(cache: ProjectCache) -> list[Json] | None:
     track = preparation.track
     frames = frames_to_mark(preparation, marked, MORE_BODIES)
     return [{"frame": int(t), "box": _rounded(track.box[t], 1)} for t in frames]
+
+
+def evidence_of_project(folder: Path) -> str | None:
+    """What a motion would be made from now; None while the options cannot be read."""
+    try:
+        workspace = Workspace(folder)
+        options = workspace.options(Options(), Options())
+    except KeyreconError:  # the next step that needs them says what is wrong
+        return None
+    return motion_evidence(workspace, options, Options())
 
 
 def describe_suggestion(cache: ProjectCache, annotations: Annotations, frame: int) -> Json:

@@ -176,20 +176,24 @@ def _describe_lens(workspace: Workspace, video: Video) -> Json | None:
     return {"degrees": degrees_across(lens, video), "told_by": told_by}
 
 
-def describe_run(workspace: Workspace, revision: int) -> Json:
+def describe_run(
+    workspace: Workspace, revision: int, evidence: Callable[[], str | None] | None
+) -> Json:
     """What spoke against the track when the motion was made and what would make it better, in the
-    words of the page, and whether it was made from the marks as they are now (true where that is
-    not known).
+    words of the page, and whether it was made from marks, keyframes, picks, videos and options as
+    they are now (true where that is not known). `evidence` tells what one would be made from now;
+    notes of former versions know of the marks alone.
 
     `revision` is that of the marks before their files are read: newer marks are not vouched for.
     """
     notes = read_run(workspace)
     if notes is None:
         return {"doubts": [], "advice": [], "is_current": True, "revision": revision}
+    now = None if evidence is None else evidence()
     return {
         "doubts": [in_page_words(line) for line in notes.doubts],
         "advice": [in_page_words(line) for line in notes.advice],
-        "is_current": notes.evidence == marks_evidence(workspace),
+        "is_current": notes.evidence in (now, marks_evidence(workspace)),
         "revision": revision,
     }
 

@@ -211,8 +211,9 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
 
 
 def run(session: Session, request: ApiRequest) -> Json:
-    """Whether the motion was made from the marks as they are."""
-    return describe_run(session.workspace, session.store.state.revision)
+    """Whether the motion was made from marks, keyframes and options as they are."""
+    evidence = session.assistant.evidence
+    return describe_run(session.workspace, session.store.state.revision, evidence)
 
 
 def swing(session: Session, request: ApiRequest) -> Json:

@@ -83,7 +83,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     shell.startJob("run", { height: height.metres, field_of_view: fov.degrees });
   }
 
-  // Whether the motion was made from the marks as they are.
+  // Whether the motion was made from the marks, keyframes and options as they are.
   function showsMarks() {
     const made = shownMarks(model.project);
     return made !== null && model.marksAreOf(made);
@@ -191,7 +191,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const left = open
       ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
       : "All keyframes are marked.";
-    if (exists() && !showsMarks()) return ["Not yet in the motion", `Marks changed since it was made. ${left}`];
+    if (exists() && !showsMarks()) return ["Not yet in the motion", `What it was made from has changed since. ${left}`];
     if (exists()) return ["The motion is made", left];
     if (open < keyframes.length) return ["Make the motion", left];
     return [
