@@ -15,6 +15,7 @@ from jaxtyping import Bool, Int
 
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.coco import coco_text, read_coco
+from keyrecon.io.formats.picks import write_picks
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
@@ -59,6 +60,8 @@ class ProjectPreparation:
     """Clicks without which the player was found more surely: they were left out."""
     doubtful: tuple[Pick, ...] = ()
     """Clicks that lie off the track, which is no surer without them."""
+    used_picks: tuple[Pick, ...] = ()
+    """Clicks that the automatic part was made with."""
     marks: Annotations | None = None
     picks: tuple[Pick, ...] = ()
 
@@ -284,7 +287,9 @@ def prepare_project(
     if marks is not None and not np.isfinite(marks.joints).any():
         marks = None  # a file without a mark tells nothing
     if options.track.method == "paper" and workspace.picks_file.is_file():
-        return _without_misplaced(workspace, video, options, None, progress)
+        prepared = _without_misplaced(workspace, video, options, None, progress)
+        write_picks(workspace.prepared_picks_file, prepared.used_picks)
+        return prepared
     file = workspace.prepared_marks_file
     used = _marks_used_before(workspace, video, marks)
     if used is None and marks is not None and not workspace.picks_file.is_file():
@@ -296,6 +301,7 @@ def prepare_project(
     if used is not None:
         size = (video.width, video.height)
         write_durably(file, coco_text(used, size).encode())
+    write_picks(workspace.prepared_picks_file, prepared.used_picks)
     return _with_told(workspace, prepared, marks)
 
 
@@ -346,19 +352,20 @@ def _without_misplaced(
     first = prepare(video, picks, options, keep, progress, marks)
     off = misplaced_picks(first, picks)
     if options.track.method == "paper":
-        return ProjectPreparation(first, doubtful=tuple(off))
+        return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
     tried: list[list[Pick]] = [[]]
-    track = first
+    track, others = first, picks
     while off not in tried:  # a track that one click misled may miss others, which come back
         tried.append(off)
         others = [pick for pick in picks if pick not in off]
         if marks is None and not {"head", "foot"} <= {pick.part for pick in others}:
-            return ProjectPreparation(first, doubtful=tuple(off))
+            return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
         track = prepare(video, others, options, keep, progress, marks)
         off = misplaced_picks(track, picks)
     if track.track.confidence.mean() < first.track.confidence.mean() - AS_SURE:
-        return ProjectPreparation(first, doubtful=tuple(misplaced_picks(first, picks)))
-    return ProjectPreparation(track, set_aside=tuple(off))
+        off = misplaced_picks(first, picks)
+        return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
+    return ProjectPreparation(track, set_aside=tuple(off), used_picks=tuple(others))
 
 
 def misplaced_picks(preparation: Preparation, picks: Sequence[Pick]) -> list[Pick]:

@@ -134,6 +134,11 @@ class Workspace:
         return self.folder / "cache" / "prepared_marks.json"
 
     @property
+    def prepared_picks_file(self) -> Path:
+        """Picks that the automatic part was last made with: those left aside are not among them."""
+        return self.folder / "cache" / "prepared_picks.json"
+
+    @property
     def motion_file(self) -> Path:
         """motion.npz"""
         return self.folder / "motion.npz"

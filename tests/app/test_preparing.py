@@ -1,10 +1,12 @@
 """What the automatic part tells of the shots of a video and of the track."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from page_project import write_numbered_video
 
+from keyrecon.annotate.assist import project_cache
 from keyrecon.app import preparing, project
 from keyrecon.app.annotator import _contradictions
 from keyrecon.app.preparing import (
@@ -22,6 +24,7 @@ from keyrecon.records import (
     PLAYER,
     Annotations,
     CameraPath,
+    Pick,
     Preparation,
     Shots,
     Track,
@@ -169,3 +172,29 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypa
     assert abs(prepare_with({2: 50, 9: 60}) - 55) < 5
     prepare_with({2: 50, 5: 54, 9: 60})
     assert used == [[2, 6, 9], [2, 9], [2, 9]]  # what is added in place changes nothing
+
+
+def test_the_page_recalls_the_track_that_was_made_without_the_misplaced_clicks(
+    tmp_path, monkeypatch
+):
+    project.start(write_numbered_video(tmp_path / "v.mp4"), tmp_path / "p")
+    workspace = Workspace(tmp_path / "p")
+    workspace.stages.folder.mkdir()
+    wrong, right = Pick(9, "head", 90.0, 5.0), [(0, "head", 10.0, 9.0), (0, "foot", 8.0, 40.0)]
+    workspace.add_picks([wrong, *(Pick(*click) for click in right)])
+
+    def prepare(video, picks, *_, **__):
+        made = object.__new__(Preparation)
+        sure = np.full(len(video), 0.77 if wrong in picks else 0.99)
+        object.__setattr__(made, "track", SimpleNamespace(confidence=sure, clicks=[*picks]))
+        return made
+
+    for module in (preparing, project_cache):
+        monkeypatch.setattr(module, "prepare", prepare)
+    monkeypatch.setattr(preparing, "misplaced_picks", lambda *_: [wrong])
+    made = preparing.prepare_project(workspace, workspace.video(), None, Options(), silent)
+    assert made.set_aside == (wrong,)
+    page = project_cache.ProjectCache(workspace)
+    assert page._prepared().track.clicks == made.preparation.track.clicks
+    workspace.add_picks([Pick(5, "foot", 12.0, 40.0)])  # whoever clicks on still has that help
+    assert page._prepared().track.clicks == made.preparation.track.clicks

@@ -1,9 +1,9 @@
 """What the annotator keeps of a project: results of the stages, and what follows from the marks.
 
-Everything is loaded when it is first asked for and again when its file has changed. Suggestions are
-kept by the marks they depend on, so that an edit makes only those anew that it touches. The body is
-estimated in a thread of its own: an answer about a pose takes the latest estimate there is, and
-waits only for the first.
+Everything is loaded when it is first asked for and again when its file has changed; what follows
+from the automatic part is dropped when that was made anew. Suggestions are kept by the marks they
+depend on, so that an edit makes only those anew that it touches. The body is estimated in a thread
+of its own: an answer about a pose takes the latest estimate there is, and waits only for the first.
 """
 
 import hashlib
@@ -37,6 +37,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.coco import read_coco
 from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.formats.motion_file import read_motion
+from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, prepare
@@ -67,6 +68,44 @@ class LatestResult(Generic[Key, Value]):
             return kept[1]
 
 
+class _Derived:
+    """What follows from one preparation and the marks."""
+
+    def __init__(self, preparation: Preparation) -> None:
+        """Nothing was asked for yet."""
+        self.preparation = preparation
+        self.suggestions: dict[int, tuple[str, PoseSuggestion]] = {}
+        self.estimating: tuple[str, Future[BodyEstimate]] | None = None
+        self.body: BodyEstimate | None = None
+        self.neighbours: LatestResult[str, tuple[Neighbours, ...]] = LatestResult(
+            lambda _, annotations: find_neighbours(preparation, annotations)
+        )
+        self.appearance: LatestResult[str, MarkAppearance | None] = LatestResult(
+            lambda _, annotations: self._compare_appearance(annotations)
+        )
+        self._features: PlayerFeatures | None = None
+
+    def _compare_appearance(self, annotations: Annotations) -> MarkAppearance | None:
+        """Only frames that were not described yet are read. One thread at a time is here."""
+        preparation = self.preparation
+        body_frame = scene_of(preparation, annotations).body_frame
+        self._features = describe_frames(
+            preparation, body_frame, annotations.frames, self._features
+        )
+        return compare_appearance(preparation, body_frame, annotations, self._features)
+
+    def estimate_body(self, annotations: Annotations) -> BodyEstimate:
+        """From marks, and from such suggestions as there are where half of the body is marked."""
+        suggestions = {frame: one for frame, (_, one) in [*self.suggestions.items()]}
+        video, track = self.preparation.video, self.preparation.track
+        return estimate_body(annotations, suggestions, track.height, video.fps)
+
+    def is_latest(self, key: str) -> bool:
+        """Whether no other marks came since."""
+        estimating = self.estimating
+        return estimating is None or estimating[0] == key
+
+
 class ProjectCache:
     """One project; safe to ask from several threads."""
 
@@ -76,16 +115,7 @@ class ProjectCache:
         self._lock = RLock()
         self._worker = ThreadPoolExecutor(1)
         self._loaded: dict[str, _Loaded] = {}
-        self._suggestions: dict[int, tuple[str, PoseSuggestion]] = {}
-        self._estimating: tuple[str, Future[BodyEstimate]] | None = None
-        self._body: BodyEstimate | None = None
-        self._neighbours: LatestResult[str, tuple[Neighbours, ...]] = LatestResult(
-            lambda _, *inputs: find_neighbours(*inputs)
-        )
-        self._appearance: LatestResult[str, MarkAppearance | None] = LatestResult(
-            lambda _, *inputs: self._compare_appearance(*inputs)
-        )
-        self._described: tuple[Preparation | None, PlayerFeatures | None] = None, None
+        self._derived: _Derived | None = None
         self._colors: LatestResult[tuple[Pick, ...], Colors] = LatestResult(
             lambda picks: learn_colors(self.video, picks)
         )
@@ -98,11 +128,23 @@ class ProjectCache:
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""
         workspace = self._workspace
-        known = workspace.keyframes_file, workspace.prepared_marks_file, workspace.picks_file
-        files = tuple(file for file in known if file.exists())
-        if not {workspace.keyframes_file, workspace.prepared_marks_file} & {*files}:
+        made = workspace.keyframes_file, workspace.prepared_marks_file
+        noted = workspace.prepared_picks_file
+        picks = noted if noted.is_file() else workspace.picks_file
+        files = tuple(file for file in (*made, picks) if file.exists())
+        if not {*made} & {*files}:
             return None
         return self._load("preparation", files, self._prepared)
+
+    def _from_preparation(self) -> _Derived | None:
+        """What follows from the automatic part, nothing of which outlives it."""
+        preparation = self.preparation()
+        with self._lock:
+            if preparation is None:
+                return None
+            if self._derived is None or self._derived.preparation is not preparation:
+                self._derived = _Derived(preparation)
+            return self._derived
 
     def prepared_bodies(self) -> Int[np.ndarray, "n"]:
         """Frames with the whole bodies that the player was followed with."""
@@ -135,97 +177,65 @@ class ProjectCache:
 
     def suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
         """Where the joints of a frame probably are; None while nothing else is annotated."""
-        preparation = self.preparation()
-        if preparation is None:
-            return None
-        sources = choose_sources(preparation, annotations, frame)
-        if not len(sources.frames):
-            return None
-        marks, video = _marks_of(annotations, frame), preparation.video
-        near = nearest_marks(annotations, frame, video.fps, preparation.shots)
-        key = _digest(sources.frames, sources.joints, marks, near.frames, near.joints)
-        kept = self._suggestions.get(frame)
-        if kept is None or kept[0] != key:
-            suggested = suggest_joints(preparation, sources, frame, marks)
-            kept = key, surer_by_flow(suggested, video, near, frame)
-            self._suggestions[frame] = kept
-        return kept[1]
+        derived = self._from_preparation()
+        return None if derived is None else _suggest(derived, annotations, frame)
 
     def any_suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
         """The last suggestion for the frame, at once, even if marks were added since."""
-        kept = self._suggestions.get(frame)
-        return self.suggestion(annotations, frame) if kept is None else kept[1]
+        derived = self._from_preparation()
+        if derived is None:
+            return None
+        kept = derived.suggestions.get(frame)
+        return _suggest(derived, annotations, frame) if kept is None else kept[1]
 
     def neighbours(self, annotations: Annotations) -> tuple[Neighbours, ...]:
         """Annotated frames compared with one another."""
-        preparation = self.preparation()
-        if preparation is None:
+        derived = self._from_preparation()
+        if derived is None:
             return ()
         key = _digest(annotations.frames, annotations.joints)
-        return self._neighbours.get(key, preparation, annotations)
+        return derived.neighbours.get(key, annotations)
 
     def appearance(self, annotations: Annotations) -> MarkAppearance | None:
         """Looks of the marks compared with those of other annotated frames."""
-        preparation = self.preparation()
-        if preparation is None or not len(annotations.frames):
+        derived = self._from_preparation()
+        if derived is None or not len(annotations.frames):
             return None
         key = _digest(annotations.frames, annotations.joints, annotations.visible)
-        return self._appearance.get(key, preparation, annotations)
-
-    def _compare_appearance(
-        self, preparation: Preparation, annotations: Annotations
-    ) -> MarkAppearance | None:
-        """Only frames that were not described yet are read. One thread at a time is here."""
-        described_for, features = self._described
-        if described_for is not preparation:
-            features = None
-        body_frame = scene_of(preparation, annotations).body_frame
-        features = describe_frames(preparation, body_frame, annotations.frames, features)
-        self._described = preparation, features
-        return compare_appearance(preparation, body_frame, annotations, features)
+        return derived.appearance.get(key, annotations)
 
     def body(self, annotations: Annotations, wait: bool = False) -> BodyEstimate | None:
         """The player's body: the latest estimate, or with `wait` that from all these marks."""
-        preparation = self.preparation()
-        if preparation is None:
+        derived = self._from_preparation()
+        if derived is None:
             return None
         key = _digest(annotations.frames, annotations.joints, annotations.nearer)
         with self._lock:
-            if self._estimating is None or self._estimating[0] != key:
-                work = self._worker.submit(self._estimate_body, preparation, annotations)
-                self._estimating = key, work
-                self._worker.submit(self._suggest_other_halves, annotations, key)
-            work, latest = self._estimating[1], self._body
+            if derived.estimating is None or derived.estimating[0] != key:
+                work = self._worker.submit(derived.estimate_body, annotations)
+                derived.estimating = key, work
+                self._worker.submit(self._suggest_other_halves, derived, annotations, key)
+            work, latest = derived.estimating[1], derived.body
         if latest is not None and not (wait or work.done()):
             return latest
         body = work.result()
         with self._lock:
-            if self._body is None or self._is_latest(key):
-                self._body = body
+            if derived.body is None or derived.is_latest(key):
+                derived.body = body
         return body
 
-    def _is_latest(self, key: str) -> bool:
-        """Whether no other marks came since."""
-        estimating = self._estimating
-        return estimating is None or estimating[0] == key
-
-    def _estimate_body(self, preparation: Preparation, annotations: Annotations) -> BodyEstimate:
-        """From marks, and from such suggestions as there are where half of the body is marked."""
-        suggestions = {frame: one for frame, (_, one) in [*self._suggestions.items()]}
-        video, track = preparation.video, preparation.track
-        return estimate_body(annotations, suggestions, track.height, video.fps)
-
-    def _suggest_other_halves(self, annotations: Annotations, key: str) -> None:
-        """Make the suggestions that are lacking until there are other marks; then estimate anew."""
+    def _suggest_other_halves(self, derived: _Derived, annotations: Annotations, key: str) -> None:
+        """Make the suggestions that are lacking until there are other marks, or another
+        preparation; then estimate anew."""
         half = ~np.isfinite(annotations.joints[:, :, 0]).all(axis=1)
-        lacking = [t for t in annotations.frames[half].tolist() if t not in self._suggestions]
+        lacking = [t for t in annotations.frames[half].tolist() if t not in derived.suggestions]
         for frame in lacking:
-            if not self._is_latest(key):
+            if derived is not self._derived or not derived.is_latest(key):
                 return
-            self.suggestion(annotations, frame)
+            _suggest(derived, annotations, frame)
         with self._lock:
-            if lacking and self._is_latest(key):
-                self._estimating = None
+            if lacking and derived.is_latest(key):
+                derived.estimating = None
 
     def _prepared(self) -> Preparation:
         """The stored results of the automatic part, with the keyframes that were asked for."""
@@ -233,14 +243,21 @@ class ProjectCache:
         options = workspace.options(Options(), Options())
         recall = workspace.stages.recall
         video, marks = workspace.video(), self._prepared_marks()
-        picks = workspace.picks() if marks is None or workspace.picks_file.is_file() else ()
-        preparation = prepare(video, picks, options, recall, marks=marks)
+        preparation = prepare(video, self._prepared_picks(marks), options, recall, marks=marks)
         if not workspace.keyframes_file.is_file():
             return preparation
         keyframes = read_keyframes(workspace.keyframes_file)
         if len(keyframes.upper.nearest) != len(preparation.video):
             raise KeyreconError(f"{workspace.keyframes_file} belongs to another video.")
         return replace(preparation, keyframes=keyframes)
+
+    def _prepared_picks(self, marks: Annotations | None) -> tuple[Pick, ...]:
+        """The clicks that the automatic part was made with; those there are in a project of a
+        former version."""
+        workspace = self._workspace
+        if workspace.prepared_picks_file.is_file():
+            return read_picks(workspace.prepared_picks_file)
+        return workspace.picks() if marks is None or workspace.picks_file.is_file() else ()
 
     def _prepared_marks(self) -> Annotations | None:
         """The marks that the automatic part was made with."""
@@ -264,6 +281,23 @@ class ProjectCache:
                     loaded = replace(loaded, failed_with=inputs)
                 self._loaded[name] = loaded
             return loaded.value
+
+
+def _suggest(derived: _Derived, annotations: Annotations, frame: int) -> PoseSuggestion | None:
+    """A suggestion, kept by the marks that it depends on."""
+    preparation = derived.preparation
+    sources = choose_sources(preparation, annotations, frame)
+    if not len(sources.frames):
+        return None
+    marks, video = _marks_of(annotations, frame), preparation.video
+    near = nearest_marks(annotations, frame, video.fps, preparation.shots)
+    key = _digest(sources.frames, sources.joints, marks, near.frames, near.joints)
+    kept = derived.suggestions.get(frame)
+    if kept is None or kept[0] != key:
+        suggested = suggest_joints(preparation, sources, frame, marks)
+        kept = key, surer_by_flow(suggested, video, near, frame)
+        derived.suggestions[frame] = kept
+    return kept[1]
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,24 @@
 import time
 from concurrent.futures import ThreadPoolExecutor, wait
 from threading import Barrier
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from keyrecon.annotate.assist import project_cache
+from keyrecon.annotate.assist.body_estimate import BodyEstimate
+from keyrecon.annotate.assist.neighbours import Neighbours
+from keyrecon.annotate.assist.pose_suggestion import PoseSuggestion
 from keyrecon.annotate.assist.preview import Strip
 from keyrecon.annotate.assist.project_cache import ProjectCache
+from keyrecon.body import LSP14
 from keyrecon.io.workspace import Workspace
-from keyrecon.records import CameraPath, Colors, Pick
+from keyrecon.records import Annotations, CameraPath, Colors, Pick, Preparation
+
+MARKS = Annotations(
+    LSP14, np.array([4]), np.full((1, 14, 2), 20.0), np.ones((1, 14), bool), np.zeros((1, 13), int)
+)
 
 QUESTIONS = {
     "colors": [(Pick(frame, "head", 1.0, 2.0),) for frame in range(2)],
@@ -82,3 +92,32 @@ def test_nobody_gets_the_colors_that_another_thread_asked_for_meanwhile(cache, m
 
         monkeypatch.setattr(WatchedPick, "compared", staticmethod(meanwhile))
         assert cache.colors(mine) is kept
+
+
+def test_nothing_that_followed_from_a_preparation_outlives_it(cache, monkeypatch):
+    """The track, the shots and the sizes that it was made with may all be others."""
+    one, other = object.__new__(Preparation), object.__new__(Preparation)
+    known = dict.fromkeys(("video", "shots", "track"), SimpleNamespace(fps=50.0, height=None))
+    for preparation in (one, other):
+        vars(preparation).update(known)
+    of = {
+        made: {kind: object.__new__(kind) for kind in (Neighbours, PoseSuggestion, BodyEstimate)}
+        for made in (one, other)
+    }
+    preparations = {of[made][PoseSuggestion]: made for made in of}
+    source = SimpleNamespace(frames=MARKS.frames, joints=MARKS.joints)
+    for name, said in (
+        ("find_neighbours", lambda made, marks: (of[made][Neighbours],)),
+        ("choose_sources", lambda *_: source),
+        ("nearest_marks", lambda *_: source),
+        ("suggest_joints", lambda made, *_: of[made][PoseSuggestion]),
+        ("surer_by_flow", lambda suggested, *_: suggested),
+        ("estimate_body", lambda marks, known, *_: of[preparations[known[9]]][BodyEstimate]),
+    ):
+        monkeypatch.setattr(project_cache, name, said)
+    for made in (one, other, one):
+        monkeypatch.setattr(cache, "preparation", lambda made=made: made)
+        assert cache.neighbours(MARKS) == (of[made][Neighbours],)
+        assert cache.any_suggestion(MARKS, 9) is of[made][PoseSuggestion]
+        assert cache.suggestion(MARKS, 9) is of[made][PoseSuggestion]
+        assert cache.body(MARKS) is of[made][BodyEstimate]
