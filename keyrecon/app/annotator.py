@@ -33,6 +33,7 @@ from keyrecon.app.preparing import describe_shots, prepare_project
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
+from keyrecon.io.provenance import motion_stamp, note_exports
 from keyrecon.io.video import Video
 from keyrecon.io.work_lock import at_work
 from keyrecon.io.workers import open_workers
@@ -242,7 +243,9 @@ def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     overlay = OverlayOptions(**chosen)
     name = folder.resolve().name + "".join(f"_{part}" for part in _told_in_name(frames, overlay))
     files = [workspace.exports / f"{name}{suffix}" for suffix in options.get("formats", ())]
+    motion = motion_stamp(workspace)
     lines = export(workspace, files, progress, frames, overlay)
+    note_exports(workspace, files, motion)
     return "\n".join(line.replace(f"{workspace.exports}/", "") for line in lines)
 
 

@@ -46,7 +46,13 @@ from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.project_videos import relative_path
-from keyrecon.io.provenance import forget_run, golf_evidence, note_fitted
+from keyrecon.io.provenance import (
+    forget_run,
+    golf_evidence,
+    motion_stamp,
+    note_exports,
+    note_fitted,
+)
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.work_lock import hold_folder
 from keyrecon.io.workspace import GOLF, Workspace
@@ -310,7 +316,7 @@ def keep_clicks(workspace: Workspace, content: bytes) -> None:
 def write_results(
     workspace: Workspace, video: Video, fit: GolfFit, model: MotionModel, progress: Progress
 ) -> None:
-    """Overlay, report and table, and last the motion, whose presence tells that all are written."""
+    """Overlay, report and table, then the motion, whose presence tells that all are written."""
     folder = workspace.folder
     reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
     swing = record_swing(fit.fitted, fit.observations, reasons, fit.notes, fit.shown)
@@ -321,6 +327,8 @@ def write_results(
     write_golf_table(folder / TABLE_FILE, swing)
     forget_run(workspace)
     write_swing(workspace.motion_file, swing)
+    exports = [folder / name for name in (OVERLAY_FILE, TABLE_FILE)]
+    note_exports(workspace, exports, motion_stamp(workspace))
 
 
 def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:

@@ -6,7 +6,7 @@ files say, not of their bytes: a file that is written anew with the same marks c
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -102,6 +102,38 @@ def is_fitted(workspace: Workspace) -> bool:
     return noted.is_file() and noted.read_bytes() == golf_evidence(workspace).encode()
 
 
+def motion_stamp(workspace: Workspace) -> int:
+    """When the motion was written; 0 while there is none."""
+    return _stamp(workspace.motion_file)
+
+
+def note_exports(workspace: Workspace, files: Iterable[Path], motion: int) -> None:
+    """Keep that files in the project show the motion of this stamp, whatever replaced it since."""
+    with workspace.exclusive():
+        rows = {_name(workspace, file): [str(_stamp(file)), str(motion)] for file in files}
+        noted = json.dumps(_read_exports(workspace) | rows)
+        _exports_file(workspace).parent.mkdir(exist_ok=True)
+        write_durably(_exports_file(workspace), noted)
+
+
+def current_exports(workspace: Workspace) -> list[Path]:
+    """Files of an export or of a golf fit that show the motion there is.
+
+    Where nothing was noted of one as it is, an export is told by its time. A fit writes its files
+    before its motion: they show it unless a run is known to have made another.
+    """
+    noted, motion = _read_exports(workspace), motion_stamp(workspace)
+    exported = {file: _stamp(file) >= motion for file in workspace.exported_files()}
+    fitted = dict.fromkeys(workspace.golf_results(), read_run(workspace) is None)
+    current = []
+    for file, is_likely in (exported | fitted).items():
+        known = noted.get(_name(workspace, file))
+        is_known = isinstance(known, list) and known[:1] == [str(_stamp(file))]
+        if known[1:] == [str(motion)] if is_known else is_likely:
+            current.append(file)
+    return current
+
+
 def note_files(workspace: Workspace) -> tuple[Path, Path]:
     """Where it is kept what the motion, and the last golf fit, were made from."""
     return _run_file(workspace), _fitted_file(workspace)
@@ -109,6 +141,27 @@ def note_files(workspace: Workspace) -> tuple[Path, Path]:
 
 def _run_file(workspace: Workspace) -> Path:
     return workspace.folder / "cache" / "run.json"
+
+
+def _exports_file(workspace: Workspace) -> Path:
+    return workspace.folder / "cache" / "exports.json"
+
+
+def _name(workspace: Workspace, file: Path) -> str:
+    return file.relative_to(workspace.folder).as_posix()
+
+
+def _read_exports(workspace: Workspace) -> dict[str, Any]:
+    """By name in the project, the stamps of a file and of the motion that it shows."""
+    try:
+        noted = parse_json(read_text(_exports_file(workspace)))
+    except (OSError, ValueError):  # there is none, or it is torn
+        return {}
+    return noted if isinstance(noted, dict) else {}
+
+
+def _stamp(file: Path) -> int:
+    return file.stat().st_mtime_ns if file.is_file() else 0
 
 
 def _fitted_file(workspace: Workspace) -> Path:

@@ -1,14 +1,18 @@
 """What results were made from: by what the files say, and whatever state they are in."""
 
 import json
+import os
 
 import pytest
 
 from keyrecon.io.provenance import (
     RunNotes,
+    current_exports,
     is_fitted,
     marks_evidence,
     motion_evidence,
+    motion_stamp,
+    note_exports,
     note_fitted,
     note_run,
     read_run,
@@ -120,3 +124,41 @@ def test_a_torn_note_of_a_fit_calls_for_another(workspace):
     note_fitted(workspace, "all")
     (workspace.folder / "cache" / "golf_fitted").write_bytes(b"\xff\xfe")
     assert not is_fitted(workspace)
+
+
+def write(file, seconds):
+    """A file of a time today."""
+    seconds += 1_700_000_000
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("x")
+    os.utime(file, (seconds, seconds))
+    return file
+
+
+def test_an_export_shows_the_motion_that_there_was_when_it_was_begun(workspace):
+    write(workspace.motion_file, 10)
+    began = motion_stamp(workspace)
+    write(workspace.motion_file, 20)  # a run ends while the export is written
+    late, unknown, old = (write(workspace.exports / f"{n}.bvh", n) for n in (30, 31, 9))
+    note_exports(workspace, [late], began)
+    assert current_exports(workspace) == [unknown]
+    note_exports(workspace, [late, old], motion_stamp(workspace))
+    assert {*current_exports(workspace)} == {late, unknown, old}
+    write(old, 8)  # whatever was noted is of another file
+    assert old not in current_exports(workspace)
+    (workspace.folder / "cache" / "exports.json").write_bytes(b"[")
+    assert {*current_exports(workspace)} == {late, unknown}
+
+
+def test_what_a_fit_wrote_is_of_an_earlier_motion_after_a_run(workspace):
+    workspace.golf_clicks_file.write_text("{}")
+    table = write(workspace.folder / "golf.csv", 9)
+    write(workspace.motion_file, 10)
+    assert current_exports(workspace) == [table]  # of a fit by a former version
+    note_exports(workspace, [table], motion_stamp(workspace))
+    assert current_exports(workspace) == [table]
+    write(workspace.motion_file, 20)
+    assert current_exports(workspace) == []
+    (workspace.folder / "cache" / "exports.json").unlink()
+    note_run(workspace, RunNotes("", ()))
+    assert current_exports(workspace) == []

@@ -48,6 +48,7 @@ from keyrecon.io.formats.annotations import read_annotations
 from keyrecon.io.formats.coco import coco_text
 from keyrecon.io.formats.cvat import cvat_text
 from keyrecon.io.formats.dlc import dlc_text
+from keyrecon.io.provenance import current_exports
 
 Json = dict[str, Any]
 REPORT_POLICY = (
@@ -284,6 +285,7 @@ def exports(session: Session, request: ApiRequest) -> list[Json]:
     workspace = session.workspace
     fitted, files = workspace.golf_results(), workspace.exported_files()
     stamps = {file: file.stat() for file in (*fitted, *files)}
+    current = current_exports(workspace)
     files.sort(key=lambda file: stamps[file].st_mtime_ns, reverse=True)
     return [
         {
@@ -291,15 +293,10 @@ def exports(session: Session, request: ApiRequest) -> list[Json]:
             "bytes": stamps[file].st_size,
             "place": str(file.parent),
             "fitted": file in fitted,
-            "current": file in fitted
-            or stamps[file].st_mtime_ns >= _last_change(workspace.motion_file),
+            "current": file in current,
         }
         for file in (*fitted, *files)
     ]
-
-
-def _last_change(file: Path) -> int:
-    return file.stat().st_mtime_ns if file.is_file() else 0
 
 
 def exported_file(session: Session, request: ApiRequest) -> Response:
