@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import urllib.request
@@ -17,6 +16,7 @@ from keyrecon.annotate.server import address
 from keyrecon.app import annotator
 from keyrecon.app.annotator import announce, job_commands
 from keyrecon.io import workers as io_workers
+from keyrecon.io.provenance import current_exports
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, with_field_of_view, with_height
 from keyrecon.progress import silent
@@ -77,8 +77,11 @@ def test_an_address_that_others_can_reach_is_warned_of():
     assert "reached from other machines" in announce(Path("p"), address, "0.0.0.0")
 
 
-def test_an_address_answers_only_under_the_names_it_is_reached_by():
-    for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", socket.gethostname())):
+def test_an_address_answers_only_under_the_names_it_is_reached_by(monkeypatch):
+    """A browser sends them in small letters."""
+    monkeypatch.setattr(address.socket, "gethostname", lambda: "Annas-PC.local")
+    monkeypatch.setattr(address, "_addresses", lambda _: ())
+    for host, first in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "annas-pc.local")):
         with address.listen(host, 0) as listener:
             port = listener.getsockname()[1]
             credentials = address.make_credentials(listener, host)
@@ -133,6 +136,24 @@ def test_a_field_of_view_is_told_cleared_and_kept_as_a_height_is(bare, monkeypat
     assert told_to_run == [(62, 1.8), (40, 1.8), (None, 1.8), (62, None)]
     with pytest.raises(KeyreconError, match="200 cannot be"):
         run({"field_of_view": 200.0}, silent)
+
+
+def test_an_export_of_a_motion_that_a_run_replaces_meanwhile_is_not_of_the_new_one(
+    bare, monkeypatch
+):
+    workspace = Workspace(bare)
+    workspace.motion_file.write_text("old")
+    os.utime(workspace.motion_file, (10, 10))
+
+    def export_beside_a_run(_workspace, files, *_):
+        workspace.motion_file.write_text("new")
+        files[0].write_text("of the old one")
+        return []
+
+    monkeypatch.setattr(annotator, "export", export_beside_a_run)
+    job_commands(bare)["export"]({"formats": (".mp4",)}, silent)
+    assert len(workspace.exported_files()) == 1
+    assert current_exports(workspace) == []
 
 
 @pytest.mark.parametrize(

@@ -86,9 +86,13 @@ def _bind(host: str, port: int) -> socket.socket:
 def make_credentials(
     listener: socket.socket, host: str, memory: LastAddress = LastAddress()
 ) -> Credentials:
-    """The fixed list of names under which the server answers, and its secrets."""
+    """The fixed list of names under which the server answers, and its secrets.
+
+    Names are in small letters, as a browser sends them however they were typed.
+    """
     port = listener.getsockname()[1]
-    credentials = Credentials(tuple(f"{name}:{port}" for name in _host_names(host)), port)
+    names = (name.lower() for name in _host_names(host))
+    credentials = Credentials(tuple(f"{name}:{port}" for name in names), port)
     if memory.cookie_secret is None:
         return credentials
     return replace(credentials, cookie_secret=memory.cookie_secret)
