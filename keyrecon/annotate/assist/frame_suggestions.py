@@ -159,7 +159,10 @@ def suggest_frames(
     """At most `count` frames, the most helpful first; never one that is `taken` already.
 
     `annotations` may hold more than the motion was made from: what is annotated needs no more help.
+    A motion of another length than the video, to which a file was added since, tells nothing.
     """
+    if len(motion.time) != len(distances.row):
+        return []
     halves = [_measure_half(distances, motion, annotations, half) for half in HALVES]
     totals = [half.total for half in halves]
     open_rows = distances.visibility_score[distances.frames] * ~np.isin(

@@ -11,6 +11,7 @@ from keyrecon.annotate.server.descriptions import describe_keyframes
 from keyrecon.body import LSP14
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Annotations, Motion
+from keyrecon.timeline import cut_motion
 
 COUNT = 200
 
@@ -48,6 +49,13 @@ def test_every_frame_is_best_served_by_some_keyframe(comparison, keyframes):
     assert reasons.keys() == set(keyframes.frames.tolist())
     assert sum(reason.stands_for for reason in reasons.values()) >= COUNT
     assert all(reason.why for reason in reasons.values())
+
+
+def test_the_motion_of_a_video_that_was_shorter_suggests_nothing(comparison):
+    motion = result(np.full((COUNT, 14), 0.5))
+    assert suggest_frames(comparison, motion, annotated([3]))
+    first = cut_motion(motion, slice(0, 120))
+    assert suggest_frames(comparison, first, annotated([3, 150])) == []
 
 
 def test_frames_without_the_player_are_no_reason_for_a_keyframe():
