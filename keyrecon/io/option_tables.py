@@ -65,13 +65,16 @@ def changed_options(
     prefix: str = "",
     told: Collection[str] = (),
 ) -> dict[str, Any]:
-    """Dotted names and values of the options that differ from the defaults, or were `told`."""
+    """Dotted names and values of the options that differ from the defaults, or were `told`.
+
+    None among them, which no file can hold, is an option that has no value.
+    """
     changed: dict[str, Any] = {}
     for field in fields(options):
         value, default = getattr(options, field.name), getattr(defaults, field.name)
         if isinstance(value, OptionRecord):
             changed |= changed_options(value, default, f"{prefix}{field.name}.", told)
-        elif value is not None and (value != default or prefix + field.name in told):
+        elif value != default or prefix + field.name in told:
             changed[prefix + field.name] = value
     return changed
 

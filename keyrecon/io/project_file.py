@@ -21,7 +21,7 @@ else than it should is not written at all.
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Callable, Collection, Mapping, MutableMapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,12 +103,13 @@ def new_project(
     return _proven(document.as_string(), project, path)
 
 
-def with_video_path(path: Path, video_path: str, number: int = 0) -> str:
-    """The file's text with another place of its video, or of the `number`-th that was added."""
+def with_video_path(path: Path, video_path: str, numbers: Collection[int]) -> str:
+    """The file's text with another place of its video, number 0, or of those added, from 1 on."""
     document, project = _parse(path)
     for content in (document, project):
-        table: Any = content["added"][number - 1] if number else content["video"]
-        table["path"] = video_path
+        for number in numbers:
+            table: Any = content["added"][number - 1] if number else content["video"]
+            table["path"] = video_path
     return _proven(document.as_string(), project, path)
 
 

@@ -35,13 +35,14 @@ def relative_path(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
 
 
-def which_video(tables: Sequence[Table], file: Path) -> int:
-    """The number of the video that a file is; raises KeyreconError for another one."""
+def which_videos(tables: Sequence[Table], file: Path) -> list[int]:
+    """The numbers of the videos that are of a file; raises KeyreconError where none is."""
     if not file.is_file():
         raise KeyreconError(f"There is no video at {file}.")
-    for number, table in enumerate(tables):
-        if has_fingerprint(file, table["fingerprint"]):
-            return number
+    prints = {table["fingerprint"] for table in tables}
+    own = {told for told in prints if has_fingerprint(file, told)}
+    if numbers := [n for n, table in enumerate(tables) if table["fingerprint"] in own]:
+        return numbers
     raise KeyreconError(
         f"{file} is not {'the' if len(tables) == 1 else 'a'} video of this project (its "
         "fingerprint differs); start a new project for it with: keyrecon new"

@@ -21,6 +21,7 @@ What a person made is written durably and never replaced by something that does 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
@@ -53,6 +54,7 @@ from keyrecon.io.option_tables import (
     with_current_names,
 )
 from keyrecon.io.project_file import (
+    Project,
     new_project,
     no_project,
     read_project,
@@ -67,7 +69,7 @@ from keyrecon.io.project_videos import (
     possible_places,
     relative_path,
     shares_frames,
-    which_video,
+    which_videos,
 )
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import Video, open_video
@@ -250,11 +252,11 @@ class Workspace:
         return together
 
     def relink(self, video_file: Path) -> None:
-        """Point the project at the place that a video of it has moved to."""
-        number = which_video(self.videos, video_file)
+        """Point the project at the place that a video of it has moved to, with all its parts."""
+        numbers = which_videos(self.videos, video_file)
         with self.exclusive():
             place = relative_path(video_file, self.folder)
-            write_durably(self.project_file, with_video_path(self.project_file, place, number))
+            write_durably(self.project_file, with_video_path(self.project_file, place, numbers))
         self.project = read_project(self.project_file)
 
     def picks(self) -> tuple[Pick, ...]:
@@ -389,22 +391,30 @@ class Workspace:
         return with_changes(kept, nested_tables(changed_options(given, defaults, told=told)))
 
     def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:
-        """Keep the options that differ from the defaults; what else the file holds stays.
+        """Keep what the options change of those that the project was opened with, the defaults left
+        out; what else the file holds by now stays.
 
         Raises KeyreconError, and writes nothing, for values that an option cannot have.
         """
         check_options(options)
-        kept = flat_options(with_current_names(self.project.get("options", {})))
         prefix = f"{section}." if section else ""
-        changed = changed_options(options, defaults, prefix)
-        own = flat_options(table_of(nested_tables(kept), section, SECTIONS), prefix)
-        others = {name: value for name, value in kept.items() if name not in own}
-        changed = others | changed
-        if with_options(self.project_file, changed) == read_text(self.project_file):
-            return
+        opened_with = self.options(defaults, defaults, section)
+        before, wanted = (
+            {name: v for name, v in changed_options(one, defaults, prefix).items() if v is not None}
+            for one in (opened_with, options)
+        )
+        changed = {n: v for n, v in wanted.items() if n not in before or before[n] != v}
+
+        def with_own(project: Project) -> dict[str, Any]:
+            kept = flat_options(with_current_names(project.get("options", {})))
+            return {n: v for n, v in kept.items() if n in wanted or n not in before} | changed
+
         with self.exclusive():
-            write_durably(self.project_file, with_options(self.project_file, changed))
-        self.project = read_project(self.project_file)
+            text = with_options(self.project_file, with_own(read_project(self.project_file)))
+            if text != read_text(self.project_file):
+                write_durably(self.project_file, text)
+        # not as the file is by now: what others wrote into it would be taken back the next time
+        self.project = {**self.project, "options": nested_tables(with_own(self.project))}
 
     @contextmanager
     def remembering(
@@ -412,20 +422,29 @@ class Workspace:
     ) -> Iterator[None]:
         """Keep options, as `remember` does, from the beginning of the work that they are for.
 
-        Whoever interrupts it goes on with them; where it is refused, the file is as it was before.
+        Whoever interrupts it goes on with them; where it is refused, the file is as it was before,
+        but for what others wrote into it meanwhile.
         """
-        file, before = self.project_file, self.project_file.read_bytes()
-        options_before = flat_options(with_current_names(self.project.get("options", {})))
+        file, opened = self.project_file, self.project
+        content, before = file.read_bytes(), _options_in(file)
         self.remember(options, defaults, section)
-        kept = file.read_bytes()
+        kept, mine = file.read_bytes(), _options_in(file)
         try:
             yield
         except KeyreconError:
+            changed = {n for n in before | mine if before.get(n) != mine.get(n)}
             with self.exclusive():
+                now = {n: v for n, v in _options_in(file).items() if n not in changed}
+                restored = now | {n: before[n] for n in changed if n in before}
                 alone = file.read_bytes() == kept
-                write_durably(file, before if alone else with_options(file, options_before))
-            self.project = read_project(file)
+                write_durably(file, content if alone else with_options(file, restored))
+            self.project = opened
             raise
+
+
+def _options_in(file: Path) -> dict[str, Any]:
+    """Options that a project file has, by dotted names."""
+    return flat_options(with_current_names(read_project(file).get("options", {})))
 
 
 def another_projects_file(file: Path) -> bool:

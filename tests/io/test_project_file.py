@@ -9,7 +9,7 @@ from keyrecon.app.running import settings
 from keyrecon.io.option_tables import former_names
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.selection import KeyframeOptions
-from keyrecon.pipeline import Options
+from keyrecon.pipeline import Options, with_height
 
 VIDEO = '[video]\npath = "v.mp4"\nfingerprint = "x"\n'
 
@@ -56,6 +56,19 @@ def test_an_option_that_is_set_back_goes_and_one_that_is_as_it_was_changes_nothi
     workspace.remember(Options(), Options())
     assert Workspace(bare).options(Options(), Options()) == Options()
     assert tomllib.loads((bare / "project.toml").read_text())["video"]["path"] == "v.mp4"
+
+
+def test_what_a_person_writes_while_a_command_works_stays(bare):
+    file = bare / "project.toml"
+    file.write_text(f"{VIDEO}\n[options]\nlift.height = 1.8\nkeyframes.reach = 12\n")
+    running = Workspace(bare)
+    told = with_height(running.options(Options(), Options()), 1.85)
+    meanwhile = file.read_text().replace("keyframes.reach = 12", "keyframes.budget = 0.05 # few")
+    file.write_text(meanwhile)
+    running.remember(told, Options())
+    assert file.read_text() == meanwhile.replace("1.8", "1.85")
+    running.remember(with_height(told, None), Options())  # what it knew of is still the former
+    assert tomllib.loads(file.read_text())["options"] == {"keyframes": {"budget": 0.05}}
 
 
 def test_former_names_of_an_option_are_found_through_all_versions():

@@ -100,6 +100,14 @@ def test_an_added_video_that_moved_is_relinked(project, second, tmp_path):
     assert len(Workspace(project.folder).video()) == 15 + 10
 
 
+def test_all_parts_of_a_file_that_moved_are_relinked(project, tmp_path):
+    project.add_video(tmp_path / "video.mp4", {"start": 15})
+    (tmp_path / "far").mkdir()
+    (tmp_path / "video.mp4").rename(tmp_path / "far" / "video.mp4")
+    project.relink(tmp_path / "far" / "video.mp4")
+    assert len(Workspace(project.folder).video()) == 20
+
+
 def test_a_video_that_cannot_be_added_changes_nothing(project, tmp_path, write_numbered):
     before = project.project_file.read_bytes()
     for file in (tmp_path / "video.mp4", write_numbered("slow.mp4", [0, 24, 48])):
@@ -148,6 +156,15 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
     assert typed == {"keyframes.reach", "lift.no_x", "lift.x", "a.b_c"}
     back = project.options(Options(), Options(), told=typed)
     assert back == options(0.05, usual.reach)
+
+
+def test_an_option_that_may_be_without_a_value_is_unset_by_none(project):
+    project.remember(settings(project, Options(), 1.8), Options())
+    told = typed_options(["keyrecon", "--lift.height", "None"])
+    unset = settings(Workspace(project.folder), Options(), told=told)
+    assert unset.lift.height is None
+    Workspace(project.folder).remember(unset, Options())
+    assert Workspace(project.folder).options(Options(), Options()).lift.height is None
 
 
 def test_the_athletes_height_is_remembered(project):
