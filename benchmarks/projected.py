@@ -31,7 +31,7 @@ from keyrecon.body_models.depth_model import DepthModel
 from keyrecon.lifting.lifting import LiftOptions, LiftPriors, lift_motion
 from keyrecon.metrics import n_mpjpe, pa_mpjpe
 from keyrecon.records import Annotations, HalfKeyframes, JointTracks, Keyframes
-from keyrecon.synthetic.clips import join_clips
+from keyrecon.synthetic.clips import JOINTS, join_with_toes
 from keyrecon.synthetic.marks import MarkOptions, mark_from_truth
 from keyrecon.synthetic.sequence import read_mocap, set_stage
 
@@ -59,7 +59,8 @@ def film(sequence: Sequence, mocap: Path) -> Truth:
     """The first seconds of a sequence, not drawn."""
     options = options_of(sequence)
     captures = read_mocap(mocap_files(sequence, mocap), options.trim)
-    stage = set_stage(join_clips(captures, options.clips), sequence.fps, options.scene)
+    joined = join_with_toes(captures, options.clips)[:, :JOINTS]
+    stage = set_stage(joined, sequence.fps, options.scene)
     points = stage.points[: round(SECONDS * sequence.fps)]
     whole = stage.move.to_camera(stage.points)[: len(points)]
     tall = stage.move.focal[: len(points)] if np.ndim(stage.move.focal) else stage.move.focal

@@ -32,7 +32,6 @@ BONES = np.array(
     [*LSP14.bones, *((LSP14.index(f"{side}_ankle"), JOINTS + k) for k, side in enumerate(SIDES))]
 )
 """Those of the skeleton, and the feet from ankle to toes."""
-Points = Float[np.ndarray, "_ 14 3"]
 Footed = Float[np.ndarray, "_ 16 3"]
 """Joints, then right and left toes; NaN where no toes were captured."""
 
@@ -51,17 +50,13 @@ class JoinOptions:
     """Seconds before a clip's planned end, and after the next one's start, that are searched."""
 
 
-def join_clips(captures: Sequence[Capture], options: JoinOptions = JoinOptions()) -> Points:
-    """One motion in the world: metres, y up, floor at 0, the net at negative z.
+def join_with_toes(captures: Sequence[Capture], options: JoinOptions = JoinOptions()) -> Footed:
+    """One motion in the world, with the toes that were captured: metres, y up, floor at 0, the net
+    at negative z.
 
     Short clips are searched and blended over a third and a sixth of their length. Raises
     KeyreconError when a clip is too short even for that.
     """
-    return join_with_toes(captures, options)[:, :JOINTS]
-
-
-def join_with_toes(captures: Sequence[Capture], options: JoinOptions = JoinOptions()) -> Footed:
-    """The same motion with the toes that were captured."""
     clips = [_prepare(capture, options) for capture in captures]
     lengths = bone_lengths(clips[0])
     clips = [clips[0]] + [_fit_body(clip, lengths) for clip in clips[1:]]

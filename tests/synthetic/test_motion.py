@@ -4,7 +4,7 @@ import pytest
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.mocap import Capture
-from keyrecon.synthetic.clips import JoinOptions, bone_lengths, join_clips, join_with_toes
+from keyrecon.synthetic.clips import JoinOptions, bone_lengths, join_with_toes
 from keyrecon.synthetic.figure import ANKLE_HEIGHT, STATURE, estimate_stature, point_figure
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 
@@ -92,13 +92,13 @@ def captures(tennis):
 
 
 def test_joined_clips_never_jump(captures):
-    joined = join_clips(captures, JoinOptions(seconds=30.0))
+    joined = join_with_toes(captures, JoinOptions(seconds=30.0))[:, :14]
     assert joined.shape == (1500, 14, 3)
     assert speeds(joined).max() < 16
 
 
 def test_joined_clips_are_one_person_on_the_floor(captures):
-    joined = join_clips(captures, JoinOptions(seconds=30.0))
+    joined = join_with_toes(captures, JoinOptions(seconds=30.0))[:, :14]
     np.testing.assert_allclose(lengths(joined) / bone_lengths(captures[0].joints), 1, atol=0.03)
     assert abs(joined[:, ANKLES, 1].min() - ANKLE_HEIGHT) < 0.04
 
@@ -107,24 +107,26 @@ def test_captured_toes_go_with_their_ankles_and_change_nothing_else(captures):
     toes = [c.joints[:, ANKLES] + [0, -0.05, 0.17] for c in captures]
     footed = [Capture(c.joints, c.fps, t) for c, t in zip(captures, toes, strict=True)]
     joined = join_with_toes(footed, JoinOptions(seconds=30.0))
-    np.testing.assert_array_equal(joined[:, :14], join_clips(captures, JoinOptions(seconds=30.0)))
+    without = join_with_toes(captures, JoinOptions(seconds=30.0))
+    np.testing.assert_array_equal(joined[:, :14], without[:, :14])
     foot = np.linalg.norm(joined[:, 14:] - joined[:, ANKLES], axis=2)
     np.testing.assert_allclose(foot, np.hypot(0.05, 0.17), rtol=1e-6)
-    assert np.isnan(join_with_toes(captures, JoinOptions(seconds=30.0))[:, 14:]).all()
+    assert np.isnan(without[:, 14:]).all()
 
 
 def test_joined_clips_face_the_net(captures):
-    front = point_figure(join_clips(captures, JoinOptions(seconds=12.0)), FPS).front.mean(axis=0)
+    joined = join_with_toes(captures, JoinOptions(seconds=12.0))[:, :14]
+    front = point_figure(joined, FPS).front.mean(axis=0)
     assert -front[2] > 3 * abs(front[0])
 
 
 def test_one_short_clip_is_repeated_as_often_as_needed(captures):
     short = Capture(captures[0].joints[:100], FPS)
-    joined = join_clips([short], JoinOptions(seconds=14.0))
+    joined = join_with_toes([short], JoinOptions(seconds=14.0))[:, :14]
     assert joined.shape == (700, 14, 3)
     assert speeds(joined).max() < 20
 
 
 def test_a_clip_too_short_to_join_is_refused():
     with pytest.raises(KeyreconError, match="needs"):
-        join_clips([Capture(np.zeros((10, 14, 3)), 100.0)])
+        join_with_toes([Capture(np.zeros((10, 14, 3)), 100.0)])
