@@ -17,8 +17,9 @@ from keyrecon.app.keyframing import KeyframeSettings, find_keyframes
 from keyrecon.app.project import evaluate, start
 from keyrecon.app.running import prepared, run, settings
 from keyrecon.body import LSP14
+from keyrecon.io.durable import put_aside, write_durably
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
-from keyrecon.io.formats.coco import read_coco, write_coco
+from keyrecon.io.formats.coco import coco_text, read_coco
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.work_lock import at_work
 from keyrecon.io.workspace import Workspace
@@ -83,6 +84,19 @@ def _mark(
     known = marks_asked_for(known, *asked) if known else None
     missing = missing_marks(known, *asked)
     marks = merge_annotations(fresh, known) if known else fresh
-    write_coco(workspace.annotations_file, marks, size)
+    aside = _write_marks(workspace, coco_text(marks, size).encode())
     text = f"Marks of {len(keyframes.frames) - len(missing)} keyframes from {kept.name}"
-    return f"{text}, of {len(missing)} made from the truth." if missing else f"{text}."
+    made = f", of {len(missing)} made from the truth" if missing else ""
+    return f"{text}{made}.{aside}"
+
+
+def _write_marks(workspace: Workspace, content: bytes) -> str:
+    """Write annotations.json; tells of others that were there, which stay beside it."""
+    file = workspace.annotations_file
+    with workspace.exclusive():
+        is_other = file.is_file() and file.read_bytes() != content
+        told = (
+            f" Other marks that were there are kept in {put_aside(file).name}." if is_other else ""
+        )
+        write_durably(file, content)
+    return told
