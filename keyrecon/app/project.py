@@ -23,9 +23,16 @@ from keyrecon.io.formats.coco import read_coco, write_coco
 from keyrecon.io.formats.keyframes import read_keyframes
 from keyrecon.io.formats.motion_file import read_whole_motion
 from keyrecon.io.video import Video, open_video
+from keyrecon.io.work_lock import lock_annotation
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import evaluate_motion, read_truth
 from keyrecon.records import Annotations, Keyframes, Motion, Pick
+
+CLOSE_PAGE = (
+    "its page knows the video as it was. Stop that keyrecon annotate, add the file, and start it "
+    "again"
+)
+"""What helps where the video of an open project would become another."""
 
 
 def start(
@@ -69,14 +76,22 @@ def start(
 def add_video(
     workspace: Workspace, video: Path, trim: tuple[int, int | None], slow_motion: float = 1.0
 ) -> str:
-    """Go on with another file of the same player; what was marked stays."""
+    """Go on with another file of the same player; what was marked stays.
+
+    Raises KeyreconError while the project's page is open, which would take what is marked in the
+    new frames for damage.
+    """
     if workspace.is_golf:
         raise KeyreconError("A golf swing is one video; start a project for each swing.")
     before = len(workspace.video())
     first, end = trim
     told: dict[str, float | None] = {"start": first or None, "end": end}
     told["slow_motion"] = None if slow_motion == 1 else slow_motion
-    together = workspace.add_video(video, {n: v for n, v in told.items() if v is not None})
+    lock = lock_annotation(workspace.folder, CLOSE_PAGE)
+    try:
+        together = workspace.add_video(video, {n: v for n, v in told.items() if v is not None})
+    finally:
+        lock.release()
     folder = quoted(workspace.folder)
     return (
         f"{workspace.folder}: {counted(len(together) - before, 'frame')} of {video} were added, "

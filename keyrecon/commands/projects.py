@@ -175,7 +175,7 @@ def add(
 
     Its frames are numbered on behind those that are there. Colours, body lengths and marks count
     for all files together, so that only poses are asked for that were not marked yet. The files
-    must have pictures of one size and the same frame rate.
+    must have pictures of one size and the same frame rate. The project's page must not be open.
 
     Args:
         video: An mp4, mov, mkv or avi file.

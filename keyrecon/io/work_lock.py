@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from filelock import Timeout
+from filelock import FileLock, Timeout
 
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import hold_lock, make_folder, write_quickly
@@ -58,6 +58,17 @@ def hold_folder(folder: Path, command: str) -> Iterator[None]:
     finally:
         note.unlink(missing_ok=True)
         lock.release()
+
+
+def lock_annotation(folder: Path, remedy: str) -> FileLock:
+    """The lock that the one page has that a project can be open on; gone when its server ends.
+
+    Raises KeyreconError, which tells the remedy, where it is taken.
+    """
+    try:
+        return hold_lock(folder / ".annotate.lock", seconds=0.0)
+    except Timeout as fault:
+        raise KeyreconError(f"{folder} is being annotated already; {remedy}.") from fault
 
 
 def _describe_self(command: str) -> dict[str, str | int]:

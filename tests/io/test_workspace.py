@@ -3,10 +3,12 @@ import os
 import pytest
 
 from keyrecon import KeyreconError
+from keyrecon.app.project import add_video
 from keyrecon.app.running import settings
 from keyrecon.commands.arguments import typed_options
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
+from keyrecon.io.work_lock import lock_annotation
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.selection import KeyframeOptions
 from keyrecon.pipeline import Options, with_height
@@ -98,6 +100,15 @@ def test_an_added_video_that_moved_is_relinked(project, second, tmp_path):
         project.video()
     project.relink(tmp_path / "far" / "renamed.mp4")
     assert len(Workspace(project.folder).video()) == 15 + 10
+
+
+def test_nothing_is_added_while_the_page_knows_the_video_as_it_was(project, second):
+    page = lock_annotation(project.folder, "use it")
+    with pytest.raises(KeyreconError, match="Stop that keyrecon annotate, add the file"):
+        add_video(project, second, (0, None))
+    assert len(Workspace(project.folder).video()) == 15
+    page.release()
+    assert "25 in all" in add_video(project, second, (0, None))
 
 
 def test_all_parts_of_a_file_that_moved_are_relinked(project, tmp_path):

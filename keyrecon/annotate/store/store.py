@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from threading import RLock
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from keyrecon.annotate.store.cells import (
     Cells,
     Change,
@@ -31,11 +29,14 @@ from keyrecon.annotate.store.file_sync import FileForm, FileSync, annotations_fo
 from keyrecon.annotate.store.golf_files import clicks_form, marks_form
 from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
 from keyrecon.errors import KeyreconError
-from keyrecon.io.durable import hold_lock, put_aside
+from keyrecon.io.durable import put_aside
+from keyrecon.io.work_lock import lock_annotation
 from keyrecon.io.workspace import Workspace
 from keyrecon.reading import reading
 from keyrecon.records import Annotations
 
+OTHER_PAGE = "use the page that is open, or stop that keyrecon annotate first"
+"""What helps whose project is open already."""
 Result = dict[str, Any]
 """The answer to an edit: "ok", else "status" with "current" (409) or "error" (400)."""
 
@@ -102,7 +103,7 @@ class Store:
         self._listeners: list[Listener] = []
         self._lock = RLock()
         with ExitStack() as held:
-            held.callback(_lock_project(workspace).release)
+            held.callback(lock_annotation(workspace.folder, OTHER_PAGE).release)
             self._journal = Journal(workspace.folder / "annotate.sqlite")
             held.callback(self._journal.close)
             with reading(self._journal.path, "a whole journal of edits", REMEDY):
@@ -270,14 +271,3 @@ class Store:
         """Let go of the project."""
         with self._lock:
             self._held.close()
-
-
-def _lock_project(workspace: Workspace) -> FileLock:
-    """The lock that only one server of a project can have; gone when its process ends."""
-    try:
-        return hold_lock(workspace.folder / ".annotate.lock", seconds=0.0)
-    except Timeout as fault:
-        raise KeyreconError(
-            f"{workspace.folder} is being annotated already; use the page that is open, or "
-            "stop that keyrecon annotate first."
-        ) from fault
