@@ -125,13 +125,14 @@ def current_exports(workspace: Workspace) -> list[Path]:
     noted, motion = _read_exports(workspace), motion_stamp(workspace)
     exported = {file: _stamp(file) >= motion for file in workspace.exported_files()}
     fitted = dict.fromkeys(workspace.golf_results(), read_run(workspace) is None)
-    current = []
-    for file, is_likely in (exported | fitted).items():
+
+    def is_current(file: Path, is_likely: bool) -> bool:
         known = noted.get(_name(workspace, file))
-        is_known = isinstance(known, list) and known[:1] == [str(_stamp(file))]
-        if known[1:] == [str(motion)] if is_known else is_likely:
-            current.append(file)
-    return current
+        if isinstance(known, list) and known[:1] == [str(_stamp(file))]:
+            return known[1:] == [str(motion)]
+        return is_likely
+
+    return [file for file, is_likely in (exported | fitted).items() if is_current(file, is_likely)]
 
 
 def note_files(workspace: Workspace) -> tuple[Path, Path]:
