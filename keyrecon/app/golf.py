@@ -55,7 +55,7 @@ from keyrecon.io.provenance import (
 )
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.work_lock import hold_folder
-from keyrecon.io.workspace import GOLF, Workspace
+from keyrecon.io.workspace import GOLF, GOLF_RESULTS, Workspace
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_measures import measure_swing, record_swing
@@ -65,7 +65,7 @@ from keyrecon.report.golf_table import write_golf_table
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 CLICKS_FILE = "golf_clicks.json"
-OVERLAY_FILE, TABLE_FILE = "overlay.mp4", "golf.csv"
+TABLE_FILE, OVERLAY_FILE = GOLF_RESULTS
 KEYS = ("start", "top", "hit", "finish")
 SHORTEST_SWING = 0.7
 """Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take

@@ -86,6 +86,8 @@ OWN_NAMES = (
 """Files that a project has or may come to have."""
 KEPT = ("*.toml", "*.json", "*.sqlite*", "motion.npz", "report.html")
 """Files there are that hold a person's work, or from which the rest is made."""
+GOLF_RESULTS = ("golf.csv", "overlay.mp4")
+"""Files besides motion and report that a golf fit writes, and takes for its own."""
 GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
 COURT = "court"
@@ -185,7 +187,7 @@ class Workspace:
 
     def golf_results(self) -> list[Path]:
         """Files besides motion and report that a golf fit wrote."""
-        files = (self.folder / name for name in ("golf.csv", "overlay.mp4"))
+        files = (self.folder / name for name in GOLF_RESULTS)
         return [file for file in files if self.is_golf and file.is_file()]
 
     @property
@@ -366,11 +368,12 @@ class Workspace:
         """Whether a file's place is one of the project's own, whether there is a file or not."""
         inside = file.parent.exists() and file.parent.samefile(self.folder)
         videos = [(self.folder / table["path"]).resolve() for table in self.videos]
-        return (
-            (inside and file.name.lower() in OWN_NAMES)
-            or file.resolve() in videos
-            or (file.exists() and any(kept.samefile(file) for kept in self.kept_files()))
-        )
+        own = (*OWN_NAMES, *(GOLF_RESULTS if self.is_golf else ()))
+        return (inside and file.name.lower() in own) or file.resolve() in videos
+
+    def keeps(self, file: Path) -> bool:
+        """Whether a file is one of `kept_files`."""
+        return file.exists() and any(kept.samefile(file) for kept in self.kept_files())
 
     def options(
         self,

@@ -74,6 +74,19 @@ def test_nothing_that_the_project_needs_is_written_over(project, name):
     assert_refused(project, name, match="belongs to the project and would be lost")
 
 
+def test_an_export_in_the_project_takes_the_place_of_the_one_before(project):
+    files = [project.folder / name for name in ("coco.json", "rally.csv")]
+    export(project, files, silent)
+    assert len(export(project, files, silent)) == 2
+
+
+def test_what_a_golf_fit_has_written_is_its_own(project):
+    export(project, [project.folder / "golf.csv"], silent)  # of a project that has no swing
+    project.become_golf()
+    for name in ("p/golf.csv", "p/overlay.mp4"):
+        assert_refused(project, name, match="belongs to the project and would be lost")
+
+
 def test_a_place_that_the_project_may_come_to_need_is_kept_free(project):
     (project.folder / "annotations.json").unlink()
     assert_refused(project, "p/annotations.json", match="belongs to the project")
