@@ -34,6 +34,7 @@ from keyrecon.golf.fit.residuals import (
 )
 from keyrecon.golf.fit.solver import Problem, Regulariser, ResidualBlock, solve
 from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.motion_model import posture_by_frame
 from keyrecon.golf.prior.skeleton import CLUB
 from keyrecon.golf.records import (
     Body,
@@ -82,7 +83,10 @@ def fit_sliding_windows(
     options: WindowOptions = WindowOptions(),
     progress: Progress = silent,
 ) -> SwingFit:
-    """The whole motion from windows; `initial` has phases guessed and the root right in frame 0."""
+    """The whole motion from windows; `initial` has phases guessed and the root right in frame 0.
+
+    The fit is one of the model of `initial`: its state places swing axes, not the pelvis.
+    """
     pose = fitted_pose(initial)
     model, body = _free_root(initial.model), initial.body
     phase = initial.state.phase
@@ -100,7 +104,7 @@ def fit_sliding_windows(
         regulariser = _regulariser(basis, expected, options)
         best = solve(Problem(model, body, basis, blocks, regulariser), begin, options.steps)
         estimate = _enter(estimate, best, window)
-    return SwingFit(model, body, estimate)
+    return _with_root(SwingFit(initial.model, body, estimate))
 
 
 def _free_root(model: MotionModel) -> MotionModel:
@@ -111,6 +115,17 @@ def _free_root(model: MotionModel) -> MotionModel:
         values[..., :3] = 0
         values[..., -3:] = 0
     return replace(model, centre=centre, mean=mean, components=components)
+
+
+def _with_root(fit: SwingFit) -> SwingFit:
+    """A fit whose state has the pelvis itself for G, with G below the model's motion of the root."""
+    state = fit.state
+    if state.frame_coefficients is None:
+        raise ValueError("windows have coefficients of every frame")
+    posture = posture_by_frame(fit.model, state.phase, state.frame_coefficients)
+    rotation = state.rotation @ np.swapaxes(posture.turns[:, 0], 1, 2)
+    shift = fit.body.stature * np.einsum("tij,tj->ti", rotation, posture.place)
+    return replace(fit, state=replace(state, rotation=rotation, position=state.position - shift))
 
 
 def _stand_still(root: SwingState, number: int) -> SwingState:

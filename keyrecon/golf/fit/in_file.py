@@ -84,20 +84,23 @@ def _state_at(state: SwingState, place: Float[np.ndarray, "F"]) -> SwingState:
     frames = np.arange(len(state.phase))
     turns = Slerp(frames, Rotation.from_matrix(state.rotation))(place).as_matrix()
     position = np.stack([np.interp(place, frames, c) for c in state.position.T], axis=1)
-    nearest = np.rint(place).astype(int)
     each, deviation = state.frame_coefficients, state.deviation
-    low = np.minimum(place.astype(int), len(frames) - 2)
-    share = (place - low)[:, None, None]
     return replace(
         state,
         phase=np.interp(place, frames, state.phase),
         rotation=turns,
         position=position,
-        frame_coefficients=None if each is None else each[nearest],
-        deviation=None
-        if deviation is None
-        else (1 - share) * deviation[low] + share * deviation[low + 1],
+        frame_coefficients=None if each is None else _between(each, place),
+        deviation=None if deviation is None else _between(deviation, place),
     )
+
+
+def _between(values: Float[np.ndarray, "T *n"], place: Float[np.ndarray, "F"]) -> np.ndarray:
+    """Values of frames at places between them."""
+    low = np.minimum(place.astype(int), len(values) - 2)
+    share = (place - low).reshape(-1, *[1] * (values.ndim - 1))
+    between: np.ndarray = (1 - share) * values[low] + share * values[low + 1]
+    return between
 
 
 def _follow_camera(

@@ -17,6 +17,7 @@ from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_mod
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.numerics.geometry import warp_points
+from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
 from tests.support.golf_truth import camera_before, even_times, observe
 
 FRAMES = 12
@@ -127,3 +128,15 @@ def test_joints_lie_where_the_camera_that_turned_shows_them(fitted):
     inside = swing_in_file(swing, observations, film_seen_by(back), TIME, model)
     expected = warp_points(back[:, None], swing.motion.points2d)
     assert np.linalg.norm(inside.motion.points2d - expected, axis=2).max() < 2.5
+
+
+def test_the_papers_windows_have_the_same_swing_in_the_file_as_in_the_film(fitted):
+    swing, observations, model = fitted
+    state = replace(swing.state, coefficients=np.zeros(0))
+    initial = SwingFit(model, swing.body, state)
+    fit = fit_sliding_windows(observations, initial, WindowOptions(steps=2))
+    in_film = describe_fit(fit, observations, TIME)
+    film = replace(film_as_it_is(TIME), still=False)
+    inside = swing_in_file(in_film, observations, film, TIME, model)
+    np.testing.assert_allclose(inside.motion.points2d, in_film.motion.points2d, atol=1e-6)
+    np.testing.assert_allclose(inside.motion.points3d, in_film.motion.points3d, atol=1e-6)
