@@ -21,7 +21,7 @@ from keyrecon.golf.fit.handedness import (
     mirror_pose,
 )
 from keyrecon.golf.plausibility import SwingDoubt
-from keyrecon.golf.records import Camera, FittedSwing
+from keyrecon.golf.records import Camera, CameraTurns, FittedSwing
 from keyrecon.golf.swing_fit import FoundSwing
 
 
@@ -60,8 +60,15 @@ def _mirror_fitted(fitted: FittedSwing, width: int) -> FittedSwing:
     return replace(
         fitted, motion=mirrored, pose=mirror_pose(fitted.pose),
         capsules=mirror_capsules(fitted.capsules), club=fitted.club * MIRROR_X,
-        club2d=mirror_pixels(fitted.club2d, width),
+        club2d=mirror_pixels(fitted.club2d, width), camera=_mirror_turns(fitted.camera),
     )  # fmt: skip
+
+
+def _mirror_turns(camera: CameraTurns | None) -> CameraTurns | None:
+    if camera is None:
+        return None
+    flip = np.diag(MIRROR_X)
+    return CameraTurns(flip @ camera.turns @ flip, camera.shifts * MIRROR_X)
 
 
 def _mirror_doubt(doubt: SwingDoubt) -> SwingDoubt:

@@ -246,6 +246,24 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
+class CameraTurns:
+    """How a camera turned and zoomed, from where it is thought to stand still.
+
+    A point of the standing camera's axes lies at turn @ point + shift in those of a frame.
+    """
+
+    turns: Float[np.ndarray, "T 3 3"]
+    shifts: Float[np.ndarray, "T 3"]
+    """Metres; zooming in brings the player closer."""
+
+    def undo(
+        self, points: Float[np.ndarray, "*n 3"], frames: int | slice = slice(None)
+    ) -> Float[np.ndarray, "*n 3"]:
+        """Points in the axes of some frames (T, n, 3), or of one, in the standing camera's."""
+        return (points - self.shifts[frames, None]) @ self.turns[frames]
+
+
+@dataclass(frozen=True, eq=False)
 class FittedSwing:
     """A swing fitted to a video."""
 
@@ -262,6 +280,8 @@ class FittedSwing:
     """The same in the picture, px."""
     keys: Float[np.ndarray, "4"]
     """Frames in which the fitted motion passes the key postures."""
+    camera: CameraTurns | None = None
+    """How the real camera moved; None where it stood still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +298,7 @@ class RecordedSwing:
     keys: Float[np.ndarray, "4"]
     """Frames of the key postures."""
     vertical: Float[np.ndarray, "3"]
-    """Unit vector up, camera axes."""
+    """Unit vector up, axes of the camera where it stands still."""
     left_handed: bool
     doubts: tuple[str, ...] = ()
     """What speaks against the fit; its numbers are no measurements where anything does."""
@@ -286,6 +306,19 @@ class RecordedSwing:
     """What a reader of its numbers should know of the film."""
     shown: tuple[bool, bool, bool, bool] = (True, True, True, True)
     """Which key postures the film shows; where one is not, its frame only bounds it."""
+    camera: CameraTurns | None = None
+    """How it moved; None where it stood still, or nobody knows (files of former versions)."""
+
+    @property
+    def standing_points(self) -> Float[np.ndarray, "T 14 3"]:
+        """Joints as a camera sees them that stands still: only there frames can be compared."""
+        points = self.motion.points3d
+        return points if self.camera is None else self.camera.undo(points)
+
+    @property
+    def standing_club(self) -> Float[np.ndarray, "T 2 3"]:
+        """Grip and head likewise."""
+        return self.club if self.camera is None else self.camera.undo(self.club)
 
     @property
     def fitted(self) -> Bool[np.ndarray, "T"]:

@@ -118,7 +118,7 @@ def _free_root(model: MotionModel) -> MotionModel:
 
 
 def _with_root(fit: SwingFit) -> SwingFit:
-    """A fit whose state has the pelvis itself for G, with G below the model's motion of the root."""
+    """A fit in which G was the pelvis, with swing axes that the model's own root moves in."""
     state = fit.state
     if state.frame_coefficients is None:
         raise ValueError("windows have coefficients of every frame")

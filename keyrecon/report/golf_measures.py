@@ -5,7 +5,8 @@ beginning of the upswing, positive away from the target; the X-factor is the sho
 the hips' (McLean, Golf Magazine, 1992). The spine goes from between the hips to the neck; it bends
 ahead towards the ball and aside away from the target, against the vertical and the line between the
 ankles at address. Sway is how far the middle between the hips (or the head) has moved towards the
-target since then, lift how far up. The vertical is that of the fitted swing.
+target since then, lift how far up. The vertical is that of the fitted swing. All of it is measured
+as a camera sees it that stands still, whatever the real one did.
 
 Every number has a doubt, one standard deviation, made of two parts that are independent:
 
@@ -132,6 +133,7 @@ def record_swing(
         doubts=doubts,
         notes=notes,
         shown=shown,
+        camera=fitted.camera,
     )
 
 
@@ -246,7 +248,7 @@ def _nearest(swing: RecordedSwing, key: float) -> int:
 
 
 def _joint(swing: RecordedSwing, name: str) -> Float[np.ndarray, "T 3"]:
-    return swing.motion.points3d[:, swing.motion.skeleton.index(name)]
+    return swing.standing_points[:, swing.motion.skeleton.index(name)]
 
 
 def _mid(swing: RecordedSwing, part: str) -> Float[np.ndarray, "T 3"]:

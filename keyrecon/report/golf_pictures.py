@@ -68,18 +68,23 @@ def draw_golfer(
 
 def draw_from_above(fitted: FittedSwing, frame: int, size: int) -> UInt8[np.ndarray, "size size 3"]:
     """The primitives from above: the camera is below the picture and looks up in it."""
-    middle = fitted.pose.origins[0, 0]
     scale = size / (2 * VIEW_RADIUS)
+
+    def stand(points: np.ndarray, frame: int) -> np.ndarray:
+        return points if fitted.camera is None else fitted.camera.undo(points, frame)
+
+    middle = stand(fitted.pose.origins[0, :1], 0)[0]
 
     def from_above(points: np.ndarray) -> np.ndarray:
         flat = (points - middle)[..., [0, 2]] * [1.0, -1.0]
         return flat * scale + size / 2
 
     ends, radii = _place(fitted.capsules, fitted.pose, frame)
+    ends = stand(ends, frame)
     discs = Discs(from_above(ends), radii * scale, np.argsort(-ends[..., 1].mean(axis=1)).tolist())
     picture = np.full((size, size, 3), FLOOR, np.uint8)
     _draw_discs(picture, discs, fitted.capsules)
-    draw_club(picture, from_above(fitted.club[frame]))
+    draw_club(picture, from_above(stand(fitted.club[frame], frame)))
     return picture
 
 

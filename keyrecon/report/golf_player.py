@@ -159,7 +159,7 @@ def _swing_numbers(swing: RecordedSwing, clip: SwingClip) -> dict[str, object]:
     motion, skeleton = swing.motion, swing.motion.skeleton
     shown = np.where(swing.fitted, 1.0, np.nan)[:, None, None]
     flat = shown * np.concatenate([motion.points2d, swing.club2d], axis=1)
-    solid = np.concatenate([motion.points3d, swing.club], axis=1)
+    solid = np.concatenate([swing.standing_points, swing.standing_club], axis=1)
     solid = solid @ Rotation.align_vectors([[0, -1, 0]], [swing.vertical])[0].as_matrix().T
     first = int(np.clip(np.nan_to_num(np.round(swing.keys[0])), 0, len(solid) - 1))
     height = float(np.ptp(solid[first, : len(skeleton.names), 1]))

@@ -17,6 +17,7 @@ from keyrecon.golf.marks import hold_joints
 from keyrecon.golf.prior.skeleton import size_body
 from keyrecon.golf.records import (
     Camera,
+    CameraTurns,
     FittedSwing,
     RootPose,
     SwingMarks,
@@ -189,6 +190,34 @@ def test_a_swing_survives_its_file(tmp_path):
     for name in ("club", "club2d", "club_seen", "keys", "vertical"):
         np.testing.assert_array_equal(getattr(again, name), getattr(swing, name))
     assert read_motion(tmp_path / "motion.npz").fps == 30.0
+
+
+def seen_by_hand(fitted):
+    """The swing in the axes of a camera that pans, tilts, rolls and zooms meanwhile."""
+    turns = Rotation.from_rotvec(np.linspace([0, 0, 0], [0.05, 0.2, 0.1], FRAMES)).as_matrix()
+    shifts = np.linspace([0, 0, 0], [0.02, 0.01, -0.3], FRAMES)
+    points = np.einsum("tij,tnj->tni", turns, fitted.motion.points3d) + shifts[:, None]
+    return replace(fitted, motion=motion_of(points), camera=CameraTurns(turns, shifts))
+
+
+def test_a_camera_held_by_hand_measures_what_one_that_stands_still_does(tmp_path):
+    ramp = np.radians(90) * np.linspace(0, 1, FRAMES)
+    standing = moved(turning(ramp, ramp / 2), ["head_top"], [0.1, 0.05, 0.02])
+    held = record_swing(seen_by_hand(standing), seen())
+    write_swing(tmp_path / "motion.npz", held)
+    for swing in (held, read_swing(tmp_path / "motion.npz")):
+        for curve, expected in zip(
+            measure_swing(swing).curves, measured(standing).curves, strict=True
+        ):
+            np.testing.assert_allclose(curve.values, expected.values, atol=1e-9)
+
+
+def test_a_file_that_tells_nothing_of_the_cameras_moves_is_measured_as_it_is(tmp_path):
+    swing = record_swing(seen_by_hand(still()), seen())
+    write_swing(tmp_path / "motion.npz", replace(swing, camera=None))
+    again = read_swing(tmp_path / "motion.npz")
+    assert again.camera is None
+    np.testing.assert_array_equal(again.standing_points, swing.motion.points3d)
 
 
 def test_a_motion_that_is_no_swing_is_refused(tmp_path):

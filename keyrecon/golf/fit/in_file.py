@@ -18,6 +18,7 @@ from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.records import (
     Camera,
+    CameraTurns,
     FittedSwing,
     Matches,
     MotionModel,
@@ -117,13 +118,14 @@ def _follow_camera(
         return moved
 
     pose = RootPose(follow(fitted.pose.origins), turn[:, None] @ fitted.pose.rotations)
+    turns = None if film.still else CameraTurns(turn, nearer)
     joints, club = follow(joints), follow(fitted.club)
     pixels, ends = (
         project(p.reshape(-1, 3), moving)[0].reshape(*p.shape[:2], 2) for p in (joints, club)
     )
     scale = moving.focal / joints[..., 2].mean(axis=1)
     motion = replace(fitted.motion, points3d=joints, points2d=pixels, scale=scale)
-    return replace(fitted, motion=motion, pose=pose, club=club, club2d=ends)
+    return replace(fitted, motion=motion, pose=pose, club=club, club2d=ends, camera=turns)
 
 
 def _camera_turns(

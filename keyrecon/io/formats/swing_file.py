@@ -4,17 +4,20 @@
     club_seen (T)                    where the club was detected; elsewhere it is the model's
     key_postures (4), key_posture_names     frames, not rounded: address, top, hit, finish
     key_postures_shown (4)           which of them the film shows
-    vertical (3), left_handed        up in camera axes; which hand
+    vertical (3), left_handed        up in the axes of the camera where it stands; which hand
+    camera_turns (T,3,3), camera_shifts (T,3)   where the camera moved: turn @ point + shift has a
+                                     point of the axes in which it stands still in those of a frame
     doubts, notes                    what speaks against the fit, and is told of the film
 
 Any reader of motions reads it too.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from keyrecon.golf.records import RecordedSwing
+from keyrecon.golf.records import CameraTurns, RecordedSwing
 from keyrecon.io.formats.motion_file import read_motion, write_motion
 from keyrecon.reading import check_numbers, read_arrays, reading
 
@@ -37,6 +40,7 @@ def write_swing(path: Path, swing: RecordedSwing) -> None:
             "left_handed": np.array(swing.left_handed),
             "doubts": np.array(swing.doubts, dtype=np.str_),
             "notes": np.array(swing.notes, dtype=np.str_),
+            **_turns(swing.camera),
         },
     )
 
@@ -61,7 +65,21 @@ def read_swing(path: Path) -> RecordedSwing:
             doubts=tuple(str(doubt) for doubt in data["doubts"]),
             notes=tuple(str(note) for note in data.get("notes", ())),
             shown=_shown(data.get("key_postures_shown", np.ones(4, bool))),
+            camera=_camera(data, frames),
         )
+
+
+def _turns(camera: CameraTurns | None) -> dict[str, np.ndarray]:
+    return {} if camera is None else {"camera_turns": camera.turns, "camera_shifts": camera.shifts}
+
+
+def _camera(data: Mapping[str, np.ndarray], frames: int) -> CameraTurns | None:
+    if "camera_turns" not in data:
+        return None
+    for name in ("camera_turns", "camera_shifts"):
+        check_numbers(name, data[name])
+    turns, shifts = data["camera_turns"].astype(float), data["camera_shifts"].astype(float)
+    return CameraTurns(turns.reshape(frames, 3, 3), shifts.reshape(frames, 3))
 
 
 def _shown(stored: np.ndarray) -> tuple[bool, bool, bool, bool]:

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from keyrecon.body import LSP14
+from keyrecon.golf.fit.handedness import MIRROR_X
 from keyrecon.golf.fit.in_file import swing_in_file
 from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.mirroring import _mirror_fitted
 from keyrecon.golf.observation import ObservedSwing
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
@@ -18,6 +21,7 @@ from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.paper.sliding_windows import WindowOptions, fit_sliding_windows
+from keyrecon.report.golf_measures import record_swing
 from tests.support.golf_truth import camera_before, even_times, observe
 
 FRAMES = 12
@@ -116,6 +120,21 @@ def test_joints_lie_where_the_camera_that_was_shifted_shows_them(fitted):
     assert off.max() < 2.5 and off.mean() < 0.7
     club = warp_points(back[:, None], swing.club2d)
     assert np.linalg.norm(inside.club2d - club, axis=2).max() < 4
+
+
+def test_a_camera_that_moved_adds_nothing_to_what_is_measured(fitted):
+    swing, observations, model = fitted
+    back = np.stack([pan_and_roll(t) for t in range(FRAMES)])
+    inside = swing_in_file(swing, observations, film_seen_by(back), TIME, model)
+    for found in (inside, _mirror_fitted(inside, 720)):
+        recorded = record_swing(found, observations)
+        mirrored = found is not inside
+        expected = swing.motion.points3d
+        expected = expected[:, LSP14.mirror] * MIRROR_X if mirrored else expected
+        assert np.abs(found.motion.points3d - expected).max() > 0.05
+        np.testing.assert_allclose(recorded.standing_points, expected, atol=1e-9)
+        expected = swing.club * MIRROR_X if mirrored else swing.club
+        np.testing.assert_allclose(recorded.standing_club, expected, atol=1e-9)
 
 
 def test_joints_lie_where_the_camera_that_turned_shows_them(fitted):
