@@ -100,20 +100,25 @@ def hold_observations(observations: Observations) -> Observations:
 
 
 def correct_tracks(
-    joints: Float[np.ndarray, "T 14 2"], marks: SwingMarks, clicked: int
+    joints: Float[np.ndarray, "T 14 2"], marks: SwingMarks, clicked: int | None
 ) -> Float[np.ndarray, "T 14 2"]:
     """Tracks through the marks: a tracker drifts evenly from the click to a mark, and on from it.
 
-    Where a track was given up before a mark, it stays as it was.
+    A mark in the `clicked` frame says that the click was beside the joint; None stands for one
+    outside of these frames, where it tells nothing of them. Where a track was given up before a
+    mark, it stays as it was.
     """
     held, every = joints.copy(), np.arange(len(joints))
     for j in range(joints.shape[1]):
         drift = marks.joints[:, j] - joints[marks.frames, j]
-        known = np.isfinite(drift).all(axis=1) & (marks.frames != clicked)
-        frames = np.append(marks.frames[known], clicked)
-        order = np.argsort(frames)
-        off = np.append(drift[known], np.zeros((1, 2)), axis=0)[order]
-        held[:, j] += np.stack([np.interp(every, frames[order], c) for c in off.T], axis=1)
+        known = np.isfinite(drift).all(axis=1)
+        frames, off = marks.frames[known], drift[known]
+        if clicked is not None and clicked not in frames:
+            frames, off = np.append(frames, clicked), np.append(off, np.zeros((1, 2)), axis=0)
+        if len(frames):
+            order = np.argsort(frames)
+            drifts = [np.interp(every, frames[order], c) for c in off[order].T]
+            held[:, j] += np.stack(drifts, axis=1)
     return held
 
 

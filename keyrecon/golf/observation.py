@@ -208,12 +208,13 @@ def _observe(
     foreground = replace(seen.scene.foreground, likely=seen.scene.foreground.likely[seen.chosen])
     players = list(seen.scene.players[seen.chosen])
     whole = find_whole(players)
+    clicked = pose.frame if len(seen.reach) == len(seen.chosen) else None
     return hold_observations(Observations(
         camera=pose.camera,
         initial=pose.joints,
         height=pose.height,
         stature=pose.stature,
-        joints=correct_tracks(tracks.joints, marks, pose.frame),
+        joints=correct_tracks(tracks.joints, marks, clicked),
         spread=tracks.spread,
         club=swing.shaft.ends,
         club_spread=np.full(len(players), CLUB_SPREAD * seen.height),
