@@ -22,7 +22,6 @@ from keyrecon.golf.candidates import gather_evidence, least_cost
 from keyrecon.golf.clicks import STATURE, ClickedPose
 from keyrecon.golf.fit.handedness import mirror_initial, mirror_pixels
 from keyrecon.golf.fit.initial_pose import (
-    JOINT_SPREAD,
     LEAN_SPREAD,
     estimate_initial_pose,
     repeat_pose,
@@ -39,6 +38,9 @@ CLICKED = ("head_top", "root", *LEGS)
 """Joints that every file of clicks has; the arms move too much to tell anything."""
 NORMAL_HEIGHT = 300.0
 """px to which a player is scaled, so that spreads in px mean shares of his height."""
+CLICK_SPREAD = 8.0
+"""px of such a player by which a click, or the mean player's joint, is usually off; what misfits are
+allowed was measured with it."""
 USUAL_MISFIT, LARGEST_MISFIT = 12.0, 16.0
 """Half the sum of squared residuals, in standard deviations, of six clicked joints. Marks by eye on
 six real swings, anywhere in the swing: 0.7 to 10; with knees or ankles exchanged 11 to 60; with one
@@ -124,7 +126,7 @@ def _misfit_at(
     points = np.array([hips if n == "root" else posed[LSP14.index(n)] for n in joints.names])
     away = np.linalg.norm(project(points, camera)[0] - joints.places, axis=1)
     lean = place.rotation[[0, 2], 1] / LEAN_SPREAD
-    total = ((away / JOINT_SPREAD) ** 2).sum() / 2 + (lean**2).sum() / 2
+    total = ((away / CLICK_SPREAD) ** 2).sum() / 2 + (lean**2).sum() / 2
     worst = int(away.argmax())
     return ClickMisfit(float(total), joints.names[worst], float(away[worst] / NORMAL_HEIGHT))
 
