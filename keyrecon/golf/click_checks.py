@@ -21,11 +21,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.golf.candidates import gather_evidence, least_cost
 from keyrecon.golf.clicks import STATURE, ClickedPose
 from keyrecon.golf.fit.handedness import mirror_initial, mirror_pixels
-from keyrecon.golf.fit.initial_pose import (
-    LEAN_SPREAD,
-    estimate_initial_pose,
-    repeat_pose,
-)
+from keyrecon.golf.fit.initial_pose import LEAN_SPREAD, estimate_initial_pose, repeat_pose
 from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.prior.kinematics import find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
@@ -39,8 +35,8 @@ CLICKED = ("head_top", "root", *LEGS)
 NORMAL_HEIGHT = 300.0
 """px to which a player is scaled, so that spreads in px mean shares of his height."""
 CLICK_SPREAD = 8.0
-"""px of such a player by which a click, or the mean player's joint, is usually off; what misfits are
-allowed was measured with it."""
+"""px of such a player by which a click, or the mean player's joint, is usually off; the misfits below
+were measured with it."""
 USUAL_MISFIT, LARGEST_MISFIT = 12.0, 16.0
 """Half the sum of squared residuals, in standard deviations, of six clicked joints. Marks by eye on
 six real swings, anywhere in the swing: 0.7 to 10; with knees or ankles exchanged 11 to 60; with one
