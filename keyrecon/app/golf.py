@@ -165,11 +165,13 @@ def fit_project(
     clicks = kept_clicks(workspace)
     options = told.over(workspace.options(options, GolfOptions(), GOLF), folder)
     model = read_prior(options, folder)
-    slow_motion = workspace.project["video"].get("slow_motion", 1.0)
-    check_evidence(clicks, video, model, slow_motion, str(workspace.golf_clicks_file))
+    slow_motion = workspace.project["video"].get("slow_motion")
+    check_evidence(clicks, video, model, slow_motion or 1.0, str(workspace.golf_clicks_file))
     video = hold_frames(video)
     marks = kept_marks(workspace, video)
     fitting = replace(options, prior="")  # stages know the prior by its content
+    if slow_motion is not None:
+        fitting = believe_speed(fitting)
     with workspace.remembering(options, GolfOptions(), GOLF):
         fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
@@ -185,6 +187,11 @@ def fit_project(
             f"{spent:.0f} s ({spent / len(video):.2f} s per frame).",
         ]
     )
+
+
+def believe_speed(options: GolfOptions) -> GolfOptions:
+    """Options for a film of which a person told how fast it plays: no slow motion is searched."""
+    return replace(options, observation=replace(options.observation, find_slow_motion=False))
 
 
 def kept_clicks(workspace: Workspace) -> GolfClicks:
@@ -270,6 +277,8 @@ def open_golf_project(
         _require_same_video(workspace, video, slow_motion)
         if not (folder / workspace.project["video"]["path"]).is_file():
             workspace.relink(video.path)
+        if slow_motion is not None and "slow_motion" not in workspace.project["video"]:
+            workspace.tell_slow_motion(slow_motion)
         if clicks_file is not None:
             keep_clicks(workspace, clicks_file.read_bytes())
         if not workspace.is_golf:
@@ -278,8 +287,7 @@ def open_golf_project(
     make_folder(folder)
     if clicks_file is not None:
         write_durably(folder / CLICKS_FILE, clicks_file.read_bytes())
-    trim = {"slow_motion": None if slow_motion == 1 else slow_motion}
-    Workspace.create(folder, video, video.path, trim, GOLF)
+    Workspace.create(folder, video, video.path, {"slow_motion": slow_motion}, GOLF)
     return Workspace(folder, force)
 
 

@@ -64,8 +64,8 @@ def find_swing(
     for number, candidate in enumerate(candidates[: options.candidates], 1):
         first = attempt(candidate, f"_{number}")
         tried.append(first)
-        slowed = None
-        if first.observed.slow_motion == 1 and options.method == "swing":
+        slowed, searched = None, options.observation.find_slow_motion
+        if searched and first.observed.slow_motion == 1 and options.method == "swing":
             slowed = find_slowed_keys(first.fitted.keys, first.observed.film, scene.film)
         if slowed is not None:
             tried.append(attempt(replace(candidate, keys=slowed), f"_{number}s"))

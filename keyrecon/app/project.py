@@ -39,19 +39,21 @@ def start(
     video: Path,
     folder: Path,
     trim: tuple[int, int | None] = (0, None),
-    slow_motion: float = 1.0,
+    slow_motion: float | None = None,
     skeleton: Path | None = None,
     golf: bool = False,
 ) -> str:
-    """Make a project folder for a video; `trim` is the first frame and the one after the last."""
+    """Make a project folder for a video; `trim` is the first frame and the one after the last.
+
+    A slow motion that is told, 1 also, is kept: of a golf swing it is searched for otherwise.
+    """
     first, end = trim
     if golf and skeleton is not None:
         raise KeyreconError("A golf swing has its own skeleton; leave --skeleton or --golf out.")
-    opened = open_video(video, first, end, slow_motion)
+    opened = open_video(video, first, end, 1.0 if slow_motion is None else slow_motion)
     if skeleton is not None:
         read_skeleton(skeleton)
-    trim_of_video: dict[str, float | None] = {"start": first or None, "end": end}
-    trim_of_video["slow_motion"] = None if slow_motion == 1 else slow_motion
+    trim_of_video = {"start": first or None, "end": end, "slow_motion": slow_motion}
     Workspace.create(folder, opened, video, trim_of_video, "golf" if golf else None)
     if skeleton is not None:
         write_durably(folder / "skeleton.json", skeleton.read_bytes())

@@ -5,7 +5,14 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from keyrecon.commands.arguments import MaybeFile, MaybeWhole, Project, Switch, VideoFile
+from keyrecon.commands.arguments import (
+    MaybeFile,
+    MaybeNumber,
+    MaybeWhole,
+    Project,
+    Switch,
+    VideoFile,
+)
 
 Points = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="X,Y")]
 Regions = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME:X,Y")]
@@ -44,7 +51,7 @@ def new(
     project: Annotated[Path, arg(metavar="FOLDER")],
     start: int = 0,
     end: MaybeWhole = None,
-    slowmo: float = 1.0,
+    slowmo: MaybeNumber = None,
     skeleton: MaybeFile = None,
     golf: Switch = False,
 ) -> None:

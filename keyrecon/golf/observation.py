@@ -75,6 +75,9 @@ class ObservationOptions:
     """Head, knees and ankles."""
     matches: MatchOptions = field(default_factory=MatchOptions)
     """Points of the surface."""
+    find_slow_motion: bool = True
+    """Whether a downswing that no golfer is so slow in shows slow motion; without, it is as slow as
+    the times of the video have it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +128,9 @@ def observe_swing(
     `scene` is what the film shows, `pose` and `marks` are those of the file's frames.
     """
     film = scene.film
-    slow_motion = find_slow_motion(hypothesis.keys, film.fps)
+    slow_motion = 1.0
+    if options.find_slow_motion:
+        slow_motion = find_slow_motion(hypothesis.keys, film.fps)
     chosen = choose_swing_frames(hypothesis.keys, film, slow_motion)
     reach = _reach_to(round(float(film.place[pose.frame])), chosen)
     window, tracked = film.take(chosen, slow_motion), film.take(reach, slow_motion)

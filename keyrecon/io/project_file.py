@@ -113,6 +113,15 @@ def with_video_path(path: Path, video_path: str, numbers: Collection[int]) -> st
     return _proven(document.as_string(), project, path)
 
 
+def with_slow_motion(path: Path, factor: float) -> str:
+    """The file's text with how many times slower than life its video plays."""
+    document, project = _parse(path)
+    for content in (document, project):
+        table: Any = content["video"]
+        table["slow_motion"] = factor
+    return _proven(document.as_string(), project, path)
+
+
 def with_added_video(path: Path, video: Mapping[str, str | float | None]) -> str:
     """The file's text with one more video."""
     import tomlkit

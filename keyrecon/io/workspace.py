@@ -61,6 +61,7 @@ from keyrecon.io.project_file import (
     with_added_video,
     with_kind,
     with_options,
+    with_slow_motion,
     with_video_path,
 )
 from keyrecon.io.project_videos import (
@@ -252,6 +253,12 @@ class Workspace:
             write_durably(self.project_file, with_added_video(self.project_file, table))
         self.project = read_project(self.project_file)
         return together
+
+    def tell_slow_motion(self, factor: float) -> None:
+        """Keep how many times slower than life the video plays; its times stay as they are."""
+        with self.exclusive():
+            write_durably(self.project_file, with_slow_motion(self.project_file, factor))
+        self.project = read_project(self.project_file)
 
     def relink(self, video_file: Path) -> None:
         """Point the project at the place that a video of it has moved to, with all its parts."""

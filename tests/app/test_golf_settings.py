@@ -8,10 +8,12 @@ from small_swing import QUICK
 
 from keyrecon.app import golf as app
 from keyrecon.app.annotator import job_commands
-from keyrecon.app.golf import BUILT_IN, GolfSettings, fit_file
+from keyrecon.app.golf import BUILT_IN, GolfSettings, fit_file, open_golf_project
+from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
+from keyrecon.io.video import open_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.progress import silent
 
@@ -62,6 +64,26 @@ def test_a_fit_on_the_page_goes_on_with_the_prior_of_the_project(swing, fitted_w
     fit_file(swing / "video.mp4", None, project, told=GolfSettings(prior=BUILT_IN))
     assert len(fitted_with[-1][1].components) == len(model.components)
     assert "prior" not in (project / "project.toml").read_text()
+
+
+@pytest.mark.parametrize(("told", "searched"), [(None, True), (1.0, False)])
+def test_slow_motion_is_searched_for_unless_somebody_told_of_it(swing, fitted_with, told, searched):
+    project = swing / "project"
+    fit_file(swing / "video.mp4", None, project, slow_motion=told)
+    job_commands(project)["golf"]({}, silent)
+    found = [options.observation.find_slow_motion for options, _ in fitted_with]
+    assert found == [searched, searched]
+    assert ("slow_motion = 1" in (project / "project.toml").read_text()) == (told is not None)
+    assert "find_slow_motion" not in (project / "project.toml").read_text()
+
+
+def test_a_new_project_keeps_a_speed_that_is_told(swing, tmp_path):
+    for number, told in enumerate((None, 1.0)):
+        start(swing / "video.mp4", tmp_path / str(number), slow_motion=told, golf=True)
+        kept = Workspace(tmp_path / str(number)).project["video"].get("slow_motion")
+        assert kept == told
+    open_golf_project(tmp_path / "2", open_video(swing / "video.mp4"), None, slow_motion=1.0)
+    assert Workspace(tmp_path / "2").project["video"]["slow_motion"] == 1
 
 
 def test_a_slow_motion_that_is_told_is_never_passed_over(swing):
