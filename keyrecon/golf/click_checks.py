@@ -35,7 +35,7 @@ CLICKED = ("head_top", "root", *LEGS)
 NORMAL_HEIGHT = 300.0
 """px to which a player is scaled, so that spreads in px mean shares of his height."""
 CLICK_SPREAD = 8.0
-"""px of such a player by which a click, or the mean player's joint, is usually off; the misfits below
+"""px of such a player by which a click, or the mean player's joint, is usually off; misfits below
 were measured with it."""
 USUAL_MISFIT, LARGEST_MISFIT = 12.0, 16.0
 """Half the sum of squared residuals, in standard deviations, of six clicked joints. Marks by eye on

@@ -73,7 +73,7 @@ def fit_swing_prior(
     """Joints of the fitted swing in camera axes, metres.
 
     `heights` are the player's in every frame, px. Raises KeyreconError when the joints are not
-    those of LSP14 or do not swing.
+    those of LSP14, do not swing, or lack what a swing is found by.
     """
     if annotations.skeleton.names != LSP14.names:
         raise KeyreconError("The golf prior needs the 14 joints of the default skeleton.")
@@ -88,7 +88,7 @@ def fit_swing_prior(
     right_handed = observations
     if options.left_handed:
         right_handed = mirror_observations(observations, video.width)
-    start = int(np.clip(keys[0], 0, len(time) - 1))
+    start = _placing_frame(tracks.joints, keys[0])
     right_handed = replace(right_handed, initial=_initial_joints(right_handed.joints, start))
     initial = initial_fit(right_handed, model, size_body(options.stature))
     fit = fit_swing(right_handed, initial, fps, options.fit)
@@ -126,6 +126,23 @@ def _observations(
     )
 
 
+PLACING = tuple(
+    LSP14.index(f"{side}_{name}") for name in ("hip", "knee", "ankle") for side in ("right", "left")
+)
+"""Joints that tell where a player stands and which way he faces."""
+
+
+def _placing_frame(joints: Float[np.ndarray, "T 14 2"], near: float) -> int:
+    """The frame nearest to one that has them."""
+    known = np.flatnonzero(np.isfinite(joints[:, PLACING]).all(axis=(1, 2)))
+    if not len(known):
+        raise KeyreconError(
+            "No frame has both hips, knees and ankles, by which the golf prior places the player; "
+            "mark all six in one keyframe, best at the address."
+        )
+    return int(known[np.abs(known - near).argmin()])
+
+
 def _initial_joints(joints: Float[np.ndarray, "T 14 2"], frame: int) -> InitialJoints:
     """The known joints of one frame."""
     known = np.isfinite(joints[frame]).all(axis=1)
@@ -144,6 +161,11 @@ def _stand_in(joints: Float[np.ndarray, "T 14 2"], height: float) -> Club:
         [hands, hands + STAND_IN_LENGTH * height * unit_vectors(hands - middle, 1e-9)], axis=1
     )
     known = np.isfinite(ends).all(axis=(1, 2))
+    if not known.any():
+        raise KeyreconError(
+            "No frame has a wrist and an elbow, by which the golf prior tells when the swing is; "
+            "mark the arms in the keyframes, or use another prior."
+        )
     frames = np.arange(len(ends))
     filled = [np.interp(frames, frames[known], c[known]) for c in ends.reshape(len(ends), 4).T]
     return Club(np.stack(filled, axis=1).reshape(-1, 2, 2), known, known)

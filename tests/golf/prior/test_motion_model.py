@@ -76,6 +76,30 @@ def test_a_swing_is_found_though_no_wrist_is_known_in_some_frames(filmed):
     assert 1000 * pa_mpjpe(fitted, joints) < 40
 
 
+def test_a_swing_is_found_though_nothing_is_known_where_it_begins(filmed):
+    joints, pixels = filmed
+    gaps = pixels.copy()
+    gaps[3:12] = np.nan
+    fitted = fit_swing_prior(
+        propagated(gaps), marked(pixels, [16, 34]), read_motion_model(), HEIGHTS, VIDEO
+    )
+    assert 1000 * pa_mpjpe(fitted, joints) < 40
+
+
+@pytest.mark.parametrize(
+    ("missing", "message"),
+    [
+        (("left_wrist", "right_wrist"), "No frame has a wrist and an elbow"),
+        (("left_knee",), "No frame has both hips, knees and ankles"),
+    ],
+)
+def test_joints_without_which_no_swing_can_be_fitted_are_told(filmed, missing, message):
+    gaps = filmed[1].copy()
+    gaps[:, [LSP14.index(name) for name in missing]] = np.nan
+    with pytest.raises(KeyreconError, match=message):
+        fit_swing_prior(propagated(gaps), marked(gaps, [6]), read_motion_model(), HEIGHTS, VIDEO)
+
+
 def test_a_player_who_stands_still_does_not_swing(filmed):
     still = np.repeat(filmed[1][:1], FRAMES, axis=0)
     with pytest.raises(KeyreconError, match="no swing"):
