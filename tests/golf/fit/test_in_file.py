@@ -94,6 +94,20 @@ def test_a_posture_at_the_films_end_is_not_shown_unless_a_person_marked_it(
     assert ("the start is not shown" in told) == (not shown[0])
 
 
+def test_no_key_posture_lies_outside_of_the_film(fitted, tmp_path):
+    """Where the hit was marked in the last frame, the finish would come after it."""
+    swing, observations, model = fitted
+    write_video(tmp_path / "v.mp4", [np.zeros((96, 128, 3), np.uint8)] * FRAMES, 30.0)
+    film, last = film_as_it_is(TIME), FRAMES - 1.0
+    swing = replace(swing, keys=np.array([-1.0, 5.0, 7.0, FRAMES]))
+    marks = replace(NO_MARKS, keys=np.array([np.nan, np.nan, last, np.nan]))
+    found = swing_found(
+        swing, observations, (), ObservedSwing(film, 1.0, observations), marks,
+        open_video(tmp_path / "v.mp4"), model,
+    )  # fmt: skip
+    assert found.fitted.keys.tolist() == [0.0, 5.0, last, last]
+
+
 def film_seen_by(back):
     """A film whose frames were warped from a file by the inverses of `back`."""
     place = np.arange(FRAMES, dtype=float)
