@@ -2,8 +2,9 @@
 
 A mark is worth more than anything observed: the search passes the marked key postures, the club of
 a marked frame is the marked one, tracks of joints run through the marks, and the fit is drawn to
-them (`fit.fitting`). What limbs of fixed length leave between the fit and a mark, `hold_joints`
-closes at last, fading over the frames around, so that a marked joint is where it was marked.
+them (`fit.fitting`); those between the frames that are fitted go along with the fit to the nearest
+one. What limbs of fixed length leave between the fit and a mark, `hold_joints` closes at last,
+fading over the frames around, so that a marked joint is where it was marked.
 """
 
 from dataclasses import replace
@@ -32,7 +33,7 @@ def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
     """Marks of a file's frames in the picture and by the frame numbers of a film.
 
     What lies outside of these frames stays away; of two marked frames that are one there, the
-    later one counts.
+    later one counts. A mark between frames is one of the nearest for now (`carry_marks`).
     """
     first, last = film.window
     inside = (marks.frames >= first) & (marks.frames <= last)
@@ -47,6 +48,28 @@ def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
         pictures[rows], warp_points(warps, marks.joints[inside][rows]),
         warp_points(warps, marks.shafts[inside][rows]),
         np.where(np.isfinite(marks.keys), places, np.nan),
+        film.place[frames[rows]] - pictures[rows],
+    )  # fmt: skip
+
+
+def carry_marks(marks: SwingMarks, fitted: FittedSwing) -> SwingMarks:
+    """Marks between frames where they would be in the nearest one, as fast as a fit moves there.
+
+    A hand moves by 0.1 m from frame to frame, a shaft turns by 20 degrees or more.
+    """
+    if marks.late is None:
+        return marks
+    between = marks.frames + marks.late
+
+    def moved(points: Float[np.ndarray, "T n 2"]) -> Float[np.ndarray, "K n 2"]:
+        low = np.clip(between.astype(int), 0, max(len(points) - 2, 0))
+        high, share = np.minimum(low + 1, len(points) - 1), (between - low)[:, None, None]
+        there: Float[np.ndarray, "K n 2"] = (1 - share) * points[low] + share * points[high]
+        return points[marks.frames] - there
+
+    return replace(
+        marks, joints=marks.joints + moved(fitted.motion.points2d),
+        shafts=marks.shafts + moved(fitted.club2d), late=None,
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from keyrecon.golf.fit.residuals import (
     sample_distance,
     sight_directions,
 )
+from keyrecon.golf.marks import carry_marks
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import UNKNOWN_SHIFT, TimeShift
 from keyrecon.golf.observe.swing_timing import LEAST_DETECTED
@@ -276,7 +277,7 @@ def _doubt_clicks(fitted: FittedSwing, observations: Observations) -> list[Swing
 
 def _doubt_marks(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
     """No mark is far from where the fit would have the joint."""
-    marks = observations.marks
+    marks = carry_marks(observations.marks, fitted)
     off = np.linalg.norm(fitted.motion.points2d[marks.frames] - marks.joints, axis=2)
     far = np.nan_to_num(off / observations.height)
     if not far.size or far.max() <= FARTHEST_MARK:

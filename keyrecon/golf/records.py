@@ -175,6 +175,9 @@ class SwingMarks:
     """Between the hands, and at the club's head, px; NaN where not marked."""
     keys: Float[np.ndarray, "4"]
     """Frames of start, top, hit and finish; NaN where not marked."""
+    late: Float[np.ndarray, "K"] | None = None
+    """By how much later than its frame each picture was taken in which was marked, frames: a film
+    may lack that picture. None where all are those of their frames."""
 
     @classmethod
     def of_joints(

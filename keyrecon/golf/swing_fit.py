@@ -26,7 +26,7 @@ from keyrecon.golf.fit.in_file import observations_in_file, swing_in_file
 from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.marks import hold_joints, hold_keys, hold_observations
+from keyrecon.golf.marks import carry_marks, hold_joints, hold_keys, hold_observations
 from keyrecon.golf.observation import ObservationOptions, ObservedSwing
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.motion_timing import TimeShift
@@ -75,13 +75,14 @@ class GuidedFit:
     club_along: Float[np.ndarray, "T 2"]
     keys: Float[np.ndarray, "4"]
     phase: Float[np.ndarray, "T"]
+    marks: SwingMarks
     fitted: FittedSwing
 
     def update(self, observations: Observations) -> Observations:
         """The observations of this round."""
         return hold_observations(replace(
             observations, club=self.club, club_along=self.club_along, keys=self.keys,
-            phase=self.phase,
+            phase=self.phase, marks=self.marks,
         ))  # fmt: skip
 
 
@@ -125,16 +126,17 @@ def fit_guided(
     """The club detected where a fitted swing expects it, and the fit with it.
 
     `observations` are the first ones: their key postures at top and hit follow from the club alone,
-    since a fit must not confirm itself.
+    since a fit must not confirm itself. Marks between its frames go along with it.
     """
     guided = detect_club_guided(observations, video, fitted, options.guided_detection)
     keys = detect_swing_events(video, guided, fitted, options.events)
     keys[1:3] = observations.keys[1:3]
     keys = hold_keys(keys, observations.marks)
     phase = interpolate_times(keys, model.keys, len(video))
-    guided = hold_observations(replace(guided, keys=keys, phase=phase))
+    marks = carry_marks(observations.marks, fitted)
+    guided = hold_observations(replace(guided, keys=keys, phase=phase, marks=marks))
     fitted = fit_observations(guided, video, model, options, fitted.state)
-    return GuidedFit(guided.club, guided.club_along, keys, phase, fitted)
+    return GuidedFit(guided.club, guided.club_along, keys, phase, marks, fitted)
 
 
 def retime(

@@ -1,10 +1,23 @@
 """Marks of several makers."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from keyrecon.golf.marks import correct_tracks, join_marks
-from keyrecon.golf.records import SwingMarks
+from keyrecon.golf import swing_fit
+from keyrecon.golf.fit.handedness import mirror_marks
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.marks import carry_marks, correct_tracks, join_marks, place_marks
+from keyrecon.golf.observe.film import Film, frame_step
+from keyrecon.golf.observe.swing_timing import interpolate_times
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import Camera, SwingFit, SwingMarks, SwingState
+from keyrecon.io.formats.model_file import read_motion_model
+from keyrecon.io.video import Video
+from tests.support.golf_truth import camera_before, observe
 
 
 def test_marks_of_two_makers_are_joined_and_the_first_counts():
@@ -51,3 +64,73 @@ def test_from_a_click_outside_of_the_film_nothing_drifts():
     joints, marks = tracks_off_by(40, 10)
     corrected = correct_tracks(joints, marks, clicked=None)
     np.testing.assert_allclose(corrected[:, 0, 0], 140)
+
+
+FRAMES, FPS = 480, 240.0
+KEYS = np.array([60.0, 250.0, 310.0, 430.0])
+
+
+def swing_at(frames):
+    """Some frames of a swing that takes 60 from the top to the hit."""
+    fit, seen = played(frames)
+    return describe_fit(fit, seen, frames / FPS)
+
+
+def observed(frames):
+    return played(frames)[1]
+
+
+def played(frames):
+    model, body = read_motion_model(), size_body(1.75)
+    phase = interpolate_times(KEYS, model.keys, FRAMES)[frames]
+    rotation, position = camera_before(180.0)
+    turns, places = np.tile(rotation, (len(frames), 1, 1)), np.tile(position, (len(frames), 1))
+    fit = SwingFit(model, body, SwingState(np.zeros(4), phase, turns, places))
+    pose, camera = fitted_pose(fit), Camera(1000.0, np.array([639.5, 359.5]))
+    return fit, observe(find_joints(body, pose), find_club(body, pose), camera, 0.0)
+
+
+def film_of(numbers):
+    place = np.interp(np.arange(FRAMES), numbers, np.arange(len(numbers)))
+    still, whole = np.tile(np.eye(3), (FRAMES, 1, 1)), (0, FRAMES - 1)
+    return Film(
+        numbers, numbers / FPS, place, still, (1280, 720), np.zeros(2), True, whole, 0.0, whole
+    )
+
+
+def turned(shafts, others):
+    """Angles between shafts, degrees."""
+    one, other = shafts[:, 1] - shafts[:, 0], others[:, 1] - others[:, 0]
+    cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    return np.degrees(np.abs(np.arctan2(cross, (one * other).sum(axis=1))))
+
+
+def test_a_mark_between_fitted_frames_is_held_where_it_moved_on_to():
+    numbers = np.arange(0, FRAMES, frame_step(FPS))
+    filmed, fitted = swing_at(np.arange(FRAMES)), swing_at(numbers)
+    between = np.arange(numbers[90], numbers[106], frame_step(FPS)) + 1
+    at = np.zeros(4) * np.nan
+    marks = SwingMarks(between, filmed.motion.points2d[between], filmed.club2d[between], at)
+    placed = place_marks(marks, film_of(numbers))
+    assert turned(placed.shafts, fitted.club2d[placed.frames]).max() > 5
+    carried = carry_marks(placed, fitted)
+    assert turned(carried.shafts, fitted.club2d[placed.frames]).max() < 1
+    joints = fitted.motion.points2d[placed.frames]
+    assert np.abs(carried.joints - joints).max() < 1.5 < np.abs(placed.joints - joints).max()
+    assert mirror_marks(placed, 1280).late is placed.late
+
+
+def test_a_fit_with_guided_detection_has_the_marks_that_go_along(monkeypatch):
+    numbers = np.arange(0, FRAMES, frame_step(FPS))
+    fitted, between = swing_at(numbers), np.array([numbers[98] + 1])
+    marked = swing_at(np.arange(FRAMES)).club2d[between]
+    marks = SwingMarks(between, np.full((1, 14, 2), np.nan), marked, np.full(4, np.nan))
+    placed = place_marks(marks, film_of(numbers))
+    seen = replace(observed(numbers), marks=placed)
+    monkeypatch.setattr(swing_fit, "detect_club_guided", lambda seen, *_: seen)
+    monkeypatch.setattr(swing_fit, "detect_swing_events", lambda *_: fitted.keys.copy())
+    monkeypatch.setattr(swing_fit, "fit_observations", lambda *_: fitted)
+    video = Video(Path("v.mp4"), 1280, 720, numbers, numbers / FPS, FPS / 3, 0, False, None)
+    guided = swing_fit.fit_guided(seen, fitted, video, read_motion_model())
+    for held in (guided.club, guided.update(seen).club):
+        assert turned(held[98:99], fitted.club2d[98:99])[0] < 1
