@@ -62,6 +62,15 @@ def find_cheapest_path(
     return path
 
 
+def longest_gap(unary: Sequence[Float[np.ndarray, "_"]]) -> int:
+    """Frames from one with a state that gains (cost below zero) to the next one, at most.
+
+    A path that may not skip as many loses all on one side of a gap.
+    """
+    gaining = np.flatnonzero([cost.min(initial=0.0) < 0 for cost in unary])
+    return int(np.diff(gaining).max(initial=1))
+
+
 @dataclass(frozen=True, eq=False)
 class _Predecessors:
     """Where the cheapest path to each state of a frame comes from."""

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.numerics.geometry import unit_vectors
-from keyrecon.numerics.viterbi import find_cheapest_path
+from keyrecon.numerics.viterbi import find_cheapest_path, longest_gap
 from keyrecon.ranges import within
 
 NOWHERE = np.full((2, 2), np.nan)
@@ -62,7 +62,8 @@ class ClubOptions:
     miss: Annotated[float, within(0.03, 10)] = 0.5
     """Cost of a frame without a shaft."""
     gap: Annotated[float, within(0.06, 20)] = 1.2
-    """Longest time that is bridged: at the top a club may point at the camera for long."""
+    """Longest time that is bridged, unless nothing is seen for longer: at the top a club may point
+    at the camera for long."""
     window: Annotated[float, within(0.004, 1)] = 0.07
     """Time on either side that the local motion is fitted over."""
     off: Annotated[float, within(0.002, 0.7)] = 0.035
@@ -235,7 +236,8 @@ def choose_shafts(
             )
             for t, (cost, now, where) in enumerate(zip(costs, shafts, expected.club, strict=True))
         ]  # fmt: skip
-    return find_cheapest_path(costs, moving, max(1, round(options.gap * fps)), options.miss)
+    gap = max(round(options.gap * fps), longest_gap(costs))
+    return find_cheapest_path(costs, moving, gap, options.miss)
 
 
 def _surprise(

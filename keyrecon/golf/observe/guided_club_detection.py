@@ -27,7 +27,7 @@ from keyrecon.golf.observe.club_lines import (
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
-from keyrecon.numerics.viterbi import find_cheapest_path
+from keyrecon.numerics.viterbi import find_cheapest_path, longest_gap
 from keyrecon.ranges import within
 
 EARLY = 0.01
@@ -41,7 +41,8 @@ SAME_CLUB = 1.0
 EXPECTED_SPREAD = 0.12
 """Standard deviation along the shaft of hands that were only expected there, player heights."""
 BRIDGED_SECONDS = 0.5
-"""Longest time over which the fit's error is thought to last."""
+"""Longest time over which the fit's error is thought to last; what is unseen for longer is bridged
+all the same, since a path that ended there would lose all on one side."""
 
 
 @dataclass(frozen=True)
@@ -162,4 +163,5 @@ def _choose(
         return 0.5 * square * min(1.0, options.pace * fps / (t - before))
 
     costs = [options.miss - b.worth for b in lines]
-    return find_cheapest_path(costs, moving, max(1, round(BRIDGED_SECONDS * fps)), 0.0)
+    gap = max(round(BRIDGED_SECONDS * fps), longest_gap(costs))
+    return find_cheapest_path(costs, moving, gap, 0.0)

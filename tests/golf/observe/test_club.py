@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.observe.club import track_club
+from keyrecon.golf.observe.club import choose_shafts, track_club
 from keyrecon.golf.observe.foreground import FrameForeground
 from keyrecon.golf.observe.line_segments import (
     LineSegments,
@@ -110,6 +110,15 @@ def test_hypotheses_that_jump_about_are_not_the_club():
         shafts[t] = ShaftHypotheses(far, np.array([0.4]), np.ones(1, bool))
     club = track_club(shafts, HEIGHT, fps)
     assert not club.detected[[10, 20, 45]].any()
+
+
+@pytest.mark.parametrize("gap", [60, 90])
+def test_a_club_that_is_unseen_for_long_is_found_before_and_after(gap):
+    ends = np.array([HANDS, HANDS + (0.0, 100.0)])[None]
+    seen = ShaftHypotheses(ends, np.array([0.4]), np.array([True]))
+    crumb = ShaftHypotheses(ends, np.array([0.1]), np.array([True]))
+    taken = choose_shafts([seen] * 40 + [crumb] * gap + [seen] * 30, HEIGHT, 60.0)
+    assert (taken >= 0).tolist() == [True] * 40 + [False] * gap + [True] * 30
 
 
 def test_a_video_without_a_club_says_so():

@@ -4,7 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.golf.observe.guided_club_detection import ExpectedClubs, detect_clubs
+from keyrecon.golf.observe.club_lines import ClubLines
+from keyrecon.golf.observe.guided_club_detection import (
+    ExpectedClubs,
+    GuidedDetectionOptions,
+    _choose,
+    detect_clubs,
+)
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 
@@ -75,6 +81,14 @@ def test_what_was_detected_at_first_stays_where_the_expectation_is_all_wrong(fil
     found = detect(film, true, clubs(ANGLES + 100))
     clear = np.abs(np.arange(FRAMES) - 20) > 4
     assert (np.nan_to_num(off(found, true), nan=99.0)[clear] < 1).mean() > 0.8
+
+
+@pytest.mark.parametrize("gap", [28, 60])
+def test_a_club_that_is_unseen_for_long_is_found_before_and_after(gap):
+    one = ClubLines(np.zeros((1, 2, 2)), np.zeros((1, 2)), np.array([18.0]))
+    none = ClubLines(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0))
+    taken = _choose([one] * 60 + [none] * gap + [one] * 50, 60.0, GuidedDetectionOptions())
+    assert (taken >= 0).tolist() == [True] * 60 + [False] * gap + [True] * 50
 
 
 def test_nothing_is_found_where_the_club_points_at_the_camera(film):
