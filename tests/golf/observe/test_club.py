@@ -114,7 +114,7 @@ def test_hypotheses_that_jump_about_are_not_the_club():
 
 @pytest.mark.parametrize("gap", [60, 90])
 def test_a_club_that_is_unseen_for_long_is_found_before_and_after(gap):
-    ends = np.array([HANDS, HANDS + (0.0, 100.0)])[None]
+    ends = np.array([HANDS, HANDS + np.array([0.0, 100.0])])[None]
     seen = ShaftHypotheses(ends, np.array([0.4]), np.array([True]))
     crumb = ShaftHypotheses(ends, np.array([0.1]), np.array([True]))
     taken = choose_shafts([seen] * 40 + [crumb] * gap + [seen] * 30, HEIGHT, 60.0)
