@@ -164,7 +164,7 @@ def _pelvis_height(
         room = np.sqrt(np.maximum(leg**2 - apart.sum(axis=1), 0.05))
         limits.append(ankles[:, foot, 1] + room - hip[:, 1])
     lowest = np.min(limits, axis=0)
-    reach = round(0.06 * rate)
+    reach = max(1, round(0.06 * rate))
     lowest = minimum_filter1d(lowest, 2 * reach + 1, mode="nearest")
     return gaussian_filter1d(lowest, reach / 2.5, mode="nearest", radius=reach)
 

@@ -74,6 +74,11 @@ def test_strokes_are_repeated_but_never_the_same(tennis):
     assert len(set(np.round(tops, 4))) == len(tops)
 
 
+def test_a_camera_with_few_frames_a_second_sees_the_player_too():
+    points = play_tennis(MotionOptions(seconds=12, fps=6))
+    assert points.shape == (72, 14, 3) and np.isfinite(points).all()
+
+
 def test_the_same_seed_plays_the_same_points(tennis):
     np.testing.assert_array_equal(tennis, play_tennis(MotionOptions(seconds=20.0, seed=3)))
     assert not np.allclose(tennis, play_tennis(MotionOptions(seconds=20.0, seed=4)))
