@@ -75,7 +75,7 @@ def test_strokes_are_repeated_but_never_the_same(tennis):
 
 
 def test_a_camera_with_few_frames_a_second_sees_the_player_too():
-    points = play_tennis(MotionOptions(seconds=12, fps=6))
+    points = play_tennis(MotionOptions(seconds=12.0, fps=6.0))
     assert points.shape == (72, 14, 3) and np.isfinite(points).all()
 
 
