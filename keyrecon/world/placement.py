@@ -104,7 +104,7 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
         still = _long_enough(still, motion.fps, shots)
         if not still.any():
             return None
-        ratio = _size(motion, camera, ground, still)
+        ratio = _size(camera, ground, _distance_by_size(motion, camera, at_root), still)
     slow = _slow_and_low(speed, height, CONTACT_SPEED) & told
     slow = _long_enough(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
@@ -231,15 +231,25 @@ def _long_enough(
     return kept
 
 
+def _distance_by_size(
+    motion: Motion, camera: WorldCamera, at_root: Float[np.ndarray, "T 2"]
+) -> Float[np.ndarray, "T"]:
+    """How far away the player is by his size, in the motion's units.
+
+    Off the camera's axis a picture is larger by 1 / cosine (`ground_evidence.size_residuals`).
+    """
+    ray, _ = sight_lines(camera, at_root)
+    return camera.focal / (ray[:, 2] * motion.scale)
+
+
 def _size(
-    motion: Motion,
     camera: WorldCamera,
     ground: Float[np.ndarray, "T 2 3"],
+    by_size: Float[np.ndarray, "T"],
     contact: Bool[np.ndarray, "T 2"],
 ) -> float:
     """Size of the player by the court over that of the motion."""
     depth = np.linalg.norm(ground - camera.centre[:, None], axis=2)
-    by_size = camera.focal / motion.scale
     return float(np.nanmedian((depth / by_size[:, None])[contact]))
 
 
@@ -324,7 +334,7 @@ def _sight_rows(motion: Motion, camera: WorldCamera, evidence: _Evidence, size: 
     seen = np.flatnonzero(evidence.seen)
     _, ray = sight_lines(camera, evidence.at_root)
     ray, centre = ray[seen], camera.centre[seen]
-    far = evidence.scale * camera.focal[seen] / motion.scale[seen]
+    far = evidence.scale * _distance_by_size(motion, camera, evidence.at_root)[seen]
     side = np.cross(ray, [0.0, 0.0, 1.0])
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     sigma = PIXELS * far / camera.focal[seen]

@@ -85,7 +85,10 @@ def court_camera(pinhole, frames):
 
 
 def lifted(points, pinhole, units="m"):
-    """The motion as a perfect lifting has it: scaled orthography about the line of sight."""
+    """The motion as a perfect lifting has it: scaled orthography about the line of sight.
+
+    Its scale is that of the picture, which is larger off the camera's axis.
+    """
     hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
     sight = hips - pinhole.centre
     far = np.linalg.norm(sight, axis=1)
@@ -99,6 +102,6 @@ def lifted(points, pinhole, units="m"):
     count = len(points)
     return Motion(
         LSP14, pose / unit, pixels, pixels, np.ones((count, 14)),
-        np.zeros((count, 14), dtype=np.int64), pinhole.focal / far * unit, FPS,
+        np.zeros((count, 14), dtype=np.int64), pinhole.focal / (far * ray[:, 2]) * unit, FPS,
         np.arange(count) / FPS, units, np.array([0]),
     )  # fmt: skip

@@ -55,6 +55,17 @@ def test_the_court_tells_the_height_of_a_player_without_one():
     assert abs(world.height_ratio - STATURE) < 0.06
 
 
+def test_who_jumps_beside_the_cameras_axis_is_as_far_away_as_his_size_tells():
+    """Off the axis a picture is larger, by 1 / cosine of an angle of 30 degrees here."""
+    pinhole = camera_at((2, -20, 3), (-9.4, -9, 0.8), 0.8)
+    points, _ = walk()
+    points[50:100, :, 2] += 0.3 * np.sin(np.linspace(0, np.pi, 50))[:, None]
+    world = place_motion(lifted(points, pinhole), court_camera(pinhole, len(points)))
+    hips = points[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]].mean(axis=1)
+    off = np.linalg.norm(world.root - hips, axis=1)
+    assert off[50:100].mean() < 0.04
+
+
 def test_the_way_is_as_long_as_it_was(walked):
     points, _, motion, world = walked
     ground = points.mean(axis=1)[:, :2]
