@@ -24,10 +24,11 @@ import cv2
 import numpy as np
 from real import DEVELOP, TRUTH, VIDEOS, Clip, load_clip
 
-from keyrecon.app.golf import GolfFit, fit_video
+from keyrecon.app.golf import GolfFit, believe_speed, fit_video
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.stages import StageStore
@@ -91,7 +92,8 @@ def fit(swing: Swing, told: bool, work: Path) -> tuple[GolfFit, float]:
     store = StageStore(work / swing.clip.name / "cache")
     model = read_motion_model(BUILT_IN_SWING_PRIOR)
     began = time.perf_counter()
-    found = fit_video(hold_frames(video), click(swing), model, keep=store.keep)
+    options = believe_speed(GolfOptions()) if told else GolfOptions()
+    found = fit_video(hold_frames(video), click(swing), model, options, store.keep)
     return found, time.perf_counter() - began
 
 

@@ -85,7 +85,7 @@ def fit(
         clicks: JSON file with a few joints clicked in one frame; without it those of the project.
         out: Project folder; made if need be.
         prior: A swing prior of `keyrecon golf train`, or the one that is built-in (default).
-        slowmo: How many times slower than life the video plays (240 fps at 30: 8).
+        slowmo: How many times slower than life the video plays (240 fps at 30: 8); found without.
         method: 'swing' (default) fits all frames at once, 'windows' slides over three as the paper.
         components: Components of the prior used at most (default: 40); fewer keep nearer its mean.
         force: Make every stage again.
