@@ -13,7 +13,10 @@ const PROJECT = {
   order: Object.keys(FRONT),
   halves: { upper: ["left_shoulder", "right_shoulder"], lower: ["left_hip", "right_hip"] },
   limbs: [],
-  mirror: [],
+  mirror: [
+    ["left_shoulder", "right_shoulder"],
+    ["left_hip", "right_hip"],
+  ],
   keyframes: [{ frame: 5, half: "lower" }],
   has: { keyframes: true },
 };
@@ -27,14 +30,21 @@ function trial(changes = {}) {
     poses: { suggestion: () => null, current: () => null },
     edit: (edit) => (model.state = edits.apply(model.state, edit)),
     update: (ui) => Object.assign(model.ui, ui),
+    redraw() {},
     notify: (text) => (model.told = text),
+    notifyOfEdit: (text) => (model.told = text),
     marks: (frame = model.ui.frame) => edits.marksOf(model.state, frame),
     nearer: (frame = model.ui.frame) => edits.nearerOf(model.state, frame),
     keyframes: () => allKeyframes(PROJECT, model.state),
     keyframe: () => model.keyframes().find(({ frame }) => frame === model.ui.frame),
     isDone: () => false,
   };
-  globalThis.localStorage = { getItem: () => null, setItem() {} };
+  const kept = new Map();
+  globalThis.localStorage = {
+    getItem: (name) => kept.get(name) ?? null,
+    setItem: (name, value) => kept.set(name, value),
+    removeItem: (name) => kept.delete(name),
+  };
   const actions = createActions(model, { middle: () => [0, 0], opened() {}, showInSwing() {} });
   return { model, actions };
 }
@@ -43,6 +53,49 @@ test("whether the player faces you is asked though elsewhere a mark was cleared,
   for (const other of [{}, { neck: [1, 1, 2] }, SIDE, { ...FRONT, left_hip: [0, 0, 0] }])
     assert.equal(trial({ marks: { 2: other, 5: FRONT } }).actions.next().do, "facing");
   assert.equal(trial({ marks: { 2: FRONT, 5: FRONT } }).actions.next().do, "next");
+});
+
+test("whether the player faces you is asked again where the answer's exchange was taken back", () => {
+  const { model, actions } = trial({ marks: { 5: FRONT } });
+  const before = model.state;
+  actions.secondary();
+  assert.deepEqual(model.marks().left_hip, FRONT.right_hip);
+  assert.equal(actions.next().do, "next");
+  model.state = before; // as an undo leaves it
+  assert.equal(actions.next().do, "facing");
+  actions.primary();
+  assert.equal(actions.next().do, "next");
+  assert.deepEqual(model.marks(), FRONT);
+});
+
+test("whether the player faces you is asked of another first body, and of an exchanged one", () => {
+  const { model, actions } = trial({ marks: { 5: FRONT } });
+  actions.primary();
+  assert.equal(actions.next().do, "next");
+  model.edit(edits.swapSides(model.state, 5, PROJECT.mirror));
+  assert.equal(actions.next().do, "facing");
+  actions.primary();
+  model.state = { ...model.state, marks: {} };
+  actions.next();
+  model.state = { ...model.state, marks: { 5: FRONT } };
+  assert.equal(actions.next().do, "facing");
+  actions.primary();
+  model.state = { ...model.state, marks: { 9: FRONT } };
+  model.ui.frame = 9;
+  assert.equal(actions.next().do, "facing");
+});
+
+test("a click where a cross was moved by the arrow keys ends the cross", () => {
+  const { left_hip: at, ...others } = FRONT,
+    { model, actions } = trial({ marks: { 5: others } });
+  model.ui.joint = "left_hip";
+  actions.nudge(1, 0);
+  assert.ok(model.ui.dragged.floating);
+  actions.place("left_hip", at.slice(0, 2));
+  assert.equal(model.ui.dragged, null);
+  assert.deepEqual(model.marks().left_hip, at);
+  actions.placeFloating();
+  assert.deepEqual(model.marks().left_hip, at);
 });
 
 test("a keyframe that a person added for the whole body stays whole when half of it is asked for", () => {

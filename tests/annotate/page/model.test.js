@@ -142,3 +142,22 @@ test("only edits of marks make the marks others than those that a motion was mad
   await arrive();
   assert.ok(!model.marksAreOf(made));
 });
+
+test("what is told of an edit goes when that edit is taken back, and when another is made", async () => {
+  const { model, arrive } = await createTrial(() => ({ ok: true }));
+  place(model, "neck", 1);
+  await arrive();
+  model.notifyOfEdit("Placed; Undo takes that back.");
+  const undone = model.undo();
+  assert.equal(model.notice?.text ?? null, null);
+  await arrive();
+  await undone;
+  model.notifyOfEdit("Taken back. Redo brings it back.");
+  place(model, "left_knee", 2);
+  assert.equal(model.notice?.text ?? null, null);
+  model.notify("The work failed.");
+  place(model, "left_knee", 3);
+  assert.equal(model.notice.text, "The work failed.");
+  model.notify(null);
+  for (let n = 0; n < 2; n++) await arrive();
+});

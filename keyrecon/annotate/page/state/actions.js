@@ -128,15 +128,22 @@ export function createActions(model, { middle, opened, showInSwing }) {
       joint: ui.joint,
     });
 
-  // Asked once in a project, of the first body that tells it: whether left and right are the player's own.
+  // Asked of the first body that tells it, until its marks are as the answer has them: whether left and
+  // right are the player's own. The answer is of that frame, and forgotten when no body is left.
   const answered = `facing ${model.project.id}`;
-  const facing = () => (localStorage.getItem(answered) ? 0 : firstFacing(model.state.marks, ui.frame));
+  function facing() {
+    const first = firstFacing(model.state.marks);
+    if (!first) localStorage.removeItem(answered);
+    if (!first || first.others || first.frame !== ui.frame) return 0;
+    return localStorage.getItem(answered) === `${ui.frame} ${first.facing}` ? 0 : first.facing;
+  }
   function answerFacing(towards) {
-    const wrong = facing() !== (towards ? 1 : -1);
-    localStorage.setItem(answered, "yes");
+    const answer = towards ? 1 : -1,
+      wrong = facing() !== answer;
+    localStorage.setItem(answered, `${ui.frame} ${answer}`);
     if (wrong) {
       swap(model.project.mirror);
-      model.notify("Left and right of the body were exchanged; Undo takes that back.");
+      model.notifyOfEdit("Left and right of the body were exchanged; Undo takes that back.");
     }
     model.redraw();
   }
@@ -216,6 +223,7 @@ function createPlacing(model, middle) {
 
   function place(joint, at, v = 2) {
     if (offKeyframe() || !joint) return;
+    dropDragged();
     const fresh = !model.marks()[joint];
     model.edit(placeJoint(model.state, ui.frame, joint, [...at, v]));
     if (fresh) selectNext(joint);
@@ -343,7 +351,7 @@ function createNavigation(model, placing, { opened, showInSwing }) {
     const isKeyframe = model.keyframes().some(({ frame }) => frame === part.frame);
     if (!SEEN[ui.view]?.includes(part.kind)) {
       const offer = isKeyframe && { text: `Show frame ${part.frame}`, act: () => open(part.frame) };
-      return model.notify(told(describeEdit(edit)), offer || null);
+      return model.notifyOfEdit(told(describeEdit(edit)), offer || null);
     }
     if (ui.view === "swing") return showInSwing(part.kind === "key" ? part.to : part.frame);
     if (part.frame !== ui.frame && isKeyframe) open(part.frame);

@@ -21,11 +21,12 @@ export function facingOfMarks(marks) {
   return Math.abs(breadth) < SIDEWAYS ? 0 : Math.sign(breadth);
 }
 
-// What a frame's marks tell of the way the player faces, where no other frame's marks tell it; else 0. `marks`
-// are those of all frames, by frame.
-export function firstFacing(marks, frame) {
-  const told = Object.keys(marks).filter((other) => facingOfMarks(marks[other]));
-  return told.length === 1 && Number(told[0]) === frame ? facingOfMarks(marks[frame]) : 0;
+// {frame, facing} of the only frame whose marks tell which way the player faces, `others` where several do;
+// null where none does. `marks` are those of all frames, by frame.
+export function firstFacing(marks) {
+  const told = Object.keys(marks).filter((frame) => facingOfMarks(marks[frame]));
+  if (!told.length) return null;
+  return { frame: Number(told[0]), facing: facingOfMarks(marks[told[0]]), others: told.length > 1 };
 }
 
 // {left, right}: the likeliest readings of the depth whose chest is turned to either side of the picture

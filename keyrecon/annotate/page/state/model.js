@@ -125,6 +125,7 @@ export async function createModel() {
 
   model.edit = (edit) => {
     if (!edit) return;
+    forgetEdit();
     sent.add(edit.id);
     model.state = apply(model.state, edit);
     outbox.add(edit);
@@ -174,6 +175,13 @@ export async function createModel() {
     model.redraw();
   };
 
+  // What is true until the next edit, undo or redo.
+  model.notifyOfEdit = (text, offer = null) => {
+    model.notify(text, offer);
+    model.notice.isOfEdit = true;
+  };
+  const forgetEdit = () => model.notice?.isOfEdit && model.notify(null);
+
   // Changes that the server reports; those of cells that an edit of ours still waits for are left to
   // the answer to that edit.
   function merge({ revision, undo, redo }, changes) {
@@ -198,6 +206,7 @@ export async function createModel() {
   // Undo belongs to the server, so that it survives a restart; while it is gone, edits that wait for it
   // are taken back here. What is undone is the last edit at this moment: later ones are sent after it.
   async function step(direction) {
+    forgetEdit();
     const id = newId();
     sent.add(id);
     const last =

@@ -54,7 +54,7 @@ export function createFiles(model) {
     await model.readState();
     comparison.replaceChildren();
     chosen.value = "";
-    model.notify("The marks were taken in; Undo takes them out again.");
+    model.notifyOfEdit("The marks were taken in; Undo takes them out again.");
   }
 
   const failing = (work) => () =>

@@ -124,7 +124,7 @@ export function createKeyframePicture(model, { actions, viewer, colors }) {
     if (dragged?.floating) {
       const at = viewer.toScreen(dragged.at);
       drawCross(pen, at, "#fff");
-      drawLabel(pen, [at[0] + 16, at[1] + 16], `${label(joint)}, Space puts it here`, true);
+      drawLabel(pen, [at[0] + 16, at[1] + 16], `${label(dragged.joint)}, Space puts it here`, true);
     }
     if (!pointer || dragged) return;
     const name = asked && !hovered?.joint ? joint : (hovered?.joint ?? hovered?.limb);
