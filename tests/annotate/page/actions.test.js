@@ -9,6 +9,8 @@ const FRONT = { left_shoulder: [60, 20, 2], right_shoulder: [40, 20, 2], left_hi
 const SIDE = { left_shoulder: [51, 20, 2], right_shoulder: [49, 20, 2], left_hip: [50, 60, 2], right_hip: [50, 60, 2] };
 const PROJECT = {
   id: "p",
+  width: 200,
+  height: 100,
   joints: Object.keys(FRONT),
   order: Object.keys(FRONT),
   halves: { upper: ["left_shoulder", "right_shoulder"], lower: ["left_hip", "right_hip"] },
@@ -96,6 +98,20 @@ test("a click where a cross was moved by the arrow keys ends the cross", () => {
   assert.deepEqual(model.marks().left_hip, at);
   actions.placeFloating();
   assert.deepEqual(model.marks().left_hip, at);
+});
+
+test("a joint is seen in the picture alone: beside it none is placed, and at its edge it is at the edge", () => {
+  const { model, actions } = trial();
+  actions.place("left_hip", [-40, 50]);
+  assert.deepEqual(model.marks(), {});
+  assert.match(model.told, /beside the picture/);
+  actions.place("left_hip", [-0.8, 50]);
+  assert.deepEqual(model.marks().left_hip, [0, 50, 2]);
+  actions.drag("left_hip", [20, 130]);
+  actions.drop("left_hip", [20, 130]);
+  assert.deepEqual(model.marks().left_hip, [0, 50, 2]);
+  actions.place("right_hip", [-40, 50], 1); // where a hidden one may be
+  assert.deepEqual(model.marks().right_hip, [-40, 50, 1]);
 });
 
 test("a keyframe that a person added for the whole body stays whole when half of it is asked for", () => {

@@ -37,6 +37,11 @@ test("a click on half a pixel at the edge is one on that pixel, and one beside t
     assert.equal(geometry.placeIn([64, 36], outside), null);
 });
 
+test("what is seen a hair beside the picture is at its edge", () => {
+  assert.deepEqual(geometry.placeSeen([640, 360], [-3, 362]), [0, 359]);
+  assert.equal(geometry.placeSeen([640, 360], [-4, 300]), null);
+});
+
 test("a keyframe opens on all that is marked there", () => {
   assert.deepEqual(geometry.enclosing([10, 20, 30, 40], [[5, 30, 2], [20, 60, 1]]), [5, 20, 30, 60]);
   assert.equal(geometry.enclosing(undefined, [[5, 30, 2]]), null);

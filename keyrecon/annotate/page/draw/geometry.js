@@ -16,13 +16,20 @@ export function pictureOnScreen(view, picture) {
   return [...toScreen(view, [-0.5, -0.5]), ...picture.map((extent) => view.scale * extent)];
 }
 
+const SLIP = 0.005; // over the edge of the picture, of its longer side: a click there means the edge
+
 // Where a picture was clicked, to a tenth of a pixel and no farther out than its outermost pixel centres;
-// null for a click beside it.
-export function placeIn(picture, place) {
-  const inside = place.every((value, axis) => value >= -0.5 && value < picture[axis] - 0.5);
+// null for a click beside it, farther than `slip`.
+export function placeIn(picture, place, slip = 0) {
+  const inside = place.every((value, axis) => value >= -0.5 - slip && value < picture[axis] - 0.5 + slip);
   if (!inside) return null;
   return place.map((value, axis) => between(0, Math.round(value * 10) / 10, picture[axis] - 1));
 }
+
+// The same for what is seen, which a hand that slips over the edge means at the edge.
+export const placeSeen = (picture, place) => placeIn(picture, place, SLIP * Math.max(...picture));
+
+export const BESIDE = "That is beside the picture. Shift-click if the joint is hidden there.";
 
 const between = (low, value, high) => Math.max(low, Math.min(high, value));
 

@@ -1,4 +1,5 @@
 // What a person can do on a keyframe; keys, buttons and the pointer all end here.
+import { BESIDE, placeSeen } from "../draw/geometry.js";
 import {
   describeEdit,
   nextVisibility,
@@ -221,13 +222,16 @@ function createPlacing(model, middle) {
   const selectNext = (joint) =>
     model.update({ joint: nextUnmarked(joints(), model.marks(), joint) });
 
+  // A joint that is seen lies in the picture; a hidden one may be beside it.
   function place(joint, at, v = 2) {
-    if (offKeyframe() || !joint) return;
+    if (offKeyframe() || !joint) return undefined;
     dropDragged();
+    const { width, height } = model.project,
+      there = v === 2 ? placeSeen([width, height], at) : at;
+    if (!there) return model.notify(`${BESIDE} V says that it cannot be placed.`);
     const fresh = !model.marks()[joint];
-    model.edit(placeJoint(model.state, ui.frame, joint, [...at, v]));
-    if (fresh) selectNext(joint);
-    else model.update({ joint });
+    model.edit(placeJoint(model.state, ui.frame, joint, [...there, v]));
+    return fresh ? selectNext(joint) : model.update({ joint });
   }
 
   // A joint on its way is held until the arrow keys rest, so that one undo takes all steps back.

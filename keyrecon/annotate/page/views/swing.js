@@ -1,7 +1,7 @@
 // A fitted golf swing over the video: played, looked at in its key postures, and put right: a joint or
 // an end of the club is dragged to where it is, a frame is called the start, top, hit or finish.
 import { CASING, cssColor, drawCross, drawLabel } from "../draw/canvas.js";
-import { nearestPlace } from "../draw/geometry.js";
+import { BESIDE, nearestPlace, placeSeen } from "../draw/geometry.js";
 import { drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
@@ -100,10 +100,16 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
 
   function put(name, [x, y], v = 2) {
     if (viewer.shown() !== frame) return;
-    if (!ENDS.includes(name)) return model.edit(placeJoint(model.state, frame, name, [x, y, v]));
+    if (!ENDS.includes(name)) return putJoint(name, [x, y], v);
     const ends = { ...clubEnds(frame), ...(first ? { hands: first } : {}), [name]: [x, y] };
     first = null;
     model.edit(setShaft(model.state, frame, [...ends.hands, ...ends.head]));
+  }
+
+  function putJoint(name, at, v) {
+    const place = v === 2 ? placeSeen([project.width, project.height], at) : at;
+    if (place) model.edit(placeJoint(model.state, frame, name, [...place, v]));
+    else model.notify(BESIDE);
   }
 
   // The next click places a joint; of the club two do, first between the hands.
