@@ -59,7 +59,7 @@ const court = createCourt(model, { frames, shell });
 const ground = createGround(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
 const address = createAddress(model, { frames, shell, colors });
-const swing = createSwing(model, { frames, shell, actions, colors, go });
+const swing = createSwing(model, { frames, shell, actions, colors, go, heightIsWrong: address.heightIsWrong });
 createFiles(model);
 const exports = createExports(model, shell);
 

@@ -188,3 +188,31 @@ def test_frames_of_the_swing_are_played_to_the_end(visit):
     person.page.fill("#swing-frame", str(FRAMES - 5))
     person.press(" ")
     person.await_text("#swing-where", f"frame {FRAMES - 1} of")
+
+
+def test_no_swing_is_fitted_with_a_height_that_cannot_be(visit):
+    person, _ = visit()
+    person.press("2")
+    person.await_frame("swing", 40)
+    for key in ("e", "t"):  # the fit does not know that the top is here
+        person.press(key)
+    person.await_text("#swing-text", "does not know all your marks")
+    for typed in ("abc", "18", "2,0x"):
+        person.press("Alt+1")
+        person.page.fill("#stature", typed)
+        person.page.press("#stature", "Enter")
+        person.page.click("#address-list")  # the field is left
+        person.await_text("#address-more", "height .* cannot be")
+        assert person.page.is_disabled("#address-primary")
+        assert person.page.input_value("#stature") == typed
+        person.press("Alt+2")
+        person.await_text("#swing-more", "height .* cannot be")
+        assert person.page.is_disabled("#swing-primary")
+        person.press("r")
+        person.press("Enter")
+        person.await_drawn()
+        assert person.server.ask("jobs") == []
+    person.press("Alt+1")
+    person.page.fill("#stature", "180")
+    person.page.press("#stature", "Enter")
+    person.page.wait_for_selector("#address-primary:enabled")

@@ -6,6 +6,8 @@ export const CLICKS = ["head_top", "root", "right_knee", "left_knee", "right_ank
 export const ENDS = ["hands", "head"]; // of the club
 export const KEYS = ["start", "top", "hit", "finish"];
 
+export const WRONG_HEIGHT = "The height that is typed at the address cannot be: metres or centimetres, 1.80 or 180.";
+
 const PLACES = {
   head_top: "the top of the player's head",
   root: "the middle between the hips",

@@ -6,7 +6,7 @@ import { drawCross, drawLabel } from "../draw/canvas.js";
 import { enclosing, nearestPlace, placeIn } from "../draw/geometry.js";
 import { placeClick, setGolf } from "../state/edits.js";
 import { jointWords } from "../state/joint_words.js";
-import { CLICKS, beginIn, clickIn, clickWords, nextAddress } from "../state/swing.js";
+import { CLICKS, WRONG_HEIGHT, beginIn, clickIn, clickWords, nextAddress } from "../state/swing.js";
 import { heightIn, label } from "../state/workflow.js";
 import { byId, counted, make, setText, toggle } from "./dom.js";
 import { createGuide } from "./guide.js";
@@ -69,7 +69,7 @@ export function createAddress(model, { frames, shell, colors }) {
     click() {},
     elsewhere: ({ frame: other }) => show(other),
     wrong: () => model.notify("Drag a click to its place, or take the last one away with Del."),
-    fit: () => shell.runningJob() || shell.startJob("golf"),
+    fit: () => shell.runningJob() || heightIsWrong() || shell.startJob("golf"),
   };
   function primary() {
     const next = step();
@@ -120,7 +120,8 @@ export function createAddress(model, { frames, shell, colors }) {
   byId("left-handed").addEventListener("change", ({ target }) =>
     model.edit(setGolf(model.state, "left_handed", target.checked)),
   );
-  const height = byId("stature");
+  const height = byId("stature"),
+    heightIsWrong = () => heightIn(height.value).wrong;
   height.addEventListener("input", model.redraw);
   height.addEventListener("change", () => {
     const { metres, wrong } = heightIn(height.value);
@@ -155,7 +156,8 @@ export function createAddress(model, { frames, shell, colors }) {
     wrong: () => ({ text: "Nobody stands as it was clicked", more: model.swing.wrong, warns: true }),
     fit: () => ({
       text: model.swing?.keys ? "The address is clicked" : "All six joints are clicked",
-      more: "Height and hand are on the right. Drag what is not in its place.",
+      more: heightIsWrong() ? WRONG_HEIGHT : "Height and hand are on the right. Drag what is not in its place.",
+      warns: heightIsWrong(),
       button: model.swing?.keys ? "Fit again" : "Fit the swing",
     }),
   };
@@ -197,7 +199,7 @@ export function createAddress(model, { frames, shell, colors }) {
     guide.show(under(pointer) ?? asked ?? null);
     byId("left-handed").checked = Boolean(model.state.golf.left_handed);
     const { stature } = model.state.golf;
-    if (document.activeElement !== height) height.value = stature ?? "";
+    if (document.activeElement !== height && !heightIsWrong()) height.value = stature ?? "";
     const { said, wrong } = heightIn(height.value);
     setText(byId("stature-said"), height.value.trim() ? said : "metres; left empty, 1.75");
     toggle(byId("stature-said"), "wrong", wrong);
@@ -210,6 +212,7 @@ export function createAddress(model, { frames, shell, colors }) {
     toggle(byId("address-more"), "wrong", warns);
     byId("address-primary").hidden = !button;
     setText(byId("address-primary"), button ?? "");
+    byId("address-primary").disabled = step().do === "fit" && heightIsWrong();
     byId("address-secondary").hidden = !other;
     setText(byId("address-other"), other ?? "");
     slider.value = frame;
@@ -238,6 +241,7 @@ export function createAddress(model, { frames, shell, colors }) {
   return {
     draw,
     commands,
+    heightIsWrong,
     opened() {
       if (own() !== undefined) frame = own();
       closer();

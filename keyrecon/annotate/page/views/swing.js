@@ -6,7 +6,7 @@ import { drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
 import { placeJoint, setKey, setShaft, together } from "../state/edits.js";
-import { ENDS, KEYS, clubAt, keysOf, markedFrames, nextSwing } from "../state/swing.js";
+import { ENDS, KEYS, WRONG_HEIGHT, clubAt, keysOf, markedFrames, nextSwing } from "../state/swing.js";
 import { label } from "../state/workflow.js";
 import { createPoseFigure } from "./depth.js";
 import { byId, counted, setText, toggle } from "./dom.js";
@@ -25,7 +25,7 @@ const OUTSIDE = "Nothing is fitted to this frame: it lies before or after the sw
 
 const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
 
-export function createSwing(model, { frames, shell, actions, colors, go }) {
+export function createSwing(model, { frames, shell, actions, colors, go, heightIsWrong }) {
   const { project, sides } = model,
     last = project.n_frames - 1,
     root = byId("swing-picture");
@@ -156,7 +156,7 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     if (at !== null) goTo(at);
   }
 
-  const fit = () => shell.runningJob() || shell.startJob("golf");
+  const fit = () => shell.runningJob() || heightIsWrong() || shell.startJob("golf");
   const steps = {
     wait() {},
     address: () => go("address"),
@@ -214,10 +214,12 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     }),
     address: () => ({ text: "Click the address first", more: "Six joints in one frame begin a fit.", button: "To the address" }),
     wrong: () => ({ text: "These marks cannot be", more: found().wrong, warns: true }),
-    fit: () => ({ text: "The swing can be fitted", more: "The six joints of the address are clicked.", button: "Fit the swing" }),
+    fit: () => ({ text: "The swing can be fitted", more: heightIsWrong() ? WRONG_HEIGHT : "The six joints of the address are clicked.", button: "Fit the swing" }),
     again: () => ({
       text: "This fit does not know all your marks yet",
-      more: `${counted(markedFrames(model.state).length, "frame")} marked. What is marked holds in the next fit.`,
+      more: heightIsWrong()
+        ? WRONG_HEIGHT
+        : `${counted(markedFrames(model.state).length, "frame")} marked. What is marked holds in the next fit.`,
       button: "Fit again",
     }),
     doubt: () => ({
@@ -304,6 +306,8 @@ export function createSwing(model, { frames, shell, actions, colors, go }) {
     byId("swing-primary").hidden = !button;
     setText(byId("swing-primary"), button ?? "");
     byId("swing-again").hidden = next !== "doubt";
+    byId("swing-again").disabled = heightIsWrong();
+    byId("swing-primary").disabled = ["fit", "again"].includes(next) && heightIsWrong();
     byId("swing-report").hidden = !exists() || !model.project.has.report;
     slider.value = frame;
     const seconds = project.time?.[frame] ?? frame / project.fps;
