@@ -56,8 +56,8 @@ const panels = [
 const bodies = createBodies(model, { frames, shell, actions, colors });
 const pick = createPick(model, { frames, shell });
 const court = createCourt(model, { frames, shell });
-const ground = createGround(model, { frames, shell });
 const motion = createMotion(model, { frames, shell, actions, colors });
+const ground = createGround(model, { frames, shell, go, heightWaits: motion.heightWaits });
 const address = createAddress(model, { frames, shell, colors });
 const swing = createSwing(model, { frames, shell, actions, colors, go, heightIsWrong: address.heightIsWrong });
 createFiles(model);

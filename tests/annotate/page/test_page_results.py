@@ -19,6 +19,7 @@ from page_project import (
     write_true_motion,
 )
 
+from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
@@ -26,7 +27,7 @@ from keyrecon.io.formats.export import SUFFIXES
 from keyrecon.io.provenance import RunNotes, marks_evidence, note_run, read_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.lens import lens_advice
-from keyrecon.pipeline import Options, with_field_of_view
+from keyrecon.pipeline import Options, with_field_of_view, with_height
 from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
@@ -236,6 +237,36 @@ def test_a_height_in_centimetres_is_taken_as_such_and_said_at_once(
         mark_and_run(person, typed)
         assert said in person.text("#height-said")
         assert json.loads((folder / "told.json").read_text())["height"] == metres
+
+
+def test_a_height_that_waits_for_the_next_motion_is_kept_and_said_to(folder, visit):
+    write_true_motion(folder)
+    assistant = make_assistant(Workspace(folder))
+    with serving(folder, assistant, {"run": partial(run_and_remember, folder)}) as server:
+        person = visit(server)
+        person.have_marked(40, place)
+        person.press("Alt+3")
+        person.page.fill("#height", "183")
+        person.await_text("#height-said", "taken as 1.83 m; counts when it is made anew")
+        person.page.reload()
+        person.page.wait_for_selector("body[data-view]:not([inert])")
+        person.press("Alt+3")
+        person.await_text("#height-said", "counts when it is made anew")
+        assert person.page.input_value("#height") == "183"
+        person.press("Alt+6")
+        person.page.click("#ground-primary")
+        person.await_text("#notice-text", "height that is typed in 3 Motion counts when")
+        person.page.click("#notice-offer")
+        person.page.click("#motion-primary")
+        person.page.wait_for_function(
+            "() => !document.querySelector('#height-said').innerText.includes('counts')"
+        )
+        assert "height" not in person.page.evaluate("() => Object.keys(localStorage).join()")
+
+
+def run_and_remember(folder, options, progress):
+    Workspace(folder).remember(with_height(Options(), options["height"]), Options())
+    return run_at_once(folder, options, progress)
 
 
 def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):

@@ -17,7 +17,7 @@ const KINDS = {
   horizon: { name: "Horizon", ends: ["a point of the horizon", "another point of it, far from the first"] },
 };
 
-export function createGround(model, { frames, shell }) {
+export function createGround(model, { frames, shell, go, heightWaits }) {
   const { project } = model,
     last = project.n_frames - 1;
   const viewer = createViewer({ root: byId("ground-picture"), project, frames, redraw: model.redraw });
@@ -60,20 +60,22 @@ export function createGround(model, { frames, shell }) {
     model.redraw();
   }
 
-  // The length that is typed; undefined where one is missing or is none.
+  // {length} that is typed, null for none; {fault} where one is missing or is none.
   function typedLength() {
-    const number = selection.kind === "horizon" ? null : numberIn(metres);
-    if (Number.isNaN(number) || (number !== null && number <= 0)) return undefined;
-    return selection.kind === "length" && number === null ? undefined : number;
+    const length = selection.kind === "horizon" ? null : numberIn(metres);
+    if (length === null && selection.kind === "length") return { fault: "Type the length in metres first." };
+    if (length !== null && !(length > 0 && length < Infinity))
+      return { fault: "A length is a number of metres above 0, such as 1.8." };
+    return { length };
   }
 
   function click(at) {
     if (!ground || viewer.shown() !== selection.frame) return;
     const place = placeIn([project.width, project.height], viewer.toPicture(at));
     if (!place) return;
-    const length = typedLength();
-    if (length === undefined) {
-      model.notify("Type the length in metres first.");
+    const { length, fault } = typedLength();
+    if (fault) {
+      model.notify(fault);
       metres.focus();
       return;
     }
@@ -118,10 +120,20 @@ export function createGround(model, { frames, shell }) {
 
   const isFound = () => ground.camera && !ground.changed;
 
+  // Whether nothing is in metres but a height of which the motion does not know.
+  const waitsForHeight = () =>
+    heightWaits() && model.project.settings.height === null && ground.marks.every((mark) => mark.metres === null);
+
   // A number that Enter ended in its field is used, too.
   async function primary() {
     await changing;
-    if (!shell.runningJob() && ground?.motion && !ground.court && !isFound()) shell.startJob("ground");
+    if (shell.runningJob() || !ground?.motion || ground.court || isFound()) return;
+    if (!waitsForHeight()) shell.startJob("ground");
+    else
+      model.notify(
+        "Nothing is in metres yet: the height that is typed in 3 Motion counts when the motion is made anew. Or mark a known length.",
+        { text: "Go to 3 Motion", act: () => go("motion") },
+      );
   }
 
   function words() {
@@ -181,12 +193,12 @@ export function createGround(model, { frames, shell }) {
   function markRow(mark) {
     const { name, frame, metres: length } = mark,
       known = length === null ? "" : `, ${length} m`,
-      go = make("button", { className: "plain" }, `${name}, frame ${frame}${known}`),
+      there = make("button", { className: "plain" }, `${name}, frame ${frame}${known}`),
       removal = make("button", { className: "plain", "aria-label": `Remove ${name}` }, "✕");
-    go.addEventListener("click", () => show(frame));
+    there.addEventListener("click", () => show(frame));
     // The second click of a double one would meet the row that has moved up.
     removal.addEventListener("click", ({ detail }) => detail < 2 && remove(mark));
-    return make("div", {}, go, removal);
+    return make("div", {}, there, removal);
   }
 
   function drawMarks() {

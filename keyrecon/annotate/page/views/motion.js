@@ -74,6 +74,26 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     fov: fieldOfViewIn(byId("fov").value, model.project.settings.lens),
   });
 
+  // By field, whether it holds what no motion was made with yet.
+  function waiting() {
+    const { height, fov } = typed(),
+      { settings } = model.project;
+    return {
+      height: height.wrong || height.metres !== (settings.height ?? null),
+      fov: fov.wrong || fov.degrees !== (settings.field_of_view ?? null),
+    };
+  }
+
+  // What waits for the next motion outlives the page.
+  const kept = (name) => `${name} ${project.id}`;
+  function keepTyped() {
+    for (const [name, waits] of Object.entries(waiting())) {
+      if (waits) localStorage.setItem(kept(name), byId(name).value);
+      else localStorage.removeItem(kept(name));
+    }
+    model.redraw();
+  }
+
   async function makeMotion() {
     const { height, fov } = typed();
     if (height.wrong) byId("height").focus();
@@ -91,10 +111,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
 
   // Whether there is nothing to make anew: neither marks nor what is typed changed.
   function isMade() {
-    const { height, fov } = typed(),
-      { settings } = model.project;
-    const isSame = height.metres === (settings.height ?? null) && fov.degrees === (settings.field_of_view ?? null);
-    return isSame && showsMarks();
+    return showsMarks() && !Object.values(waiting()).some(Boolean);
   }
 
   function primary() {
@@ -102,9 +119,10 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     else makeMotion();
   }
 
-  byId("height").value = project.settings.height ?? "";
-  byId("fov").value = project.settings.field_of_view ?? "";
-  for (const field of ["height", "fov"]) byId(field).addEventListener("input", model.redraw);
+  byId("height").value = localStorage.getItem(kept("height")) ?? project.settings.height ?? "";
+  byId("fov").value = localStorage.getItem(kept("fov")) ?? project.settings.field_of_view ?? "";
+  for (const field of ["height", "fov"]) byId(field).addEventListener("input", keepTyped);
+  model.onProject(keepTyped);
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);
@@ -155,7 +173,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
 
   function drawSettings() {
     for (const [name, { said, wrong }] of Object.entries(typed())) {
-      setText(byId(`${name}-said`), said);
+      const waits = !wrong && exists() && waiting()[name];
+      setText(byId(`${name}-said`), waits ? `${said}; counts when it is made anew` : said);
       toggle(byId(`${name}-said`), "wrong", wrong);
     }
     byId("motion-primary").disabled = Object.values(typed()).some(({ wrong }) => wrong);
@@ -244,5 +263,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     step: ({ index, shift }) =>
       go(frame + (index ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
   };
-  return { draw, commands };
+  // Whether a height is typed that the motion does not know.
+  const heightWaits = () => waiting().height && typed().height.metres !== null;
+  return { draw, commands, heightWaits };
 }
