@@ -47,6 +47,8 @@ from keyrecon.world.records import GroundMarks
 
 OPEN_GROUND = ("The focal length cannot", "Mark two", "Tell the camera's", "No way on")
 """How lines begin that say what is open, and what would tell it."""
+OF_MOTION = ("On the ", "For a report with ")
+"""How lines begin that say what a new camera has made of the motion."""
 GRACE_SECONDS = 2
 """How long open connections may take to end when the server is stopped."""
 SETTLING_SECONDS = 0.05
@@ -191,7 +193,8 @@ def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> s
 
 
 def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
-    """The court from its lines and the points clicked so far; why it tells no way is returned."""
+    """The court from its lines and the points clicked so far; what became of the motion, or why it
+    tells no way, is returned."""
     try:
         text = calibrate(workspace, (), CalibrationOptions(), progress)
     except KeyreconError as fault:
@@ -199,13 +202,21 @@ def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> 
         raise KeyreconError(
             said.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
-    return _contradictions(text)
+    return "\n".join(part for part in (*_of_motion(text), _contradictions(text)) if part)
+
+
+def _of_motion(output: str) -> list[str]:
+    """What a new camera has made of the motion that there is; the page has no file of the way."""
+    lines = [line for line in output.splitlines() if line.startswith(OF_MOTION)]
+    return [re.sub(r"; \S.* shows the way\.", ".", line) for line in lines]
 
 
 def _find_ground(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
-    """The camera from all that was marked; what is still open is returned."""
-    lines = find_ground(workspace, GroundMarks(), progress).splitlines()
-    return "\n".join(line for line in lines if line.startswith(OPEN_GROUND))
+    """The camera from all that was marked; what is still open is returned, and what became of the
+    motion."""
+    text = find_ground(workspace, GroundMarks(), progress)
+    open_lines = [line for line in text.splitlines() if line.startswith(OPEN_GROUND)]
+    return "\n".join([*_of_motion(text), *open_lines])
 
 
 def _fit_swing(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:

@@ -15,7 +15,7 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.hyperextension import hyperextended_stretches
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
-from keyrecon.io.provenance import RunNotes, motion_evidence, note_run
+from keyrecon.io.provenance import RunNotes, camera_evidence, motion_evidence, note_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import list_stretches, listed_stretches
@@ -85,6 +85,7 @@ def run(
         automatic = prepare_project(workspace, video, annotations, options, progress)
         preparation = replace(automatic.preparation, keyframes=asked)
         motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
+    camera = camera_evidence(workspace)
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.contradictions()
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
@@ -106,7 +107,7 @@ def run(
         lens=None if near is None else lens_caveat(near),
     )
     wrong = _write_report(workspace.report_file, preparation, material, doubts, progress)
-    note_run(workspace, RunNotes(evidence, tuple(doubts), advice))
+    note_run(workspace, RunNotes(evidence, tuple(doubts), advice, camera))
     seconds = time.perf_counter() - started
     unsure = [*(one.text for one in hyperextended_stretches(motion)), *describe_uncertainty(motion)]
     lines = [*placed.lines, *shots, *doubts, *wrong, *unsure, *advice]

@@ -31,6 +31,8 @@ class RunNotes:
     """What spoke against the track, line by line."""
     advice: tuple[str, ...] = ()
     """What would make the motion better, line by line."""
+    camera: str | None = None
+    """Digest of the camera that the report knows, empty for none; None in older notes."""
 
 
 def marks_evidence(workspace: Workspace) -> str:
@@ -58,6 +60,14 @@ def motion_evidence(workspace: Workspace, options: OptionRecord, defaults: Optio
     )
 
 
+def camera_evidence(workspace: Workspace) -> str:
+    """A digest of the camera; empty where there is none."""
+    try:
+        return hashlib.sha256(workspace.camera_file.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
 def golf_evidence(workspace: Workspace) -> str:
     """A digest of all that a person told a golf fit."""
     return _digest(
@@ -80,7 +90,7 @@ def read_run(workspace: Workspace) -> RunNotes | None:
         noted = parse_json(read_text(_run_file(workspace)))
         advice = noted.get("advice", ())  # older versions kept none
         lines = (tuple(map(str, told)) for told in (noted["doubts"], advice))
-        return RunNotes(str(noted["evidence"]), *lines)
+        return RunNotes(str(noted["evidence"]), *lines, noted.get("camera"))
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None
 

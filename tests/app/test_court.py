@@ -9,9 +9,10 @@ from painted_court import camera_at, paint
 
 from keyrecon import cli
 from keyrecon.annotate.assist.court_views import describe_court
+from keyrecon.annotate.server.descriptions import describe_run
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.app import court as appcourt
-from keyrecon.app.annotator import job_commands
+from keyrecon.app.annotator import _of_motion, job_commands
 from keyrecon.app.court import calibrate, court_click, describe_camera
 from keyrecon.app.placing import old_report, place_again, write_placed_motion
 from keyrecon.app.project import start
@@ -19,6 +20,7 @@ from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.motion_file import write_motion
+from keyrecon.io.provenance import RunNotes, camera_evidence, note_run
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
@@ -59,6 +61,22 @@ def test_with_a_camera_the_motion_is_on_the_court_too(bare, motion):
     after = stored(workspace)
     assert all(np.array_equal(before[name], after[name]) for name in before)
     assert after["root_world"].shape == (len(motion.time), 3)
+
+
+def test_a_report_does_not_know_a_camera_that_came_after_it(bare, motion):
+    workspace = Workspace(bare)
+    (bare / "cache").mkdir(exist_ok=True)
+    write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
+    placed = write_placed_motion(workspace, motion)
+    assert old_report(workspace, placed) == []  # there is no report
+    workspace.report_file.write_text("a report")
+    for camera, lacks, count in (("", "court", 1), (camera_evidence(workspace), None, 0)):
+        note_run(workspace, RunNotes("marks", (), (), camera))
+        assert describe_run(workspace, 1)["report_lacks"] == lacks
+        lines = old_report(workspace, placed)
+        assert len(lines) == count
+    (line,) = _of_motion("\n".join(["Court found in 100.0% of 7 frames.", *placed.lines]))
+    assert "m run, top speed" in line and "way.jpg" not in line
 
 
 def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bare, motion):

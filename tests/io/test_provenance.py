@@ -113,7 +113,7 @@ def test_damaged_marks_are_left_to_their_reader(workspace, content):
 
 @pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff"])
 def test_torn_notes_are_none(workspace, content):
-    noted = RunNotes("marks", ("a doubt",), ("what helps",))
+    noted = RunNotes("marks", ("a doubt",), ("what helps",), "camera")
     note_run(workspace, noted)
     assert read_run(workspace) == noted
     (workspace.folder / "cache" / "run.json").write_bytes(content)

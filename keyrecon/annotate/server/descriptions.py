@@ -14,7 +14,8 @@ from keyrecon.annotate.store.kept_keyframes import halves_by_frame, join_halves
 from keyrecon.annotation_budget import usual_budget
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
-from keyrecon.io.provenance import marks_evidence, read_run
+from keyrecon.io.formats.camera_file import read_camera
+from keyrecon.io.provenance import RunNotes, camera_evidence, marks_evidence, read_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.lens import degrees_across, known_lens
@@ -180,22 +181,41 @@ def describe_run(
     workspace: Workspace, revision: int, evidence: Callable[[], str | None] | None
 ) -> Json:
     """What spoke against the track when the motion was made and what would make it better, in the
-    words of the page, and whether it was made from marks, keyframes, picks, videos and options as
-    they are now (true where that is not known). `evidence` tells what one would be made from now;
-    notes of former versions know of the marks alone.
+    words of the page, whether it was made from marks, keyframes, picks, videos and options as they
+    are now (true where that is not known), and what told a camera, "court" or "ground", that the
+    report does not know. `evidence` tells what one would be made from now; notes of former versions
+    know of the marks alone.
 
     `revision` is that of the marks before their files are read: newer marks are not vouched for.
     """
     notes = read_run(workspace)
     if notes is None:
-        return {"doubts": [], "advice": [], "is_current": True, "revision": revision}
+        return {
+            "doubts": [],
+            "advice": [],
+            "is_current": True,
+            "report_lacks": None,
+            "revision": revision,
+        }
     now = None if evidence is None else evidence()
     return {
         "doubts": [in_page_words(line) for line in notes.doubts],
         "advice": [in_page_words(line) for line in notes.advice],
         "is_current": notes.evidence in (now, marks_evidence(workspace)),
+        "report_lacks": _camera_not_in_report(workspace, notes),
         "revision": revision,
     }
+
+
+def _camera_not_in_report(workspace: Workspace, notes: RunNotes) -> str | None:
+    """What told a camera that was found after the report was written; None where none was."""
+    there = camera_evidence(workspace)
+    if not there or notes.camera in (None, there) or not workspace.report_file.is_file():
+        return None
+    try:
+        return read_camera(workspace.camera_file).origin
+    except KeyreconError:  # the step that needs the file says so
+        return None
 
 
 def describe_state(state: JournalState) -> Json:

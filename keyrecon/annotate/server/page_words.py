@@ -42,6 +42,7 @@ PHRASES = (
      "; type it in degrees as field of view, beside the height"),
     (r"--fov is", "The field of view is"),
     (rf"first with keyrecon run {_NAME} --height METRES", "first (3 Motion)."),
+    (rf"(a report with the \w+): keyrecon run {_NAME}", r"\1, make the motion anew (3 Motion)."),
     (r"\(keyrecon run --height\)", "(3 Motion)"),
     (r"--coverage", "the coverage"),
     (r"--reach", "the reach"),

@@ -154,6 +154,7 @@ class ProjectWatch:
             workspace.project_file,
             workspace.keyframes_file,
             workspace.motion_file,
+            workspace.camera_file,
             workspace.report_file,
             *note_files(workspace),
             *workspace.golf_results(),

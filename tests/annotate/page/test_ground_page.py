@@ -52,10 +52,6 @@ def test_upright_things_are_marked_and_squares_lie_on_the_ground(folder, chromiu
         person.page.click("#ground-kinds [data-kind=length]")
         click_on(person, posts()[0].start)
         person.await_text("#notice-text", "Type the length in metres first")
-        person.page.fill("#ground-metres", "-3")
-        click_on(person, posts()[0].start)
-        person.await_text("#notice-text", "A length is a number of metres above 0")
-        person.page.fill("#ground-metres", "")
         person.page.click("#ground-kinds [data-kind=horizon]")
         click_on(person, HORIZON.start)
         click_on(person, HORIZON.end)
@@ -72,6 +68,23 @@ def test_upright_things_are_marked_and_squares_lie_on_the_ground(folder, chromiu
         assert [mark.kind for mark in told.marks] == ["vertical", "vertical", "horizon"]
         for mark, post in zip(told.marks, posts(), strict=False):
             assert np.abs(np.subtract(mark.start, post.start)).max() < 2.5
+
+
+def test_a_length_that_is_none_is_told_from_one_that_is_missing(folder, chromium):
+    with serving(folder, make_assistant(Workspace(folder))) as server:
+        context = chromium.new_context(viewport={"width": 1440, "height": 900})
+        person = Person(context, server.credentials.address)
+        person.press("Alt+6")
+        person.page.wait_for_selector("#ground-picture[data-frame='0']")
+        for kind in ("length", "vertical"):
+            person.page.click(f"#ground-kinds [data-kind={kind}]")
+            person.page.fill("#ground-metres", "-3")
+            click_on(person, posts()[0].start)
+            person.await_text("#notice-text", "A length is a number of metres above 0")
+            person.page.click("#notice-close")
+            person.page.wait_for_selector("#notice", state="hidden")
+        context.close()
+        assert person.complaints == []
 
 
 INK = """

@@ -8,9 +8,11 @@ from typing import get_args
 
 import av
 import pytest
+from court_walker import court_camera
 from page_driver import BROWSER, Person, serving
 from page_project import (
     FPS,
+    FRAMES,
     SIZE,
     make_project,
     run_at_once,
@@ -18,13 +20,21 @@ from page_project import (
     write_numbered_video,
     write_true_motion,
 )
+from painted_court import camera_at
 
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
+from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.formats.export import SUFFIXES
-from keyrecon.io.provenance import RunNotes, marks_evidence, note_run, read_run
+from keyrecon.io.provenance import (
+    RunNotes,
+    camera_evidence,
+    marks_evidence,
+    note_run,
+    read_run,
+)
 from keyrecon.io.workspace import Workspace
 from keyrecon.lens import lens_advice
 from keyrecon.pipeline import Options, with_field_of_view, with_height
@@ -35,6 +45,7 @@ pytestmark = pytest.mark.skipif(
 )
 SCREENS = ((1440, 900), (1920, 1080))
 POINTS2D = truth()[1]
+COURT_CAMERA = camera_at((0.4, -32, 9), (0, -2, 0), 1.5, SIZE)
 INK = """
 (id) => {
   const canvas = document.getElementById(id), pen = canvas.getContext("2d");
@@ -323,6 +334,39 @@ def test_an_unknown_lens_is_asked_for_beside_the_motion_in_words_of_the_page(fol
         person.page.fill("#fov", "62")
         person.page.press("#fov", "Enter")
         person.page.wait_for_selector("#motion-advice", state="hidden")
+
+
+def find_court_after(folder, options, progress):
+    write_camera(Workspace(folder).camera_file, court_camera(COURT_CAMERA, FRAMES))
+    return "On the court: 9.1 m run.\nFor a report with the court: keyrecon run rally"
+
+
+def run_before_court(folder, options, progress):
+    (folder / "report.html").write_text("<p>A report</p>")
+    run_at_once(folder, options, progress)
+    workspace = Workspace(folder)
+    camera = camera_evidence(workspace)
+    note_run(workspace, RunNotes(marks_evidence(workspace), (), (), camera))
+    return ""
+
+
+def test_after_the_court_the_page_tells_of_the_motion_and_makes_the_report_anew(folder, visit):
+    (folder / "cache").mkdir(exist_ok=True)
+    jobs = {"run": run_before_court, "court": find_court_after}
+    commands = {name: partial(job, folder) for name, job in jobs.items()}
+    with serving(folder, make_assistant(Workspace(folder)), commands) as server:
+        person = visit(server)
+        mark_and_run(person)
+        assert person.text("#motion-report") == "Report"
+        person.press("Alt+5")
+        person.page.click("#court-primary")
+        person.await_text("#notice-text", r"9.1 m run.*\n.*make the motion anew \(3 Motion\)")
+        person.page.click("#notice-offer")
+        person.await_text("#motion-text", "The report does not know the court yet")
+        assert person.text("#motion-report") == "Old report"
+        person.page.click("#motion-primary")
+        person.await_text("#motion-text", "The motion is made")
+        assert person.text("#motion-report") == "Report"
 
 
 def test_a_file_of_marks_that_is_not_taken_in_says_so(folder, visit, tmp_path):

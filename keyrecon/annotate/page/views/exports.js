@@ -131,12 +131,15 @@ export function createExports(model, shell) {
 
   function draw() {
     const { has } = model.project,
-      doubtful = Boolean(model.swing?.doubts?.length);
-    toggle(byId("report-text"), "wrong", doubtful);
+      doubtful = Boolean(model.swing?.doubts?.length),
+      lacked = has.report && model.project.run.report_lacks;
+    toggle(byId("report-text"), "wrong", doubtful || lacked);
     setText(
       byId("report-text"),
       doubtful
         ? "The fit of this swing is doubtful: do not use its numbers. 2 Swing tells what is, and what to do."
+        : lacked
+        ? `It does not know the ${lacked} yet: make the motion anew (3 Motion).`
         : has.report
         ? "What was found, how sure it is, and the figure beside the video; one file that can be passed on."
         : `It is written when ${model.project.golf ? "the swing is fitted (2 Swing)" : "the motion is made (3 Motion)"}.`,

@@ -109,9 +109,12 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     return made !== null && model.marksAreOf(made);
   }
 
-  // Whether there is nothing to make anew: neither marks nor what is typed changed.
+  // "court" or "ground", which the report does not know.
+  const lacked = () => (exists() && model.project.has.report && model.project.run.report_lacks) || null;
+
+  // Whether there is nothing to make anew: neither camera, marks nor what is typed changed.
   function isMade() {
-    return showsMarks() && !Object.values(waiting()).some(Boolean);
+    return showsMarks() && !lacked() && !Object.values(waiting()).some(Boolean);
   }
 
   function primary() {
@@ -211,6 +214,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
       ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
       : "All keyframes are marked.";
     if (exists() && !showsMarks()) return ["Not yet in the motion", `What it was made from has changed since. ${left}`];
+    if (lacked())
+      return [`The report does not know the ${lacked()} yet`, `The motion lies on it; make it anew for a report of the way. ${left}`];
     if (exists()) return ["The motion is made", left];
     if (open < keyframes.length) return ["Make the motion", left];
     return [
@@ -229,6 +234,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     byId("motion-primary").hidden = byId("motion-settings").hidden = !idle;
     drawSettings();
     byId("motion-report").hidden = !model.project.has.report;
+    setText(byId("motion-report"), lacked() ? "Old report" : "Report");
+    byId("motion-report").title = lacked() ? `Made before the ${lacked()} was found` : "";
     byId("motion-files").hidden = !exists();
     toggle(byId("motion-files"), "primary", isMade());
     toggle(byId("motion-primary"), "primary", !isMade());

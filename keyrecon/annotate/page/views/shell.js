@@ -207,13 +207,16 @@ export function createJobs(model) {
     model.redraw();
   }
 
+  const toMotion = { text: "Go to 3 Motion", act: () => model.update({ view: "motion" }) };
+
   function ended(job) {
     if (job.state === "failed") model.notify(job.text || "The work failed.");
     if (job.state === "cancelled")
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
     const news = job.text?.split("\n") ?? [];
-    if (job.text) model.notify(job.text, news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT);
+    const read = news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT;
+    if (job.text) model.notify(job.text, /make the motion anew/.test(job.text) ? toMotion : read);
     const shown = model.readProject().then(() => {
       if (job.kind === "follow") model.update({ view: "bodies" });
       if (job.kind === "keyframes") model.update({ view: "keyframes" });
