@@ -72,7 +72,7 @@ def test_a_report_does_not_know_a_camera_that_came_after_it(bare, motion):
     workspace.report_file.write_text("a report")
     for camera, lacks, count in (("", "court", 1), (camera_evidence(workspace), None, 0)):
         note_run(workspace, RunNotes("marks", (), (), camera))
-        assert describe_run(workspace, 1)["report_lacks"] == lacks
+        assert describe_run(workspace, 1, None)["report_lacks"] == lacks
         lines = old_report(workspace, placed)
         assert len(lines) == count
     (line,) = _of_motion("\n".join(["Court found in 100.0% of 7 frames.", *placed.lines]))

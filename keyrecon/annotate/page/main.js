@@ -95,7 +95,7 @@ function addressed() {
 function drawKeyframes() {
   if (ui.frame === null && model.keyframes().length) {
     const all = model.keyframes();
-    actions.open(addressed() ?? nextOpen(all, -1, model.isDone) ?? all[0].frame);
+    actions.open(addressed() ?? nextOpen(all, -1, model.isMarked) ?? all[0].frame);
     return;
   }
   for (const panel of panels) panel.draw();

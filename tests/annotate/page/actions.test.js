@@ -40,6 +40,7 @@ function trial(changes = {}) {
     keyframes: () => allKeyframes(PROJECT, model.state),
     keyframe: () => model.keyframes().find(({ frame }) => frame === model.ui.frame),
     isDone: () => false,
+    isMarked: () => false,
   };
   const kept = new Map();
   globalThis.localStorage = {

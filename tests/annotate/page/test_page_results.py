@@ -38,6 +38,7 @@ from keyrecon.io.provenance import (
 from keyrecon.io.workspace import Workspace
 from keyrecon.lens import lens_advice
 from keyrecon.pipeline import Options, with_field_of_view, with_height
+from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.report.overlay import Limbs, View
 
 pytestmark = pytest.mark.skipif(
@@ -384,12 +385,13 @@ def test_a_file_of_marks_that_is_not_taken_in_says_so(folder, visit, tmp_path):
         person.await_text("#marks-files", "The disk is full")
 
 
-def test_every_format_and_view_there_is_can_be_chosen(folder, visit):
+def test_the_page_knows_every_format_and_view_and_when_a_keyframe_is_marked(folder, visit):
     with serving(folder) as server:
         person = visit(server)
         for name, known in (("FORMATS", SUFFIXES), ("VIEWS", get_args(View)),
                             ("SKELETONS", get_args(Limbs))):  # fmt: skip
             assert {*person.call("views/exports", f"m.{name}.map(([value]) => value)")} == {*known}
+        assert person.call("state/workflow", "m.LEAST_MARKED") == LEAST_MARKED
 
 
 def test_the_report_opens_sealed_off_from_the_page(folder, visit):

@@ -4,6 +4,7 @@ import { test } from "node:test";
 import * as workflow from "../../../keyrecon/annotate/page/state/workflow.js";
 import { facingOfMarks, undecidedTurn } from "../../../keyrecon/annotate/page/state/facing.js";
 import { FIGURE, jointWords } from "../../../keyrecon/annotate/page/state/joint_words.js";
+import { purposeOf } from "../../../keyrecon/annotate/page/views/lists.js";
 import { KEYS, belongsTo, interpret, keyText } from "../../../keyrecon/annotate/page/views/keyboard.js";
 
 const PROJECT = {
@@ -42,6 +43,28 @@ test("a keyframe of the upper body asks for no legs, and its depths need both en
   assert.deepEqual(workflow.requiredJoints(PROJECT, "upper"), ["neck", "left_wrist"]);
   assert.ok(workflow.isDone(PROJECT, { half: "upper" }, { neck: AT, left_wrist: [0, 0, 0] }));
   assert.deepEqual(workflow.placedLimbs(PROJECT.limbs, { neck: AT, left_wrist: [0, 0, 0] }), []);
+});
+
+test("a keyframe is marked with most joints of each half that it is asked for, or all that can be said", () => {
+  const project = { halves: { upper: ["neck", "left_wrist"], lower: ["left_hip", "left_knee", "left_ankle"] } };
+  const marked = (half, ...joints) =>
+    workflow.isMarked(project, { half }, Object.fromEntries(joints.map((joint) => [joint, AT])));
+  assert.ok(marked("upper", "neck"));
+  assert.ok(!marked("lower", "neck", "left_hip"));
+  assert.ok(marked("lower", "left_hip", "left_ankle"));
+  assert.ok(!marked("both", "neck", "left_hip"));
+  assert.ok(marked("both", "neck", "left_hip", "left_knee"));
+  const absent = Object.fromEntries(project.halves.lower.map((joint) => [joint, [0, 0, 0]]));
+  assert.ok(workflow.isMarked(project, { half: "lower" }, absent));
+  assert.ok(!workflow.isMarked(project, { half: "lower" }, { ...absent, left_hip: undefined }));
+});
+
+test("what a keyframe is for stands in short lines, and in words under the pointer", () => {
+  const row = purposeOf({ stands_for: 10, brings: 0.0049 });
+  assert.deepEqual(row.lines, ["stands for 10 frames", "covers +0.5 %"]);
+  assert.match(row.title, /Stands for 10 frames .* brings 0.5 % more of the video within reach/);
+  assert.deepEqual(purposeOf({ stands_for: 1, brings: null }).lines, ["stands for 1 frame"]);
+  assert.deepEqual(purposeOf({ own: true }), { lines: ["added by you"], title: "" });
 });
 
 test("joints and keyframes are asked for going round", () => {

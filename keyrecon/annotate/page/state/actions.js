@@ -322,7 +322,7 @@ function createNavigation(model, placing, { opened, showInSwing }) {
   }
 
   function nextKeyframe() {
-    const frame = nextOpen(model.keyframes(), ui.frame, model.isDone);
+    const frame = nextOpen(model.keyframes(), ui.frame, model.isMarked);
     if (model.project.golf && !model.project.has.keyframes) model.update({ view: "swing" });
     else if (frame === null) model.update({ view: model.project.has.keyframes ? "motion" : "bodies" });
     else open(frame);

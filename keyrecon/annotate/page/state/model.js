@@ -18,7 +18,7 @@ import {
 import { describeFault } from "./faults.js";
 import { createOutbox, pendingEdits } from "./outbox.js";
 import { createPoses } from "./poses.js";
-import { allKeyframes, isDone, sidesOf } from "./workflow.js";
+import { allKeyframes, isDone, isMarked, sidesOf } from "./workflow.js";
 
 const NOTICE_MS = 10000; // that a notice is shown
 const IDLE_MS = 800; // without an edit, after which what is computed from edits is asked for anew
@@ -265,6 +265,15 @@ export async function createModel() {
     null;
   model.isDone = (keyframe) =>
     isDone(model.project, keyframe, marksOf(model.state, keyframe.frame));
+  model.isMarked = (keyframe) =>
+    isMarked(model.project, keyframe, marksOf(model.state, keyframe.frame));
+  // How far the keyframes are: {all, marked, lacking}, the last marked but for single joints.
+  model.progress = () => {
+    const all = model.keyframes(),
+      marked = all.filter(model.isMarked),
+      lacking = marked.filter((keyframe) => !model.isDone(keyframe));
+    return { all: all.length, marked: marked.length, lacking: lacking.length };
+  };
   // The marks, a joint that is being dragged where the pointer has it: name -> [x, y, v].
   model.placed = () => {
     const marks = { ...model.marks() },

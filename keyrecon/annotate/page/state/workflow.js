@@ -54,6 +54,18 @@ export function isDone(project, keyframe, marks) {
   return unmarked(requiredJoints(project, keyframe.half), marks).length === 0;
 }
 
+export const LEAST_MARKED = 0.5; // of a half's joints, as the program has it that makes the motion
+
+// Whether a keyframe counts as marked: most joints of each half that it is asked for are placed, as the
+// motion needs it, or all that can be said of them is.
+export function isMarked({ halves }, { half }, marks) {
+  const asked = half && half !== "both" ? [half] : ["upper", "lower"];
+  return asked.every((name) => {
+    const placed = halves[name].filter((joint) => marks[joint]?.[2] > 0);
+    return placed.length >= LEAST_MARKED * halves[name].length || !unmarked(halves[name], marks).length;
+  });
+}
+
 // The next keyframe that is not done: the one that brings most; among equals, and where that is not
 // known, the first after a frame, going round. Null when all are done.
 export function nextOpen(keyframes, frame, done) {

@@ -19,34 +19,40 @@ function fillRow(element, content, parts) {
   element.replaceChildren(...parts());
 }
 
-// What a keyframe adds to the share of the video that is covered.
-const bringing = ({ brings }) => (brings >= 0.0005 ? `, +${(100 * brings).toFixed(1)} %` : "");
+// What a keyframe is for: {lines} to show and the whole as `title`; `brings` is what it adds to the share of
+// the video that lies within reach of a keyframe.
+export function purposeOf({ stands_for: count, brings, own }) {
+  if (!count) return { lines: own ? ["added by you"] : [], title: "" };
+  const share = brings >= 0.0005 ? (100 * brings).toFixed(1) : null,
+    gain = share && `Marked, it brings ${share} % more of the video within reach of a keyframe.`;
+  return {
+    lines: [`stands for ${counted(count, "frame")}`, ...(share ? [`covers +${share} %`] : [])],
+    title: [`Stands for ${counted(count, "frame")} of a similar pose.`, gain].filter(Boolean).join(" "),
+  };
+}
 
 function keyframeRow(model, element, keyframe) {
   const marks = model.marks(keyframe.frame),
     joints = requiredJoints(model.project, keyframe.half);
   const count = joints.filter((joint) => marks[joint]).length,
     done = count === joints.length;
-  const stands = keyframe.stands_for
-    ? `stands for ${counted(keyframe.stands_for, "frame")}${bringing(keyframe)}`
-    : keyframe.own
-      ? "added by you"
-      : "";
-  const content = [keyframe.frame, keyframe.half, stands, count, keyframe.locked].join();
+  const { lines, title } = purposeOf(keyframe),
+    tick = model.isMarked(keyframe) ? "✓" : "";
+  const content = [keyframe.frame, keyframe.half, ...lines, count, keyframe.locked].join();
   toggle(element, "done", done);
   fillRow(element, content, () => [
     halfIcon(keyframe.half),
     make(
       "span",
-      { className: "text" },
+      { className: "text", title },
       make("b", {}, `Frame ${keyframe.frame}`),
-      make("small", {}, stands),
+      ...lines.map((line) => make("small", { className: "line" }, line)),
     ),
     make(
       "span",
       { className: "state" },
       keyframe.locked ? "🔒︎ " : "",
-      done ? "✓" : count ? `${count}/${joints.length}` : "",
+      done ? tick : count ? `${count}/${joints.length} ${tick}` : "",
     ),
   ]);
 }
@@ -104,7 +110,7 @@ export function createLists(model, actions) {
   let tab = "frames",
     suggestions = [];
   const frames = createVirtualList(byId("frame-list"), {
-    height: 44,
+    height: 54,
     fill: (element, item) => keyframeRow(model, element, item),
     choose: ({ frame }) => actions.open(frame),
   });

@@ -4,7 +4,7 @@ import { createViewer } from "../draw/viewer.js";
 import { createMotionCache } from "../state/caches.js";
 import { createPoseFigure } from "./depth.js";
 import { fieldOfViewIn, heightIn, label } from "../state/workflow.js";
-import { byId, make, setText, toggle } from "./dom.js";
+import { byId, counted, make, setText, toggle } from "./dom.js";
 import { createPlayer } from "./player.js";
 
 const PREFETCHED = 24; // frames fetched ahead while playing
@@ -206,21 +206,22 @@ export function createMotion(model, { frames, shell, actions, colors }) {
   }
 
   function words() {
-    const keyframes = model.keyframes(),
-      open = keyframes.filter((keyframe) => !model.isDone(keyframe)).length;
+    const { all, marked, lacking } = model.progress(),
+      single = lacking ? `, ${counted(lacking, "marked one")} ${lacking > 1 ? "lack" : "lacks"} single joints` : "";
     if (shell.runningJob())
       return ["The motion is being made", "You may go on marking meanwhile."];
-    const left = open
-      ? `${open} of ${keyframes.length} keyframes are still open; what is marked is used.`
-      : "All keyframes are marked.";
+    const left =
+      marked < all
+        ? `${all - marked} of ${all} keyframes are still open${single}; what is marked is used.`
+        : `All keyframes are marked${single}.`;
     if (exists() && !showsMarks()) return ["Not yet in the motion", `What it was made from has changed since. ${left}`];
     if (lacked())
-      return [`The report does not know the ${lacked()} yet`, `The motion lies on it; make it anew for a report of the way. ${left}`];
+      return [`The report does not know the ${lacked()} yet`, `Make the motion anew for a report with it. ${left}`];
     if (exists()) return ["The motion is made", left];
-    if (open < keyframes.length) return ["Make the motion", left];
+    if (marked) return ["Make the motion", left];
     return [
       "No marks yet",
-      keyframes.length ? "Mark some keyframes first." : "One marked body comes first.",
+      all ? "Mark some keyframes first." : "One marked body comes first.",
     ];
   }
 
@@ -228,7 +229,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     const [text, more] = words(),
       { fps, time } = project,
       seconds = time?.[frame] ?? frame / fps;
-    const idle = !shell.runningJob() && model.keyframes().some(model.isDone);
+    const idle = !shell.runningJob() && model.keyframes().some(model.isMarked);
     setText(byId("motion-text"), text);
     setText(byId("motion-more"), more);
     byId("motion-primary").hidden = byId("motion-settings").hidden = !idle;

@@ -52,6 +52,9 @@ function doubted(checks) {
   return `${counted(checks, "mark")} ${checks > 1 ? "look" : "looks"} wrong: G goes there. `;
 }
 
+const lackingWords = (count) =>
+  count ? `${counted(count, "keyframe")} ${count > 1 ? "lack" : "lacks"} single joints. ` : "";
+
 function framesNamed(frames) {
   if (frames.length === 1) return `frame ${frames[0]}`;
   return `frames ${frames.slice(0, -1).join(", ")} and ${frames.at(-1)}`;
@@ -89,16 +92,16 @@ const PROMPTS = {
   }),
   next(model) {
     if (!model.project.has.keyframes) return afterBody(model);
-    const open = model.keyframes().filter((keyframe) => !model.isDone(keyframe)).length;
-    return open
+    const { all, marked, lacking } = model.progress();
+    return marked < all
       ? {
           text: "This keyframe is done",
-          more: `${counted(open, "keyframe")} to go.`,
+          more: `${counted(all - marked, "keyframe")} to go.`,
           button: "Next keyframe",
         }
       : {
-          text: "All keyframes are done",
-          more: `${doubted(model.checks.length)}The motion can be made.`,
+          text: lacking ? "All keyframes are marked" : "All keyframes are done",
+          more: `${doubted(model.checks.length)}${lackingWords(lacking)}The motion can be made.`,
           button: "Go to the motion",
         };
   },

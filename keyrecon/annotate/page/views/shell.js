@@ -124,9 +124,9 @@ export function createShell(model, go) {
   // How far each step is; bodies that are marked before there are keyframes belong to the first.
   function drawCounts() {
     const { has } = model.project,
-      keyframes = model.keyframes(),
-      done = keyframes.filter(model.isDone).length,
-      counts = keyframes.length ? `${done} of ${keyframes.length}` : "",
+      { all, marked, lacking } = model.progress(),
+      done = has.keyframes ? marked : marked - lacking,
+      counts = all ? `${done} of ${all}` : "",
       picked = model.state.picks.length;
     setText(byId("pick-count"), picked ? counted(picked, "click") : "");
     setText(byId("body-count"), has.keyframes ? "" : counts);
