@@ -12,7 +12,14 @@ from keyrecon.io.workspace import Workspace
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
-WINDOWS = ((1920, 1080), (1366, 768), (1100, 500), (1024, 768), (768, 1024), (600, 900), (390, 800))
+WINDOWS = (
+    (1920, 1080), (1366, 768), (1100, 500), (1024, 768), (911, 512), (768, 1024), (600, 900),
+    (390, 800),
+)  # fmt: skip
+
+STEP_HEIGHTS = (
+    "[...document.querySelectorAll('header nav button')].map((button) => button.offsetHeight)"
+)
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +48,51 @@ def test_no_part_of_a_page_lies_over_another_or_out_of_reach(chromium, server, s
             person.press(key)
         person.page.wait_for_selector(f"#{page}:not([hidden])")
         person.await_drawn()
+        heights = person.page.evaluate(STEP_HEIGHTS)
+        assert max(heights) <= 46, page  # no name of a step takes two lines
         found[page] = person.page.evaluate(OVERLAPS, PARTS)
         wide = person.page.evaluate("document.documentElement.scrollWidth")
         assert wide <= size[0], page
     context.close()
     assert found == {"bodies": [], "pick": [], "keyframes": [], "motion": [], "files": []}
+
+
+NEWS = "The light changes in frames 3 to 9: what the player wears is hard to tell there. " * 6
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (1024, 700), (600, 900)])
+@pytest.mark.parametrize("text", ["Taken back: neck, frame 10.", NEWS], ids=["short", "long"])
+def test_a_notice_lies_over_no_control(chromium, server, size, text):
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+    person = Person(context, server.credentials.address)
+    for key, page in (("Alt+1", "bodies"), ("Alt+2", "keyframes"), ("Alt+3", "motion"),
+                      ("Alt+4", "files"), ("Alt+5", "court"), ("Alt+6", "ground")):  # fmt: skip
+        person.press(key)
+        person.page.wait_for_selector(f"#{page}:not([hidden])")
+        server.session.events.publish({"trouble": text})
+        person.page.wait_for_selector("#notice:not([hidden])")
+        person.await_drawn()
+        notice = person.page.locator("#notice").bounding_box()
+        assert notice["width"] > 200
+        assert person.page.evaluate(COVERED) == [], page
+        person.page.click("#notice-close")
+        person.page.wait_for_selector("#notice", state="hidden")
+    context.close()
+    assert person.complaints == []
+
+
+COVERED = """
+() => {
+  const notice = document.querySelector("#notice").getBoundingClientRect();
+  const apart = (box) => box.right <= notice.left || notice.right <= box.left
+    || box.bottom <= notice.top || notice.bottom <= box.top;
+  return [...document.querySelectorAll("header button, main :is(button, a, input, select)")]
+    .filter((part) => part.checkVisibility() && !part.closest("#notice"))
+    .filter((part) => !apart(part.getBoundingClientRect()))
+    .map((part) => part.id || part.innerText);
+}
+"""
+"""Controls that a notice lies over."""
 
 
 @pytest.mark.parametrize("width", [1920, 1366, 1100])

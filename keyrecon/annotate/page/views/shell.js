@@ -1,7 +1,7 @@
 // What surrounds every page: the steps, whether all is saved, notices, long work on the server, and
 // the table of keys.
 import * as api from "../state/api.js";
-import { byId, counted, make, numberIn, setText } from "./dom.js";
+import { byId, counted, make, numberIn, setText, toggle } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
 import { CLICKS } from "../state/swing.js";
 import { budgetIn, stepsOf } from "../state/workflow.js";
@@ -113,9 +113,14 @@ export function createShell(model, go) {
     if (offer === LASTING && !here && performance.now() - since > READ_MS) model.notify(null);
   }
 
+  // A notice lies over what is looked at, so that it covers no control; a page without a picture makes room.
   function drawNotice() {
-    const { text, offer } = model.notice ?? {};
+    const { text, offer } = model.notice ?? {},
+      page = byId(model.ui.view),
+      over = page.querySelector(page.dataset.stage ? ".figure" : ".viewer") ?? document.body;
+    if (byId("notice").parentElement !== over) over.append(byId("notice"));
     byId("notice").hidden = !text;
+    toggle(byId("notice"), "passing", !offer);
     setText(byId("notice-text"), text ?? "");
     byId("notice-offer").hidden = !offer?.text;
     setText(byId("notice-offer"), offer?.text ?? "");
