@@ -141,6 +141,9 @@ function drawFlat(pen, bones, place, { color, width, alpha = 1 }) {
 
 const CAMERA = { away: 0.62, size: 0.05 }; // from the center and half its width, body heights
 const LABEL_FONT = "12px system-ui, sans-serif";
+const LINE_HEIGHT = 16; // px
+const LONGEST = "180° to the right of the camera, 75° from above"; // that is said of a view
+const footHeight = (lines) => (lines.length ? LINE_HEIGHT * lines.length + 6 : 0);
 
 function drawText(pen, text, [x, y], align) {
   pen.font = LABEL_FONT;
@@ -189,11 +192,33 @@ export function viewInWords({ yaw, pitch }) {
   return parts.filter(Boolean).join(", ");
 }
 
-// What the colours and the squares mean, and from where the body is seen.
-// In two corners: the left of the upper edge belongs to the page's buttons.
-function drawLegend(pen, [width, height], { words, ground }) {
-  drawText(pen, words, [10, height - 12], "left");
-  drawText(pen, ground, [10, height - 28], "left");
+// Words in lines that have room: broken after a comma where they are too long.
+export function wrapWords(words, room, breadthOf) {
+  const lines = [];
+  for (const part of words.split(/(?<=,) /)) {
+    const longer = lines.length ? `${lines.at(-1)} ${part}` : part;
+    if (lines.length && breadthOf(longer) <= room) lines[lines.length - 1] = longer;
+    else lines.push(part);
+  }
+  return lines;
+}
+
+// What is said at the foot of a figure: what the squares mean, and from where the body is seen.
+function footOf(pen, width, { words, ground }) {
+  pen.font = LABEL_FONT;
+  const breadthOf = (text) => pen.measureText(text).width;
+  return [ground, words].filter(Boolean).flatMap((text) => wrapWords(text, width - 20, breadthOf));
+}
+
+// The foot, and what the colours mean. In two corners: the left of the upper edge belongs to the page's
+// buttons. What was moved over the foot shows through no word.
+function drawLegend(pen, [width, height], lines) {
+  pen.fillStyle = cssColor("card");
+  pen.globalAlpha = 0.85;
+  pen.fillRect(0, height - footHeight(lines), width, footHeight(lines));
+  pen.globalAlpha = 1;
+  for (const [n, line] of lines.entries())
+    drawText(pen, line, [10, height - 12 - LINE_HEIGHT * (lines.length - 1 - n)], "left");
   for (const [n, side] of ["right", "left"].entries()) {
     const y = 14 + 16 * n;
     drawText(pen, side, [width - 10, y], "right");
@@ -314,10 +339,14 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
       now = scene();
     if (!now) return;
     const seen = followed(now);
+    const words = seen.words || (now.lines ? "" : viewInWords(seen)),
+      foot = footOf(pen, width, { words, ground: now.ground }),
+      longest = now.lines ? foot : footOf(pen, width, { words: LONGEST, ground: now.ground }),
+      size = [width, height - footHeight(longest)]; // of the body and its ground, above all words there may be
     const project = createProjection(seen, {
       ...now,
-      scale: (style.fit(width, height) / now.unit / (now.reach || 1)) * seen.zoom,
-      size: [width, height],
+      scale: (style.fit(...size) / now.unit / (now.reach || 1)) * seen.zoom,
+      size,
       eye: now.lines && (seen.distance || FREE_EYE),
     });
     const onGround = (key) => {
@@ -337,8 +366,7 @@ export function createFigure3d(canvas, { scene, style, buttons }) {
     if (now.trunk.length) drawVolumes(pen, project, now, view.zoom);
     drawBones(pen, sortBones(now, project), style, view.zoom);
     if (now.trunk.length) drawFront(pen, project, now);
-    const words = seen.words || (now.lines ? "" : viewInWords(seen));
-    drawLegend(pen, [width, height], { words, ground: now.ground });
+    drawLegend(pen, [width, height], foot);
   }
 
   // At most once for every picture on the screen.

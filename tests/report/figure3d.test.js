@@ -1,7 +1,7 @@
 // The figure in space: where a turned point is seen, and what lies before what.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { chestDirection, createProjection, seenFrom, sortBones, turned, viewInWords, zoomed } from "../../keyrecon/report/figure3d.js";
+import { chestDirection, createProjection, seenFrom, sortBones, turned, viewInWords, wrapWords, zoomed } from "../../keyrecon/report/figure3d.js";
 
 const SCENE = { center: [1, 2, 3], unit: 1.8, scale: 100, size: [400, 300] };
 const AHEAD = { yaw: 0, pitch: 0, zoom: 1 };
@@ -67,4 +67,12 @@ test("from an eye the center is straight ahead, as far away as it is", () => {
   near(x, 200);
   near(y, 150);
   near(depth, -distance);
+});
+
+test("words that are too long for a figure are broken after a comma, and nowhere else", () => {
+  const words = "34° to the right of the camera, 14° from above",
+    breadth = (text) => text.length;
+  assert.deepEqual(wrapWords(words, 50, breadth), [words]);
+  assert.deepEqual(wrapWords(words, 40, breadth), ["34° to the right of the camera,", "14° from above"]);
+  assert.deepEqual(wrapWords("from above", 5, breadth), ["from above"]);
 });
