@@ -89,8 +89,8 @@ def read_run(workspace: Workspace) -> RunNotes | None:
     try:
         noted = parse_json(read_text(_run_file(workspace)))
         advice = noted.get("advice", ())  # older versions kept none
-        lines = (tuple(map(str, told)) for told in (noted["doubts"], advice))
-        return RunNotes(str(noted["evidence"]), *lines, noted.get("camera"))
+        doubts, helps = (tuple(map(str, told)) for told in (noted["doubts"], advice))
+        return RunNotes(str(noted["evidence"]), doubts, helps, noted.get("camera"))
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None
 

@@ -74,13 +74,18 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     fov: fieldOfViewIn(byId("fov").value, model.project.settings.lens),
   });
 
+  // By field, what the last motion was made with.
+  const used = () => {
+    const { height = null, field_of_view: fov = null } = model.project.settings;
+    return { height, fov };
+  };
+
   // By field, whether it holds what no motion was made with yet.
   function waiting() {
-    const { height, fov } = typed(),
-      { settings } = model.project;
+    const { height, fov } = typed();
     return {
-      height: height.wrong || height.metres !== (settings.height ?? null),
-      fov: fov.wrong || fov.degrees !== (settings.field_of_view ?? null),
+      height: height.wrong || height.metres !== used().height,
+      fov: fov.wrong || fov.degrees !== used().fov,
     };
   }
 
@@ -92,6 +97,13 @@ export function createMotion(model, { frames, shell, actions, colors }) {
       else localStorage.removeItem(kept(name));
     }
     model.redraw();
+  }
+
+  // What nobody typed is what the motion was made with, be it elsewhere.
+  function fillFields() {
+    for (const [name, value] of Object.entries(used()))
+      byId(name).value = localStorage.getItem(kept(name)) ?? value ?? "";
+    keepTyped();
   }
 
   async function makeMotion() {
@@ -122,10 +134,9 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     else makeMotion();
   }
 
-  byId("height").value = localStorage.getItem(kept("height")) ?? project.settings.height ?? "";
-  byId("fov").value = localStorage.getItem(kept("fov")) ?? project.settings.field_of_view ?? "";
+  fillFields();
   for (const field of ["height", "fov"]) byId(field).addEventListener("input", keepTyped);
-  model.onProject(keepTyped);
+  model.onProject(fillFields);
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);
