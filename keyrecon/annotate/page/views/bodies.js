@@ -5,7 +5,7 @@ import { drawJoint, drawLimb } from "../draw/skeleton.js";
 import { createViewer } from "../draw/viewer.js";
 import { jointWords } from "../state/joint_words.js";
 import { budgetText, label, nextBeginning } from "../state/workflow.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, followProject, make, setText } from "./dom.js";
 import { createGuide } from "./guide.js";
 import { createShots } from "./shots.js";
 
@@ -59,7 +59,7 @@ export function createBodies(model, { frames, shell, actions, colors }) {
     steps[step.do](step);
   }
 
-  byId("bodies-budget").value = budgetText(project);
+  followProject(model, byId("bodies-budget"), budgetText);
   const slider = byId("bodies-frame");
   slider.max = last;
   slider.addEventListener("input", () => show(Number(slider.value)));

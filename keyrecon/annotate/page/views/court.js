@@ -129,7 +129,9 @@ export function createCourt(model, { frames, shell }) {
     if (view?.fault) return ["These points do not tell the camera", view.fault];
     if (court.changed)
       return [
-        count < court.fewest ? `Click ${point}` : "Do the yellow lines lie on the painted ones?",
+        count < court.fewest || view?.source !== "clicks"
+          ? `Click ${point}`
+          : "Do the yellow lines lie on the painted ones?",
         `${counted(count, "point")} clicked. Four tell the camera, five tell which one is wrong; choose another on the map.`,
       ];
     if (court.found !== null)

@@ -25,6 +25,17 @@ export function numberIn(field) {
   return text ? Number(text) : null;
 }
 
+// Fills a field from the project, as it comes to be by commands and other pages, until somebody types in it.
+export function followProject(model, field, text) {
+  let typed = false;
+  const fill = () => {
+    if (!typed) field.value = text(model.project);
+  };
+  field.addEventListener("input", () => (typed = true));
+  model.onProject(fill);
+  fill();
+}
+
 // Sets text only where it differs, so that nothing is laid out anew without need.
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -108,7 +108,8 @@ function suspicionMeter(share) {
 
 export function createLists(model, actions) {
   let tab = "frames",
-    suggestions = [];
+    suggestions = [],
+    checked = false; // whether the marks were ever looked through
   const frames = createVirtualList(byId("frame-list"), {
     height: 54,
     fill: (element, item) => keyframeRow(model, element, item),
@@ -131,14 +132,24 @@ export function createLists(model, actions) {
     if (suggestion) actions.addKeyframe(suggestion.frame, suggestion.half);
   }
 
-  // The server takes a while over these: one request at a time, or edits would wait for it.
+  const answers = {
+    stretches: (found) => (model.stretches = found),
+    next_frames: (found) => (suggestions = found),
+    checks(found) {
+      model.checks = found;
+      checked = true;
+    },
+  };
+  // The server takes a while over these: one request at a time, or edits would wait for it. Where it has no
+  // answer to one, the others are still asked for.
   const refresh = api.latestOnly(
     async () => {
-      model.stretches = await api.read("stretches");
-      suggestions = await api.read("next_frames");
-      model.redraw();
-      model.checks = await api.read("checks");
-      model.redraw();
+      let failed = null;
+      for (const [name, take] of Object.entries(answers)) {
+        await api.read(name).then(take, (fault) => (failed ??= fault));
+        model.redraw();
+      }
+      if (failed) throw failed;
     },
     (fault) => model.notify(fault.message),
   );
@@ -159,7 +170,9 @@ export function createLists(model, actions) {
     if (tab === "checks")
       return model.checks.length
         ? model.checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
-        : "Nothing looks wrong.";
+        : checked
+        ? "Nothing looks wrong."
+        : "The marks were not looked through yet.";
     if (tab === "next") {
       if (model.stretches.length && !suggestions.length)
         return "Where the program is least sure. Choose a line to mark its frame.";

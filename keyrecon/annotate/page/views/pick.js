@@ -5,7 +5,7 @@ import { nearestPlace, placeIn } from "../draw/geometry.js";
 import { createViewer } from "../draw/viewer.js";
 import { addPick, newId, removePick } from "../state/edits.js";
 import { REQUIRED_PARTS, budgetText, missingParts, nextPart, partsOf } from "../state/workflow.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, followProject, make, setText } from "./dom.js";
 import { arrowStep } from "./keyboard.js";
 import { createStrip } from "./strip.js";
 
@@ -112,7 +112,7 @@ export function createPick(model, { frames, shell }) {
   byId("pick-primary").addEventListener("click", primary);
   byId("show-map").addEventListener("change", loadMap);
 
-  byId("budget").value = budgetText(project);
+  followProject(model, byId("budget"), budgetText);
 
   function primary() {
     const [next] = missingParts(parts());

@@ -1,0 +1,91 @@
+// Lists beside the picture and fields: what the server has not said is not known, what somebody typed stays.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+const elements = new Map();
+const nothing = () => {};
+function element(id) {
+  if (!elements.has(id))
+    elements.set(id, {
+      value: "",
+      textContent: "",
+      dataset: {},
+      style: {},
+      handlers: {},
+      classList: { toggle: nothing },
+      addEventListener(kind, handle) {
+        this.handlers[kind] = handle;
+      },
+      append: nothing,
+      replaceChildren: nothing,
+      setAttribute: nothing,
+      remove: nothing,
+    });
+  return elements.get(id);
+}
+const tabs = ["frames", "checks", "next"].map((name) => {
+  const button = element(`tab ${name}`);
+  button.dataset.tab = name;
+  return button;
+});
+globalThis.document = {
+  getElementById: element,
+  createElement: () => element(`made ${elements.size}`),
+  querySelectorAll: () => tabs,
+};
+globalThis.ResizeObserver = class {
+  observe() {}
+};
+const { createLists } = await import("../../../keyrecon/annotate/page/views/lists.js");
+const { followProject } = await import("../../../keyrecon/annotate/page/views/dom.js");
+
+const CHECK = { frame: 3, joint: "left_knee", kind: "crossed", suspicion: 0.95, text: "Legs look swapped." };
+
+// What the tab of checks says when the server answers so.
+async function said(answers) {
+  globalThis.fetch = async (path) => {
+    const answer = answers[path.split("/").at(-1)];
+    return answer ? { ok: true, status: 200, json: async () => answer } : { ok: false, status: 500, json: async () => ({ error: "x" }) };
+  };
+  const model = {
+    project: { has: { keyframes: true, assistant: true }, halves: {}, order: [] },
+    ui: { frame: null, joint: null },
+    checks: [],
+    stretches: [],
+    keyframes: () => [],
+    keyframe: () => null,
+    redraw: nothing,
+    onIdle: nothing,
+    onProject: nothing,
+    notify: nothing,
+  };
+  const lists = createLists(model, {});
+  await lists.refresh();
+  tabs[1].handlers.click();
+  lists.draw();
+  return element("explanation").textContent;
+}
+
+test("checks are shown though another list has no answer", async () => {
+  assert.match(await said({ stretches: [], checks: [CHECK] }), /^Most suspicious first/);
+});
+
+test("nothing is said to look right before the marks were looked through", async () => {
+  assert.equal(await said({ stretches: [], next_frames: [] }), "The marks were not looked through yet.");
+  assert.equal(await said({ stretches: [], next_frames: [], checks: [] }), "Nothing looks wrong.");
+});
+
+test("a field follows the project until somebody types in it", () => {
+  const field = element("field");
+  let changed = nothing;
+  const model = { project: { budget: "1.5" }, onProject: (react) => (changed = react) };
+  followProject(model, field, ({ budget }) => budget);
+  assert.equal(field.value, "1.5");
+  model.project = { budget: "3" };
+  changed();
+  assert.equal(field.value, "3");
+  field.value = "2";
+  field.handlers.input();
+  changed();
+  assert.equal(field.value, "2");
+});
