@@ -59,8 +59,8 @@ from small_swing import QUICK
 video, folder = Path(sys.argv[1]), Path(sys.argv[2])
 fit_file(video, video.with_name("clicks.json"), folder, options=QUICK)
 """
-TIMED = ("report.html", "project.toml", "annotator.json")
-"""Files that tell how long something took, or where the video lies from there."""
+TIMED = ("report.html", "project.toml", "annotator.json", "exports.json")
+"""Files that tell how long something took, when a file was written, or where the video lies."""
 
 
 def made_by(script: str, video: Path, folders: list[Path], cores: set[int]) -> list[dict[str, str]]:
