@@ -202,6 +202,14 @@ _LSP = (  # name, parent, bone length in statures
 )
 
 
+def standing_length(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
+    """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
+    reach = skeleton.ancestry @ lengths
+    midline = skeleton.mirror == np.arange(len(reach))
+    lower = skeleton.is_lower
+    return float(reach[lower].max(initial=0.0) + reach[midline].max(initial=0.0))
+
+
 def _skeleton_from_rows(rows: list[tuple[str, str | None, float]], lower: list[str]) -> Skeleton:
     names = tuple(name for name, _, _ in rows)
     return Skeleton(

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from keyrecon.body import standing_length
 from keyrecon.body_models.depth_model import DepthModel, length_errors
-from keyrecon.lifting.limb_lengths import BodySize, standing_length
+from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.records import Shots
 

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from scipy.optimize import OptimizeResult, minimize
 from scipy.sparse import block_array, block_diag, csr_array, eye_array, vstack
 
-from keyrecon.body import Skeleton
+from keyrecon.body import Skeleton, standing_length
 from keyrecon.errors import KeyreconError
 from keyrecon.lifting.foreshortening import log_densities
 from keyrecon.ranges import within
@@ -148,14 +148,6 @@ def estimate_lengths(
     return BodySize(
         skeleton, lengths[:bones] / size, lengths[bones:] / size, np.exp(fit.log_scale) * size
     )
-
-
-def standing_length(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
-    """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
-    reach = skeleton.ancestry @ lengths
-    midline = skeleton.mirror == np.arange(len(reach))
-    lower = skeleton.is_lower
-    return float(reach[lower].max(initial=0.0) + reach[midline].max(initial=0.0))
 
 
 def joint_noise(

@@ -304,7 +304,7 @@ def _result(
         inner[:, 0, 0] * sd[0],
         np.where(usable, sd_tilt, np.nan),
         GROUND,
-        stature=None if np.isfinite(evidence.marks.metres).any() else evidence.stances.stature,
+        stature=None if np.isfinite(evidence.marks.metres).any() else evidence.stances.told_height,
     )
     far = _distances(state, evidence)
     return GroundCalibration(camera, state, GroundState(*sd), reference, evidence.stances, far)

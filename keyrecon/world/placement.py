@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.linalg import spsolve
 
+from keyrecon.body import standing_length
 from keyrecon.records import Motion
 from keyrecon.world.records import WorldCamera, WorldMotion
 from keyrecon.world.refinement import (
@@ -156,11 +157,28 @@ def stature_in_units(motion: Motion) -> float:
     """Length of the body in the motion's own units."""
     if motion.units != "m":
         return 1.0
-    bones = motion.skeleton.bones
+    shares = np.array([motion.skeleton.proportions[child] for child in motion.skeleton.bones[:, 1]])
+    return float(_bone_lengths(motion).sum() / shares.sum())
+
+
+def _bone_lengths(motion: Motion) -> Float[np.ndarray, "B"]:
+    """Medians, in the motion's own units."""
+    start, stop = motion.skeleton.bones.T
     points = motion.points3d[motion.known]
-    lengths = np.median(np.linalg.norm(points[:, bones[:, 1]] - points[:, bones[:, 0]], axis=2), 0)
-    shares = np.array([motion.skeleton.proportions[child] for child in bones[:, 1]])
-    return float(lengths.sum() / shares.sum())
+    lengths: np.ndarray = np.median(np.linalg.norm(points[:, stop] - points[:, start], axis=2), 0)
+    return lengths
+
+
+def told_height(motion: Motion) -> float:
+    """The player's height as it was told, by which a motion in metres is as large as it is; else 1.
+
+    Legs and trunk stand that tall, however long marks have made the arms (`standing_length`).
+    """
+    if motion.units != "m":
+        return 1.0
+    skeleton = motion.skeleton
+    usual = standing_length(skeleton.lengths, skeleton)
+    return standing_length(_bone_lengths(motion), skeleton) / usual
 
 
 def stature_change(motion: Motion, camera: WorldCamera) -> float:
@@ -170,7 +188,7 @@ def stature_change(motion: Motion, camera: WorldCamera) -> float:
     """
     if camera.stature is None or motion.units != "m":
         return 1.0
-    change = stature_in_units(motion) / camera.stature
+    change = told_height(motion) / camera.stature
     return change if abs(change - 1) > SAME_STATURE else 1.0
 
 

@@ -84,7 +84,7 @@ def test_a_player_of_another_height_takes_the_cameras_metres_with_him(walked):
     assert not describe_ground(workspace)["changed"]
     taller = replace(motion, points3d=1.12 * motion.points3d, scale=motion.scale / 1.12)
     placed = write_placed_motion(workspace, taller)
-    assert "with a player 1.86 m tall who is 2.08 m now" in placed.lines[1]
+    assert "with a player 1.81 m tall who is 2.03 m now" in placed.lines[1]
     world, camera = on_ground(workspace)
     size = stature_in_units(replace(motion, points3d=world.points))
     assert size == pytest.approx(stature_in_units(taller), rel=0.02)
@@ -95,6 +95,20 @@ def test_a_player_of_another_height_takes_the_cameras_metres_with_him(walked):
     told(walked)
     assert not describe_ground(workspace)["changed"]
     assert len(write_placed_motion(workspace, taller).lines) == 1
+    write_motion(workspace.motion_file, motion)
+
+
+def test_arms_that_more_marks_have_made_longer_move_no_camera(walked):
+    told(walked, posts(), 60.4)
+    workspace, motion = Workspace(walked), seen(WAY)
+    camera, names = read_camera(workspace.camera_file), motion.skeleton.names
+    points = motion.points3d.copy()
+    for side in ("left", "right"):
+        elbow, wrist = (names.index(f"{side}_{part}") for part in ("elbow", "wrist"))
+        points[:, wrist] += 0.3 * (points[:, wrist] - points[:, elbow])
+    placed = write_placed_motion(workspace, replace(motion, points3d=points))
+    assert len(placed.lines) == 1
+    assert np.array_equal(placed.court[1].t, camera.t)
     write_motion(workspace.motion_file, motion)
 
 

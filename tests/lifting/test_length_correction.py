@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from keyrecon.body import LSP14
+from keyrecon.body import LSP14, standing_length
 from keyrecon.io.formats.model_file import read_depth_model
 from keyrecon.lifting.length_correction import correct_lengths
-from keyrecon.lifting.limb_lengths import BodySize, standing_length
+from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.records import Shots
 from keyrecon.synthetic.motion import MotionOptions, play_tennis

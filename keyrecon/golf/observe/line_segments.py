@@ -57,9 +57,11 @@ SAME_ENDS = 0.02
 """Distance between the ends of two segments that are one, player heights."""
 STATIC_SHARE = 0.3
 """Share of the active frames in which a static segment is detected: players hide it at times."""
-DETECTION_ERROR = 2.0
-"""Distance by which pieces of one shaft may lie beside one another, px of the pictures in which
-they are detected: the sides of a shaft that is three wide."""
+DETECTION_ERROR, MEASURED_HEIGHT = 2.0, 480.0
+"""Distance by which pieces of one shaft may lie beside one another, px, of a player so tall at most;
+of taller ones, whose segments are found in pictures reduced further, as much more. With 2 px of
+`DETECTED_HEIGHT` two real swings of players 460 and 500 px tall had clubs within 5 degrees in 87
+and 88 % of the frames instead of 91 and 92."""
 COLLINEAR_OFFSET = 0.008
 """The same in addition, lengths of the segment: one that is turned by half a degree."""
 
@@ -248,7 +250,7 @@ def _grow(
     """The segments in the line of one, which grows by the nearest ones first."""
     whole, members = segments[start], np.arange(len(segments)) == start
     limit = options.bridge * foreground.height
-    beside = DETECTION_ERROR * max(1.0, foreground.height / DETECTED_HEIGHT)
+    beside = DETECTION_ERROR * max(1.0, foreground.height / MEASURED_HEIGHT)
     while True:
         length = float(np.linalg.norm(whole[1] - whole[0]))
         axis = (whole[1] - whole[0]) / length

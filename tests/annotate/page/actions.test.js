@@ -88,6 +88,17 @@ test("whether the player faces you is asked of another first body, and of an exc
   assert.equal(actions.next().do, "facing");
 });
 
+test("whether the player faces you is not asked again where a joint is taken away and placed again", () => {
+  const { model, actions } = trial({ marks: { 5: FRONT } });
+  actions.primary();
+  const whole = model.state,
+    { left_hip: _, ...others } = FRONT;
+  model.state = { ...whole, marks: { 5: others } };
+  actions.next();
+  model.state = whole;
+  assert.equal(actions.next().do, "next");
+});
+
 test("a click where a cross was moved by the arrow keys ends the cross", () => {
   const { left_hip: at, ...others } = FRONT,
     { model, actions } = trial({ marks: { 5: others } });

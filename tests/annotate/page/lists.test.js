@@ -4,6 +4,7 @@ import { test } from "node:test";
 
 const elements = new Map();
 const nothing = () => {};
+const made = []; // what was put into elements that were made
 function element(id) {
   if (!elements.has(id))
     elements.set(id, {
@@ -30,7 +31,7 @@ const tabs = ["frames", "checks", "next"].map((name) => {
 });
 globalThis.document = {
   getElementById: element,
-  createElement: () => element(`made ${elements.size}`),
+  createElement: () => ({ ...element(`made ${elements.size}`), append: (...parts) => made.push(...parts) }),
   querySelectorAll: () => tabs,
 };
 globalThis.ResizeObserver = class {
@@ -73,6 +74,33 @@ test("checks are shown though another list has no answer", async () => {
 test("nothing is said to look right before the marks were looked through", async () => {
   assert.equal(await said({ stretches: [], next_frames: [] }), "The marks were not looked through yet.");
   assert.equal(await said({ stretches: [], next_frames: [], checks: [] }), "Nothing looks wrong.");
+});
+
+test("the tick of a keyframe follows whether it counts as marked, with as many marks as before", () => {
+  let marked = true;
+  const model = {
+    project: { has: { keyframes: true, assistant: true }, halves: { upper: ["neck", "head_top"] }, order: ["neck", "head_top"] },
+    ui: { frame: 5, joint: null },
+    checks: [],
+    stretches: [],
+    keyframes: () => [{ frame: 5, half: "upper", stands_for: 3, brings: 0, locked: false }],
+    keyframe: () => null,
+    marks: () => ({ neck: [1, 1, 2] }),
+    isMarked: () => marked,
+    redraw: nothing,
+    onIdle: nothing,
+    onProject: nothing,
+    notify: nothing,
+  };
+  Object.assign(element("frame-list"), { clientHeight: 500, scrollTop: 0 });
+  globalThis.requestAnimationFrame = (draw) => draw();
+  const lists = createLists(model, {}),
+    shown = () => made.findLast((part) => typeof part === "string" && part.startsWith("1/2"));
+  lists.draw();
+  assert.equal(shown(), "1/2 ✓");
+  marked = false;
+  lists.draw();
+  assert.equal(shown(), "1/2 ");
 });
 
 test("a field follows the project until somebody types in it", () => {

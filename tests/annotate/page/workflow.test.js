@@ -136,6 +136,11 @@ test("Space belongs to a checkbox that has the focus, and no other key does", ()
   for (const key of ["Enter", "q", "ArrowLeft"]) assert.equal(belongsTo(checkbox, key), false);
 });
 
+test("Space and Enter belong to a button also where the arrow keys turn what it lies in", () => {
+  const button = { closest: (selector) => /button|data-turns/.test(selector) || null };
+  assert.deepEqual([" ", "Enter", "ArrowLeft", "q"].map((key) => belongsTo(button, key)), [true, true, true, false]);
+});
+
 test("before there are keyframes: a frame, its body, following, more bodies, the choice", () => {
   const begin = (keyframes, { bodies = null, keyframed = false, done = [] } = {}) =>
     workflow.nextBeginning({ has: { keyframes: keyframed }, bodies }, keyframes, ({ frame }) =>

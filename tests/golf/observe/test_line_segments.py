@@ -18,7 +18,7 @@ def joined(scale):
         DETECTED_HEIGHT * scale,
         np.zeros((side, side), np.uint8),
     )
-    pieces = np.array([[[100, 100], [140, 100]], [[150, 101.8], [190, 101.8]]])
+    pieces = np.array([[[100, 100], [140, 100]], [[150, 101.2], [190, 101.2]]])
     return _join(scale * pieces, player, LineSegmentOptions()).ends / scale
 
 

@@ -130,11 +130,12 @@ export function createActions(model, { middle, opened, showInSwing }) {
     });
 
   // Asked of the first body that tells it, until its marks are as the answer has them: whether left and
-  // right are the player's own. The answer is of that frame, and forgotten when no body is left.
+  // right are the player's own. The answer is of that frame, and forgotten when nothing is marked there.
   const answered = `facing ${model.project.id}`;
   function facing() {
     const first = firstFacing(model.state.marks);
-    if (!first) localStorage.removeItem(answered);
+    const [frame] = (localStorage.getItem(answered) ?? "").split(" ");
+    if (!first && !Object.keys(model.state.marks[frame] ?? {}).length) localStorage.removeItem(answered);
     if (!first || first.others || first.frame !== ui.frame) return 0;
     return localStorage.getItem(answered) === `${ui.frame} ${first.facing}` ? 0 : first.facing;
   }

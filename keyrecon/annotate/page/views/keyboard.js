@@ -156,10 +156,10 @@ export function interpret(event, page) {
 export function belongsTo(element, key) {
   if (element.closest("input[type=text]:not(form *)") && key === "Enter") return false;
   if (element.closest("input[type=text], textarea, select")) return true;
+  if (element.closest("button, a, summary") && [" ", "Enter"].includes(key)) return true;
   if (element.closest("input[type=range], [role=listbox], [data-turns]"))
     return key.startsWith("Arrow");
-  if (element.closest("input[type=checkbox]")) return key === " ";
-  return Boolean(element.closest("button, a, summary")) && [" ", "Enter"].includes(key);
+  return Boolean(element.closest("input[type=checkbox]")) && key === " ";
 }
 
 const keyNames = {

@@ -38,7 +38,7 @@ function keyframeRow(model, element, keyframe) {
     done = count === joints.length;
   const { lines, title } = purposeOf(keyframe),
     tick = model.isMarked(keyframe) ? "✓" : "";
-  const content = [keyframe.frame, keyframe.half, ...lines, count, keyframe.locked].join();
+  const content = [keyframe.frame, keyframe.half, ...lines, count, tick, keyframe.locked].join();
   toggle(element, "done", done);
   fillRow(element, content, () => [
     halfIcon(keyframe.half),

@@ -99,7 +99,8 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     model.redraw();
   }
 
-  // What nobody typed is what the motion was made with, be it elsewhere.
+  // What nobody typed is what the motion was made with, be it elsewhere. While one is made the project has
+  // what it is made with, and may take that back.
   function fillFields() {
     for (const [name, value] of Object.entries(used()))
       byId(name).value = localStorage.getItem(kept(name)) ?? value ?? "";
@@ -136,7 +137,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
 
   fillFields();
   for (const field of ["height", "fov"]) byId(field).addEventListener("input", keepTyped);
-  model.onProject(fillFields);
+  model.onProject(() => shell.runningJob() || fillFields());
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);

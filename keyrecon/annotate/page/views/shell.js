@@ -11,9 +11,9 @@ const SAVING = {
   saving: () => "Saving …",
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
-const LASTING = {}; // an offer of nothing: the notice stays until it is read
+const LASTING = { isRead: true }; // an offer of nothing: the notice stays until it is read
 const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
-const GOOD_NEWS = /^(Player found in|Note: |Wrote )/;
+const GOOD_NEWS = /^(Player found in|Note: |Wrote |On the (court|ground): |For a report )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court", ground: "Ground" };
 
@@ -110,7 +110,7 @@ export function createShell(model, go) {
   function leaveRead(event) {
     const { offer, since } = model.notice ?? {};
     const here = event.target instanceof Node && byId("notice").contains(event.target);
-    if (offer === LASTING && !here && performance.now() - since > READ_MS) model.notify(null);
+    if (offer?.isRead && !here && performance.now() - since > READ_MS) model.notify(null);
   }
 
   // A notice lies over what is looked at, so that it covers no control; a page without a picture makes room.
@@ -212,13 +212,14 @@ export function createJobs(model) {
     model.redraw();
   }
 
-  const toMotion = { text: "Go to 3 Motion", act: () => model.update({ view: "motion" }) };
+  const toMotion = { text: "Go to 3 Motion", act: () => model.update({ view: "motion" }), isRead: true };
 
   function ended(job) {
     if (job.state === "failed") model.notify(job.text || "The work failed.");
     if (job.state === "cancelled")
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
+    if (job.kind === "run" && model.notice?.offer === toMotion) model.notify(null); // it was made
     const news = job.text?.split("\n") ?? [];
     const read = news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT;
     if (job.text) model.notify(job.text, /make the motion anew/.test(job.text) ? toMotion : read);
