@@ -171,7 +171,8 @@ addEventListener("unhandledrejection", ({ reason }) => tell(reason));
 document.addEventListener("keydown", (event) => {
   if (document.body.inert || (document.querySelector("dialog[open]") && event.key !== "?")) return;
   const key = interpret(event, ui.view);
-  if (!key || belongsTo(event.target, event.key)) return;
+  // Other pages can be gone to out of a field, too.
+  if (!key || (key.action !== "page" && belongsTo(event.target, event.key))) return;
   event.preventDefault();
   if (event.repeat && !goesOn(key)) return;
   if (event.target.matches("input[type=text]")) event.target.blur(); // takes what was typed

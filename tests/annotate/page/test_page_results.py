@@ -276,6 +276,24 @@ def test_a_height_that_waits_for_the_next_motion_is_kept_and_said_to(folder, vis
         assert "height" not in person.page.evaluate("() => Object.keys(localStorage).join()")
 
 
+def test_a_press_before_the_ground_is_there_is_not_lost(folder, visit):
+    held = []
+    write_true_motion(folder)
+    assistant = make_assistant(Workspace(folder))
+    with serving(folder, assistant, {"run": partial(run_at_once, folder)}) as server:
+        person = visit(server)
+        person.have_marked(40, place)
+        person.press("Alt+3")
+        person.page.fill("#height", "183")
+        person.await_text("#height-said", "counts when it is made anew")
+        person.page.route("**/api/ground", lambda route: held.append(route))
+        person.press("Alt+6")
+        person.page.click("#ground-primary")
+        person.page.wait_for_timeout(300)
+        held.pop().continue_()
+        person.await_text("#notice-text", "height that is typed in 3 Motion counts when")
+
+
 def run_and_remember(folder, options, progress):
     Workspace(folder).remember(with_height(Options(), options["height"]), Options())
     return run_at_once(folder, options, progress)

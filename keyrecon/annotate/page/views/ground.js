@@ -45,7 +45,8 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
   }
 
   const load = async () => take(await api.read("ground"));
-  let changing = Promise.resolve(); // what was typed last, on its way
+  let changing = Promise.resolve(); // what was opened or typed last, on its way
+  const opened = () => (changing = load().catch(failed));
   const change = (request) => (changing = api.send("ground", request).then(take, failed));
 
   function show(frame) {
@@ -124,7 +125,7 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
   const waitsForHeight = () =>
     heightWaits() && model.project.settings.height === null && ground.marks.every((mark) => mark.metres === null);
 
-  // A number that Enter ended in its field is used, too.
+  // A number that Enter ended in its field is used, too, and a page that has just opened is waited for.
   async function primary() {
     await changing;
     if (shell.runningJob() || !ground?.motion || ground.court || isFound()) return;
@@ -240,5 +241,5 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
     zoom: viewer.toggleZoom,
     zoomBy: ({ index }) => viewer.zoom(viewer.toScreen(viewer.middle()), index ? 0.8 : 1.25),
   };
-  return { draw, commands, opened: () => load().catch(failed) };
+  return { draw, commands, opened };
 }
