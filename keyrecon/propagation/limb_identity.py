@@ -1,20 +1,20 @@
 """Which leg is the left one, and which arm: one inference for each pair over the whole clip.
 
 Silhouettes do not tell left from right, but limbs do not jump: two limbs can only be exchanged
-where they meet in the picture. What motion says against exchanging them between two frames is the
-price of doing so (`limb_motion`): high wherever the limbs are apart, and low where they meet; where
+where they meet in the picture. Exchanging them between two frames has a cost, by what motion says
+against it (`limb_motion`): high wherever the limbs are apart, and low where they meet; where
 legs cross, a planted foot stays and a swinging one goes on.
 
-First, exchanges that are themselves against the laws of motion are undone, so that there are two
-threads without a name. Then a chain of two states (the one thread is left, or the other) with these
-prices is solved for the whole clip: marks fix the state, so that what a crossing leaves open is
-decided by the next mark; in between, the annotated poses that are most like a frame say which is
-which, and so do what the joints of either arm look like on the marked frames and what a rule learnt
-from captures says of arms by the pose of the whole body (`side_model`). A pose that no mark is like
-can look the wrong way round for as long as it lasts, in one frame like in the next: so what
-likeness to marks says is believed or doubted, a second pair of states, and a run of frames counts
-no more than doubting it costs. The probability that the chain gives to its sides is small where
-nothing decides.
+First, exchanges of identity that raise the probability of the motion are made (`undo_exchanges`),
+which leaves two smooth trajectories, not yet known as left or right. Then a hidden Markov model
+over the whole clip decides which is which. Its states are which trajectory is the left limb; its
+transitions have the costs of an exchange. Marks fix the state, so that what a crossing leaves open
+is decided by the next mark. Between marks the log odds come from the most similar annotated poses,
+from what the joints of either arm look like on the marked frames, and from a rule learnt from
+captures, of arms by the pose of the whole body (`side_model`). A pose that no mark resembles can
+mislead for as long as it lasts: so a second pair of states ignores the log odds at a cost per
+second, and a run of frames counts no more than that. The posterior probability of the state is
+small where nothing decides.
 
 Marked joints that optical flow follows were tried as further evidence. A leg that passes the other
 hands its flow over, so that one mistake counts in every frame that follows: 3.3 % of the limbs of a
@@ -32,7 +32,7 @@ from keyrecon.body import Skeleton
 from keyrecon.body_models.side_model import SideModel, arm_log_odds
 from keyrecon.numerics.viterbi import find_cheapest_path, state_probabilities
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.limb_motion import exchange_price, foot_exchange_price
+from keyrecon.propagation.limb_motion import exchange_cost, foot_exchange_cost
 from keyrecon.propagation.mark_sides import exchange_evidence
 from keyrecon.propagation.trajectory_smoothing import ACCELERATION_SPREAD
 from keyrecon.records import Shots
@@ -58,7 +58,7 @@ DISTINCTION = 0.1
 """Difference in distance at which a joint belongs to the one side for certain, player heights. A
 quarter more or less, others with it: at most 1.5 points, 2.1 mm on nine clips."""
 MIN_THREAD_SECONDS = 0.1
-"""Exchanges nearer in time than this are not made in one go: each spoils the price of the other. A
+"""Exchanges nearer in time than this are not made in one go: each alters the cost of the other. A
 quarter more or less, others with it: at most 1.5 points, 2.1 mm on nine clips."""
 MAX_ROUNDS = 20
 """Times that exchanges are made at most; three or four usually leave none that pays. A quarter more
@@ -73,27 +73,27 @@ MARK_COST = 1e3
 mm on nine clips."""
 
 
-def template_gain(
+def template_log_odds(
     half: BodyHalf,
     joints: Complex[np.ndarray, "T J"],
     poses: Complex[np.ndarray, "T S J"],
     fps: float,
 ) -> Float[np.ndarray, "T"]:
-    """What similar annotated poses, fitted to each frame, say for the sides as they are and against
-    the exchanged, nats."""
+    """Log odds of the sides as they are against the exchanged by similar annotated poses that were
+    fitted to each frame, nats."""
     sides = np.concatenate(half.sides)
     direct = np.abs(joints[:, None, sides] - poses[..., sides])
     crossed = np.abs(joints[:, None, half.mirror[sides]] - poses[..., sides])
-    gain = np.clip((crossed - direct) / DISTINCTION, -1, 1)
-    return TEMPLATE_RATE / fps * gain.mean(axis=(1, 2))
+    log_odds = np.clip((crossed - direct) / DISTINCTION, -1, 1)
+    return TEMPLATE_RATE / fps * log_odds.mean(axis=(1, 2))
 
 
-def appearance_gain(
+def appearance_log_odds(
     half: BodyHalf, unlikeness: Float[np.ndarray, "T 2 J"], fps: float
 ) -> Float[np.ndarray, "T"]:
-    """What joints that look like marks of their own side, or of the other, say likewise.
+    """The same log odds by whether joints look like marks of their own side or of the other.
 
-    To be asked of arms (`APPEARANCE_RATE`).
+    For arms alone (`APPEARANCE_RATE`).
     """
     sides = np.concatenate(half.sides)
     return APPEARANCE_RATE / fps * (unlikeness[:, 1, sides] - unlikeness[:, 0, sides]).mean(axis=1)
@@ -127,7 +127,7 @@ def exchange_sides(
 
 @dataclass(frozen=True, eq=False)
 class ArmEvidence:
-    """What the poses of whole bodies say of their arms, by a model learnt from captures."""
+    """What the pose of the whole body says of its arms, by a model learnt from captures."""
 
     model: SideModel
     skeleton: Skeleton
@@ -140,9 +140,9 @@ class ArmEvidence:
         """Of some frames."""
         return replace(self, others=self.others[frames])
 
-    def gain(self, joints: Complex[np.ndarray, "T j"], fps: float) -> Float[np.ndarray, "T"]:
-        """What joints of the half say, with the others, for their sides as they are and against the
-        exchanged, nats."""
+    def log_odds(self, joints: Complex[np.ndarray, "T j"], fps: float) -> Float[np.ndarray, "T"]:
+        """Of the arms as they are against the exchanged, by these joints of the upper half and the
+        others, nats."""
         body = self.others.copy()
         body[:, self.half.joints[self.half.free]] = joints[:, self.half.free]
         return POSE_RATE / fps * arm_log_odds(self.model, self.skeleton, body, fps)
@@ -152,16 +152,16 @@ class ArmEvidence:
 class IdentityEvidence:
     """What tells which limb is the left one, besides motion and marks."""
 
-    gain: Float[np.ndarray, "T"]
-    """What likeness to marks says for the sides as they are and against the exchanged, nats."""
+    log_odds: Float[np.ndarray, "T"]
+    """Of the sides as they are against the exchanged, by likeness to marks, nats."""
     ground: Complex[np.ndarray, "T"] | None = None
-    """Way of the origin of the joints over the ground, of limbs that stand on it."""
+    """Path of the origin of the joints over the ground, for limbs that stand on it."""
     arms: ArmEvidence | None = None
 
     def part(self, frames: slice) -> "IdentityEvidence":
         """Of some frames."""
         ground = None if self.ground is None else self.ground[frames]
-        return IdentityEvidence(self.gain[frames], ground, self.arms and self.arms.part(frames))
+        return IdentityEvidence(self.log_odds[frames], ground, self.arms and self.arms.part(frames))
 
 
 def identify_in_shots(
@@ -197,19 +197,19 @@ def identify_limbs(
     """
     pair = np.stack([joints[:, list(side)] for side in half.sides], axis=1)
 
-    def price_of(pair: Complex[np.ndarray, "T 2 j"]) -> Float[np.ndarray, "S"]:
-        return motion_price(half, pair, fps, evidence.ground)
+    def costs_of(pair: Complex[np.ndarray, "T 2 j"]) -> Float[np.ndarray, "S"]:
+        return motion_cost(half, pair, fps, evidence.ground)
 
-    crossed, price = untangle_threads(pair, price_of, round(MIN_THREAD_SECONDS * fps))
-    gain = evidence.gain
-    if evidence.arms is not None:  # moments around a frame are shown, which must be of one thread
-        threads = exchange_sides(half, joints, crossed)
-        gain = gain + np.where(crossed, -1, 1) * evidence.arms.gain(threads, fps)
-    cost = _side_costs(crossed, gain, np.isin(np.arange(len(pair)), marked), fps)
+    crossed, exchange_costs = undo_exchanges(pair, costs_of, round(MIN_THREAD_SECONDS * fps))
+    log_odds = evidence.log_odds
+    if evidence.arms is not None:  # it sees frames around, which must be of one trajectory
+        trajectories = exchange_sides(half, joints, crossed)
+        log_odds = log_odds + np.where(crossed, -1, 1) * evidence.arms.log_odds(trajectories, fps)
+    cost = _side_costs(crossed, log_odds, np.isin(np.arange(len(pair)), marked), fps)
     other_belief = DOUBT_COST * np.kron(1 - np.eye(2), np.ones((2, 2)))
 
     def transition(_: int, t: int) -> Float[np.ndarray, "4 4"]:
-        return other_belief + np.tile(price[t - 1] * (1 - np.eye(2)), (2, 2))
+        return other_belief + np.tile(exchange_costs[t - 1] * (1 - np.eye(2)), (2, 2))
 
     chance = state_probabilities(list(cost), transition)
     side = find_cheapest_path(list(cost), transition) % 2
@@ -217,29 +217,29 @@ def identify_limbs(
     return LimbIdentity(
         side.astype(bool) ^ crossed,
         probability,
-        exchange_evidence(crossed, price, marked),
+        exchange_evidence(crossed, exchange_costs, marked),
     )
 
 
 def _side_costs(
     crossed: Bool[np.ndarray, "T"],
-    gain: Float[np.ndarray, "T"],
+    log_odds: Float[np.ndarray, "T"],
     marked: Bool[np.ndarray, "T"],
     fps: float,
 ) -> Float[np.ndarray, "T 4"]:
-    """Cost of either naming of the threads, while likeness to marks is believed and while not."""
+    """Unary costs of the four states: which trajectory is left, with log odds used and ignored."""
     frames = np.arange(len(crossed))
-    gain = np.where(marked, MARK_COST, np.stack([gain, np.zeros(len(gain))]))
+    log_odds = np.where(marked, MARK_COST, np.stack([log_odds, np.zeros(len(log_odds))]))
     cost = np.zeros((len(crossed), 2, 2))
     for belief in (0, 1):
-        cost[frames, belief, crossed.astype(int)] = np.maximum(-gain[belief], 0)
-        cost[frames, belief, 1 - crossed] = np.maximum(gain[belief], 0)
+        cost[frames, belief, crossed.astype(int)] = np.maximum(-log_odds[belief], 0)
+        cost[frames, belief, 1 - crossed] = np.maximum(log_odds[belief], 0)
     cost[:, 1] += DOUBT_RATE / fps
     cost[0, 1] += DOUBT_COST
     return cost.reshape(-1, 4)
 
 
-def motion_price(
+def motion_cost(
     half: BodyHalf,
     pair: Complex[np.ndarray, "T 2 j"],
     fps: float,
@@ -254,40 +254,40 @@ def motion_price(
     """
     spread = ACCELERATION_SPREAD * 2.0 ** half.depth[list(half.sides[0])] * (50 / fps) ** 2
     if ground is None or half.limb_bones(half.sides[0]) is None:
-        return exchange_price(pair, spread)
+        return exchange_cost(pair, spread)
     ankles = pair[:, :, 2] + ground[:, None]
-    knees = exchange_price(pair[:, :, 1:2], spread[1:2])
-    return knees + foot_exchange_price(ankles, float(spread[2]), fps)
+    knees = exchange_cost(pair[:, :, 1:2], spread[1:2])
+    return knees + foot_exchange_cost(ankles, float(spread[2]), fps)
 
 
-def untangle_threads(
+def undo_exchanges(
     pair: Complex[np.ndarray, "T 2 j"],
-    price_of: Callable[[Complex[np.ndarray, "T 2 j"]], Float[np.ndarray, "S"]],
+    costs_of: Callable[[Complex[np.ndarray, "T 2 j"]], Float[np.ndarray, "S"]],
     apart: int,
 ) -> tuple[Bool[np.ndarray, "T"], Float[np.ndarray, "S"]]:
-    """Where to exchange two limbs so that both move as limbs do, and the price of each further
-    exchange between two frames, nats; S is T - 1.
+    """Frames in which to exchange two limbs so that both move as limbs do, and the cost of a
+    further exchange between two frames, nats; S is T - 1.
 
     Exchanges that pay are made at once when they are at least `apart` frames from one another.
     """
     crossed = np.zeros(len(pair), dtype=bool)
-    pair, price = pair.copy(), price_of(pair)
+    pair, exchange_costs = pair.copy(), costs_of(pair)
     for _ in range(MAX_ROUNDS):
-        taken = _separate_minima(price, apart)
+        taken = _separate_minima(exchange_costs, apart)
         if not len(taken):
             break
         for gap in taken:
             crossed[gap + 1 :] ^= True
             pair[gap + 1 :] = pair[gap + 1 :, ::-1]
-        price = price_of(pair)
-    return crossed, np.maximum(price, 0)
+        exchange_costs = costs_of(pair)
+    return crossed, np.maximum(exchange_costs, 0)
 
 
-def _separate_minima(price: Float[np.ndarray, "S"], apart: int) -> list[int]:
-    """Where a price is negative and lowest for some frames around."""
+def _separate_minima(exchange_costs: Float[np.ndarray, "S"], apart: int) -> list[int]:
+    """Where the cost is negative and lowest for some frames around."""
     taken: list[int] = []
-    for gap in np.argsort(price, kind="stable").tolist():
-        if price[gap] >= 0:
+    for gap in np.argsort(exchange_costs, kind="stable").tolist():
+        if exchange_costs[gap] >= 0:
             break
         if all(abs(gap - other) > apart for other in taken):
             taken.append(gap)

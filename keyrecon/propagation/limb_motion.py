@@ -1,8 +1,8 @@
-"""What motion says against exchanging two limbs between two frames: its price.
+"""Cost of exchanging the identity of two limbs between two frames, by their motion.
 
 Between two frames, each joint is predicted from all frames before by a Kalman filter with constant
-velocity, and from all frames after by the same filter run backwards; what the predictions speak
-against exchanging the limbs there is the price of doing so. It is high wherever the limbs are
+velocity, and from all frames after by the same filter run backwards. The cost is how much better
+the predictions agree without an exchange than with one, nats. It is high wherever the limbs are
 apart, and low where they meet.
 
 A foot does not move like that: it stands, and then it swings. Where the legs of a runner meet, one
@@ -59,10 +59,10 @@ LEAST = 1e-12
 mm on nine clips."""
 
 
-def exchange_price(
+def exchange_cost(
     pair: Complex[np.ndarray, "T 2 j"], spread: Float[np.ndarray, "j"]
 ) -> Float[np.ndarray, "S"]:
-    """What motion says against exchanging two limbs between frames t and t + 1, nats; S is T - 1.
+    """Cost of exchanging two limbs between frames t and t + 1 by their motion, nats; S is T - 1.
 
     `spread` is the standard deviation of each joint's second difference.
     """
@@ -177,10 +177,10 @@ class _FootBelief:
     probability: Float[np.ndarray, "*n 2"]
 
 
-def foot_exchange_price(
+def foot_exchange_cost(
     feet: Complex[np.ndarray, "T 2"], spread: float, fps: float
 ) -> Float[np.ndarray, "S"]:
-    """What motion says against exchanging two feet between frames t and t + 1, nats; S is T - 1.
+    """Cost of exchanging two feet between frames t and t + 1 by their motion, nats; S is T - 1.
 
     `feet` are places on the ground as the camera sees it, player heights: a foot that stands stays
     where it is. `spread` is the standard deviation of the second difference of a swinging foot.

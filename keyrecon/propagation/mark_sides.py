@@ -2,8 +2,8 @@
 
 A person who marks a figure seen from behind, or two dark legs that pass, exchanges the sides
 without noticing, and the limbs jump there and back again. Between two marks the limbs can only be
-exchanged where they meet (`limb_motion`), at the lowest price on the way. A mark that costs its
-neighbours a price that the exchanged mark would not is in doubt; nothing is changed.
+exchanged where they meet (`limb_motion`), at the lowest cost on the way. A mark is in doubt if the
+motion to its neighbours would cost less with the mark exchanged; nothing is changed.
 """
 
 import numpy as np
@@ -19,19 +19,19 @@ but one."""
 
 def exchange_evidence(
     crossed: Bool[np.ndarray, "T"],
-    price: Float[np.ndarray, "S"],
+    exchange_costs: Float[np.ndarray, "S"],
     marked: Int[np.ndarray, "K"],
 ) -> Float[np.ndarray, "T"]:
     """What motion says for left and right of a pair of limbs being exchanged on a marked frame, and
     against it where negative, nats; 0 elsewhere.
 
-    Two threads without a name are followed through all frames; where they are `crossed` the marks
-    call the one by the other's name. `price` is what motion says against a change of names between
-    two frames, nats, none below zero; S is T - 1. The worst mark is judged first, and those that
-    are left beside its exchanged twin, so that one mark does not bring those next to it into doubt.
+    Two trajectories pass through all frames; where they are `crossed` the sides of the marks are
+    those of the other trajectory. `exchange_costs` are of an exchange between two frames, nats,
+    none below zero; S is T - 1. The worst mark is judged first, and the remaining ones beside its
+    exchanged twin, so that one mark does not bring those next to it into doubt.
     """
     evidence = np.zeros(len(crossed))
-    name, between = crossed[marked].copy(), _lowest_between(price, marked)
+    name, between = crossed[marked].copy(), _lowest_between(exchange_costs, marked)
     judged = np.zeros(len(marked), dtype=bool)
     while not judged.all():
         gain = _exchange_gains(name, between)
@@ -45,11 +45,11 @@ def exchange_evidence(
 
 
 def _lowest_between(
-    price: Float[np.ndarray, "S"], marked: Int[np.ndarray, "K"]
+    exchange_costs: Float[np.ndarray, "S"], marked: Int[np.ndarray, "K"]
 ) -> Float[np.ndarray, "gaps"]:
-    """The cheapest place to change names between each mark and the next."""
+    """Lowest cost of an exchange between each mark and the next."""
     pairs = zip(marked[:-1].tolist(), marked[1:].tolist(), strict=True)
-    return np.array([price[first:last].min() for first, last in pairs])
+    return np.array([exchange_costs[first:last].min() for first, last in pairs])
 
 
 def _exchange_gains(

@@ -62,9 +62,9 @@ from keyrecon.propagation.hypotheses import (
 from keyrecon.propagation.limb_identity import (
     ArmEvidence,
     IdentityEvidence,
-    appearance_gain,
+    appearance_log_odds,
     identify_in_shots,
-    template_gain,
+    template_log_odds,
 )
 from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
 from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
@@ -309,10 +309,12 @@ def propagate_half(
     hypotheses = _with_looks(hypotheses, appearance, colors)
     limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
     limbs_chosen.joints[:, half.fixed] = start.fixed
-    gain = template_gain(half, limbs_chosen.joints, fitted.joints, fps)
+    log_odds = template_log_odds(half, limbs_chosen.joints, fitted.joints, fps)
     if half.name == "upper":
-        gain += appearance_gain(half, limbs_chosen.unlikeness, fps)
-    evidence = IdentityEvidence(gain, player.ground if half.name == "lower" else None, start.arms)
+        log_odds += appearance_log_odds(half, limbs_chosen.unlikeness, fps)
+    evidence = IdentityEvidence(
+        log_odds, player.ground if half.name == "lower" else None, start.arms
+    )
     identity = identify_in_shots(half, limbs_chosen.joints, evidence, poses.frames, shots, fps)
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)

@@ -20,7 +20,7 @@ from drawn_legs import (
 from keyrecon.propagation.appearance import describe_player, learn_appearance, regular_frames
 from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.bone_color import learn_bone_colors
-from keyrecon.propagation.limb_identity import appearance_gain
+from keyrecon.propagation.limb_identity import appearance_log_odds
 from keyrecon.propagation.limb_search import search_by_looks
 
 
@@ -62,8 +62,8 @@ def test_colour_tells_sides_that_outlines_do_not(appearance):
     apart = np.abs(JOINTS[:, ONE[0]] - JOINTS[:, OTHER[0]]) > 0.15
     right = appearance.unlikeness(JOINTS[:, None])[:, 0]
     wrong = appearance.unlikeness(JOINTS[:, None, LEGS.mirror])[:, 0]
-    assert (appearance_gain(LEGS, right, 25.0)[apart] > 1).all()
-    assert (appearance_gain(LEGS, wrong, 25.0)[apart] < -1).all()
+    assert (appearance_log_odds(LEGS, right, 25.0)[apart] > 1).all()
+    assert (appearance_log_odds(LEGS, wrong, 25.0)[apart] < -1).all()
 
 
 def test_the_size_of_the_player_does_not_matter(appearance):

@@ -9,7 +9,7 @@ from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import (
     IdentityEvidence,
     identify_limbs,
-    template_gain,
+    template_log_odds,
 )
 
 LEGS = split_body(LSP14)[0]
@@ -39,9 +39,9 @@ def exchange(joints, frames):
     return result
 
 
-def identify(joints, marked, gain=None):
-    told = IdentityEvidence(np.zeros(len(joints)) if gain is None else gain)
-    return identify_limbs(LEGS, joints, told, np.array(marked), FPS)
+def identify(joints, marked, log_odds=None):
+    evidence = IdentityEvidence(np.zeros(len(joints)) if log_odds is None else log_odds)
+    return identify_limbs(LEGS, joints, evidence, np.array(marked), FPS)
 
 
 TIME = np.linspace(-1, 1, 41)
@@ -99,16 +99,18 @@ def test_similar_poses_tell_sides_after_limbs_were_in_one_place():
     together[:10] = CROSSING[0]
     together[30:] = CROSSING[0]
     wrong = exchange(together, list(range(30, 41)))
-    told = template_gain(LEGS, wrong, np.repeat(CROSSING[:1, None], len(together), axis=0), FPS)
-    found = identify(wrong, [0], told)
+    log_odds = template_log_odds(
+        LEGS, wrong, np.repeat(CROSSING[:1, None], len(together), axis=0), FPS
+    )
+    found = identify(wrong, [0], log_odds)
     assert found.exchanged[31:].all()
     assert not found.exchanged[:10].any()
 
 
 def test_a_likeness_that_misleads_for_a_while_does_not_outweigh_two_jumps():
     wrong = list(range(30, 36))
-    told = np.where(np.isin(np.arange(41), wrong), 6.0, -0.0)
-    found = identify(exchange(CROSSING, wrong), [0, 40], told)
+    log_odds = np.where(np.isin(np.arange(41), wrong), 6.0, -0.0)
+    found = identify(exchange(CROSSING, wrong), [0, 40], log_odds)
     assert np.flatnonzero(found.exchanged).tolist() == wrong
 
 

@@ -8,9 +8,9 @@ from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.limb_identity import IdentityEvidence, identify_limbs
 from keyrecon.propagation.limb_motion import (
     PLACE_SPREAD,
-    exchange_price,
+    exchange_cost,
     filter_motion,
-    foot_exchange_price,
+    foot_exchange_cost,
 )
 
 LEGS = split_body(LSP14)[0]
@@ -56,10 +56,10 @@ def test_limbs_far_apart_are_dearer_to_exchange_than_limbs_that_meet():
     swing = np.array([0.1, 0.6, 1.0])
     one = np.array([0.0, 0.2j, 0.45j]) + np.outer(0.25 * time, swing)
     other = np.array([0.0, 0.2j, 0.45j]) - np.outer(0.25 * time, swing)
-    price = exchange_price(np.stack([one, other], axis=1), np.array([0.016, 0.032, 0.064]))
-    assert price[19] < 0.5 * price[4]
-    assert price[19] < 0.5 * price[34]
-    assert (price > 0).all()
+    cost = exchange_cost(np.stack([one, other], axis=1), np.array([0.016, 0.032, 0.064]))
+    assert cost[19] < 0.5 * cost[4]
+    assert cost[19] < 0.5 * cost[34]
+    assert (cost > 0).all()
 
 
 def feet_that_meet():
@@ -72,8 +72,8 @@ def feet_that_meet():
 
 def test_one_frame_has_nothing_to_exchange_between():
     limbs = np.zeros((1, 2, 3), complex)
-    assert exchange_price(limbs, np.array([0.016, 0.032, 0.064])).shape == (0,)
-    assert foot_exchange_price(limbs[:, :, 2], ANKLE_SPREAD, FPS).shape == (0,)
+    assert exchange_cost(limbs, np.array([0.016, 0.032, 0.064])).shape == (0,)
+    assert foot_exchange_cost(limbs[:, :, 2], ANKLE_SPREAD, FPS).shape == (0,)
 
 
 def test_a_foot_that_stands_goes_on_standing_while_the_other_passes():
@@ -81,18 +81,18 @@ def test_a_foot_that_stands_goes_on_standing_while_the_other_passes():
     for gap in (9, 10):
         bounced = feet.copy()
         bounced[gap + 1 :] = feet[gap + 1 :, ::-1]
-        right = foot_exchange_price(feet, ANKLE_SPREAD, FPS)[gap]
+        right = foot_exchange_cost(feet, ANKLE_SPREAD, FPS)[gap]
         assert right > 2
-        assert foot_exchange_price(bounced, ANKLE_SPREAD, FPS)[gap] == pytest.approx(-right)
+        assert foot_exchange_cost(bounced, ANKLE_SPREAD, FPS)[gap] == pytest.approx(-right)
         # constant velocity hardly minds a foot that stops where the other leaves
-        assert exchange_price(feet[..., None], np.array([ANKLE_SPREAD]))[gap] < 0.75 * right
+        assert exchange_cost(feet[..., None], np.array([ANKLE_SPREAD]))[gap] < 0.75 * right
 
 
 def test_where_the_ground_lies_changes_nothing():
     feet = feet_that_meet()
-    price = foot_exchange_price(feet, ANKLE_SPREAD, FPS)
-    moved = foot_exchange_price(1j * feet + 3 - 2j, ANKLE_SPREAD, FPS)
-    np.testing.assert_allclose(moved, price, atol=1e-9)
+    cost = foot_exchange_cost(feet, ANKLE_SPREAD, FPS)
+    moved = foot_exchange_cost(1j * feet + 3 - 2j, ANKLE_SPREAD, FPS)
+    np.testing.assert_allclose(moved, cost, atol=1e-9)
 
 
 def as_found(joints, seed):

@@ -54,18 +54,18 @@ def test_right_marks_are_confirmed():
 
 
 def test_where_limbs_meet_on_both_sides_of_a_mark_little_is_said_of_it():
-    price = APART.copy()
-    price[[12, 20]] = 0.5
-    assert exchange_evidence(crossed_on(17), price, MARKED)[17] == pytest.approx(1.0)
-    assert exchange_evidence(crossed_on(), price, MARKED)[17] == pytest.approx(-1.0)
+    cost = APART.copy()
+    cost[[12, 20]] = 0.5
+    assert exchange_evidence(crossed_on(17), cost, MARKED)[17] == pytest.approx(1.0)
+    assert exchange_evidence(crossed_on(), cost, MARKED)[17] == pytest.approx(-1.0)
 
 
 def test_a_mark_in_little_doubt_leaves_those_beside_it_in_theirs():
     for nats in (0.9, 1.1):
-        price = np.full(40, np.log(RIGHT_FOR_EACH_EXCHANGED) * nats / 2)
-        found = exchange_evidence(crossed_on(17), price, MARKED)
+        cost = np.full(40, np.log(RIGHT_FOR_EACH_EXCHANGED) * nats / 2)
+        found = exchange_evidence(crossed_on(17), cost, MARKED)
         beside = found[[10, 29]]
-        np.testing.assert_allclose(beside, 0 if nats < 1 else -2 * price[0], atol=1e-12)
+        np.testing.assert_allclose(beside, 0 if nats < 1 else -2 * cost[0], atol=1e-12)
 
 
 def test_few_marks_tell_nothing():
