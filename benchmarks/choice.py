@@ -70,7 +70,12 @@ RENDERED_WEIGHT = 0.35
 frames as nine real clips twice over."""
 RIDGE = 3.0
 """Pull of the weights to 0, in frames, per weight squared in units of SPREAD."""
-SPREAD = {"residual": 3.0, "end residual": 3.0, "unexplained": 20.0, "uncovered": 20.0}
+SPREAD = {
+    "residual": 3.0,
+    "end residual": 3.0,
+    "unexplained edges": 20.0,
+    "unexplained silhouette": 20.0,
+}
 """Usual weights; others have that of a likeness, 2 units."""
 USED = {
     "upper": (
@@ -82,8 +87,8 @@ USED = {
         "other side",
         "off flow",
         "off lines",
-        "unexplained",
-        "uncovered",
+        "unexplained edges",
+        "unexplained silhouette",
         "together",
         "of two poses",
     ),
@@ -97,15 +102,15 @@ USED = {
         "disagreement",
         "off flow",
         "off lines",
-        "unexplained",
-        "uncovered",
+        "unexplained edges",
+        "unexplained silhouette",
         "together",
         "of two poses",
     ),
 }
 """Evidence that is weighed. With disagreement among the arms' fewer were right in other clips (88.0
 % against 88.7)."""
-PAIRED = "unexplained", "uncovered", "together", "of two poses"
+PAIRED = "unexplained edges", "unexplained silhouette", "together", "of two poses"
 
 
 @dataclass(frozen=True, eq=False)

@@ -192,7 +192,7 @@ def _bounds(
 def choose_greedily(
     hoods: Neighborhoods,
     reach: int,
-    uncovered: int,
+    max_uncovered: int,
     max_keyframes: int,
     tie: Float[np.ndarray, "M"],
     elapsed: Int[np.ndarray, "ends"] | None = None,
@@ -200,14 +200,15 @@ def choose_greedily(
 ) -> list[int]:
     """Candidates that each bridge or represent the most further frames, at most `max_keyframes`.
 
-    Stops when at most `uncovered` frames (with `elapsed`: hundredths of measured time) are left.
+    Stops when at most `max_uncovered` frames (with `elapsed`: hundredths of a frame of measured
+    time) are uncovered.
     Among equals the one that represents most wins, then the one with the largest `tie` (0-1).
     """
     cost = uncovered_cost(hoods.n_frames, reach, elapsed, shot)
     everyone = np.arange(len(tie))
     chosen: list[int] = []
     represented = np.zeros(hoods.n_frames, dtype=bool)
-    while total_cost(represented, cost) > uncovered and len(chosen) < max_keyframes:
+    while total_cost(represented, cost) > max_uncovered and len(chosen) < max_keyframes:
         hoods = hoods.without(represented)
         gain, added = measure_gains(hoods, everyone, represented, cost)
         if not added.any():

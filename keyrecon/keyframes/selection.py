@@ -144,7 +144,7 @@ class HalfDistances:
     """Where the search for beta starts: frames as alike as neighbours in time."""
     exemplar_distance: Float[np.ndarray, "T"]
     reach: int
-    uncovered: int
+    max_uncovered_frames: int
     elapsed: Int[np.ndarray, "ends"]
     """Measured time before each frame and at the end, hundredths of a frame."""
     options: KeyframeOptions
@@ -168,7 +168,9 @@ class HalfDistances:
         visibility_score = self.pose_distances.visibility_score[self.pose_distances.frames]
         elapsed = None if self.options.method == "paper" else self.elapsed
         shot = shot_numbers(self.pose_distances)
-        return CoverageGoal(hoods, self.reach, self.uncovered, visibility_score, elapsed, shot)
+        return CoverageGoal(
+            hoods, self.reach, self.max_uncovered_frames, visibility_score, elapsed, shot
+        )
 
 
 def count_labels(options: KeyframeOptions, n_frames: int, fps: float) -> int:
@@ -248,7 +250,7 @@ def half_distances(
         first_beta=max(same_pose, MIN_BETA),
         exemplar_distance=comparison.exemplar_distance[index],
         reach=reach,
-        uncovered=int((1 - options.coverage) * len(comparison.row) + 1e-9),
+        max_uncovered_frames=int((1 - options.coverage) * len(comparison.row) + 1e-9),
         elapsed=elapsed_time(comparison, index, reach, options.pose_time),
         options=options,
     )
@@ -283,9 +285,9 @@ def _sufficient_count(half: HalfDistances, least: int, most: int) -> int:
     farther from it than that, no keyframe covers them: then the coverage is a share of the others.
     """
     goal = half.sufficient_goal
-    unreachable = goal.time_left(goal.hoods.union(list(range(len(half.matched)))))
-    if unreachable > goal.allowed:
-        goal = goal.beyond(unreachable, half.options.coverage)
+    uncoverable = goal.uncovered_time(goal.hoods.union(list(range(len(half.matched)))))
+    if uncoverable > goal.max_uncovered_time:
+        goal = goal.excluding(uncoverable, half.options.coverage)
     chosen = _fewest(half, goal, most)
     return max(least, len(chosen)) if goal.reached(chosen) else most
 
@@ -302,12 +304,14 @@ def _fewest(half: HalfDistances, goal: CoverageGoal, most: int) -> list[int]:
 def _choose(half: HalfDistances, goal: CoverageGoal, max_keyframes: int) -> list[int]:
     """Keyframes by the selected method, at most `max_keyframes`; the goal may be left unreached."""
     if half.options.method == "paper":
-        return choose_as_printed(goal.hoods, goal.reach, goal.uncovered, max_keyframes, goal.shot)
+        return choose_as_printed(
+            goal.hoods, goal.reach, goal.max_uncovered_frames, max_keyframes, goal.shot
+        )
     # What the greedy choice takes too many can often be dropped again.
     chosen = choose_greedily(
         goal.hoods,
         goal.reach,
-        goal.allowed,
+        goal.max_uncovered_time,
         max_keyframes + max_keyframes // 5 + 1,
         goal.visibility_score,
         goal.elapsed,
@@ -347,7 +351,7 @@ def _lower_beta(
         start = choose_greedily(
             goal.hoods,
             goal.reach,
-            goal.allowed,
+            goal.max_uncovered_time,
             max_keyframes,
             goal.visibility_score,
             goal.elapsed,
@@ -396,7 +400,7 @@ def record_half(
         goal.hoods, comparison, exemplar_distance[keyframes] < beta, keyframes
     )
     most = len(comparison.frames)
-    printed = choose_as_printed(goal.hoods, goal.reach, goal.uncovered, most, goal.shot)
+    printed = choose_as_printed(goal.hoods, goal.reach, goal.max_uncovered_frames, most, goal.shot)
     enough, of_enough = beta, goal
     if half.options.method == "coverage":
         enough, of_enough = half.options.sufficient_beta, half.sufficient_goal
@@ -404,7 +408,7 @@ def record_half(
         frames=keyframes,
         nearest=nearest,
         represented=represented,
-        coverage=1 - goal.left_over(represented) / len(represented),
+        coverage=1 - goal.uncovered_frames(represented) / len(represented),
         beta=beta,
         distance=distance,
         printed_count=len(printed),

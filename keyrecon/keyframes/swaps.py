@@ -35,8 +35,8 @@ class CoverageGoal:
     hoods: Neighborhoods
     reach: int
     """T of the paper, frames."""
-    uncovered: int
-    """Frames that may be left uncovered: (1 - alpha) of all."""
+    max_uncovered_frames: int
+    """(1 - alpha) of all frames."""
     visibility_score: Float[np.ndarray, "M"]
     """0-1: how well each candidate could be annotated."""
     elapsed: Int[np.ndarray, "ends"] | None = None
@@ -46,55 +46,52 @@ class CoverageGoal:
     """The shot of each frame: no gap is bridged from one to the next; None where there is one."""
 
     @property
-    def allowed(self) -> int:
-        """What may be left uncovered, of the measure that keyframes are chosen by."""
-        return self.uncovered * (1 if self.elapsed is None else TIME_UNIT)
+    def max_uncovered_time(self) -> int:
+        """The same in the units of `uncovered_time`."""
+        return self.max_uncovered_frames * (1 if self.elapsed is None else TIME_UNIT)
 
-    def left_over(self, represented: Bool[np.ndarray, "T"]) -> int:
-        """Frames not covered."""
+    def uncovered_frames(self, represented: Bool[np.ndarray, "T"]) -> int:
+        """How many frames are not covered (Eq. 1)."""
         return total_cost(represented, self.frame_cost())
 
-    def time_left(self, represented: Bool[np.ndarray, "T"]) -> int:
-        """What is not covered, in the measure that keyframes are chosen by."""
-        return total_cost(represented, self._cost())
+    def uncovered_time(self, represented: Bool[np.ndarray, "T"]) -> int:
+        """Measured time that is not covered, hundredths of a frame; frames without `elapsed`."""
+        return total_cost(represented, self._time_cost())
 
     def reached(self, chosen: list[int]) -> bool:
         """Whether Eq. 1 holds, for frames and for measured time."""
         represented = self.hoods.union(chosen)
-        enough = self.time_left(represented) <= self.allowed
-        return enough and self.left_over(represented) <= self.uncovered
+        enough = self.uncovered_time(represented) <= self.max_uncovered_time
+        return enough and self.uncovered_frames(represented) <= self.max_uncovered_frames
 
-    def beyond(self, unreachable: int, coverage: float) -> "CoverageGoal":
-        """The same share of what can be covered at all; `unreachable` cannot be, in measured time.
+    def excluding(self, uncoverable: int, coverage: float) -> "CoverageGoal":
+        """The goal with `coverage` of the frames that can be covered at all.
 
-        Frames are counted by their share of that time.
+        `uncoverable` is the `uncovered_time` with every candidate chosen.
         """
         unit = 1 if self.elapsed is None else TIME_UNIT
-        frames = unreachable / unit
+        frames = uncoverable / unit
         return replace(
-            self, uncovered=int(frames + (1 - coverage) * (self.hoods.n_frames - frames))
+            self, max_uncovered_frames=int(frames + (1 - coverage) * (self.hoods.n_frames - frames))
         )
 
     def frame_cost(self) -> GapCost:
         """What gaps cost where every frame counts alike."""
         return uncovered_cost(self.hoods.n_frames, self.reach, shot=self.shot)
 
-    def _cost(self) -> GapCost:
+    def _time_cost(self) -> GapCost:
         return uncovered_cost(self.hoods.n_frames, self.reach, self.elapsed, self.shot)
 
     def replacements(self, others: list[int]) -> tuple[Int[np.ndarray, "M"], Int[np.ndarray, "M"]]:
-        """What is left uncovered with each candidate beside `others`, and how many frames it adds.
-
-        In the measure that keyframes are chosen by.
-        """
-        return self._replacements(others, self._cost())
+        """`uncovered_time` with each candidate beside `others`, and how many frames it adds."""
+        return self._replacements(others, self._time_cost())
 
     def sufficient(self, others: list[int]) -> Bool[np.ndarray, "M"]:
         """Candidates beside `others` with which the goal is reached."""
-        left, _ = self.replacements(others)
-        enough = left <= self.allowed
+        uncovered, _ = self.replacements(others)
+        enough = uncovered <= self.max_uncovered_time
         if self.elapsed is not None:
-            enough &= self._replacements(others, self.frame_cost())[0] <= self.uncovered
+            enough &= self._replacements(others, self.frame_cost())[0] <= self.max_uncovered_frames
         return enough
 
     def _replacements(
@@ -122,17 +119,17 @@ def drop_redundant(goal: CoverageGoal, chosen: list[int]) -> list[int]:
 def swap_for_coverage(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     """As many keyframes that leave fewer frames uncovered; stops when the goal is reached."""
     chosen = list(chosen)
-    left = goal.time_left(goal.hoods.union(chosen))
+    uncovered = goal.uncovered_time(goal.hoods.union(chosen))
     for _ in range(MAX_ROUNDS):
-        before = left
+        before = uncovered
         for place in range(len(chosen)):
-            if left <= goal.allowed:
+            if uncovered <= goal.max_uncovered_time:
                 return chosen
-            left_with, added = goal.replacements(chosen[:place] + chosen[place + 1 :])
-            best = largest_gain(-left_with, added, goal.visibility_score)
-            if left_with[best] < left:
-                chosen[place], left = best, int(left_with[best])
-        if left == before:
+            uncovered_with, added = goal.replacements(chosen[:place] + chosen[place + 1 :])
+            best = largest_gain(-uncovered_with, added, goal.visibility_score)
+            if uncovered_with[best] < uncovered:
+                chosen[place], uncovered = best, int(uncovered_with[best])
+        if uncovered == before:
             break
     return chosen
 
@@ -141,7 +138,7 @@ def shrink_by_swaps(goal: CoverageGoal, chosen: list[int]) -> list[int]:
     """Fewer keyframes by dropping one and swapping the others, as long as that succeeds."""
     while len(chosen) > 1:
         others = [chosen[:place] + chosen[place + 1 :] for place in range(len(chosen))]
-        least = min(others, key=lambda kept: goal.time_left(goal.hoods.union(kept)))
+        least = min(others, key=lambda kept: goal.uncovered_time(goal.hoods.union(kept)))
         fewer = swap_for_coverage(goal, least)
         if not goal.reached(fewer):
             break
@@ -183,10 +180,10 @@ def swap_medoids(
             others = chosen[:place] + chosen[place + 1 :]
             sufficient = goal.sufficient(others)
             sufficient[others] = False
-            allowed = np.flatnonzero(sufficient)
+            eligible = np.flatnonzero(sufficient)
             nearest = distance[others].min(axis=0, initial=np.inf)
             total = np.full(len(weight), np.inf, distance.dtype)
-            total[allowed] = np.minimum(distance[allowed], nearest) @ weight
+            total[eligible] = np.minimum(distance[eligible], nearest) @ weight
             best = int(total.argmin())
             if total[best] < total[present] * (1 - 1e-6):
                 chosen[place], changed = best, True

@@ -30,7 +30,7 @@ LAZY_BATCH = 64
 def choose_as_printed(
     hoods: Neighborhoods,
     reach: int,
-    uncovered: int,
+    max_uncovered: int,
     max_keyframes: int,
     shot: Int[np.ndarray, "T"] | None = None,
 ) -> list[int]:
@@ -42,11 +42,13 @@ def choose_as_printed(
     represented or not, so it is last.
     """
     cost = printed_cost(hoods.n_frames, shot)
-    left_over = uncovered_cost(hoods.n_frames, reach, shot=shot)
+    cost_of_uncovered = uncovered_cost(hoods.n_frames, reach, shot=shot)
     bound = np.full(len(hoods.first) - 1, np.iinfo(np.int64).max)
     chosen: list[int] = []
     represented = np.zeros(hoods.n_frames, dtype=bool)
-    while total_cost(represented, left_over) > uncovered and len(chosen) < max_keyframes:
+    while (
+        total_cost(represented, cost_of_uncovered) > max_uncovered and len(chosen) < max_keyframes
+    ):
         hoods = hoods.without(represented)
         best = _lazily_best(hoods, bound, represented, cost)
         if bound[best] <= 0:

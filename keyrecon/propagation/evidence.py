@@ -4,8 +4,8 @@ Evidence of one limb: do edges lie on its outline (`residual`), do its joints an
 bones look like marked ones (`unlikeness`), have its bones the colours of marked ones
 (`bone_color`), is it where optical flow from the marks and straight lines between them lead, do
 other hypotheses agree? Evidence of two limbs: how many of the frame's edge elements do both and the
-trunk leave unexplained, how much of its silhouette (`uncovered`), do both lie in one place, do they
-come from one pose, are their ends farther apart than ever marked?
+trunk leave unexplained, how much of its silhouette (`unexplained_silhouette`), do both lie in one
+place, do they come from one pose, are their ends farther apart than ever marked?
 
 The weights are not set by hand: with probabilities proportional to exp(-cost), those of the right
 pairs of limbs were made as likely as they can be (a conditional logit, McFadden 1974) on frames
@@ -26,7 +26,7 @@ from keyrecon.propagation.silhouette import (
     Silhouettes,
     find_holding_hand,
     limb_places,
-    uncovered,
+    unexplained_silhouette,
 )
 
 COLOR_EVIDENCE = "color unlikeness"
@@ -41,8 +41,8 @@ WEIGHTS: dict[str, dict[str, float]] = {
         "other side": 0.78,
         "off flow": 0.71,
         "off lines": 0.64,
-        "unexplained": 13.6,
-        "uncovered": 20.7,
+        "unexplained edges": 13.6,
+        "unexplained silhouette": 20.7,
         "together": 0.36,
         "of two poses": 0.78,
         "span": 1.19,
@@ -57,8 +57,8 @@ WEIGHTS: dict[str, dict[str, float]] = {
         "disagreement": 0.40,
         "off flow": 0.67,
         "off lines": 0.31,
-        "unexplained": 13.9,
-        "uncovered": 19.8,
+        "unexplained edges": 13.9,
+        "unexplained silhouette": 19.8,
         "together": 0.39,
         "of two poses": 0.03,
     },
@@ -255,19 +255,25 @@ def pair_evidence(
     middle = unexplained[frames, trunk, 0]
     first = np.concatenate([unexplained[:, :, 1], unexplained[:, :, 2]], axis=1)
     second = np.concatenate([unexplained[:, :, 2], unexplained[:, :, 1]], axis=1)
-    left = (first * middle[:, None]) @ second.transpose(0, 2, 1)
-    yield "unexplained", left / count[:, None, None]
+    unexplained_edges = (first * middle[:, None]) @ second.transpose(0, 2, 1)
+    yield "unexplained edges", unexplained_edges / count[:, None, None]
     if silhouettes is not None:
         half, joints = templates.half, hypotheses.joints[frames, trunk]
         places = limb_places(silhouettes, half, joints)
         holding = find_holding_hand(silhouettes, templates.poses)
-        yield "uncovered", uncovered(places, half, joints, (one.joints, other.joints), holding)
-    together = np.zeros(left.shape)
+        yield (
+            "unexplained silhouette",
+            unexplained_silhouette(places, half, joints, (one.joints, other.joints), holding),
+        )
+    together = np.zeros(unexplained_edges.shape)
     for place in range(1, one.joints.shape[2]):
         apart = np.abs(one.joints[:, :, None, place] - other.joints[:, None, :, place])
         together += np.exp(-0.5 * (apart / OVERLAP_DISTANCE) ** 2)
     yield "together", together
-    yield "of two poses", np.broadcast_to(1 - np.eye(left.shape[1]), left.shape)
+    yield (
+        "of two poses",
+        np.broadcast_to(1 - np.eye(unexplained_edges.shape[1]), unexplained_edges.shape),
+    )
     span = np.abs(one.joints[:, :, None, -1] - other.joints[:, None, :, -1])
     yield "span", rareness(span, marked_spans(templates.poses))
 

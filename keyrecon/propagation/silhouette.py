@@ -1,17 +1,17 @@
 """What limbs explain of the player's silhouette, and limbs looked for where it has one.
 
-Two legs on one leg match edges and look like marked legs, and yet the leg that kicks out beside
-them is nobody's. A silhouette does not tell which limb is which, but all of it belongs to some:
-what neither limb of a pair and no trunk covers speaks against the pair (`uncovered`). And where no
-annotated frame has the pose, the silhouette itself proposes it: beside the leg that edges are sure
-of, the other leg is where it explains most of the rest and leaves the silhouette least
-(`search_by_silhouette`). Bones count as capsules, the simplest body there is.
+A hypothesis that puts both legs on one leg of the picture matches the edges, and leaves the other
+leg of the picture unexplained. A silhouette does not tell which limb is which, but all of it
+belongs to some limb: a pair of limbs is rated by the share of the silhouette that neither they nor
+the trunk cover (`unexplained_silhouette`). Where no annotated frame has the pose, the silhouette
+also proposes limbs: with one limb fixed, the other is placed where it explains most of what remains
+and lies least outside the silhouette (`search_by_silhouette`). Bones are capsules.
 
-A racket that is drawn with the player is nobody's arm, and yet, left unexplained, it speaks against
-the right arms and for those that lie along it. Whether a hand holds such a thing is told by marks:
-what marked limbs leave of the silhouette lies then for the most part in one piece at one of the
-wrists (`find_holding_hand`). There one more capsule, turned to where it covers most, explains as
-much as a limb.
+A held racket that is part of the silhouette belongs to no limb; unexplained, it would favour arms
+that lie along it. Whether a hand holds such a thing is learnt from marks: what the marked limbs
+leave unexplained then lies for the most part in one piece at one of the wrists
+(`find_holding_hand`). There one more capsule explains as much as a limb, in the direction in which
+it covers most.
 """
 
 from collections.abc import Iterator
@@ -80,23 +80,23 @@ class Silhouettes:
     """Places on the player in every frame, player coordinates, `INSIDE_SPACING` apart."""
 
     points: Complex[np.ndarray, "T P"]
-    there: Bool[np.ndarray, "T P"]
-    """False for what only fills up."""
+    valid: Bool[np.ndarray, "T P"]
+    """False for padding."""
 
     def take(self, frames: slice) -> "Silhouettes":
         """Those of some frames."""
-        return Silhouettes(self.points[frames], self.there[frames])
+        return Silhouettes(self.points[frames], self.valid[frames])
 
 
 def gather_silhouettes(edges: tuple[Edges, ...], body_frame: BodyFrame) -> Silhouettes:
     """Of all frames, side by side."""
     count = np.array([len(e.inside) for e in edges])
-    there = np.arange(max(1, count.max(initial=0))) < count[:, None]
-    points = np.zeros(there.shape, complex)
-    frame, _ = np.nonzero(there)
+    valid = np.arange(max(1, count.max(initial=0))) < count[:, None]
+    points = np.zeros(valid.shape, complex)
+    frame, _ = np.nonzero(valid)
     pixels = np.concatenate([e.inside for e in edges])
-    points[there] = (to_complex(pixels) - body_frame.origin[frame]) / body_frame.height[frame]
-    return Silhouettes(points, there)
+    points[valid] = (to_complex(pixels) - body_frame.origin[frame]) / body_frame.height[frame]
+    return Silhouettes(points, valid)
 
 
 def limb_places(
@@ -107,11 +107,11 @@ def limb_places(
     hips = trunk[:, half.fixed].mean(axis=1) if half.fixed.any() else roots
     below = silhouettes.points.imag > hips.imag[:, None]
     near = np.abs(silhouettes.points - roots[:, None]) < LIMB_REACH
-    own = silhouettes.there & near & (below == (half.name == "lower"))
+    own = silhouettes.valid & near & (below == (half.name == "lower"))
     width = max(1, int(own.sum(axis=1).max(initial=0)))
     order = np.argsort(~own, axis=1, kind="stable")[:, :width]
-    points, there = (np.take_along_axis(v, order, axis=1) for v in (silhouettes.points, own))
-    return Silhouettes(points, there)
+    points, valid = (np.take_along_axis(v, order, axis=1) for v in (silhouettes.points, own))
+    return Silhouettes(points, valid)
 
 
 def bone_gaps(
@@ -153,49 +153,50 @@ def trunk_gaps(
     return reduce(np.minimum, gaps)
 
 
-def uncovered(
+def unexplained_silhouette(
     places: Silhouettes,
     half: BodyHalf,
     trunk: Complex[np.ndarray, "T J"],
     limbs: tuple[Complex[np.ndarray, "T S j"], Complex[np.ndarray, "T S j"]],
     holding: int | None = None,
 ) -> Float[np.ndarray, "T S S"]:
-    """Share of the `limb_places` that the trunk and both limbs of a pair leave unexplained.
+    """Share of the `limb_places` that neither the trunk nor the limbs of a pair explain.
 
-    The end of the limb `holding` (0 or 1) has something in its hand that explains places too.
+    The hand of the limb `holding` (0 or 1) holds something that explains places too.
     """
-    left = np.empty((*limbs[0].shape[:2], limbs[1].shape[1]))
+    unexplained_share = np.empty((*limbs[0].shape[:2], limbs[1].shape[1]))
     for frames in _blocks(len(trunk)):
-        points, there = places.points[frames], places.there[frames]
-        count = np.maximum(there.sum(axis=1), 1)
-        free = trunk_gaps(points, half, trunk[frames]) * there
+        points, valid = places.points[frames], places.valid[frames]
+        count = np.maximum(valid.sum(axis=1), 1)
+        beside_trunk = trunk_gaps(points, half, trunk[frames]) * valid
         gaps = [
             limb_gaps(points[:, None], tuple(limb[frames].transpose(2, 0, 1)[..., None]))
             for limb in limbs
         ]
         if holding is not None:
-            rest = gaps[holding] * free[:, None]
-            held, _ = find_held(points, rest, limbs[holding][frames, :, -1])
+            unexplained = gaps[holding] * beside_trunk[:, None]
+            held, _ = find_held(points, unexplained, limbs[holding][frames, :, -1])
             gaps[holding] = np.minimum(gaps[holding], held)
-        unexplained = (gaps[0] * free[:, None]) @ gaps[1].transpose(0, 2, 1)
-        left[frames] = unexplained / count[:, None, None]
-    return left
+        unexplained = (gaps[0] * beside_trunk[:, None]) @ gaps[1].transpose(0, 2, 1)
+        unexplained_share[frames] = unexplained / count[:, None, None]
+    return unexplained_share
 
 
 def find_held(
     points: Complex[np.ndarray, "T P"],
-    rest: Float32[np.ndarray, "T S P"],
+    unexplained: Float32[np.ndarray, "T S P"],
     hands: Complex[np.ndarray, "T S"],
 ) -> tuple[Float32[np.ndarray, "T S P"], Float32[np.ndarray, "T S"]]:
-    """Of the thing at each hand that covers most of the `rest`, which limbs leave of the places:
-    distance of places from its surface, in `SOFTNESS`, 0-1, and how many of them it covers."""
-    gaps, most = np.ones(rest.shape, np.float32), np.full(hands.shape, -1, np.float32)
+    """The held thing at each hand, in the direction in which it covers most of the places that
+    limbs leave `unexplained` (0-1): distance of places from its surface, in `SOFTNESS`, 0-1, and
+    how many of them it covers."""
+    gaps, most = np.ones(unexplained.shape, np.float32), np.full(hands.shape, -1, np.float32)
     apart = (points[:, None] - hands[..., None]).astype(np.complex64)
     for turn in np.exp(2j * np.pi * np.arange(HELD_DIRECTIONS) / HELD_DIRECTIONS):
         along = apart * np.complex64(turn)
         gap = np.hypot(along.real - np.clip(along.real, HELD_FROM, HELD_TO), along.imag)
         gap = _soften(gap, HELD_RADIUS)
-        covers = ((1 - gap) * rest).sum(axis=2)
+        covers = ((1 - gap) * unexplained).sum(axis=2)
         gaps = np.where((covers > most)[..., None], gap, gaps)
         most = np.maximum(most, covers)
     return gaps, most
@@ -208,16 +209,16 @@ def find_holding_hand(silhouettes: Silhouettes, poses: AnnotatedPoses) -> int | 
     if half.name != "upper" or not whole.any():
         return None
     joints, frames = poses.joints[whole], poses.frames[whole]
-    marked = Silhouettes(silhouettes.points[frames], silhouettes.there[frames])
+    marked = Silhouettes(silhouettes.points[frames], silhouettes.valid[frames])
     places = limb_places(marked, half, joints)
-    rest = (trunk_gaps(places.points, half, joints) * places.there).astype(np.float32)
+    unexplained = (trunk_gaps(places.points, half, joints) * places.valid).astype(np.float32)
     for side in half.sides:
-        rest *= limb_gaps(places.points, tuple(joints[:, list(side)].T[..., None]))
-    count = np.maximum(places.there.sum(axis=1), 1)
+        unexplained *= limb_gaps(places.points, tuple(joints[:, list(side)].T[..., None]))
+    count = np.maximum(places.valid.sum(axis=1), 1)
     hands = joints[:, [side[-1] for side in half.sides]]
-    _, covered = find_held(places.points, np.stack([rest, rest], axis=1), hands)
+    _, covered = find_held(places.points, np.stack([unexplained, unexplained], axis=1), hands)
     share = (covered / count[:, None]).mean(axis=0)
-    all_of_it = float((rest.sum(axis=1) / count).mean())
+    all_of_it = float((unexplained.sum(axis=1) / count).mean())
     best = int(share.argmax())
     return best if share[best] > max(LEAST_HELD, LEAST_HELD_PART * all_of_it) else None
 
@@ -249,15 +250,15 @@ def search_by_silhouette(
     places = limb_places(silhouettes, half, best)
     for frames in _blocks(len(best)):
         whole, points = silhouettes.take(frames), places.points[frames]
-        free = trunk_gaps(points, half, best[frames]) * places.there[frames]
+        beside_trunk = trunk_gaps(points, half, best[frames]) * places.valid[frames]
         for number, (side, kept) in enumerate(zip(half.sides, half.sides[::-1], strict=True)):
             root = best[frames, side[0]][:, None]
             kept_limb = tuple(best[frames][:, kept].T[..., None])
-            rest = free * limb_gaps(points, kept_limb)
-            left = _splat(points - root, rest) @ library.explained
-            inside = _splat(whole.points - root, whole.there.astype(float))
+            unexplained = beside_trunk * limb_gaps(points, kept_limb)
+            explained = _splat(points - root, unexplained) @ library.explained
+            inside = _splat(whole.points - root, whole.valid.astype(float))
             beside = (1 - np.minimum(inside, 1)) @ library.core
-            chosen = (left - OUTSIDE_COST * beside).argmax(axis=1)
+            chosen = (explained - OUTSIDE_COST * beside).argmax(axis=1)
             outer = root + library.outer[chosen][:, None]
             moved = best[frames][:, side[2:]] + outer - best[frames, side[2]][:, None]
             joints[frames, number, side[1]] = root[:, 0] + library.middle[chosen]

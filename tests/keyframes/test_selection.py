@@ -121,7 +121,7 @@ def test_exchanging_keyframes_never_covers_less(comparison):
     start = [0, 100, 200, 300]
     better = swap_for_coverage(goal, start)
     assert len(better) == len(start)
-    assert goal.left_over(hoods.union(better)) < goal.left_over(hoods.union(start))
+    assert goal.uncovered_frames(hoods.union(better)) < goal.uncovered_frames(hoods.union(start))
 
 
 def test_exemplars_choose_as_their_frames_would():
@@ -276,7 +276,8 @@ def test_marks_come_with_what_they_bring_the_best_first(comparison):
     near = comparison.upper < 0.02
     alone = [
         1 - CoverageGoal(find_neighborhoods(comparison.upper, comparison, np.zeros(400), 0.02), 10,
-                         0, np.ones(400)).left_over(near[frame] | (np.arange(400) == frame)) / 400
+                         0, np.ones(400))
+        .uncovered_frames(near[frame] | (np.arange(400) == frame)) / 400
         for frame in half.frames
     ]  # fmt: skip
     assert gains.coverage[0] == pytest.approx(max(alone), abs=0.005)
@@ -300,7 +301,7 @@ def test_the_next_mark_is_the_best_of_all_tried_one_by_one(comparison):
     def covered(chosen):
         represented = goal.hoods.union(chosen)
         represented[comparison.frames[chosen]] = True
-        return 1 - goal.left_over(represented) / len(represented)
+        return 1 - goal.uncovered_frames(represented) / len(represented)
 
     tried = [covered([*rows, row]) for row in range(len(comparison.frames))]
     assert half.gains.next_gain == pytest.approx(max(tried) - covered(rows))

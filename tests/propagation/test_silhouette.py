@@ -18,7 +18,7 @@ from keyrecon.propagation.silhouette import (
     gather_silhouettes,
     limb_places,
     search_by_silhouette,
-    uncovered,
+    unexplained_silhouette,
 )
 from keyrecon.records import Shots
 
@@ -61,11 +61,11 @@ def test_both_limbs_on_one_leave_the_other_unexplained(half):
     silhouette, joints = seen({"lower": kicking, "upper": raising}[half.name](), half)
     places = limb_places(silhouette, half, joints)
     left, right = limbs(half, joints)
-    assert uncovered(places, half, joints, (left, right)) < 0.05
-    assert uncovered(places, half, joints, (right, right)) > 0.15
+    assert unexplained_silhouette(places, half, joints, (left, right)) < 0.05
+    assert unexplained_silhouette(places, half, joints, (right, right)) > 0.15
     # which of them is the left one it does not tell
-    assert uncovered(places, half, joints, (right, left)) == pytest.approx(
-        uncovered(places, half, joints, (left, right)), abs=0.02
+    assert unexplained_silhouette(places, half, joints, (right, left)) == pytest.approx(
+        unexplained_silhouette(places, half, joints, (left, right)), abs=0.02
     )
 
 
@@ -102,8 +102,8 @@ def test_without_a_silhouette_no_pair_is_better_than_another():
     nothing = Silhouettes(np.zeros((1, 1), complex), np.zeros((1, 1), bool))
     places = limb_places(nothing, LEGS, joints)
     left, right = limbs(LEGS, joints)
-    assert uncovered(places, LEGS, joints, (left, right)) == 0
-    assert uncovered(places, LEGS, joints, (right, right)) == 0
+    assert unexplained_silhouette(places, LEGS, joints, (left, right)) == 0
+    assert unexplained_silhouette(places, LEGS, joints, (right, right)) == 0
 
 
 def test_legs_without_knees_are_not_looked_for():
@@ -137,10 +137,10 @@ def test_a_racket_speaks_for_no_arm_where_marks_show_that_a_hand_holds_it():
     assert find_holding_hand(armed, marked(ARMS, joints)) == RIGHT
     places = limb_places(armed, ARMS, joints)
     left, right = limbs(ARMS, joints)
-    assert uncovered(places, ARMS, joints, (left, right), None) > 0.1
-    assert uncovered(places, ARMS, joints, (left, right), RIGHT) < 0.05
+    assert unexplained_silhouette(places, ARMS, joints, (left, right), None) > 0.1
+    assert unexplained_silhouette(places, ARMS, joints, (left, right), RIGHT) < 0.05
     along_it = right + np.array([0, -0.1j, -0.3j])
-    assert uncovered(places, ARMS, joints, (left, along_it), RIGHT) > 0.05
+    assert unexplained_silhouette(places, ARMS, joints, (left, along_it), RIGHT) > 0.05
 
 
 def test_a_hand_holds_nothing_where_marked_limbs_leave_nothing():
