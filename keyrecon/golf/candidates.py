@@ -44,7 +44,7 @@ def find_slowed_keys(
     A search may take part of a slow downswing for a pause, and then the fit has the wrong time: of
     two real films in slow motion, in twelve variants, three fits took 0.7 to 1.2 s down.
     """
-    frames = np.searchsorted(searched.numbers, fitted.numbers)
+    frames = np.searchsorted(searched.file_frames, fitted.file_frames)
     slowed = np.interp(keys, np.arange(len(frames)), frames)
     return None if find_slow_motion(slowed, searched.fps) == 1 else slowed
 
@@ -58,7 +58,7 @@ def choose_swing_frames(
     keys: Float[np.ndarray, "4"], film: Film, slow_motion: float
 ) -> Int[np.ndarray, "T"]:
     """The frames of a film in which a swing with these key postures is fitted."""
-    fps, last = film.fps * slow_motion, len(film.numbers) - 1
+    fps, last = film.fps * slow_motion, len(film.file_frames) - 1
     begin = max(0, int(keys[0] - MARGINS[0] * fps))
     end = min(last, int(np.ceil(keys[3] + MARGINS[1] * fps)))
     return np.arange(begin, end + 1, frame_step(fps))
@@ -67,7 +67,7 @@ def choose_swing_frames(
 def place_in_film(pose: ClickedPose, film: Film) -> ClickedPose:
     """A clicked pose in the picture and by the frame numbers of a film."""
     joints, camera = pose.joints, pose.camera
-    frame = round(float(film.place[joints.frame]))
+    frame = round(float(film.film_index[joints.frame]))
     return replace(
         pose,
         joints=replace(joints, frame=frame, places=joints.places + film.corner),

@@ -35,20 +35,20 @@ def place_marks(marks: SwingMarks, film: Film) -> SwingMarks:
     What lies outside of these frames stays away; of two marked frames that are one there, the
     later one counts. A mark between frames is one of the nearest for now (`carry_marks`).
     """
-    first, last = film.window
+    first, last = film.file_range
     inside = (marks.frames >= first) & (marks.frames <= last)
     frames = marks.frames[inside]
-    pictures = np.rint(film.place[frames]).astype(int)
+    pictures = np.rint(film.film_index[frames]).astype(int)
     _, latest = np.unique(pictures[::-1], return_index=True)
     rows = len(pictures) - 1 - latest
     warps = film.warps[frames[rows]][:, None]
-    keys = np.clip(np.nan_to_num(marks.keys), 0, len(film.place) - 1)
-    places = np.interp(keys, np.arange(len(film.place)), film.place)
+    keys = np.clip(np.nan_to_num(marks.keys), 0, len(film.film_index) - 1)
+    places = np.interp(keys, np.arange(len(film.film_index)), film.film_index)
     return SwingMarks(
         pictures[rows], warp_points(warps, marks.joints[inside][rows]),
         warp_points(warps, marks.shafts[inside][rows]),
         np.where(np.isfinite(marks.keys), places, np.nan),
-        film.place[frames[rows]] - pictures[rows],
+        film.film_index[frames[rows]] - pictures[rows],
     )  # fmt: skip
 
 

@@ -132,7 +132,7 @@ def observe_swing(
     if options.find_slow_motion:
         slow_motion = find_slow_motion(hypothesis.keys, film.fps)
     chosen = choose_swing_frames(hypothesis.keys, film, slow_motion)
-    reach = _reach_to(round(float(film.place[pose.frame])), chosen)
+    reach = _reach_to(round(float(film.film_index[pose.frame])), chosen)
     window, tracked = film.take(chosen, slow_motion), film.take(reach, slow_motion)
     placed = place_in_film(pose, window)
     seen = _Seen(window, scene, chosen, reach, place_marks(marks, window), placed)

@@ -142,9 +142,9 @@ def shown_keys(keys: Float[np.ndarray, "4"], film: Film) -> tuple[bool, bool, bo
     the finish has it there or where hands are slow on the way. A top or hit at an end is a doubt.
     """
     start, top, hit, finish = keys.tolist()
-    edge = EDGE * float(np.median(np.diff(film.numbers)))
-    ends = finish < film.window[1] - edge and finish - hit >= SHORTEST_FINISH * (hit - top)
-    return start > film.window[0] + edge, True, True, ends
+    edge = EDGE * float(np.median(np.diff(film.file_frames)))
+    ends = finish < film.file_range[1] - edge and finish - hit >= SHORTEST_FINISH * (hit - top)
+    return start > film.file_range[0] + edge, True, True, ends
 
 
 def _frame(fitted: FittedSwing, key: float) -> int:

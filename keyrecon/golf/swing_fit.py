@@ -236,9 +236,10 @@ def _describe_film(observed: ObservedSwing, frames: int) -> list[str]:
         )
     if film.shot != (0, frames - 1):
         notes.append(f"only frames {film.shot[0]} to {film.shot[1]} show the shot that was clicked")
-    if film.window != film.shot:
+    if film.file_range != film.shot:
+        first, last = film.file_range
         notes.append(
-            f"the swing was found in frames {film.window[0]} to {film.window[1]}; nothing is "
+            f"the swing was found in frames {first} to {last}; nothing is "
             "fitted to the others (their confidence is 0)"
         )
     return notes

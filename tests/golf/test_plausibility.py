@@ -178,7 +178,9 @@ def test_a_film_that_begins_late_or_ends_early_does_not_show_the_whole_swing(key
 
 def test_a_finish_that_is_held_in_pictures_that_repeat_is_shown():
     whole = film_of(60)
-    place = np.minimum(whole.place, 50.0)
-    held = replace(whole, numbers=whole.numbers[:51], time=whole.time[:51], place=place)
+    index = np.minimum(whole.film_index, 50.0)
+    held = replace(
+        whole, file_frames=whole.file_frames[:51], time=whole.time[:51], film_index=index
+    )
     in_file = held.keys_in_file(np.array([10.0, 30.0, 38.0, 50.0]))
     assert shown_keys(in_file, held) == (True, True, True, True)

@@ -32,7 +32,7 @@ from keyrecon.numerics.geometry import unit_vectors, warp_points
 
 def observations_in_file(observations: Observations, film: Film) -> Observations:
     """What was observed, in the frames and pictures of the file; masks and matches stay away."""
-    back, nearest = np.linalg.inv(film.warps), np.rint(film.place).astype(int)
+    back, nearest = np.linalg.inv(film.warps), np.rint(film.film_index).astype(int)
     shown = np.where(film.shows, 1.0, np.nan)[:, None, None]
     initial, camera = observations.initial, observations.camera
     clicked = film.frame_in_file(initial.frame)
@@ -51,7 +51,7 @@ def observations_in_file(observations: Observations, film: Film) -> Observations
         silhouette_distance=np.zeros((0, 2, 2)),
         matches=Matches(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros((0, 2))),
         keys=film.keys_in_file(observations.keys),
-        phase=np.interp(film.place, np.arange(len(observations.phase)), observations.phase),
+        phase=np.interp(film.film_index, np.arange(len(observations.phase)), observations.phase),
     )
 
 
@@ -69,7 +69,7 @@ def swing_in_file(
     model: MotionModel,
 ) -> FittedSwing:
     """A fitted swing in every frame of the file; `time` is that of each, seconds of the world."""
-    fit = SwingFit(model, fitted.body, _state_at(fitted.state, film.place))
+    fit = SwingFit(model, fitted.body, _state_at(fitted.state, film.film_index))
     real = observations_in_file(observations, film)
     # Described before the camera of the film first, whose principal point the fit has.
     described = describe_fit(fit, replace(real, camera=observations.camera), time)

@@ -6,7 +6,8 @@ frame would be another motion. High frame rates and slow motion show more than a
 shows another scene: only the shot with the clicks is fitted. And a camera held by hand moves: its
 frames are warped into the clicked one, where the scene then stands still.
 
-`Film.place` tells for every frame of the video where it lies among the fitted ones.
+Frames of the film are numbered from 0; `Film.file_frames` and `Film.film_index` convert between
+them and the frames of the video file.
 """
 
 from dataclasses import dataclass, replace
@@ -41,14 +42,14 @@ STILL = 0.002
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """The frames that are fitted."""
+    """The T of a file's F frames that are fitted."""
 
-    numbers: Int[np.ndarray, "T"]
-    """Frames of the file."""
+    file_frames: Int[np.ndarray, "T"]
+    """Their frames of the file."""
     time: Float[np.ndarray, "T"]
     """When they were taken, seconds of the world."""
-    place: Float[np.ndarray, "F"]
-    """Where each frame of the file lies among these, between two where it is not one of them."""
+    film_index: Float[np.ndarray, "F"]
+    """Position of each frame of the file among these; a fraction where it is not one of them."""
     warps: Float[np.ndarray, "F 3 3"]
     """Homographies from every frame of the file to the common picture."""
     size: tuple[int, int]
@@ -61,14 +62,14 @@ class Film:
     """First and last frame of the file in the shot that was clicked."""
     repeated: float
     """Share of the file's frames that repeat the one before."""
-    window: tuple[int, int]
+    file_range: tuple[int, int]
     """First and last frame of the file that these frames show."""
 
     @property
     def shows(self) -> Bool[np.ndarray, "F"]:
         """Which frames of the file these frames show; all others come before or after."""
-        frames = np.arange(len(self.place))
-        return (frames >= self.window[0]) & (frames <= self.window[1])
+        frames = np.arange(len(self.film_index))
+        return (frames >= self.file_range[0]) & (frames <= self.file_range[1])
 
     @property
     def fps(self) -> float:
@@ -79,42 +80,43 @@ class Film:
         """These frames of the file, as a camera that stands still sees them."""
         if self.is_whole(video) and np.array_equal(self.time, video.time):
             return video
-        warps = None if self.still else self.warps[self.numbers]
-        return steady_video(video, self.numbers, self.time, warps, self.size)
+        warps = None if self.still else self.warps[self.file_frames]
+        return steady_video(video, self.file_frames, self.time, warps, self.size)
 
     def is_whole(self, video: Video) -> bool:
         """Whether these are all frames of the file, as they are."""
-        return self.still and len(self.numbers) == len(video)
+        return self.still and len(self.file_frames) == len(video)
 
     def keys_in_file(self, keys: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         """Frames of the file for places among these frames; the middle of repeated ones."""
-        pictures = np.arange(len(self.numbers))
-        first = np.searchsorted(self.place, pictures, side="left")
-        last = np.searchsorted(self.place, pictures, side="right") - 1
+        pictures = np.arange(len(self.file_frames))
+        first = np.searchsorted(self.film_index, pictures, side="left")
+        last = np.searchsorted(self.film_index, pictures, side="right") - 1
         middles = (first + np.maximum(last, first)) / 2
         # The first and last frame stand for all before and after them, but are not among these.
-        begin, end = self.window
+        begin, end = self.file_range
         middles[0] = (begin + min(last[0], end)) / 2
         middles[-1] = (max(first[-1], begin) + end) / 2
         return np.interp(keys, pictures, middles)
 
     def frame_in_file(self, frame: int) -> int:
         """The frame of the file that is a frame of these."""
-        return int(self.numbers[frame])
+        return int(self.file_frames[frame])
 
     def take(self, chosen: Int[np.ndarray, "m"], slow_motion: float = 1.0) -> "Film":
         """Some of these frames, `slow_motion` times faster than was thought."""
-        if len(chosen) == len(self.numbers) and slow_motion == 1:
+        if len(chosen) == len(self.file_frames) and slow_motion == 1:
             return self
-        begin, end = self.window
+        begin, end = self.file_range
         if chosen[0] > 0:
-            begin = int(self.numbers[chosen[0]])
+            begin = int(self.file_frames[chosen[0]])
         step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
-        if chosen[-1] + step < len(self.numbers):
-            end = int(self.numbers[chosen[-1] + 1]) - 1
+        if chosen[-1] + step < len(self.file_frames):
+            end = int(self.file_frames[chosen[-1] + 1]) - 1
         return replace(
-            self, numbers=self.numbers[chosen], time=self.time[chosen] / slow_motion,
-            place=np.interp(self.place, chosen, np.arange(len(chosen))), window=(begin, end),
+            self, file_frames=self.file_frames[chosen], time=self.time[chosen] / slow_motion,
+            film_index=np.interp(self.film_index, chosen, np.arange(len(chosen))),
+            file_range=(begin, end),
         )  # fmt: skip
 
 
@@ -130,12 +132,12 @@ def choose_frames(video: Video, camera: CameraPath, clicked: int) -> Film:
     kept = np.unique(np.append(kept, first))
     picture = np.searchsorted(kept, inside, side="right") - 1  # the picture that each frame shows
     time = _times(video.time[inside], picture, float(repeats[inside].mean()))
-    place = np.interp(np.arange(len(video)), inside, picture)
+    film_index = np.interp(np.arange(len(video)), inside, picture)
     steady = _steady(video, camera, clicked, inside)
     shot, repeated = (int(first), int(last)), float(repeats.mean())
     film = Film(
-        kept, time, place, steady.warps, steady.size, steady.corner, steady.still, shot, repeated,
-        shot,
+        kept, time, film_index, steady.warps, steady.size, steady.corner, steady.still, shot,
+        repeated, shot,
     )  # fmt: skip
     return film.take(np.arange(0, len(kept), frame_step(film.fps)))
 

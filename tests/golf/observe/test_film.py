@@ -39,13 +39,13 @@ def film_of(folder, pictures, camera=None, clicked=0, fps=30.0):
 def test_a_video_without_repeats_from_one_place_is_fitted_as_it_is(tmp_path):
     video, film = film_of(tmp_path, [picture(t) for t in range(40)])
     assert film.is_whole(video) and film.open(video) is video
-    assert film.place.tolist() == list(range(40))
+    assert film.film_index.tolist() == list(range(40))
 
 
 def test_pictures_shown_four_times_are_fitted_once_and_lie_evenly_in_time(tmp_path):
     video, film = film_of(tmp_path, [picture(t // 4) for t in range(80)])
-    assert len(film.numbers) == 20
-    assert film.place[:9].tolist() == [0, 0, 0, 0, 1, 1, 1, 1, 2]
+    assert len(film.file_frames) == 20
+    assert film.film_index[:9].tolist() == [0, 0, 0, 0, 1, 1, 1, 1, 2]
     assert np.diff(film.time) == pytest.approx(4 / 30, abs=0.003)
     assert film.keys_in_file(np.array([2.0])) == pytest.approx([9.5])
     shown = list(film.open(video).frames())
@@ -63,7 +63,7 @@ def test_only_the_shot_that_was_clicked_is_fitted(tmp_path):
     other = [picture(t) // 4 for t in range(15)]
     _, film = film_of(tmp_path, [picture(t) for t in range(30)] + other)
     assert film.shot == (0, 29)
-    assert film.numbers[-1] == 29 and film.place[-1] == 29
+    assert film.file_frames[-1] == 29 and film.film_index[-1] == 29
 
 
 def test_frames_of_a_camera_that_moves_show_the_scene_in_one_place(tmp_path):
@@ -84,7 +84,7 @@ def test_frames_of_a_camera_that_moves_show_the_scene_in_one_place(tmp_path):
 def test_twice_as_many_frames_as_a_swing_needs_are_halved(tmp_path):
     _, film = film_of(tmp_path, [picture(t / 2) for t in range(100)], fps=240.0)
     assert film.fps == pytest.approx(80.0, rel=0.01)
-    assert film.place[3] == pytest.approx(1.0)
+    assert film.film_index[3] == pytest.approx(1.0)
 
 
 def test_a_part_of_a_film_knows_which_frames_of_the_file_it_shows(tmp_path):
@@ -94,4 +94,4 @@ def test_a_part_of_a_film_knows_which_frames_of_the_file_it_shows(tmp_path):
     assert part.window == (10, 29)
     assert np.flatnonzero(part.shows).tolist() == list(range(10, 30))
     assert part.keys_in_file(np.array([0.0, 3.0, 9.0])) == pytest.approx([10.5, 16.5, 28.5])
-    assert film.window == (0, 59) and film.shows.all()
+    assert film.file_range == (0, 59) and film.shows.all()
