@@ -93,7 +93,7 @@ class _FeatureTracker:
     options: CameraMotionOptions
     overlaid: Bool[np.ndarray, "h w"] | None = None
     overlay: StaticOverlay = field(default_factory=StaticOverlay)
-    light: ExposureMeter = field(default_factory=ExposureMeter)
+    exposure_meter: ExposureMeter = field(default_factory=ExposureMeter)
     keys: list[KeyPicture] = field(default_factory=list)
     current: int = 0
     lost: bool = False
@@ -235,10 +235,10 @@ def _estimate_motion(
     """
     width = _reduced_width(video, options)
     shape = (round(video.height * width / video.width), width)
-    tracker = _FeatureTracker(options, light=ExposureMeter(video.black))
+    tracker = _FeatureTracker(options, exposure_meter=ExposureMeter(video.black))
     held: list[Grey] | None = [] if len(video) * shape[0] * shape[1] <= MOST_HELD else None
     path, confidence = _register_all(_holding(watched, held), tracker, max(1, len(video) // 64))
-    exposure = tracker.light.exposure()
+    exposure = tracker.exposure_meter.exposure()
     if _is_static(path, shape, options):
         return _still(confidence, exposure)
     if detector is not None and detector.cuts:
@@ -247,7 +247,7 @@ def _estimate_motion(
     hidden = tracker.overlay.share(corners) > MAX_OVERLAY_SHARE
     overlaid = tracker.overlay.mask() if hidden else None
     for _ in range(MOST_REPEATS if hidden or exposure is not None else 0):
-        tracker = _FeatureTracker(options, overlaid, light=ExposureMeter(video.black))
+        tracker = _FeatureTracker(options, overlaid, exposure_meter=ExposureMeter(video.black))
         again: Iterable[Grey]
         if exposure is None:
             again = held or _read_reduced(video, options, progress)
@@ -256,8 +256,8 @@ def _estimate_motion(
         path, confidence = _register_all(again, tracker)
         if exposure is None:
             break
-        exposure = exposure * tracker.light.factors()
-        if tracker.light.exposure() is None:
+        exposure = exposure * tracker.exposure_meter.factors()
+        if tracker.exposure_meter.exposure() is None:
             break
     if _is_static(path, shape, options):
         return _still(confidence, exposure)
@@ -344,9 +344,9 @@ def _register_all(
 
 
 def _meter(tracker: _FeatureTracker, waiting: list[Grey], path: list[tuple[Matrix, float]]) -> None:
-    """Measure the light of the frames at the end of the path."""
+    """Measure the exposure of the frames at the end of the path."""
     for grey, (pose, _) in zip(waiting, path[len(path) - len(waiting) :], strict=True):
-        tracker.light.add(grey, pose)
+        tracker.exposure_meter.add(grey, pose)
 
 
 def _register(
