@@ -191,7 +191,7 @@ def describe_ground(
         )
         if (count := sum(mark.kind == kind for mark in told.marks))
     ]
-    evidence += [known.told_by] if known else []
+    evidence += [known.source] if known else []
     return [
         f"The camera is {height:.2f} m high (standard deviation {height * sd.log_height:.2f} m), "
         f"looks {'down' if tilt >= 0 else 'up'} by {abs(tilt):.1f} degrees "

@@ -1,8 +1,8 @@
 """The camera over level ground where there is no court: maximum likelihood over all evidence.
 
-Clicked marks, the player's height and stances, and what cameras are like (`USUAL_*`) where nothing
-else tells; `ground_posterior` holds them against each other. A mark that contradicts the rest is
-named, and the camera is carried to all frames by its motion.
+The evidence is clicked marks, the player's height and stances, and a prior on cameras (`USUAL_*`);
+`ground_posterior` combines it. A mark that contradicts the rest is named in the error that is
+raised. The camera of the reference frame is carried to the others by the camera's motion.
 """
 
 from collections.abc import Iterator, Sequence
@@ -63,12 +63,12 @@ class FieldOfView:
     """px"""
     spread: float
     """Of its logarithm."""
-    told_by: str
+    source: str
 
 
 @dataclass(frozen=True, eq=False)
 class GroundCalibration:
-    """The camera and how it came about."""
+    """The camera, with its parameters in the reference frame and what they were estimated from."""
 
     camera: WorldCamera
     state: GroundState
@@ -99,7 +99,7 @@ def calibrate_ground(
     Raises KeyreconError where the player never stands, nothing is in metres, or marks contradict
     one another.
     """
-    usable = _shot(motion, path)
+    usable = _frames_of_longest_shot(motion, path)
     if motion.units != "m" and not any(mark.metres for mark in marks):
         raise KeyreconError(
             "Nothing is in metres yet: give the player's height (keyrecon run --height), or mark "
@@ -107,37 +107,52 @@ def calibrate_ground(
         )
     principal = (np.array(size) - 1) / 2
     first = np.flatnonzero(usable)[:1]
-    zoom = _zoom(path, usable, int(first[0]), principal, max(size)) if len(first) else np.ones(0)
+    zoom = (
+        _relative_focal(path, usable, int(first[0]), principal, max(size))
+        if len(first)
+        else np.ones(0)
+    )
     reference = _first_stance(motion, usable, path, zoom)
     to_reference = _homographies(path, reference)
     stances = find_stances(motion, usable, to_reference, zoom / zoom[reference])
-    ends = _marked(marks, usable, to_reference)
+    ends = _marks_in_reference(marks, usable, to_reference)
     click = CLICK_NOISE * max(size) / 1280
     evidence = GroundEvidence(ends, stances, _prior(motion, max(size), known), principal, click)
     posterior, evidence = explore_cameras(evidence, max(size))
     if blame := _contradiction(evidence, posterior, marks, max(size)):
         raise ContradictoryMarks(blame)
-    return _result(posterior, evidence, path, usable, reference)
+    best, spread = posterior.best, _camera_spread(posterior, evidence)
+    state = GroundState(*best)
+    at_reference = replace(state.pinhole(principal), centre=_camera_centre(best, evidence))
+    camera = _camera_of_frames(at_reference, spread, path, reference, usable)
+    return GroundCalibration(
+        replace(camera, stature=_stature_of_scale(evidence)),
+        state,
+        GroundState(*spread.state),
+        reference,
+        stances,
+        _distances(state, evidence),
+    )
 
 
-def _shot(motion: Motion, path: CameraPath) -> Bool[np.ndarray, "T"]:
-    """Frames of the shot with the most of the motion: a path means nothing across cuts."""
+def _frames_of_longest_shot(motion: Motion, path: CameraPath) -> Bool[np.ndarray, "T"]:
+    """Frames with a motion in the shot that has most of them: the path ends at a cut."""
     number = np.searchsorted(path.cuts, np.arange(len(motion.time)), side="right")
     longest = np.bincount(number, weights=motion.known).argmax()
     return motion.known & (number == longest)
 
 
-def _zoom(
+def _relative_focal(
     path: CameraPath,
     usable: Bool[np.ndarray, "T"],
     start: int,
     principal: Float[np.ndarray, "2"],
     longer: int,
 ) -> Float[np.ndarray, "T"]:
-    """Focal length of every frame in those of one of them; it hardly hangs on what that one is."""
+    """Focal length of every frame relative to the frame `start`; insensitive to the latter's."""
     camera = Pinhole(USUAL_FOCAL * longer, principal, np.eye(3), np.zeros(3))
     zoom = np.ones(len(usable))
-    for frames, view in _views(camera, path, start, usable):
+    for frames, view in _camera_in_frames(camera, path, start, usable):
         zoom[frames] = view.focal / camera.focal
     return zoom
 
@@ -148,10 +163,10 @@ def _homographies(path: CameraPath, frame: int) -> Float[np.ndarray, "T 3 3"]:
     return to_frame / to_frame[:, 2:, 2:]
 
 
-def _views(
+def _camera_in_frames(
     camera: Pinhole, path: CameraPath, frame: int, usable: Bool[np.ndarray, "T"]
 ) -> Iterator[tuple[slice, Pinhole]]:
-    """The camera of one frame in the others, runs of frames in which it stands still at a time."""
+    """The camera of one frame carried to the others: runs of frames with the same camera."""
     moves = np.ones(len(usable), dtype=bool)
     moves[1:] = (path.to_reference[1:] != path.to_reference[:-1]).any(axis=(1, 2))
     moves[1:] |= usable[1:] != usable[:-1]
@@ -181,7 +196,7 @@ def _first_stance(
     return int(frames[0])
 
 
-def _marked(
+def _marks_in_reference(
     marks: Sequence[GroundMark],
     usable: Bool[np.ndarray, "T"],
     to_reference: Float[np.ndarray, "T 3 3"],
@@ -269,62 +284,77 @@ def describe_mark(mark: GroundMark) -> str:
     return f"the {mark.kind} at {x0:g},{y0:g} to {x1:g},{y1:g} in frame {mark.frame}"
 
 
-def _result(
-    posterior: GroundPosterior,
-    evidence: GroundEvidence,
+@dataclass(frozen=True, eq=False)
+class _CameraSpread:
+    """Standard deviations of the posterior."""
+
+    state: Float[np.ndarray, "6"]
+    centre: Float[np.ndarray, "3"]
+    """Metres."""
+    vertical: float
+    """Angle, radians."""
+
+
+def _camera_spread(posterior: GroundPosterior, evidence: GroundEvidence) -> _CameraSpread:
+    """Of the camera in the reference frame, from draws of the posterior."""
+    draws = posterior.draws()
+    centres = np.array([_camera_centre(x, evidence) for x in draws])
+    off = np.array([_vertical(x) for x in draws]) - _vertical(posterior.best)
+    return _CameraSpread(
+        draws.std(axis=0), centres.std(axis=0), float(np.sqrt((off**2).sum(axis=1).mean()))
+    )
+
+
+def _camera_of_frames(
+    camera: Pinhole,
+    spread: _CameraSpread,
     path: CameraPath,
-    usable: Bool[np.ndarray, "T"],
     reference: int,
-) -> GroundCalibration:
-    """The camera of all frames in the world of the player's first stance."""
-    best, draws = posterior.best, posterior.draws()
-    places = np.array([_place(x, evidence) for x in [best, *draws]])
-    sd = draws.std(axis=0)
-    tilts = np.array([_up(x) for x in [best, *draws]])
-    sd_tilt = float(np.sqrt(((tilts[1:] - tilts[0]) ** 2).sum(axis=1).mean()))
-    state = GroundState(*best)
-    pinhole = replace(state.pinhole(evidence.principal), centre=places[0])
+    usable: Bool[np.ndarray, "T"],
+) -> WorldCamera:
+    """The `camera` of the reference frame carried to the usable ones; NaN in the others."""
     count = len(usable)
     inner, rotation = np.full((2, count, 3, 3), np.nan)
     shift = np.full((count, 3), np.nan)
-    for t, view in _views(pinhole, path, reference, usable):
+    for t, view in _camera_in_frames(camera, path, reference, usable):
         inner[t] = [
             [view.focal, 0, view.principal[0]],
             [0, view.focal, view.principal[1]],
             [0, 0, 1],
         ]
         rotation[t], shift[t] = view.rotation, -view.rotation @ view.centre
-    spread = np.where(usable[:, None], places[1:].std(axis=0), np.nan)
-    camera = WorldCamera(
+    return WorldCamera(
         inner,
         rotation,
         shift,
         usable,
-        spread,
-        inner[:, 0, 0] * sd[0],
-        np.where(usable, sd_tilt, np.nan),
+        np.where(usable[:, None], spread.centre, np.nan),
+        inner[:, 0, 0] * spread.state[0],
+        np.where(usable, spread.vertical, np.nan),
         GROUND,
-        stature=None if np.isfinite(evidence.marks.metres).any() else evidence.stances.told_height,
     )
-    far = _distances(state, evidence)
-    return GroundCalibration(camera, state, GroundState(*sd), reference, evidence.stances, far)
 
 
-def _place(x: Float[np.ndarray, "6"], evidence: GroundEvidence) -> Float[np.ndarray, "3"]:
-    """The camera's place when the origin is under the foot on which the player first stands."""
+def _stature_of_scale(evidence: GroundEvidence) -> float | None:
+    """The player's height where it alone sets the scale; None where a mark has a length."""
+    return None if np.isfinite(evidence.marks.metres).any() else evidence.stances.given_height
+
+
+def _camera_centre(x: Float[np.ndarray, "6"], evidence: GroundEvidence) -> Float[np.ndarray, "3"]:
+    """With the origin under the foot on which the player first stands, metres."""
     state = GroundState(*x)
     foot = _standing_ankles(state, evidence)[0]
     return state.pinhole(evidence.principal).centre - foot * [1, 1, 0]
 
 
 def _standing_ankles(state: GroundState, evidence: GroundEvidence) -> Float[np.ndarray, "N 3"]:
-    """Where they are, the camera being over the origin."""
+    """Of all stances, with the camera above the origin, metres."""
     height = ANKLE_SHARE * np.exp(state.log_size) * evidence.stances.stature
     camera = state.pinhole(evidence.principal)
     return on_plane(camera, evidence.stances.foot, float(height))
 
 
-def _up(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
+def _vertical(x: Float[np.ndarray, "6"]) -> Float[np.ndarray, "3"]:
     """The vertical in camera axes."""
     return GroundState(*x).pinhole(np.zeros(2)).rotation[:, 2]
 

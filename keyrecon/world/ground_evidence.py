@@ -74,7 +74,7 @@ class Stances:
     """From there to the centre of mass, px."""
     stature: float
     """In units of the motion."""
-    told_height: float
+    given_height: float
     """The height that says what a metre is, where the motion is in metres."""
 
 

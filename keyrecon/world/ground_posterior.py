@@ -56,7 +56,7 @@ class GroundEvidence:
         """In standard deviations."""
         state = GroundState(*x)
         camera = state.pinhole(self.principal)
-        mean, spread = (state_numbers(part) for part in self.prior)
+        mean, spread = (state_vector(part) for part in self.prior)
         parts = [(x - mean) / spread, mark_residuals(camera, self.marks, self.click).ravel()]
         if len(self.stances.frame):
             once = 1 / np.sqrt(SIZE_MEMORY)
@@ -91,7 +91,7 @@ class GroundPosterior:
         return drawn
 
 
-def state_numbers(state: GroundState) -> Float[np.ndarray, "6"]:
+def state_vector(state: GroundState) -> Float[np.ndarray, "6"]:
     """In the order of the fields."""
     return np.array(list(vars(state).values()))
 
@@ -101,14 +101,14 @@ def explore_cameras(
 ) -> tuple[GroundPosterior, GroundEvidence]:
     """All focal lengths, coarsely, then the likely ones; with the noise that the fit tells."""
     grid = np.log(np.geomspace(*FOCAL_LENGTHS, COARSE) * longer)
-    posterior = _over(evidence, grid)
+    posterior = _laplace_posterior(evidence, grid)
     for _ in range(2):
         evidence = replace(evidence, noise=_size_noise(evidence, posterior.best))
         middle = float(posterior.weight @ posterior.mean[:, 0])
         spread = float(np.sqrt(posterior.weight @ (posterior.mean[:, 0] - middle) ** 2))
         step = max(spread, 0.3 * (grid[1] - grid[0]))
         low, high = max(grid[0], middle - 4 * step), min(grid[-1], middle + 4 * step)
-        posterior = _over(evidence, np.linspace(low, high, FINE), posterior.best)
+        posterior = _laplace_posterior(evidence, np.linspace(low, high, FINE), posterior.best)
     return posterior, evidence
 
 
@@ -121,13 +121,13 @@ def _size_noise(evidence: GroundEvidence, x: Float[np.ndarray, "6"]) -> float:
     return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), *SIZE_NOISE))
 
 
-def _over(
+def _laplace_posterior(
     evidence: GroundEvidence,
     log_focals: Float[np.ndarray, "n"],
     near: Float[np.ndarray, "6"] | None = None,
 ) -> GroundPosterior:
     """How likely each focal length is, and the rest given it, which is not far from `near`."""
-    usual = state_numbers(evidence.prior[0])[1:]
+    usual = state_vector(evidence.prior[0])[1:]
     start = usual if near is None else near[1:]
     cost, means, roots = [], [], []
     for log_focal in log_focals:
@@ -138,7 +138,7 @@ def _over(
         if near is None:  # lines of sight over the horizon pull nowhere: begin where they do
             others = (np.array([t, 0.0, h, *usual[3:]]) for t, h in STARTS)
             start = min((start, *others), key=lambda rest: float((residuals(rest) ** 2).sum()))
-        spread = state_numbers(evidence.prior[1])[1:]
+        spread = state_vector(evidence.prior[1])[1:]
         solved = least_squares(residuals, start, x_scale=spread, **ENOUGH)
         start = solved.x
         normal = solved.jac.T @ solved.jac

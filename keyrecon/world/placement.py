@@ -169,7 +169,7 @@ def _bone_lengths(motion: Motion) -> Float[np.ndarray, "B"]:
     return lengths
 
 
-def told_height(motion: Motion) -> float:
+def given_height(motion: Motion) -> float:
     """The player's height as it was told, by which a motion in metres is as large as it is; else 1.
 
     Legs and trunk stand that tall, however long marks have made the arms (`standing_length`).
@@ -188,7 +188,7 @@ def stature_change(motion: Motion, camera: WorldCamera) -> float:
     """
     if camera.stature is None or motion.units != "m":
         return 1.0
-    change = told_height(motion) / camera.stature
+    change = given_height(motion) / camera.stature
     return change if abs(change - 1) > SAME_STATURE else 1.0
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import Motion
 from keyrecon.world.ground_evidence import Stances
-from keyrecon.world.placement import HELD_SPEED, REACH, stature_in_units, told_height
+from keyrecon.world.placement import HELD_SPEED, REACH, given_height, stature_in_units
 from keyrecon.world.sight import unseen_joints
 from keyrecon.world.world_terms import joint_masses
 
@@ -67,7 +67,7 @@ def find_stances(
         between,
         np.einsum("j,tjk->tk", masses, pixels[frames]) - between,
         stature,
-        told_height(motion),
+        given_height(motion),
     )
 
 

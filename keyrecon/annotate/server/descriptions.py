@@ -173,8 +173,8 @@ def _describe_lens(workspace: Workspace, video: Video) -> Json | None:
         return None
     if lens is None:
         return None
-    told_by = lens.told_by if typed is None else "step 6 Ground"
-    return {"degrees": degrees_across(lens, video), "told_by": told_by}
+    source = lens.source if typed is None else "step 6 Ground"
+    return {"degrees": degrees_across(lens, video), "told_by": source}
 
 
 def describe_run(
