@@ -62,7 +62,7 @@ from keyrecon.timeline import (
     put_back,
     take_frames,
 )
-from keyrecon.tracking.anchors import contradicted_frames, least_sure_frames
+from keyrecon.tracking.anchors import frames_off_anchors, least_sure_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
 from keyrecon.tracking.detection import EVERY_FRAME, FindOptions
 from keyrecon.tracking.mark_flow import FlowOptions
@@ -207,7 +207,7 @@ def frames_off_marks(preparation: Preparation, marks: Annotations) -> Int[np.nda
 
     Where there are any, `prepare` with these marks follows the player anew.
     """
-    return contradicted_frames(preparation.track, anchors_from_bodies(marks))
+    return frames_off_anchors(preparation.track, anchors_from_bodies(marks))
 
 
 def frames_to_mark(

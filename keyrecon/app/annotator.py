@@ -161,7 +161,7 @@ def _follow_player(workspace: Workspace, _: dict[str, Any], progress: Progress) 
     shots = prepared.preparation.shots
     seen = float((prepared.preparation.track.confidence[shots.usable_frames] > 0).mean())
     share = f"Player found in {seen:.1%} of {len(shots.usable_frames)} frames."
-    return "\n".join([share, *describe_shots(shots), *prepared.contradictions()])
+    return "\n".join([share, *describe_shots(shots), *prepared.warnings()])
 
 
 def _prepare_with_bodies(workspace: Workspace, video: Video) -> None:
@@ -179,7 +179,7 @@ def _find_keyframes(workspace: Workspace, options: dict[str, Any], progress: Pro
         options.get("budget"), options.get("coverage"), None if reach is None else round(reach)
     )
     _prepare_with_bodies(workspace, workspace.video())
-    return _contradictions(keyframing.find_keyframes(workspace, Options(), chosen, progress))
+    return _warnings(keyframing.find_keyframes(workspace, Options(), chosen, progress))
 
 
 def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> str:
@@ -189,7 +189,7 @@ def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> s
         settings = with_height(settings, None)
     if options.get("field_of_view", settings.lift.field_of_view) is None:
         settings = with_field_of_view(settings, None)
-    return _contradictions(running.run(workspace, settings, progress, partial=True))
+    return _warnings(running.run(workspace, settings, progress, partial=True))
 
 
 def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:
@@ -202,7 +202,7 @@ def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> 
         raise KeyreconError(
             said.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
-    return "\n".join(part for part in (*_of_motion(text), _contradictions(text)) if part)
+    return "\n".join(part for part in (*_of_motion(text), _warnings(text)) if part)
 
 
 def _of_motion(output: str) -> list[str]:
@@ -225,7 +225,7 @@ def _fit_swing(workspace: Workspace, _: dict[str, Any], progress: Progress) -> s
     return "\n".join(line for line in summary.splitlines() if line.startswith("Note: "))
 
 
-def _contradictions(output: str) -> str:
+def _warnings(output: str) -> str:
     """Of what a command tells, the cuts, clicks and marks that do not fit the rest, and what speaks
     against the track or the camera: the page shows everything else in places of its own."""
     named = re.compile(

@@ -94,14 +94,14 @@ def find_keyframes(
     workspace.forget_shot_choices(choices)
     write_durably(workspace.keyframes_file, keyframes_to_json(preparation.keyframes))
     write_keyframe_pictures(workspace, preparation, progress)
-    return describe_keyframes(workspace, preparation, marks, prepared.contradictions())
+    return describe_keyframes(workspace, preparation, marks, prepared.warnings())
 
 
 def describe_keyframes(
     workspace: Workspace,
     preparation: Preparation,
     marks: Annotations | None = None,
-    contradictions: Sequence[str] = (),
+    warnings: Sequence[str] = (),
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     keyframes, frames = preparation.keyframes, len(preparation.video)
@@ -123,7 +123,7 @@ def describe_keyframes(
         [
             f"Player found in {seen:.1%} of {counted(len(used), 'frame')}.",
             *describe_shots(preparation.shots),
-            *contradictions,
+            *warnings,
             *_describe_absence(preparation),
             *(stretch.text for stretch in unsure),
             *halves,
@@ -227,7 +227,7 @@ def _describe_absence(preparation: Preparation) -> list[str]:
 
 
 def _told_to_be_unlinked(preparation: Preparation) -> Bool[np.ndarray, "T"]:
-    """Frames of which `contradictions` tell already that who is followed there may be anybody."""
+    """Frames of which `warnings` tell already that who is followed there may be anybody."""
     told = np.zeros(len(preparation.track.head), dtype=bool)
     if preparation.verification is not None:
         for first, last in unlinked_stretches(preparation.track, preparation.verification):

@@ -1,9 +1,9 @@
-"""The automatic part of a project, made with what a person told and doubting what does not fit.
+"""The automatic part of a project, made with a person's clicks and marks but without outliers.
 
 A click on the wrong place spoils colours and sizes for the whole video, and nothing that comes
-later shows which click it was. So each click on a head or foot is held against the track that was
-made with it; where some lie elsewhere, the track is made without them too, and kept where
-it is as sure of the player.
+later shows which click it was. So each click on a head or foot is compared with the track that was
+made with it. Where some lie elsewhere, the track is made without them too; that track is kept if
+its confidence is as high.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from keyrecon.records import (
     TrackVerification,
 )
 from keyrecon.segmentation.marked_bodies import anchors_from_bodies
-from keyrecon.tracking.anchors import distance_to_track, misplaced_marks
+from keyrecon.tracking.anchors import distance_to_track, outlier_marks
 from keyrecon.tracking.tracklets import MAX_STEP_SECONDS, find_jumps
 from keyrecon.tracking.verification import find_meetings
 
@@ -53,20 +53,20 @@ LIGHT_CHANGE = 1.25
 
 @dataclass(frozen=True, eq=False)
 class ProjectPreparation:
-    """The automatic part, and what a person told that does not fit it."""
+    """The automatic part, and the clicks and marks that do not agree with it."""
 
     preparation: Preparation
-    set_aside: tuple[Pick, ...] = ()
-    """Clicks without which the player was found more surely: they were left out."""
-    doubtful: tuple[Pick, ...] = ()
-    """Clicks that lie off the track, which is no surer without them."""
-    used_picks: tuple[Pick, ...] = ()
+    rejected_picks: tuple[Pick, ...] = ()
+    """Outliers that were left out: without them the track is as sure or surer."""
+    suspect_picks: tuple[Pick, ...] = ()
+    """Outliers that were kept: without them the track is less sure."""
+    prepared_picks: tuple[Pick, ...] = ()
     """Clicks that the automatic part was made with."""
     marks: Annotations | None = None
     picks: tuple[Pick, ...] = ()
 
-    def contradictions(self) -> list[str]:
-        """A line for every click or mark that does not fit the rest."""
+    def warnings(self) -> list[str]:
+        """Lines on the video, the track, and every click or mark that does not agree with it."""
         track = self.preparation.track
         made, lines = self.preparation, []
         lines += describe_light(made.camera, made.shots)
@@ -85,18 +85,18 @@ class ProjectPreparation:
             f"{_named(pick)} lies {distance_to_track(track, pick):.1f} body heights from where the "
             f"player's {pick.part} was found, and was left aside: without it the player is found "
             "as surely or more so. Click it anew."
-            for pick in self.set_aside
+            for pick in self.rejected_picks
         ]
         lines += [
             f"{_named(pick)} lies {distance_to_track(track, pick):.1f} body heights from where the "
             f"player's {pick.part} was found: one of the two is wrong; look at that frame."
-            for pick in self.doubtful
+            for pick in self.suspect_picks
         ]
         if self.marks is not None:
             lines += [
                 f"The {mark.part} marked in frame {mark.frame}: {mark.distance:.1f} body heights "
                 "off the way through the frames before and after; look at that mark."
-                for mark in misplaced_marks(
+                for mark in outlier_marks(
                     track,
                     anchors_from_bodies(self.marks),
                     self.preparation.video.fps,
@@ -107,7 +107,7 @@ class ProjectPreparation:
 
     def _known_frames(self) -> list[int]:
         """Frames in which a person told where the player is, and the track is there."""
-        off = {pick.frame for pick in self.doubtful}
+        off = {pick.frame for pick in self.suspect_picks}
         known = {pick.frame for pick in self.picks if pick.part == "head"} - off
         if self.marks is not None:
             marked = np.isfinite(self.marks.joints).all(axis=2).mean(axis=1) > 0.5
@@ -279,43 +279,45 @@ def prepare_project(
     options: Options,
     progress: Progress,
 ) -> ProjectPreparation:
-    """The automatic part; made with the marks where there are no picks, or where it was off.
+    """The automatic part, made with the picks, if any, and with marks where the track needs them.
 
-    What was made before is found again while no mark contradicts its track and none that taught it
-    was taken back. The printed forms know picks alone, where there are any.
+    The track is made with the marks where there are no picks, or where a track without them has
+    marked heads or feet elsewhere. The stored track is used again as long as no new mark disagrees
+    with it and none of those it was made with was deleted. The printed forms use picks alone, where
+    there are any.
     """
     if marks is not None and not np.isfinite(marks.joints).any():
         marks = None  # a file without a mark tells nothing
     if options.track.method == "paper" and workspace.picks_file.is_file():
-        prepared = _without_misplaced(workspace, video, options, None, progress)
-        write_picks(workspace.prepared_picks_file, prepared.used_picks)
+        prepared = _without_outlier_picks(workspace, video, options, None, progress)
+        write_picks(workspace.prepared_picks_file, prepared.prepared_picks)
         return prepared
     file = workspace.prepared_marks_file
-    used = _marks_used_before(workspace, video, marks)
-    if used is None and marks is not None and not workspace.picks_file.is_file():
-        used = marks
-    prepared = _without_misplaced(workspace, video, options, used, progress)
+    track_marks = _marks_of_last_preparation(workspace, video, marks)
+    if track_marks is None and marks is not None and not workspace.picks_file.is_file():
+        track_marks = marks
+    prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
     if marks is not None and len(frames_off_marks(prepared.preparation, marks)):
-        used = marks
-        prepared = _without_misplaced(workspace, video, options, used, progress)
-    if used is not None:
+        track_marks = marks
+        prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
+    if track_marks is not None:
         size = (video.width, video.height)
-        write_durably(file, coco_text(used, size).encode())
-    write_picks(workspace.prepared_picks_file, prepared.used_picks)
-    return _with_told(workspace, prepared, marks)
+        write_durably(file, coco_text(track_marks, size).encode())
+    write_picks(workspace.prepared_picks_file, prepared.prepared_picks)
+    return _with_marks_and_picks(workspace, prepared, marks)
 
 
-def _marks_used_before(
+def _marks_of_last_preparation(
     workspace: Workspace, video: Video, marks: Annotations | None
 ) -> Annotations | None:
-    """The marks that the last preparation was made with, or those there are now where a head or
-    feet that taught it are no longer marked; None without any."""
+    """The marks that the last preparation was made with; the present ones where a head or feet of
+    those was deleted; None without any."""
     file = workspace.prepared_marks_file
     if workspace.stages.force or not file.is_file():
         return None
-    used = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
+    last_marks = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
     still_marked = set() if marks is None else _marked_parts(marks)
-    return used if _marked_parts(used) <= still_marked else marks
+    return last_marks if _marked_parts(last_marks) <= still_marked else marks
 
 
 def _marked_parts(marks: Annotations) -> set[tuple[str, int]]:
@@ -329,46 +331,46 @@ def _marked_parts(marks: Annotations) -> set[tuple[str, int]]:
     }
 
 
-def _with_told(
+def _with_marks_and_picks(
     workspace: Workspace, prepared: ProjectPreparation, marks: Annotations | None
 ) -> ProjectPreparation:
-    """With the marks and with the clicks that were not left aside."""
+    """With the marks, and with the clicks that were not rejected."""
     picks = workspace.picks() if workspace.picks_file.is_file() else ()
-    kept = tuple(pick for pick in picks if pick not in prepared.set_aside)
+    kept = tuple(pick for pick in picks if pick not in prepared.rejected_picks)
     return replace(prepared, marks=marks, picks=kept)
 
 
-def _without_misplaced(
+def _without_outlier_picks(
     workspace: Workspace,
     video: Video,
     options: Options,
     marks: Annotations | None,
     progress: Progress,
 ) -> ProjectPreparation:
-    """With all picks, or without those that lie off the track where it is surer without them."""
+    """Made with all picks, or without the outliers where the track is at least as sure then."""
     keep = workspace.stages
     asked = marks is None or workspace.picks_file.is_file()
     picks = list(workspace.picks()) if asked else []
     first = prepare(video, picks, options, keep, progress, marks)
-    off = misplaced_picks(first, picks)
+    off = outlier_picks(first, picks)
     if options.track.method == "paper":
-        return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
+        return ProjectPreparation(first, suspect_picks=tuple(off), prepared_picks=tuple(picks))
     tried: list[list[Pick]] = [[]]
     track, others = first, picks
     while off not in tried:  # a track that one click misled may miss others, which come back
         tried.append(off)
         others = [pick for pick in picks if pick not in off]
         if marks is None and not {"head", "foot"} <= {pick.part for pick in others}:
-            return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
+            return ProjectPreparation(first, suspect_picks=tuple(off), prepared_picks=tuple(picks))
         track = prepare(video, others, options, keep, progress, marks)
-        off = misplaced_picks(track, picks)
+        off = outlier_picks(track, picks)
     if track.track.confidence.mean() < first.track.confidence.mean() - AS_SURE:
-        off = misplaced_picks(first, picks)
-        return ProjectPreparation(first, doubtful=tuple(off), used_picks=tuple(picks))
-    return ProjectPreparation(track, set_aside=tuple(off), used_picks=tuple(others))
+        off = outlier_picks(first, picks)
+        return ProjectPreparation(first, suspect_picks=tuple(off), prepared_picks=tuple(picks))
+    return ProjectPreparation(track, rejected_picks=tuple(off), prepared_picks=tuple(others))
 
 
-def misplaced_picks(preparation: Preparation, picks: Sequence[Pick]) -> list[Pick]:
+def outlier_picks(preparation: Preparation, picks: Sequence[Pick]) -> list[Pick]:
     """Clicks on heads and feet that lie far from those of the track."""
     track = preparation.track
     return [

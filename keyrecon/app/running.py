@@ -46,7 +46,7 @@ def settings(
 ) -> Options:
     """The project's options and what is told now: height in metres, angle of the camera in degrees.
 
-    Options `told` by dotted names count also where they are as usual.
+    Options `warnings` by dotted names count also where they are as usual.
     """
     if height is not None and not SHORTEST <= height <= TALLEST:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
@@ -87,7 +87,7 @@ def run(
         motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
     camera = camera_evidence(workspace)
     placed = write_placed_motion(workspace, motion)
-    doubts = automatic.contradictions()
+    doubts = automatic.warnings()
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
     near = _nearness(options, motion, video)
     advice = () if near is None else (lens_advice(workspace.folder, near),)
@@ -101,7 +101,7 @@ def run(
         seconds=workspace.stages.seconds,
         truth=truth,
         options=options,
-        contradictions=placed.doubts,
+        warnings=placed.doubts,
         court=placed.court,
         shots=shots,
         lens=None if near is None else lens_caveat(near),
@@ -131,8 +131,8 @@ def _write_report(
     seen = marks_to_see(preparation, annotations)
     pictures = cut_report_pictures(material, progress, seen.see)
     wrong = describe_doubtful_marks(preparation, annotations, material.motion, seen)
-    told = [*doubts, *wrong, *material.contradictions]
-    write_page(path, replace(material, contradictions=told), pictures)
+    warnings = [*doubts, *wrong, *material.warnings]
+    write_page(path, replace(material, warnings=warnings), pictures)
     return wrong
 
 

@@ -41,7 +41,7 @@ class ReportMaterial:
     """The options record of the run, to be listed."""
     court: tuple[WorldMotion, WorldCamera] | None = None
     """The motion on the court, where that is known, and the camera."""
-    contradictions: Sequence[str] = ()
+    warnings: Sequence[str] = ()
     """What of the video and of what a person told does not fit the rest, a line each."""
     shots: Sequence[str] = ()
     """Which shots the motion is of, and where nobody is seen in them, a line each; none where the

@@ -98,7 +98,7 @@ def _body(material: ReportMaterial, pictures: Pictures) -> str:
     return "".join(
         (
             opening(material),
-            sections.contradictions(material),
+            sections.warnings(material),
             _figure_player(pictures, material),
             _on_court(material),
             sections.instants(material, pictures),

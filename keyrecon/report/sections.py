@@ -51,11 +51,11 @@ def story(pictures: Pictures, time: Float[np.ndarray, "T"]) -> str:
     return section("video", "Through the video", note(key), f'<div class="strip">{stills}</div>')
 
 
-def contradictions(material: ReportMaterial) -> str:
+def warnings(material: ReportMaterial) -> str:
     """What cannot be overlooked; empty where everything fits together."""
-    if not material.contradictions:
+    if not material.warnings:
         return ""
-    lines = "".join(f"<li>{sentence(line)}</li>" for line in material.contradictions)
+    lines = "".join(f"<li>{sentence(line)}</li>" for line in material.warnings)
     return (
         '<section class="warning" role="alert"><h2>Not everything fits together</h2>'
         f"<ul>{lines}</ul></section>"

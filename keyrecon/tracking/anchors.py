@@ -1,8 +1,8 @@
 """Marks of a person as fixed points of the track.
 
-A marked head or pair of feet is the best evidence there is: in its frame it takes the place of all
-candidates, at a cost that no path passes by. The same marks are examples for the filters, and tell
-where a track that was made without them is wrong.
+In its frame a marked head or pair of feet replaces all candidates, at a cost so low that every best
+path passes through it. The same marks train the filters, and show where a track that was made
+without them is wrong.
 """
 
 from collections.abc import Sequence
@@ -97,8 +97,8 @@ def _bridges(
     after = np.searchsorted(known, frames)
     since = np.where(after > 0, frames - known[after - 1], np.inf)
     until = np.where(after < len(known), known[np.minimum(after, len(known) - 1)] - frames, np.inf)
-    told = np.square(1 / np.maximum(since, 1)) + np.square(1 / np.maximum(until, 1))
-    return place, step / np.sqrt(np.minimum(told, 1))
+    precision = np.square(1 / np.maximum(since, 1)) + np.square(1 / np.maximum(until, 1))
+    return place, step / np.sqrt(np.minimum(precision, 1))
 
 
 def marked_places(
@@ -115,7 +115,7 @@ def marked_places(
     return head, feet
 
 
-def contradicted_frames(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:
+def frames_off_anchors(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:
     """Frames in which the head or a foot of a track is not where a person marked it."""
     if not anchors.marked.all():
         raise ValueError("only a person's marks contradict a track")
@@ -163,8 +163,8 @@ def distance_to_track(track: Track, pick: Pick) -> float:
 
 
 @dataclass(frozen=True)
-class MisplacedMark:
-    """A mark that lies off the way of its part through the frames before and after."""
+class OutlierMark:
+    """A mark far off the path of its part through the frames before and after."""
 
     frame: int
     part: str
@@ -173,13 +173,13 @@ class MisplacedMark:
     """Player heights."""
 
 
-def misplaced_marks(
+def outlier_marks(
     track: Track, anchors: TrackAnchors, fps: float, shots: Shots | None = None
-) -> list[MisplacedMark]:
-    """Marked heads and feet to which the track would have to jump, and back again."""
+) -> list[OutlierMark]:
+    """Marked heads and feet far off the straight path through the frames before and after."""
     shot = (shots or Shots.between((), len(track.height))).number
     step = max(1, round(WAY_SECONDS * fps))
-    misplaced: list[MisplacedMark] = []
+    outliers: list[OutlierMark] = []
     for row in np.flatnonzero(anchors.marked):
         frame = int(anchors.frames[row])
         if not step <= frame < len(track.height) - step:
@@ -196,8 +196,8 @@ def misplaced_marks(
         for part, far, most in zip(("head", "feet"), (head, feet), MAX_WAY_DISTANCE, strict=True):
             distance = float(far / track.height[frame])
             if distance > most + turning:  # not where nothing is marked, which is NaN
-                misplaced.append(MisplacedMark(frame, part, distance))
-    return misplaced
+                outliers.append(OutlierMark(frame, part, distance))
+    return outliers
 
 
 def _turning_distance(track: Track, frame: int, step: int) -> float:

@@ -8,7 +8,7 @@ from page_project import write_numbered_video
 
 from keyrecon.annotate.assist import project_cache
 from keyrecon.app import preparing, project
-from keyrecon.app.annotator import _contradictions
+from keyrecon.app.annotator import _warnings
 from keyrecon.app.preparing import (
     describe_hiding,
     describe_identity,
@@ -82,18 +82,18 @@ def test_a_change_of_the_light_within_a_usable_shot_is_told():
     shots = Shots((0, 50, 150), 200, (PLAYER, PLAYER, "black"))
     (line,) = describe_light(path, shots)
     assert "frame 49 is 2.0 times as bright as frame 0" in line
-    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert _warnings(f"Took 3 s.\n{line}\nNext: x") == line
     assert describe_light(path, replace(shots, shows=("black", PLAYER, "black"))) == []
     assert describe_light(replace(path, exposure=None), shots) == []
     (line,) = describe_light(replace(path, exposure=0 * light + 0.4), shots)
     assert "as if 2.5 times as bright" in line
-    assert _contradictions(line) == line
+    assert _warnings(line) == line
 
 
 def test_what_is_laid_over_the_player_is_told_and_shown_on_the_page():
     (line,) = describe_hiding(verified(hidden=[4, *range(100, 133)]))
     assert "in about 20% of the frames (longest: 100-132)" in line
-    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert _warnings(f"Took 3 s.\n{line}\nNext: x") == line
     assert describe_hiding(verified(hidden=range(8))) == []
 
 
@@ -114,18 +114,18 @@ def test_nobody_meets_a_player_who_is_not_seen():
 def test_a_hop_of_the_track_is_told_with_its_frame():
     (line,) = identity(jump=120)
     assert "in frame 12" in line
-    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert _warnings(f"Took 3 s.\n{line}\nNext: x") == line
 
 
 def test_frames_beyond_a_hop_that_nothing_joins_to_the_player_are_told_once():
     (line,) = identity(jump=120, unlinked=range(120, 200))
     assert "frames 120-199" in line and "frame 159." in line
-    assert _contradictions(f"Took 3 s.\n{line}\nNext: x") == line
+    assert _warnings(f"Took 3 s.\n{line}\nNext: x") == line
 
 
 def test_what_speaks_against_the_track_is_shown_on_the_page():
     lines = [*describe_truncation(verified(truncated=range(100))), *identity(range(90, 111))]
-    assert _contradictions("\n".join(["Player found.", *lines])) == "\n".join(lines)
+    assert _warnings("\n".join(["Player found.", *lines])) == "\n".join(lines)
 
 
 def standing_bodies(places):
@@ -161,7 +161,7 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypa
         object.__setattr__(made, "track", track)
         return preparing.ProjectPreparation(made)
 
-    monkeypatch.setattr(preparing, "_without_misplaced", follow)
+    monkeypatch.setattr(preparing, "_without_outlier_picks", follow)
 
     def prepare_with(places):
         marks = standing_bodies(places)
@@ -174,7 +174,7 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypa
     assert used == [[2, 6, 9], [2, 9], [2, 9]]  # what is added in place changes nothing
 
 
-def test_the_page_recalls_the_track_that_was_made_without_the_misplaced_clicks(
+def test_the_page_recalls_the_track_that_was_made_without_the_outlying_clicks(
     tmp_path, monkeypatch
 ):
     project.start(write_numbered_video(tmp_path / "v.mp4"), tmp_path / "p")
@@ -191,9 +191,9 @@ def test_the_page_recalls_the_track_that_was_made_without_the_misplaced_clicks(
 
     for module in (preparing, project_cache):
         monkeypatch.setattr(module, "prepare", prepare)
-    monkeypatch.setattr(preparing, "misplaced_picks", lambda *_: [wrong])
+    monkeypatch.setattr(preparing, "outlier_picks", lambda *_: [wrong])
     made = preparing.prepare_project(workspace, workspace.video(), None, Options(), silent)
-    assert made.set_aside == (wrong,)
+    assert made.rejected_picks == (wrong,)
     page = project_cache.ProjectCache(workspace)
     assert page._prepared().track.clicks == made.preparation.track.clicks
     workspace.add_picks([Pick(5, "foot", 12.0, 40.0)])  # whoever clicks on still has that help

@@ -195,7 +195,7 @@ def test_a_reader_meets_the_motion_first_and_how_it_was_made_last(page):
 def test_what_does_not_fit_together_is_told_before_anything_else(material, pictures, page):
     assert "Not everything fits together" not in page
     line = "The video cuts to another shot at frame 20 <b>"
-    warned = build_page(replace(material, contradictions=[line]), pictures)
+    warned = build_page(replace(material, warnings=[line]), pictures)
     assert "at frame 20 &lt;b&gt;" in warned
     assert warned.index('class="warning"') < warned.index('id="clip"')
 

@@ -10,10 +10,10 @@ from keyrecon.records import Pick, Track, TrackAnchors
 from keyrecon.tracking.anchors import (
     DOUBT_SECONDS,
     anchored_states,
-    contradicted_frames,
     distance_to_track,
+    frames_off_anchors,
     least_sure_frames,
-    misplaced_marks,
+    outlier_marks,
     with_bridge_costs,
 )
 
@@ -93,15 +93,15 @@ def test_a_bridge_forgives_more_the_farther_a_mark_is_and_most_between_marks():
 
 def test_marks_where_the_track_is_contradict_nothing_and_others_are_named():
     track = standing(30)
-    assert len(contradicted_frames(track, marks(track, [3, 9]))) == 0
-    assert contradicted_frames(track, marks(track, [3, 9], (20.0, 0.0))).tolist() == [3, 9]
+    assert len(frames_off_anchors(track, marks(track, [3, 9]))) == 0
+    assert frames_off_anchors(track, marks(track, [3, 9], (20.0, 0.0))).tolist() == [3, 9]
 
 
 def test_feet_contradict_in_no_particular_order_and_what_is_not_marked_contradicts_nothing():
     track = standing(30)
     crossed = marks(track, [5])
     crossed = replace(crossed, head=crossed.head * np.nan, feet=crossed.feet[:, ::-1])
-    assert len(contradicted_frames(track, crossed)) == 0
+    assert len(frames_off_anchors(track, crossed)) == 0
 
 
 def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is_near():
@@ -115,19 +115,19 @@ def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is
 def test_a_mark_that_the_player_would_have_to_jump_to_is_named_and_others_are_not():
     track = walking(60)
     wrong = replace_head(marks(track, [10, 30, 50]), 1, (40.0, 0.0))
-    (found,) = misplaced_marks(track, wrong, 25.0)
+    (found,) = outlier_marks(track, wrong, 25.0)
     assert (found.frame, found.part) == (30, "head")
     assert found.distance == pytest.approx(0.4, abs=0.01)
-    assert misplaced_marks(track, marks(track, [0, 10, 30, 59]), 25.0) == []
+    assert outlier_marks(track, marks(track, [0, 10, 30, 59]), 25.0) == []
 
 
 def test_feet_in_either_order_lie_on_their_way():
     track = walking(60)
     crossed = marks(track, [30])
     crossed = replace(crossed, feet=crossed.feet[:, ::-1])
-    assert misplaced_marks(track, crossed, 25.0) == []
+    assert outlier_marks(track, crossed, 25.0) == []
     off = replace(crossed, feet=crossed.feet + np.array([0, 60.0]))
-    assert [mark.part for mark in misplaced_marks(track, off, 25.0)] == ["feet"]
+    assert [mark.part for mark in outlier_marks(track, off, 25.0)] == ["feet"]
 
 
 def test_a_click_lies_as_far_from_the_track_as_from_the_nearer_foot():
@@ -139,9 +139,9 @@ def test_a_click_lies_as_far_from_the_track_as_from_the_nearer_foot():
 def test_marks_of_a_player_who_turns_over_lie_on_their_way_and_wrong_ones_do_not():
     """A back flip in .6 s: head and feet go round the middle of the body, and no straight way."""
     track = somersaulting(60, 25.0)
-    assert misplaced_marks(track, marks(track, [20, 26, 31, 38]), 25.0) == []
+    assert outlier_marks(track, marks(track, [20, 26, 31, 38]), 25.0) == []
     wrong = replace_head(marks(track, [20, 31, 50]), 1, (0.0, 130.0))
-    assert [(m.frame, m.part) for m in misplaced_marks(track, wrong, 25.0)] == [(31, "head")]
+    assert [(m.frame, m.part) for m in outlier_marks(track, wrong, 25.0)] == [(31, "head")]
 
 
 def somersaulting(count, fps):
