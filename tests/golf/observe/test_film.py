@@ -91,7 +91,7 @@ def test_a_part_of_a_film_knows_which_frames_of_the_file_it_shows(tmp_path):
     """Each picture is shown twice; the pictures 5 to 14 are frames 10 to 29."""
     _, film = film_of(tmp_path, [picture(t // 2) for t in range(60)])
     part = film.take(np.arange(5, 15))
-    assert part.window == (10, 29)
+    assert part.file_range == (10, 29)
     assert np.flatnonzero(part.shows).tolist() == list(range(10, 30))
     assert part.keys_in_file(np.array([0.0, 3.0, 9.0])) == pytest.approx([10.5, 16.5, 28.5])
     assert film.file_range == (0, 59) and film.shows.all()
