@@ -28,7 +28,7 @@ USUAL_DEGREES = "phones 60 to 75, held upright 35 to 45"
 
 
 def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
-    """The focal length by a field of view that was told, else by the lens that the file names."""
+    """The focal length by a field of view that was given, else by the lens that the file names."""
     if degrees is not None:
         focal = video.width / 2 / np.tan(np.radians(degrees) / 2)
         return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
@@ -39,8 +39,8 @@ def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
 
 
 def known_lens(workspace: Workspace, video: Video) -> FieldOfView | None:
-    """The focal length by `keyrecon ground`, by the file, or by the camera that a court or the
-    ground told; None where none of them does."""
+    """The focal length by `keyrecon ground`, by the file, or by a calibrated camera; None where
+    none of them has it."""
     known = known_focal(video, workspace.ground_marks().field_of_view)
     return _calibrated_lens(workspace) if known is None else known
 

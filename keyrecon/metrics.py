@@ -164,13 +164,13 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
     if scaled:
         every = every * _best_scale(_centred(every, root), _centred(true, root), axes=(0, 1, 2))
     one_shot = motion.cuts is None
-    used = slice(None) if one_shot else motion.known
+    inside = slice(None) if one_shot else motion.known
     parts = [slice(None)] if one_shot else motion.stretches
-    points, known = every[used], true[used]
-    pixels, known_pixels = motion.points2d[used][:, ours], truth["points2d"][used][:, theirs]
+    points, known = every[inside], true[inside]
+    pixels, known_pixels = motion.points2d[inside][:, ours], truth["points2d"][inside][:, theirs]
     torso = (names.index("right_hip"), names.index("left_shoulder"))
-    errors, told = joint_errors(points, known, root), _known(known, root)
-    variation = limb_variation(motion.points3d[used], motion.skeleton.bones)
+    errors, has_joint = joint_errors(points, known, root), _known(known, root)
+    variation = limb_variation(motion.points3d[inside], motion.skeleton.bones)
     return Scores(
         mpjpe=mpjpe(points, known, root),
         n_mpjpe=n_mpjpe(points, known, root),
@@ -180,7 +180,7 @@ def evaluate_motion(motion: Motion, truth: Mapping[str, np.ndarray]) -> Scores:
         median_px=median_distance(pixels, known_pixels),
         limb_variation=float(variation.mean()),
         limb_variation_max=float(variation.max()),
-        by_joint={name: _mean(errors[:, j], told[:, j]) for j, name in enumerate(names)},
+        by_joint={name: _mean(errors[:, j], has_joint[:, j]) for j, name in enumerate(names)},
         frames=len(points),
         scaled=scaled,
     )

@@ -90,8 +90,8 @@ class Shots:
     def joined(self) -> "Shots":
         """The usable shots alone, one after the other without the frames between."""
         lengths = [part.stop - part.start for part in self.parts]
-        used = [length for length, good in zip(lengths, self.usable, strict=True) if good]
-        return Shots.between(tuple(np.cumsum(used[:-1]).tolist()), sum(used))
+        usable = [length for length, good in zip(lengths, self.usable, strict=True) if good]
+        return Shots.between(tuple(np.cumsum(usable[:-1]).tolist()), sum(usable))
 
     def in_each(self, work: Callable[..., np.ndarray], *values: np.ndarray) -> np.ndarray:
         """`work` done on the values of each shot by themselves; its results end to end."""
@@ -138,8 +138,8 @@ class TrackVerification:
     hidden: Bool[np.ndarray, "n"]
     """Whether something laid over the picture, such as a score, hides a part of the player."""
     unlinked: Bool[np.ndarray, "n"] | None = None
-    """Whether somebody was followed there who is not joined to the player that a person told; None
-    where that was not looked at."""
+    """Whether the track there is not linked to a head that a person marked or clicked; None where
+    that was not examined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +155,8 @@ class TrackAnchors:
     marked: Bool[np.ndarray, "A"]
     """False where flow between marks has found them, not a person."""
     height: Float[np.ndarray, "A"]
-    """How tall the marked bodies would stand from head centre to mid-feet by the lengths of their
-    bones, px; NaN where nothing tells."""
+    """Standing length of the marked bodies from head centre to mid-feet by the lengths of their
+    bones, px; NaN where too little is marked."""
     footless: Bool[np.ndarray, "A"]
     """Where hips or knees are marked and no foot is."""
 

@@ -198,14 +198,14 @@ def part_of_keyframes(keyframes: Keyframes, frames: Int[np.ndarray, "n"]) -> Key
 
 PER_FRAME = ("points3d", "points2d", "points2d_propagated", "confidence", "source", "scale", "time")
 """Values of a motion that have one entry per frame."""
-TOLD_PER_FRAME = ("expected_error", "exchange_evidence", "elsewhere")
+OPTIONAL_PER_FRAME = ("expected_error", "exchange_evidence", "elsewhere")
 """Further ones, that some motions lack."""
 
 
 def cut_motion(motion: Motion, part: slice) -> Motion:
     """Some frames of a motion; times stay those of the video, frames count from the new start."""
-    told = [name for name in TOLD_PER_FRAME if getattr(motion, name) is not None]
-    own: dict[str, Any] = {name: getattr(motion, name)[part] for name in (*PER_FRAME, *told)}
+    optional = [name for name in OPTIONAL_PER_FRAME if getattr(motion, name) is not None]
+    own: dict[str, Any] = {name: getattr(motion, name)[part] for name in (*PER_FRAME, *optional)}
     return replace(
         motion,
         **own,
@@ -223,10 +223,10 @@ def motion_in_file(motion: Motion, shots: Shots, time: Float[np.ndarray, "T"]) -
     """The motion of the usable shots, over the frames of the file; unknown in the others."""
     frames, count = shots.usable_frames, shots.n_frames
 
-    told = [name for name in TOLD_PER_FRAME if getattr(motion, name) is not None]
+    optional = [name for name in OPTIONAL_PER_FRAME if getattr(motion, name) is not None]
     own: dict[str, Any] = {
         name: spread_values(name, getattr(motion, name), frames, count)
-        for name in (*PER_FRAME, *told)
+        for name in (*PER_FRAME, *optional)
     }
     return replace(
         motion,

@@ -144,13 +144,13 @@ def error_predictors(motion: Motion) -> dict[str, Float[np.ndarray, "T J"]]:
     for part in motion.stretches:
         if part.stop - part.start > 1:
             velocity[part] = np.gradient(motion.points2d[part], motion.time[part], axis=0)
-    told = {
+    predictors = {
         "correction": correction,
         "part_correction": part_correction,
         "part_confidence": part_confidence,
         "speed": np.linalg.norm(velocity, axis=2) / player_height(motion)[:, None],
     }
-    return told if motion.elsewhere is None else {**told, "elsewhere": motion.elsewhere}
+    return predictors if motion.elsewhere is None else {**predictors, "elsewhere": motion.elsewhere}
 
 
 def expected_error(motion: Motion) -> Float[np.ndarray, "T J"]:

@@ -252,7 +252,7 @@ def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
         if not {*np.atleast_1d(chosen.get(name, ()))} <= {*get_args(kind)}:
             raise KeyreconError(f"There is no {name} '{chosen[name]}'.")
     overlay = OverlayOptions(**chosen)
-    name = folder.resolve().name + "".join(f"_{part}" for part in _told_in_name(frames, overlay))
+    name = folder.resolve().name + "".join(f"_{part}" for part in _name_parts(frames, overlay))
     files = [workspace.exports / f"{name}{suffix}" for suffix in options.get("formats", ())]
     motion = motion_stamp(workspace)
     lines = export(workspace, files, progress, frames, overlay)
@@ -260,7 +260,7 @@ def _export(folder: Path, options: dict[str, Any], progress: Progress) -> str:
     return "\n".join(line.replace(f"{workspace.exports}/", "") for line in lines)
 
 
-def _told_in_name(frames: str | None, overlay: OverlayOptions) -> list[str]:
+def _name_parts(frames: str | None, overlay: OverlayOptions) -> list[str]:
     """What tells files of one motion apart."""
     plain = OverlayOptions()
     parts = [frames] if frames else []

@@ -43,17 +43,17 @@ def calibrate(
     options: CalibrationOptions,
     progress: Progress,
     forget: Sequence[str] = (),
-    told: Collection[str] = (),
+    typed: Collection[str] = (),
 ) -> str:
     """Find the court, write camera.npz and court.jpg; returns the text to show.
 
-    Options `told` by dotted names count also where they are as usual.
+    `typed` options, by dotted names, count also where their value is the default.
     The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
     clicks are taken out first. New clicks that contradict the rest are not kept. Where no court is
     found without clicks that were taken out, the camera that they told is set aside.
     """
     check_options(options.court, "--")
-    options = workspace.options(options, CalibrationOptions(), COURT, told)
+    options = workspace.options(options, CalibrationOptions(), COURT, typed)
     widths = _unusual_widths(options.court)
     video = workspace.video()
     dropped = _forgotten(workspace.court_clicks(), forget)

@@ -95,8 +95,8 @@ def _write_marks(workspace: Workspace, content: bytes) -> str:
     file = workspace.annotations_file
     with workspace.exclusive():
         is_other = file.is_file() and file.read_bytes() != content
-        told = (
+        note = (
             f" Other marks that were there are kept in {put_aside(file).name}." if is_other else ""
         )
         write_durably(file, content)
-    return told
+    return note

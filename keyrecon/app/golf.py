@@ -121,14 +121,14 @@ def fit_file(
     force: bool = False,
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
-    told: GolfSettings = GolfSettings(),
+    settings: GolfSettings = GolfSettings(),
 ) -> str:
     """Fit a swing in a project folder; returns what to print. `force` makes every stage again.
 
-    Without a file of clicks those are taken that the project has. What is `told` goes before
-    `options`, and these before what the project remembers.
+    Without a file of clicks those are taken that the project has. `settings` override `options`,
+    and these what the project remembers.
     """
-    model = read_prior(told.over(options, folder), folder)
+    model = read_prior(settings.over(options, folder), folder)
     factor = 1.0 if slow_motion is None else slow_motion
     is_new = not (folder / "project.toml").is_file()
     video = open_video(video_file, slow_motion=factor, square_only=is_new)
@@ -136,10 +136,10 @@ def fit_file(
         check_evidence(read_clicks(clicks_file), video, model, factor, str(clicks_file))
     else:
         check_length(video, factor)
-    check_options(told.over(options, folder))
+    check_options(settings.over(options, folder))
     with hold_folder(folder, "keyrecon golf fit"):
         workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
-        return fit_project(workspace, options, progress, told)
+        return fit_project(workspace, options, progress, settings)
 
 
 def read_prior(options: GolfOptions, folder: Path) -> MotionModel:
@@ -157,13 +157,13 @@ def fit_project(
     workspace: Workspace,
     options: GolfOptions = GolfOptions(),
     progress: Progress = silent,
-    told: GolfSettings = GolfSettings(),
+    settings: GolfSettings = GolfSettings(),
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
     video, folder, evidence = workspace.video(), workspace.folder, golf_evidence(workspace)
     clicks = kept_clicks(workspace)
-    options = told.over(workspace.options(options, GolfOptions(), GOLF), folder)
+    options = settings.over(workspace.options(options, GolfOptions(), GOLF), folder)
     model = read_prior(options, folder)
     slow_motion = workspace.project["video"].get("slow_motion")
     check_evidence(clicks, video, model, slow_motion or 1.0, str(workspace.golf_clicks_file))

@@ -57,7 +57,7 @@ def ground_mark(kind: Kind, text: str) -> GroundMark:
 
 def find_ground(
     workspace: Workspace,
-    told: GroundMarks,
+    new: GroundMarks,
     progress: Progress,
     forget: Sequence[str] = (),
 ) -> str:
@@ -70,8 +70,8 @@ def find_ground(
     before = workspace.ground_marks()
     dropped = named_marks(before, forget)
     kept = merge_marks(before, GroundMarks(), dropped)
-    _check_told(told, video)
-    together = merge_marks(kept, told)
+    _check_new(new, video)
+    together = merge_marks(kept, new)
     _keep_court(workspace)
     motion = _motion_of(workspace, video)
     known = known_focal(video, together.field_of_view)
@@ -82,8 +82,8 @@ def find_ground(
     try:
         found = calibrate_ground(motion, path, (video.width, video.height), together.marks, known)
     except ContradictoryMarks as fault:
-        raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, told)}") from fault
-    workspace.change_ground_marks(told, dropped)
+        raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, new)}") from fault
+    workspace.change_ground_marks(new, dropped)
     write_camera(workspace.camera_file, found.camera)
     if workspace.ground_marks() != together:
         date_after(workspace.ground_marks_file, workspace.camera_file)
@@ -105,12 +105,12 @@ def find_ground(
     )
 
 
-def _check_told(told: GroundMarks, video: Video) -> None:
+def _check_new(new: GroundMarks, video: Video) -> None:
     """Raise KeyreconError for marks outside the video, and a field of view that no camera has."""
-    for mark in told.marks:
+    for mark in new.marks:
         check_mark(mark, len(video), (video.width, video.height))
-    if told.field_of_view is not None:
-        check_field_of_view(told.field_of_view)
+    if new.field_of_view is not None:
+        check_field_of_view(new.field_of_view)
 
 
 def _motion_of(workspace: Workspace, video: Video) -> Motion:
@@ -139,12 +139,12 @@ def _keep_court(workspace: Workspace) -> None:
         )
 
 
-def _whose(kept: GroundMarks, told: GroundMarks) -> str:
+def _whose(kept: GroundMarks, new: GroundMarks) -> str:
     """What becomes of marks that contradict one another."""
     if not kept.marks:
         return ""
     return (
-        f"{' The new marks were not kept.' if told.marks else ''} Marks of former calls: "
+        f"{' The new marks were not kept.' if new.marks else ''} Marks of former calls: "
         f"{', '.join(mark_names(kept.marks))}; --forget NAME takes one out, --forget all starts "
         "anew."
     )
@@ -158,14 +158,14 @@ def _with_names(text: str, kept: GroundMarks) -> str:
     return text
 
 
-def _list_marks(told: GroundMarks) -> list[str]:
+def _list_marks(marks: GroundMarks) -> list[str]:
     """What is kept."""
-    if not told.marks:
+    if not marks.marks:
         return []
     rows = [
         f"{name} (frame {m.frame}, {m.start[0]:g},{m.start[1]:g} to {m.end[0]:g},{m.end[1]:g}"
         f"{'' if m.metres is None else f', {m.metres:g} m'})"
-        for name, m in zip(mark_names(told.marks), told.marks, strict=True)
+        for name, m in zip(mark_names(marks.marks), marks.marks, strict=True)
     ]
     return [f"Kept marks: {'; '.join(rows)}."]
 
@@ -176,7 +176,7 @@ def _height(found: GroundCalibration) -> float:
 
 
 def describe_ground(
-    found: GroundCalibration, told: GroundMarks, known: FieldOfView | None
+    found: GroundCalibration, marks: GroundMarks, known: FieldOfView | None
 ) -> list[str]:
     """Where the camera stands, how it is turned, how surely, and what told so."""
     state, sd = found.state, found.sd
@@ -189,7 +189,7 @@ def describe_ground(
         for kind, words in zip(
             KINDS, ("upright thing", "length on the ground", "horizon"), strict=True
         )
-        if (count := sum(mark.kind == kind for mark in told.marks))
+        if (count := sum(mark.kind == kind for mark in marks.marks))
     ]
     evidence += [known.source] if known else []
     return [
@@ -203,7 +203,7 @@ def describe_ground(
 
 
 def _advice(
-    workspace: Workspace, found: GroundCalibration, told: GroundMarks, known: FieldOfView | None
+    workspace: Workspace, found: GroundCalibration, marks: GroundMarks, known: FieldOfView | None
 ) -> list[str]:
     """What is open, and what would tell it."""
     open_focal = found.sd.log_focal > OPEN_FOCAL
@@ -221,7 +221,7 @@ def _advice(
             f"{focal * factor:.0f} px): the player{still}{tells}, and distances away from the "
             "camera are as open."
         )
-    verticals = sum(mark.kind == "vertical" for mark in told.marks)
+    verticals = sum(mark.kind == "vertical" for mark in marks.marks)
     command = f"keyrecon ground {quoted(workspace.folder)}"
     if verticals < 2:
         help_by = (

@@ -70,17 +70,17 @@ def find_keyframes(
     chosen: KeyframeSettings,
     progress: Progress,
     printed: bool = False,
-    told: Collection[str] = (),
+    typed: Collection[str] = (),
 ) -> str:
     """Run the automatic part; write keyframes.json and a picture of each keyframe.
 
-    Options `told` by dotted names count also where they are as usual.
+    `typed` options, by dotted names, count also where their value is the default.
     `printed` takes the forms that the paper prints. The project remembers its options without
     them, so that a run by the same forms finds the same stages, and one by ours is not bound.
     """
     workspace.check_writable()
     choices = workspace.shot_choices()
-    options = with_chosen_shots(workspace.options(options, Options(), told=told), choices)
+    options = with_chosen_shots(workspace.options(options, Options(), typed=typed), choices)
     options = replace(options, keyframes=chosen.over(options.keyframes))
     check_options(options)
     forms = as_printed(options) if printed else options
@@ -105,14 +105,14 @@ def describe_keyframes(
 ) -> str:
     """What was found, what of the person's does not fit it, and what to do next."""
     keyframes, frames = preparation.keyframes, len(preparation.video)
-    told = _told_to_be_unlinked(preparation)
+    unlinked = _unlinked_frames(preparation)
     unsure = [
         stretch
         for stretch in unsure_track(preparation.track, preparation.shots, keyframes.reach)
-        if not told[stretch.frame]
+        if not unlinked[stretch.frame]
     ]
-    used = preparation.shots.usable_frames
-    seen = float((preparation.track.confidence[used] > 0).mean())
+    usable = preparation.shots.usable_frames
+    seen = float((preparation.track.confidence[usable] > 0).mean())
     halves = [
         f"{name} body: {counted(len(half.frames), 'keyframe')}; {half.coverage:.1%} of the frames "
         f"look like one of them (outlines at most {half.beta:.1%} of the player's height apart; "
@@ -121,7 +121,7 @@ def describe_keyframes(
     ]
     return "\n".join(
         [
-            f"Player found in {seen:.1%} of {counted(len(used), 'frame')}.",
+            f"Player found in {seen:.1%} of {counted(len(usable), 'frame')}.",
             *describe_shots(preparation.shots),
             *warnings,
             *_describe_absence(preparation),
@@ -211,7 +211,7 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     """Stretches in which no keyframes are asked for."""
     reach = preparation.keyframes.reach
     absent = absent_frames(preparation.pose_distances, reach) & preparation.track.known
-    absent &= ~_told_to_be_unlinked(preparation)
+    absent &= ~_unlinked_frames(preparation)
     lines = []
     if stretches := list_stretches(absent):
         listed = listed_stretches(stretches)
@@ -226,13 +226,13 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     return lines
 
 
-def _told_to_be_unlinked(preparation: Preparation) -> Bool[np.ndarray, "T"]:
-    """Frames of which `warnings` tell already that who is followed there may be anybody."""
-    told = np.zeros(len(preparation.track.head), dtype=bool)
+def _unlinked_frames(preparation: Preparation) -> Bool[np.ndarray, "T"]:
+    """Frames whose track is not linked to the player, which the warnings say already."""
+    unlinked = np.zeros(len(preparation.track.head), dtype=bool)
     if preparation.verification is not None:
         for first, last in unlinked_stretches(preparation.track, preparation.verification):
-            told[first : last + 1] = True
-    return told
+            unlinked[first : last + 1] = True
+    return unlinked
 
 
 def write_keyframe_pictures(

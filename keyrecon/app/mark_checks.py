@@ -12,10 +12,10 @@ from keyrecon.annotate.assist.pose_suggestion import scene_of
 from keyrecon.annotate.assist.side_checks import evidence_of_motion
 from keyrecon.records import Annotations, Motion, Preparation
 
-TOLD = 0.8
-"""Suspicion from which a mark is told of where nobody asked; the page's list of checks has all from
-one half on, and joints that were left out."""
-MOST_TOLD = 8
+LISTED_SUSPICION = 0.8
+"""Suspicion from which a mark is listed after a run; the page's list of checks has all from one
+half on, and joints that were left out."""
+MAX_LISTED = 8
 """Lines at most."""
 
 
@@ -42,14 +42,16 @@ def describe_doubtful_marks(
         compare_appearance(preparation, scene.body_frame, completed, described),
         evidence_of_motion(annotations, motion),
     )
-    told = [check for check in checks if check.suspicion >= TOLD and check.kind != "missing"]
+    suspicious = [
+        check for check in checks if check.suspicion >= LISTED_SUSPICION and check.kind != "missing"
+    ]
     lines = [
         f"Marks of frame {check.frame} look wrong: {check.text[0].lower()}{check.text[1:]}"
-        for check in told[:MOST_TOLD]
+        for check in suspicious[:MAX_LISTED]
     ]
-    if len(told) > MOST_TOLD:
+    if len(suspicious) > MAX_LISTED:
+        more = len(suspicious) - MAX_LISTED
         lines.append(
-            f"{len(told) - MOST_TOLD} more marks look wrong; the page of keyrecon annotate lists "
-            "all under Checks."
+            f"{more} more marks look wrong; the page of keyrecon annotate lists all under Checks."
         )
     return lines

@@ -258,11 +258,11 @@ def describe_shots(shots: Shots) -> list[str]:
         for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
     ]
     more = f"; and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
-    told = f"{'; '.join(listed[:MOST_LISTED])}{more}"
+    listing = f"{'; '.join(listed[:MOST_LISTED])}{more}"
     if all(shots.usable):
-        return [f"{len(listed)} shots, all usable (frames): {told}."]
+        return [f"{len(listed)} shots, all usable (frames): {listing}."]
     return [
-        f"{len(listed)} shots, {sum(shots.usable)} usable (frames): {told}. "
+        f"{len(listed)} shots, {sum(shots.usable)} usable (frames): {listing}. "
         "Nothing is made of the others; where this is wrong, say so with --shots.use or "
         "--shots.skip and their numbers, or mark the player there."
     ]

@@ -87,11 +87,11 @@ def add_video(
         raise KeyreconError("A golf swing is one video; start a project for each swing.")
     before = len(workspace.video())
     first, end = trim
-    told: dict[str, float | None] = {"start": first or None, "end": end}
-    told["slow_motion"] = None if slow_motion == 1 else slow_motion
+    settings: dict[str, float | None] = {"start": first or None, "end": end}
+    settings["slow_motion"] = None if slow_motion == 1 else slow_motion
     lock = lock_annotation(workspace.folder, CLOSE_PAGE)
     try:
-        together = workspace.add_video(video, {n: v for n, v in told.items() if v is not None})
+        together = workspace.add_video(video, {n: v for n, v in settings.items() if v is not None})
     finally:
         lock.release()
     folder = quoted(workspace.folder)

@@ -41,7 +41,7 @@ def settings(
     workspace: Workspace,
     given: Options,
     height: float | None = None,
-    told: Collection[str] = (),
+    typed: Collection[str] = (),
     fov: float | None = None,
 ) -> Options:
     """The project's options and what is told now: height in metres, angle of the camera in degrees.
@@ -52,7 +52,7 @@ def settings(
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")
     if fov is not None:
         check_field_of_view(fov)
-    options = workspace.options(given, Options(), told=told)
+    options = workspace.options(given, Options(), typed=typed)
     options = options if fov is None else with_field_of_view(options, fov)
     return options if height is None else with_height(options, height)
 

@@ -26,10 +26,10 @@ MaybeHeight = Annotated[str | None, arg(metavar="METRES", help_behavior_hint="")
 
 def body_height(text: str) -> float:
     """A height in metres from 1.88, 188, 1.88m or 188cm; KeyreconError for what nobody has."""
-    told = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|cm)?", text.strip())
-    if told:
-        height = float(told[1].replace(",", "."))
-        if told[2] == "cm" or (told[2] is None and height >= 100 * SHORTEST):
+    match = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|cm)?", text.strip())
+    if match:
+        height = float(match[1].replace(",", "."))
+        if match[2] == "cm" or (match[2] is None and height >= 100 * SHORTEST):
             height /= 100
         if SHORTEST <= height <= TALLEST:
             return height

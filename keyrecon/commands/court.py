@@ -35,6 +35,6 @@ def court(
         force: Look for the court again.
     """
     clicks = [court_click(text) for text in point]
-    told = {f"court.{name}" for name in typed_options(sys.argv)}
+    typed = {f"court.{name}" for name in typed_options(sys.argv)}
     with at_work(project, "keyrecon court"):
-        print(calibrate(Workspace(project, force), clicks, options, show, forget, told))
+        print(calibrate(Workspace(project, force), clicks, options, show, forget, typed))

@@ -90,8 +90,8 @@ def fit(
         components: Components of the prior used at most (default: 40); fewer keep nearer its mean.
         force: Make every stage again.
     """
-    told = golf_job.GolfSettings(method, components, prior)
-    print(golf_job.fit_file(video, clicks, out, slowmo, force, progress=show, told=told))
+    settings = golf_job.GolfSettings(method, components, prior)
+    print(golf_job.fit_file(video, clicks, out, slowmo, force, progress=show, settings=settings))
 
 
 def compare(

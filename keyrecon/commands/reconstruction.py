@@ -62,8 +62,8 @@ def keyframes(
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
     with at_work(project, "keyrecon keyframes"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
-        told = typed_options(sys.argv)
-        print(keyframing.find_keyframes(workspace, options, chosen, show, printed, told))
+        typed = typed_options(sys.argv)
+        print(keyframing.find_keyframes(workspace, options, chosen, show, printed, typed))
 
 
 def run(
@@ -115,9 +115,9 @@ def _is_printed(method: Literal["best", "paper"], typed: Options) -> bool:
             "--prior golf puts a model's swing where --method paper interpolates between keyframes "
             "(Section 6.1); leave out one of the two."
         )
-    told = typed_options(sys.argv)
+    names = typed_options(sys.argv)
     for name, value in changed_options(typed, as_printed(typed)).items():
-        if name in told:
+        if name in names:
             flag = name.replace("_", "-")
             raise KeyreconError(
                 f"--{flag} {value} is not what --method paper takes (the printed form has another "

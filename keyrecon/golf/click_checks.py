@@ -131,8 +131,8 @@ def _misfit_at(
 class HandCosts:
     """How badly the mean swing explains a film at best (`candidates.least_cost`)."""
 
-    told: float
-    """By the hand that was told."""
+    given: float
+    """Of a player of the hand that was given."""
     other: float
 
 
@@ -145,7 +145,7 @@ def measure_hands(scene: SwingScene, pose: ClickedPose, model: MotionModel) -> H
 
 def check_hand(costs: HandCosts, pose: ClickedPose, origin: str) -> None:
     """Raises KeyreconError where a player of the other hand explains a film far better."""
-    if not costs.told - costs.other >= HAND_GAIN:
+    if not costs.given - costs.other >= HAND_GAIN:
         return
     left_handed = pose.left_handed != pose.mirrored
     hand, opposite = ("left", "right") if left_handed else ("right", "left")

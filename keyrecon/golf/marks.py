@@ -79,8 +79,8 @@ def join_marks(first: SwingMarks, second: SwingMarks) -> SwingMarks:
     joints, shafts = np.full((len(frames), 14, 2), np.nan), np.full((len(frames), 2, 2), np.nan)
     for marks in (second, first):
         rows = np.searchsorted(frames, marks.frames)
-        for held, told in ((joints, marks.joints), (shafts, marks.shafts)):
-            held[rows] = np.where(np.isfinite(told), told, held[rows])
+        for held, marked in ((joints, marks.joints), (shafts, marks.shafts)):
+            held[rows] = np.where(np.isfinite(marked), marked, held[rows])
     keys = np.where(np.isfinite(first.keys), first.keys, second.keys)
     return SwingMarks(frames, joints, shafts, keys)
 

@@ -15,8 +15,8 @@ SAMPLED = "64-"
 
 def fingerprint_file(path: Path) -> str:
     """Hash of a file's size and of what it holds, of a large file of samples throughout."""
-    told = path.stat()
-    return _fingerprint_state(path.absolute(), told.st_size, told.st_mtime_ns)
+    status = path.stat()
+    return _fingerprint_state(path.absolute(), status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=64)

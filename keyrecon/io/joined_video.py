@@ -40,8 +40,8 @@ class JoinedVideo(Video):
     @cached_property
     def fingerprint(self) -> str:
         """Tells these files from others."""
-        told = "".join(file.fingerprint for file in self.files)
-        return hashlib.sha256(told.encode()).hexdigest()[:32]
+        fingerprints = "".join(file.fingerprint for file in self.files)
+        return hashlib.sha256(fingerprints.encode()).hexdigest()[:32]
 
     @property
     def joints(self) -> tuple[int, ...]:

@@ -63,9 +63,9 @@ def changed_options(
     options: OptionRecord,
     defaults: OptionRecord,
     prefix: str = "",
-    told: Collection[str] = (),
+    typed: Collection[str] = (),
 ) -> dict[str, Any]:
-    """Dotted names and values of the options that differ from the defaults, or were `told`.
+    """Dotted names and values of the options that differ from the defaults, or were `typed`.
 
     None among them, which no file can hold, is an option that has no value.
     """
@@ -73,8 +73,8 @@ def changed_options(
     for field in fields(options):
         value, default = getattr(options, field.name), getattr(defaults, field.name)
         if isinstance(value, OptionRecord):
-            changed |= changed_options(value, default, f"{prefix}{field.name}.", told)
-        elif value != default or prefix + field.name in told:
+            changed |= changed_options(value, default, f"{prefix}{field.name}.", typed)
+        elif value != default or prefix + field.name in typed:
             changed[prefix + field.name] = value
     return changed
 

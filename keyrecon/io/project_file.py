@@ -127,15 +127,15 @@ def with_added_video(path: Path, video: Mapping[str, str | float | None]) -> str
     import tomlkit
 
     document, project = _parse(path)
-    told = {n: v for n, v in video.items() if v is not None}
+    added_video = {n: v for n, v in video.items() if v is not None}
     table = tomlkit.table()
-    table.update(told)
+    table.update(added_video)
     if "added" not in document:
         document.add("added", tomlkit.aot())
     added: Any = document["added"]
     added.append(table)
     return _proven(
-        document.as_string(), {**project, "added": [*project.get("added", []), told]}, path
+        document.as_string(), {**project, "added": [*project.get("added", []), added_video]}, path
     )
 
 

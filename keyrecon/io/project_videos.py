@@ -40,7 +40,7 @@ def which_videos(tables: Sequence[Table], file: Path) -> list[int]:
     if not file.is_file():
         raise KeyreconError(f"There is no video at {file}.")
     prints = {table["fingerprint"] for table in tables}
-    own = {told for told in prints if has_fingerprint(file, told)}
+    own = {fingerprint for fingerprint in prints if has_fingerprint(file, fingerprint)}
     if numbers := [n for n, table in enumerate(tables) if table["fingerprint"] in own]:
         return numbers
     raise KeyreconError(
@@ -59,8 +59,8 @@ def shares_frames(one: Table, other: Table) -> bool:
 
 def possible_places(folder: Path, tables: Sequence[Table]) -> list[Path]:
     """Where the videos may be: as the project tells, and where they are looked for if moved."""
-    told = [folder / table["path"] for table in tables]
-    return told + [place / path.name for path in told for place in _beside(folder)]
+    recorded = [folder / table["path"] for table in tables]
+    return recorded + [place / path.name for path in recorded for place in _beside(folder)]
 
 
 def _open(folder: Path, table: Table) -> Video:

@@ -89,7 +89,7 @@ def read_run(workspace: Workspace) -> RunNotes | None:
     try:
         noted = parse_json(read_text(_run_file(workspace)))
         advice = noted.get("advice", ())  # older versions kept none
-        doubts, helps = (tuple(map(str, told)) for told in (noted["doubts"], advice))
+        doubts, helps = (tuple(map(str, lines)) for lines in (noted["doubts"], advice))
         return RunNotes(str(noted["evidence"]), doubts, helps, noted.get("camera"))
     except (OSError, ValueError, TypeError, KeyError):  # there is none, or it is torn
         return None

@@ -305,8 +305,8 @@ def _find_orientation(frame: av.VideoFrame, stream: av.VideoStream) -> tuple[int
     """
     from av.sidedata.sidedata import Type
 
-    told_with_frame: Any = frame.side_data  # PyAV's stubs know motion vectors alone
-    matrix = told_with_frame.get(Type.DISPLAYMATRIX)
+    side_data: Any = frame.side_data  # PyAV's stubs know motion vectors alone
+    matrix = side_data.get(Type.DISPLAYMATRIX)
     if matrix is None:
         tag = {name.lower(): value for name, value in stream.metadata.items()}.get("rotate", "0")
         return (-round(int(tag) / 90) % 4 if tag.lstrip("-").isdigit() else 0), False

@@ -83,9 +83,9 @@ def _describe_self(command: str) -> dict[str, str | int]:
 def _describe_holder(note: Path) -> str:
     """Who has the project, as far as that is known."""
     try:
-        told = json.loads(note.read_bytes())
-        here = told["machine"] == platform.node()
-        place = "" if here else f" on {told['machine']}"
-        return f"{told['command']} (process {told['process']}{place}, since {told['since']})"
+        holder = json.loads(note.read_bytes())
+        here = holder["machine"] == platform.node()
+        place = "" if here else f" on {holder['machine']}"
+        return f"{holder['command']} (process {holder['process']}{place}, since {holder['since']})"
     except (OSError, ValueError, KeyError, TypeError):  # it is gone, or torn
         return "Another command"

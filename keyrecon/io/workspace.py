@@ -387,18 +387,18 @@ class Workspace:
         given: Record,
         defaults: Record,
         section: str | None = None,
-        told: Collection[str] = (),
+        typed: Collection[str] = (),
     ) -> Record:
         """Options that this project has set, and on top of them what `given` sets otherwise.
 
-        `section` names a table of SECTIONS; what is `told`, by dotted names, counts also where it
-        is as usual.
+        `section` names a table of SECTIONS. `typed` are dotted names of options that were given on
+        the command line: they count also where their value is the default.
         """
         check_options(given)
         table = with_current_names(self.project.get("options", {}))
         where = f"options.{section}" if section else "options"
         kept = with_changes(defaults, table_of(table, section, SECTIONS), where)
-        return with_changes(kept, nested_tables(changed_options(given, defaults, told=told)))
+        return with_changes(kept, nested_tables(changed_options(given, defaults, typed=typed)))
 
     def remember(self, options: Record, defaults: Record, section: str | None = None) -> None:
         """Keep what the options change of those that the project was opened with, the defaults left

@@ -104,16 +104,16 @@ def group_elements(
     """Share the elements out to cells `pitch` wide and a turn / `directions` deep."""
     reach = reach + pitch / 2
     grid = _lay_grid(elements, pitch, directions, reach)
-    used, of_element = np.unique(grid.place, return_inverse=True)
-    weight = 1 / np.bincount(of_element, minlength=len(used))
+    occupied, of_element = np.unique(grid.place, return_inverse=True)
+    weight = 1 / np.bincount(of_element, minlength=len(occupied))
 
     def mean(values: Float[np.ndarray, "E"]) -> Float[np.ndarray, "G"]:
-        return np.bincount(of_element, values, minlength=len(used)) * weight
+        return np.bincount(of_element, values, minlength=len(occupied)) * weight
 
     center = mean(elements.points[:, 0]) + 1j * mean(elements.points[:, 1])
     heading = mean(np.cos(elements.angle)) + 1j * mean(np.sin(elements.angle))
     heading /= np.maximum(np.abs(heading), 1e-9)
-    first, neighbor = _neighborhoods(used, grid, center, heading, reach)
+    first, neighbor = _neighborhoods(occupied, grid, center, heading, reach)
     return DescriptorBins(of_element, center.astype(np.complex64), first, neighbor)
 
 
@@ -129,7 +129,7 @@ def _lay_grid(elements: BinnedElements, pitch: float, directions: int, reach: fl
 
 
 def _neighborhoods(
-    used: Int[np.ndarray, "G"],
+    occupied: Int[np.ndarray, "G"],
     grid: _BinGrid,
     center: Complex[np.ndarray, "G"],
     heading: Complex[np.ndarray, "G"],
@@ -137,10 +137,10 @@ def _neighborhoods(
 ) -> tuple[Int[np.ndarray, "G+1"], Int[np.ndarray, "P"]]:
     """Cells of the same colour, within reach and inside the cone, for each cell."""
     counts, neighbors = [np.zeros(1, int)], []
-    for at in range(0, len(used), BINS_PER_STRIP):
+    for at in range(0, len(occupied), BINS_PER_STRIP):
         strip = slice(at, at + BINS_PER_STRIP)
         # the cells are in order of their places, so that a run of places is a run of cells
-        start, stop = (np.searchsorted(used, p) for p in grid.beside(used[strip]))
+        start, stop = (np.searchsorted(occupied, p) for p in grid.beside(occupied[strip]))
         room = (stop - start).sum(axis=1)
         column = ranges(start.ravel(), (stop - start).ravel())
         row = np.repeat(np.arange(len(room)), room)

@@ -285,13 +285,14 @@ def _shift_joints(
         away = np.linalg.norm(model.edges.points - model.joints[j], axis=1)
         weight = np.where(away < VICINITY_RADIUS, np.exp(-0.5 * (away / VICINITY_SPREAD) ** 2), 0)
         share[j] = weight[matched].sum() / max(weight.sum(), 1e-9)
-        used = matched & (weight > 0)
-        if used.sum() < MIN_ELEMENTS or share[j] < MIN_MATCHED_SHARE:
+        nearby = matched & (weight > 0)
+        if nearby.sum() < MIN_ELEMENTS or share[j] < MIN_MATCHED_SHARE:
             share[j] = 0
             continue
-        shift = geometric_median(moved[used], weight[used])
+        shift = geometric_median(moved[nearby], weight[nearby])
         joints[j] = model.joints[j] + shift
-        spread[j] = np.average(np.linalg.norm(moved[used] - shift, axis=1), weights=weight[used])
+        away = np.linalg.norm(moved[nearby] - shift, axis=1)
+        spread[j] = np.average(away, weights=weight[nearby])
     return JointSearch(model.joints, joints, spread, represented), share
 
 

@@ -25,8 +25,8 @@ def write_golf_table(path: Path, swing: RecordedSwing) -> None:
     measures = measure_swing(swing)
     text = io.StringIO()
     text.write("# keyrecon golf swing; doubt is one standard deviation\n")
-    for told in swing.notes:
-        text.write(f"# {told}\n")
+    for note in swing.notes:
+        text.write(f"# {note}\n")
     for doubt in swing.doubts:
         text.write(f"# DOUBTFUL, these are no measurements: {doubt}\n")
     writer = csv.writer(text, lineterminator="\n")

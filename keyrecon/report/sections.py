@@ -116,14 +116,14 @@ def doubts(material: ReportMaterial) -> str:
     motion, backward = material.motion, hyperextended_stretches(material.motion)
     if motion.expected_error is None and not backward:
         return ""
-    told = [(stretch.frame, stretch.text) for stretch in backward]
-    told += [
+    found = [(stretch.frame, stretch.text) for stretch in backward]
+    found += [
         (stretch.frame, stretch.in_words(_length_there(motion, stretch)))
         for stretch in uncertain_stretches(motion)
     ]
     lines = "".join(
         f'<li><button type="button" class="goes" data-frame="{frame}">{text(line)}</button></li>'
-        for frame, line in told
+        for frame, line in found
     )
     rows = [
         (

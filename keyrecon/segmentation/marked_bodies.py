@@ -78,8 +78,8 @@ def with_heights(
 ) -> TrackAnchors:
     """The same with how tall the bodies marked in `frames` (ascending) would stand, px."""
     row = np.searchsorted(frames, anchors.frames).clip(max=len(frames) - 1)
-    told = anchors.marked & (frames[row] == anchors.frames)
-    return replace(anchors, height=np.where(told, heights[row], anchors.height))
+    matched = anchors.marked & (frames[row] == anchors.frames)
+    return replace(anchors, height=np.where(matched, heights[row], anchors.height))
 
 
 def _anchors(

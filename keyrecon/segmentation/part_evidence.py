@@ -65,9 +65,9 @@ def model_scene_by_colour(
     Where everything has, the background does, and the median of all it is. `pictures` gives the
     frames with some of the `numbers`, reduced by `shrink`.
     """
-    used = numbers[sample_frames(len(numbers), BackgroundOptions.samples)]
-    lab = [to_lab(p) for p in pictures(used)]
-    paths = camera.to_reference[used]
+    sampled = numbers[sample_frames(len(numbers), BackgroundOptions.samples)]
+    lab = [to_lab(p) for p in pictures(sampled)]
+    paths = camera.to_reference[sampled]
     window = np.ones((3, 3), np.uint8)
     free = [
         cv2.dilate((look_up(player, color_bins(p)) > 0.5).astype(np.uint8), window) == 0

@@ -118,11 +118,11 @@ def find_overlay(
     clear = {n: cv2.resize(free[n].astype(np.uint8), size) > 0 for n in seen}
     held, asked = np.zeros((2, size[1], size[0]), int), np.zeros((size[1], size[0]), int)
     for pair in pairs:
-        told = clear[pair[0]] | clear[pair[1]]
-        asked += told
+        comparable = clear[pair[0]] | clear[pair[1]]
+        asked += comparable
         for way, (one, other) in enumerate((pair, pair[::-1])):
             moved = np.linalg.inv(paths[one]) @ paths[other]
-            held[way] += told & _stands_still(seen[one], seen[other], moved)
+            held[way] += comparable & _stands_still(seen[one], seen[other], moved)
     share = np.where(asked >= LEAST_PAIRS * len(pairs), held / np.maximum(asked, 1), 0.0)
     either, both = (shares >= LEAST_SHARE for shares in (share.max(axis=0), share.min(axis=0)))
     usual = np.median([*seen.values()], axis=0)

@@ -81,7 +81,7 @@ def part_of_preparation(preparation: Preparation, frames: Int[np.ndarray, "n"]) 
 
 def marks_in_shots(marks: Annotations, shots: Shots) -> Annotations:
     """What was marked in usable shots, by the frames of the file."""
-    used = shots.usable_frames
-    shot_marks = part_of_marks(marks, used)
-    absent = tuple((int(used[frame]), name) for frame, name in shot_marks.absent)
-    return replace(shot_marks, frames=used[shot_marks.frames], absent=absent)
+    frames = shots.usable_frames
+    shot_marks = part_of_marks(marks, frames)
+    absent = tuple((int(frames[frame]), name) for frame, name in shot_marks.absent)
+    return replace(shot_marks, frames=frames[shot_marks.frames], absent=absent)

@@ -28,13 +28,13 @@ out of the picture: a crouch takes less away, and what marks tell is off by as m
 
 @dataclass(frozen=True, eq=False)
 class SizeEvidence:
-    """What tells of the player's size beside head and feet, in every frame."""
+    """Evidence of the player's size other than head and feet, in every frame."""
 
     magnification: Float[np.ndarray, "T"]
     """By the camera's zoom."""
-    told: Float[np.ndarray, "T"]
-    """Standing height by the bones of marked bodies, between these by the zoom, px; NaN where none
-    tells."""
+    marked_height: Float[np.ndarray, "T"]
+    """Standing height by the bones of marked bodies, interpolated between these by the zoom, px;
+    NaN without marks."""
     footless: Bool[np.ndarray, "T"]
     """Next to a marked body without feet, up to the next one that has them."""
     rows: int
@@ -44,32 +44,33 @@ class SizeEvidence:
     def of(cls, camera: CameraPath, video: Video, anchors: TrackAnchors) -> "SizeEvidence":
         """By the camera and by marked bodies."""
         magnification, frames = zoom(camera, video), np.arange(len(video))
-        told, known = np.full(len(video), np.nan), np.isfinite(anchors.height)
+        marked_height, known = np.full(len(video), np.nan), np.isfinite(anchors.height)
         footless = np.zeros(len(video), dtype=bool)
         if known.any():
             at, height = anchors.frames[known], anchors.height[known]
-            told = np.exp(np.interp(frames, at, np.log(height / magnification[at]))) * magnification
+            unzoomed = np.log(height / magnification[at])
+            marked_height = np.exp(np.interp(frames, at, unzoomed)) * magnification
             below = (anchors.feet[known, :, 1] > video.height).all(axis=1)
             lacking = anchors.footless[known] | below
             after = np.searchsorted(at, frames).clip(max=len(at) - 1)
             before = (np.searchsorted(at, frames, side="right") - 1).clip(min=0)
             footless = lacking[before] | lacking[after]
             footless[at] = lacking
-        return cls(magnification, told, footless, video.height)
+        return cls(magnification, marked_height, footless, video.height)
 
     def every(self, step: int) -> "SizeEvidence":
         """That of each `step`-th frame."""
         return SizeEvidence(
-            self.magnification[::step], self.told[::step], self.footless[::step], self.rows
+            self.magnification[::step], self.marked_height[::step], self.footless[::step], self.rows
         )
 
     def cut(
         self, head: Float[np.ndarray, "T 2"], share: float = SURELY_CUT
     ) -> Bool[np.ndarray, "T"]:
-        """Frames whose lower edge cuts off the feet of who stands under these heads, and is a
-        `share` of what is told tall."""
-        # comparisons with NaN are false: where nothing is told feet are taken to be seen
-        return (head[:, 1] + share * self.told > self.rows) & self.footless
+        """Frames whose lower edge cuts off the feet of a player who stands under these heads and is
+        `share` times the marked height tall."""
+        # comparisons with NaN are false: without marks feet are taken to be seen
+        return (head[:, 1] + share * self.marked_height > self.rows) & self.footless
 
 
 def zoom(camera: CameraPath, video: Video) -> Float[np.ndarray, "T"]:
@@ -116,28 +117,28 @@ def measured(
     height = standing_height(head, track.mid_feet, evidence.magnification, frames, whole)
     if not cut.any():
         return replace(track, height=height, box=player_boxes(head, track.feet, height))
-    height = _as_told(height, evidence, whole, seen & ~evidence.cut(head, 1.0))
+    height = _with_marked_heights(height, evidence, whole, seen & ~evidence.cut(head, 1.0))
     below = head[:, None] + height[:, None, None] * [0, 1]
     feet = np.where(cut[:, None, None], below, track.feet)
     return replace(track, feet=feet, height=height, box=player_boxes(head, feet, height))
 
 
-def _as_told(
+def _with_marked_heights(
     height: Float[np.ndarray, "T"],
     evidence: SizeEvidence,
     whole: Bool[np.ndarray, "T"],
     surely: Bool[np.ndarray, "T"],
 ) -> Float[np.ndarray, "T"]:
-    """The standing height as marked bodies tell it where the player may not be `surely` whole.
+    """The standing height by marked bodies where the player may not be `surely` whole.
 
-    Feet and bones differ by a share, which whole frames tell and which goes on between them.
+    It is scaled by the ratio of both heights in whole frames, interpolated between them.
     """
     surely = surely if surely.any() else whole
     if not surely.any():
-        return evidence.told
+        return evidence.marked_height
     at = np.flatnonzero(surely)
-    share = np.interp(np.arange(len(height)), at, height[at] / evidence.told[at])
-    return np.where(surely, height, share * evidence.told)
+    share = np.interp(np.arange(len(height)), at, height[at] / evidence.marked_height[at])
+    return np.where(surely, height, share * evidence.marked_height)
 
 
 def player_boxes(

@@ -35,24 +35,24 @@ these."""
 def linked_to_player(
     track: Track,
     camera: CameraPath,
-    told_frames: Int[np.ndarray, "n"],
-    told_heads: Float[np.ndarray, "n 2"],
+    known_frames: Int[np.ndarray, "n"],
+    known_heads: Float[np.ndarray, "n 2"],
     fps: float,
 ) -> Bool[np.ndarray, "T"]:
-    """Frames of a shot in which the track is joined to a head that a person told.
+    """Frames of a shot in whose tracklet a person marked or clicked the head, or joined to one.
 
-    All of them where no head was told, or none that lies on the track.
+    All frames where no `known_heads` are given, or none of them lies on the track.
     """
-    off = np.linalg.norm(track.head[told_frames] - told_heads, axis=-1)
-    told = told_frames[off < ON_TRACK * track.height[told_frames]]
+    off = np.linalg.norm(track.head[known_frames] - known_heads, axis=-1)
+    on_track = known_frames[off < ON_TRACK * track.height[known_frames]]
     linked = np.ones(len(track.head), dtype=bool)
-    if not len(told):
+    if not len(on_track):
         return linked
     seen = track.confidence > 0
-    seen[told] = True
+    seen[on_track] = True
     path = _SeenPath.of(track, camera, np.flatnonzero(seen), fps)
     tracklets = path.tracklets()
-    rows = np.searchsorted(path.frames, told)
+    rows = np.searchsorted(path.frames, on_track)
     known = [bool(((first <= rows) & (rows <= last)).any()) for first, last in tracklets]
     for number, is_joined in enumerate(_joined(path, tracklets, known)):
         if not is_joined:  # nor is what lies between it and those before and after

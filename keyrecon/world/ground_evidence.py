@@ -75,7 +75,7 @@ class Stances:
     stature: float
     """In units of the motion."""
     given_height: float
-    """The height that says what a metre is, where the motion is in metres."""
+    """The player's height that scales a motion in metres (`placement.given_height`)."""
 
 
 @dataclass(frozen=True)

@@ -55,17 +55,17 @@ def mark_names(marks: Sequence[GroundMark]) -> list[str]:
     return names
 
 
-def named_marks(told: GroundMarks, names: Sequence[str]) -> GroundMarks:
+def named_marks(kept: GroundMarks, names: Sequence[str]) -> GroundMarks:
     """The marks that are named; "all" names every one.
 
     Raises KeyreconError for a name that none has.
     """
-    there = mark_names(told.marks)
-    known = [*there, *([FOV] if told.field_of_view is not None else [])]
+    there = mark_names(kept.marks)
+    known = [*there, *([FOV] if kept.field_of_view is not None else [])]
     if unknown := sorted(set(names) - {*known, "all"}):
         has = f"it has {', '.join(known)}" if known else "it has none"
         raise KeyreconError(f"The project has no mark {unknown[0]} to forget; {has}.")
     if "all" in names:
-        return told
-    marks = tuple(m for name, m in zip(there, told.marks, strict=True) if name in names)
-    return GroundMarks(marks, told.field_of_view if FOV in names else None)
+        return kept
+    marks = tuple(m for name, m in zip(there, kept.marks, strict=True) if name in names)
+    return GroundMarks(marks, kept.field_of_view if FOV in names else None)

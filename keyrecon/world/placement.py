@@ -95,18 +95,18 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     seen &= inside
     at_root = motion.points2d[:, hips].mean(axis=1)
     pose = _turned_pose(motion, camera, at_root, hips)
-    feet, told = motion.points2d[:, ankles], seen[:, None] & ~unseen_joints(motion)[:, ankles]
+    feet, feet_seen = motion.points2d[:, ankles], seen[:, None] & ~unseen_joints(motion)[:, ankles]
     ratio, still = 1.0 if motion.units == "m" else 1.75, np.zeros((len(seen), 2), dtype=bool)
     for _ in range(2):  # the ankle's height hangs on the player's size
         height = ratio * pose[:, ankles, 2]
         ground = _on_ground(camera, feet, ANKLE_SHARE * ratio * stature_in_units(motion))
         speed = _speed_across(motion, camera, ground, shots)
-        still = _slow_and_low(speed, height, HELD_SPEED) & told
+        still = _slow_and_low(speed, height, HELD_SPEED) & feet_seen
         still = _long_enough(still, motion.fps, shots)
         if not still.any():
             return None
         ratio = _size(camera, ground, _distance_by_size(motion, camera, at_root), still)
-    slow = _slow_and_low(speed, height, CONTACT_SPEED) & told
+    slow = _slow_and_low(speed, height, CONTACT_SPEED) & feet_seen
     slow = _long_enough(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)
@@ -170,7 +170,7 @@ def _bone_lengths(motion: Motion) -> Float[np.ndarray, "B"]:
 
 
 def given_height(motion: Motion) -> float:
-    """The player's height as it was told, by which a motion in metres is as large as it is; else 1.
+    """The player's height that was given, which scales a motion in metres; 1 for other motions.
 
     Legs and trunk stand that tall, however long marks have made the arms (`standing_length`).
     """

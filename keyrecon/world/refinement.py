@@ -312,8 +312,8 @@ def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list
     masses = terms.joint_masses(skeleton.names)
     grounded = standing.still[:, 0] | standing.still[:, 1]
     feet = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
-    told = placed.seen & ~unseen_joints(motion)[:, feet].any(axis=1)
-    flying = without_moments((told & ~grounded)[:, None], max(3, round(SHORTEST_FLIGHT * fps)))
+    feet_seen = placed.seen & ~unseen_joints(motion)[:, feet].any(axis=1)
+    flying = without_moments((feet_seen & ~grounded)[:, None], max(3, round(SHORTEST_FLIGHT * fps)))
     expected = np.where(flying, [0.0, 0.0, -GRAVITY], np.zeros(3))
     weight = np.where(flying, 1 / FALL_ERROR, np.full(3, 1 / ACCELERATION))
     made.append(terms.body_acceleration(masses, expected, weight, fps))

@@ -211,8 +211,8 @@ def test_a_width_that_is_typed_counts_also_where_it_is_the_usual_one(bare, monke
     narrow = CalibrationOptions(CourtOptions(line_width=0.03, baseline_width=0.05))
     Workspace(bare).remember(narrow, usual, COURT)
 
-    def spy(workspace, clicks, options, progress, forget, told):
-        counted.append(workspace.options(options, usual, COURT, told))
+    def spy(workspace, clicks, options, progress, forget, typed):
+        counted.append(workspace.options(options, usual, COURT, typed))
 
     monkeypatch.setattr(commands, "calibrate", spy)
     monkeypatch.setattr("sys.argv", ["keyrecon", "court", str(bare), "--line-width", "0.05"])

@@ -31,7 +31,7 @@ def keep(name, stage, *inputs, **named):
     """A film whose swing goes round the other way."""
     if name == "search":
         raise SearchBegan
-    return HandCosts(told=0.6, other=0.1) if name == "hands" else None
+    return HandCosts(given=0.6, other=0.1) if name == "hands" else None
 
 
 def test_who_marks_is_believed_whichever_way_the_swing_seems_to_go(tmp_path, monkeypatch):

@@ -40,11 +40,11 @@ def fitted_with(monkeypatch):
 def test_a_method_that_is_told_counts_also_where_it_is_the_usual_one(swing, fitted_with):
     for method in ("windows", None, "swing", None):
         told = GolfSettings(method)
-        fit_file(swing / "video.mp4", None, swing / "project", told=told)
+        fit_file(swing / "video.mp4", None, swing / "project", settings=told)
     methods = [options.method for options, _ in fitted_with]
     assert methods == ["windows", "windows", "swing", "swing"]
     most = GolfOptions().fit.components
-    fit_file(swing / "video.mp4", None, swing / "project", told=GolfSettings(components=most))
+    fit_file(swing / "video.mp4", None, swing / "project", settings=GolfSettings(components=most))
     assert fitted_with[-1][0].fit.components == most
     remembered = Workspace(swing / "project").options(GolfOptions(), GolfOptions(), GOLF)
     assert remembered == replace(QUICK, fit=replace(QUICK.fit, components=most))
@@ -54,14 +54,14 @@ def test_a_fit_on_the_page_goes_on_with_the_prior_of_the_project(swing, fitted_w
     project, model = swing / "project", read_motion_model()
     few = replace(model, components=model.components[:5], explained=model.explained[:5])
     write_motion_model(swing / "mine.npz", few)
-    fit_file(swing / "video.mp4", None, project, told=GolfSettings(prior=swing / "mine.npz"))
+    fit_file(swing / "video.mp4", None, project, settings=GolfSettings(prior=swing / "mine.npz"))
     assert 'prior = "../mine.npz"' in (project / "project.toml").read_text()
     job_commands(project)["golf"]({}, silent)
     assert [len(model.components) for _, model in fitted_with] == [5, 5]
     (swing / "mine.npz").unlink()
     with pytest.raises(KeyreconError, match=r"no swing prior at .*mine\.npz; name .*--prior FILE"):
         job_commands(project)["golf"]({}, silent)
-    fit_file(swing / "video.mp4", None, project, told=GolfSettings(prior=BUILT_IN))
+    fit_file(swing / "video.mp4", None, project, settings=GolfSettings(prior=BUILT_IN))
     assert len(fitted_with[-1][1].components) == len(model.components)
     assert "prior" not in (project / "project.toml").read_text()
 

@@ -129,7 +129,7 @@ def test_a_forgotten_hand_is_told(azimuth, left_handed):
     check_hand(costs, pose, "clicks.json")
     forgotten = replace(pose, left_handed=not left_handed)
     with pytest.raises(KeyreconError, match="the swing goes round the other way"):
-        check_hand(HandCosts(costs.other, costs.told), forgotten, "clicks.json")
+        check_hand(HandCosts(costs.other, costs.given), forgotten, "clicks.json")
 
 
 def test_exchanged_sides_from_the_front_are_told_by_the_swing():

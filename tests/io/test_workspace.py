@@ -165,14 +165,14 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
     assert project.options(Options(), Options()) == options(0.05, 12)
     typed = typed_options(["keyrecon", "--keyframes.reach=10", "--lift.no-x", "--a.b-c", "3"])
     assert typed == {"keyframes.reach", "lift.no_x", "lift.x", "a.b_c"}
-    back = project.options(Options(), Options(), told=typed)
+    back = project.options(Options(), Options(), typed=typed)
     assert back == options(0.05, usual.reach)
 
 
 def test_an_option_that_may_be_without_a_value_is_unset_by_none(project):
     project.remember(settings(project, Options(), 1.8), Options())
-    told = typed_options(["keyrecon", "--lift.height", "None"])
-    unset = settings(Workspace(project.folder), Options(), told=told)
+    typed = typed_options(["keyrecon", "--lift.height", "None"])
+    unset = settings(Workspace(project.folder), Options(), typed=typed)
     assert unset.lift.height is None
     Workspace(project.folder).remember(unset, Options())
     assert Workspace(project.folder).options(Options(), Options()).lift.height is None

@@ -63,4 +63,4 @@ def test_a_marked_body_without_feet_speaks_for_the_frames_up_to_those_that_have_
     write_video(tmp_path / "dark.mp4", np.zeros((COUNT, ROWS, 400, 3), np.uint8), 25.0)
     told = SizeEvidence.of(camera, open_video(tmp_path / "dark.mp4"), bodies)
     np.testing.assert_array_equal(np.flatnonzero(told.footless), np.arange(11, 100))
-    np.testing.assert_allclose(told.told[marked], height[marked])
+    np.testing.assert_allclose(told.marked_height[marked], height[marked])

@@ -28,7 +28,7 @@ POST = np.array([[[0.0, 0, 0], [0, 0, 1.75]]])
 
 def describe_ground(workspace: Workspace) -> Json:
     """What was marked, and what is known of the camera."""
-    told, camera = workspace.ground_marks(), _camera(workspace)
+    marks, camera = workspace.ground_marks(), _camera(workspace)
     return {
         "marks": [
             {
@@ -38,9 +38,9 @@ def describe_ground(workspace: Workspace) -> Json:
                 "ends": [mark.start, mark.end],
                 "metres": mark.metres,
             }
-            for name, mark in zip(mark_names(told.marks), told.marks, strict=True)
+            for name, mark in zip(mark_names(marks.marks), marks.marks, strict=True)
         ],
-        "field_of_view": told.field_of_view,
+        "field_of_view": marks.field_of_view,
         "motion": workspace.motion_file.is_file(),
         "court": camera is not None and camera.origin == COURT,
         "camera": None if camera is None or camera.origin == COURT else _in_words(camera),

@@ -41,13 +41,13 @@ WORLDS = {
 
 def write_camera(path: Path, camera: WorldCamera) -> None:
     """Write camera.npz; names and axes as in `WorldCamera`."""
-    told: dict[str, Any] = {} if camera.stature is None else {STATURE: np.array(camera.stature)}
+    stature: dict[str, Any] = {} if camera.stature is None else {STATURE: np.array(camera.stature)}
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
         **{name: getattr(camera, name) for name in (*ARRAYS, TILT)},
         origin=np.array(camera.origin),
-        **told,
+        **stature,
         keyrecon_version=np.array(__version__),
     )
     write_durably(path, buffer.getvalue())

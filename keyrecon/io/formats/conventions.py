@@ -147,7 +147,7 @@ def stand_on_floor(
         if lost.any() and _is_brief(lost, motion):
             bridged = replace(world, points=_bridge(world.points, lost, motion))
             standing = stand_on_floor(motion, even_times, bridged)
-            return _with_gaps(standing, lost, motion) if gaps else _told(standing, lost)
+            return _with_gaps(standing, lost, motion) if gaps else _with_bridge_note(standing, lost)
         if lost.any():
             standing = stand_on_floor(motion, even_times)
             instead = (
@@ -186,10 +186,10 @@ def _bridge(
     return whole
 
 
-def _told(standing: StandingMotion, lost: Bool[np.ndarray, "T"]) -> StandingMotion:
+def _with_bridge_note(standing: StandingMotion, lost: Bool[np.ndarray, "T"]) -> StandingMotion:
     """The same, with what was bridged."""
-    told = f"; the place there is unknown in {lost.sum()} of {len(lost)} frames, which are bridged"
-    return replace(standing, placing=standing.placing + told)
+    note = f"; the place there is unknown in {lost.sum()} of {len(lost)} frames, which are bridged"
+    return replace(standing, placing=standing.placing + note)
 
 
 def _with_gaps(
@@ -199,8 +199,8 @@ def _with_gaps(
     frames = np.arange(len(lost))
     nearest = np.rint(np.interp(standing.time, motion.time - motion.time[0], frames)).astype(int)
     points = np.where(lost[nearest, None, None], np.nan, standing.points)
-    told = f"; left out are {lost.sum()} of {len(lost)} frames, in which the place there is unknown"
-    return replace(standing, points=points, placing=standing.placing + told)
+    note = f"; left out are {lost.sum()} of {len(lost)} frames, in which the place there is unknown"
+    return replace(standing, points=points, placing=standing.placing + note)
 
 
 def _stand_in_shots(

@@ -36,14 +36,14 @@ def _kind(name: object) -> Kind:
     raise ValueError(f"{name!r} is no kind of mark")
 
 
-def write_ground_marks(path: Path, told: GroundMarks) -> None:
+def write_ground_marks(path: Path, marks: GroundMarks) -> None:
     """Write marks durably, one to a line."""
     rows = [
         {"kind": m.kind, "frame": m.frame, "ends": [m.start, m.end], "metres": m.metres}
-        for m in told.marks
+        for m in marks.marks
     ]
     body = ",\n  ".join(json.dumps(row) for row in rows)
-    angle = json.dumps(told.field_of_view)
+    angle = json.dumps(marks.field_of_view)
     write_durably(path, f'{{"field_of_view": {angle}, "marks": [\n  {body}\n]}}\n')
 
 
