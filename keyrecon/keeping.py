@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import ParamSpec, Protocol, TypeVar, runtime_checkable
 
 from keyrecon.numerics.threads import one_order_of_sums
-from keyrecon.spreading import Spread, one_by_one
+from keyrecon.parallel_map import ParallelMap, one_by_one
 
 Item = TypeVar("Item")
 Inputs = ParamSpec("Inputs")
@@ -34,7 +34,7 @@ class Keep(Protocol):
 class KeepWithWorkers(Keep, Protocol):
     """One that may have stages run elsewhere, several at a time."""
 
-    spread: Spread
+    parallel_map: ParallelMap
     """Hands out pieces of one stage's work."""
 
     @property
@@ -66,14 +66,18 @@ def work_on_each(
     return map(work, items)
 
 
-def spread_of(keep: Keep) -> Spread:
-    """Who does pieces of a stage's work: workers, or nobody but the stage itself."""
-    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_workers else one_by_one
+def parallel_map_of(keep: Keep) -> ParallelMap:
+    """That of the workers, where there are any; else one piece after the other."""
+    if isinstance(keep, KeepWithWorkers) and keep.has_workers:
+        return keep.parallel_map
+    return one_by_one
 
 
-def spread_far(keep: Keep, here: Spread) -> Spread:
-    """The same for pieces of what is at hand here: other machines do them, or `here`."""
-    return keep.spread if isinstance(keep, KeepWithWorkers) and keep.has_far_workers else here
+def parallel_map_elsewhere(keep: Keep, here: ParallelMap) -> ParallelMap:
+    """That of the workers, where they are other machines; else `here`."""
+    if isinstance(keep, KeepWithWorkers) and keep.has_far_workers:
+        return keep.parallel_map
+    return here
 
 
 def call_stage(

@@ -22,7 +22,7 @@ from keyrecon.golf.swing_prior import SwingPriorOptions, fit_swing_prior
 from keyrecon.io.frame_reader import in_threads
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
-from keyrecon.keeping import Keep, call_stage, spread_far, spread_of
+from keyrecon.keeping import Keep, call_stage, parallel_map_elsewhere, parallel_map_of
 from keyrecon.keyframes.absence import legs_outside, without_legs
 from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.distance_matrix import CompareOptions, compare_frames
@@ -59,7 +59,7 @@ from keyrecon.timeline import (
     end_at_cuts,
     motion_in_file,
     part_of_marks,
-    put_back,
+    scatter_frames,
     take_frames,
 )
 from keyrecon.tracking.anchors import frames_off_anchors, least_sure_frames
@@ -134,7 +134,8 @@ def prepare(
     count_labels(options.keyframes, len(video), video.fps)
     camera = keep(
         "camera", estimate_camera_motion, video,
-        options=options.camera, progress=progress, spread=spread_far(keep, in_threads),
+        options=options.camera, progress=progress,
+        parallel_map=parallel_map_elsewhere(keep, in_threads),
     )  # fmt: skip
     video = with_exposure(video, camera.exposure)
     clicks, anchors = tuple(picks), TrackAnchors.none()
@@ -158,7 +159,7 @@ def prepare(
         followed.track,
         options=options.compare,
         progress=progress,
-        spread=spread_of(keep),
+        parallel_map=parallel_map_of(keep),
     )
     distances = end_at_cuts(distances, followed.shots.joined())
     outside = legs_outside(followed.track, video.height)
@@ -307,7 +308,9 @@ def carry_joints(
     """The annotated joints in every frame of the video."""
     shots = preparation.shots
     _, _, tracks = _carry_usable(preparation, annotations, models, options, keep, progress)
-    return tracks if all(shots.usable) else put_back(tracks, shots.usable_frames, shots.n_frames)
+    return (
+        tracks if all(shots.usable) else scatter_frames(tracks, shots.usable_frames, shots.n_frames)
+    )
 
 
 def _carry_usable(

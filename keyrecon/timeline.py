@@ -91,12 +91,12 @@ def part_of_picks(picks: Sequence[Pick], part: slice) -> tuple[Pick, ...]:
     return tuple(replace(pick, frame=pick.frame - part.start) for pick in inside)
 
 
-def put_back(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerFrame:
+def scatter_frames(record: PerFrame, frames: Int[np.ndarray, "n"], count: int) -> PerFrame:
     """A record of `frames` as one of `count` frames: those between have NaN, or 0."""
     values: dict[str, Any] = {}
     for field in fields(record):
         own: np.ndarray | None = getattr(record, field.name)
-        values[field.name] = None if own is None else spread_values(field.name, own, frames, count)
+        values[field.name] = None if own is None else scatter_values(field.name, own, frames, count)
     return type(record)(**values)
 
 
@@ -105,7 +105,7 @@ SAYING_NOTHING |= {"source": float(SOURCES.index("interpolated"))}
 """What some values are in frames of which nothing is known; others are NaN, or 0."""
 
 
-def spread_values(
+def scatter_values(
     name: str, values: np.ndarray, frames: Int[np.ndarray, "n"], count: int
 ) -> np.ndarray:
     """Values of `frames` among `count`: NaN between them, or what says nothing."""
@@ -120,7 +120,7 @@ def frames_before(frames: Int[np.ndarray, "n"], count: int) -> Int[np.ndarray, "
     return np.clip(np.searchsorted(frames, np.arange(count), side="right") - 1, 0, None)
 
 
-def spread_track(track: Track, frames: Int[np.ndarray, "n"], count: int) -> Track:
+def scatter_track(track: Track, frames: Int[np.ndarray, "n"], count: int) -> Track:
     """The track of `frames` among `count`: between them the player is nowhere, and the rest stands
     as before, with no confidence."""
     spread = take_frames(track, frames_before(frames, count))
@@ -132,7 +132,7 @@ def spread_track(track: Track, frames: Int[np.ndarray, "n"], count: int) -> Trac
     )
 
 
-def spread_edges(
+def scatter_edges(
     edges: Sequence[Edges], frames: Int[np.ndarray, "n"], count: int
 ) -> tuple[Edges, ...]:
     """The edges of `frames` among `count`; none between them."""
@@ -151,7 +151,7 @@ def end_at_cuts(distances: PoseDistances, shots: Shots) -> PoseDistances:
     return replace(distances, consecutive_distance=steps)
 
 
-def spread_distances(
+def scatter_distances(
     distances: PoseDistances, frames: Int[np.ndarray, "n"], count: int
 ) -> PoseDistances:
     """Pose distances of `frames` among `count`: the others are like none, and not to be seen."""
@@ -225,7 +225,7 @@ def motion_in_file(motion: Motion, shots: Shots, time: Float[np.ndarray, "T"]) -
 
     optional = [name for name in OPTIONAL_PER_FRAME if getattr(motion, name) is not None]
     own: dict[str, Any] = {
-        name: spread_values(name, getattr(motion, name), frames, count)
+        name: scatter_values(name, getattr(motion, name), frames, count)
         for name in (*PER_FRAME, *optional)
     }
     return replace(

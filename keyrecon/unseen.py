@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from keyrecon.records import SOURCES, Annotations, JointTracks, Motion
-from keyrecon.timeline import OPTIONAL_PER_FRAME, PER_FRAME, spread_values
+from keyrecon.timeline import OPTIONAL_PER_FRAME, PER_FRAME, scatter_values
 
 BRIDGED_SECONDS = 0.5
 """Longest time without evidence that the motion before and after bridges: a step. From one side
@@ -56,7 +56,7 @@ def without_unseen(motion: Motion) -> Motion:
     shown = np.flatnonzero(~unseen)
     names = [name for name in (*PER_FRAME, *OPTIONAL_PER_FRAME) if name != "time"]
     own: dict[str, Any] = {
-        name: spread_values(name, getattr(motion, name)[shown], shown, len(unseen))
+        name: scatter_values(name, getattr(motion, name)[shown], shown, len(unseen))
         for name in names
         if getattr(motion, name) is not None
     }

@@ -23,7 +23,7 @@ BASE = {
     "reading",
     "ranges",
     "progress",
-    "spreading",
+    "parallel_map",
     "numerics",
 }
 SHARED = BASE | {"segmentation", "io"}

@@ -13,9 +13,9 @@ from keyrecon.timeline import (
     cut_motion,
     join_frames,
     motion_in_file,
-    put_back,
-    spread_distances,
-    spread_track,
+    scatter_distances,
+    scatter_frames,
+    scatter_track,
     take_frames,
 )
 
@@ -47,7 +47,7 @@ def make_tracks(count, seed=0):
 
 def test_frames_that_are_taken_and_put_back_are_where_they_were_and_nothing_is_between():
     tracks = make_tracks(60)
-    back = put_back(take_frames(tracks, USED), USED, 60)
+    back = scatter_frames(take_frames(tracks, USED), USED, 60)
     np.testing.assert_array_equal(back.joints[USED], tracks.joints[USED])
     between = np.setdiff1d(np.arange(60), USED)
     assert np.isnan(back.joints[between]).all()
@@ -60,7 +60,7 @@ def test_what_nobody_looked_at_stays_untold():
     tracks = replace(make_tracks(60), exchange_evidence=None)
     parts = [take_frames(tracks, part) for part in SHOTS.parts]
     assert join_frames(parts).exchange_evidence is None
-    assert put_back(take_frames(tracks, USED), USED, 60).exchange_evidence is None
+    assert scatter_frames(take_frames(tracks, USED), USED, 60).exchange_evidence is None
 
 
 def test_parts_that_are_joined_are_the_whole():
@@ -78,7 +78,7 @@ def test_a_track_is_nowhere_in_other_shots():
         np.ones((count, 4)),
         np.ones(count),
     )
-    spread = spread_track(track, USED, 60)
+    spread = scatter_track(track, USED, 60)
     assert spread.known.tolist() == np.isin(np.arange(60), USED).tolist()
     assert (spread.confidence[~spread.known] == 0).all()
     assert np.isfinite(spread.head).all()
@@ -93,7 +93,7 @@ def test_pose_distances_come_back_as_they_were():
         upper, lower, everyone, everyone, np.zeros((2, count), np.float32),
         rng.random((2, count - 1)).astype(np.float32), np.ones(count), np.ones((2, count)),
     )  # fmt: skip
-    spread = spread_distances(distances, USED, 60)
+    spread = scatter_distances(distances, USED, 60)
     assert len(spread.row) == 60
     assert (spread.visibility_score[20:30] == 0).all()
     assert (spread.seen[:, 20:30] == 0).all()

@@ -74,7 +74,7 @@ def side_by_side(
 
 
 def in_threads(work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
-    """Pieces of a stage's work (`spreading.Spread`) that are done here, side by side."""
+    """Pieces of a stage's work (`parallel_map.ParallelMap`) that are done here, side by side."""
     return side_by_side(lambda arguments: work(*arguments), inputs)
 
 

@@ -33,7 +33,7 @@ from keyrecon.io.storage import is_mapped, load_record, save_record
 from keyrecon.io.video import Video
 from keyrecon.io.workers import Workers
 from keyrecon.numerics.threads import one_order_of_sums
-from keyrecon.spreading import one_by_one
+from keyrecon.parallel_map import one_by_one
 
 KEPT_RESULTS = 3
 """Results kept of each stage, so that options can be tried out and taken back."""
@@ -41,7 +41,7 @@ PLAIN_TYPES = (bool, int, float, complex, str, bytes, type(None), Path, PosixPat
 """Values whose text tells all of them; anything else would collide or never be found again."""
 
 
-NO_INPUTS = ("progress", "spread")
+NO_INPUTS = ("progress", "parallel_map")
 """Named arguments that change no result: how progress is shown, and who does the work."""
 
 
@@ -97,9 +97,9 @@ class StageStore:
         result = _NOTHING if self.force else _stored(path)
         if result is _NOTHING:
             workers = self.workers
-            if workers is None or "spread" in named or not workers.takes_stage():
+            if workers is None or "parallel_map" in named or not workers.takes_stage():
                 result = self._make(name, path, stage, inputs, named)
-            else:  # one with `spread` hands out its work by itself
+            else:  # one with `parallel_map` hands out its work by itself
                 result = self._make_elsewhere(name, path, stage, inputs, named)
             self._forget(name, path)
         self._note_kept(result, key, path)
@@ -183,10 +183,10 @@ class StageStore:
         """Whether other machines do."""
         return self.workers is not None and self.workers.far
 
-    def spread(
+    def parallel_map(
         self, work: Callable[..., Result], inputs: Iterable[tuple[Any, ...]]
     ) -> Iterator[Result]:
-        """Pieces of a stage's work (`spreading.Spread`), done by the workers if there are any."""
+        """Pieces of a stage's work (`ParallelMap`), done by the workers if there are any."""
         if self.workers is None:
             return one_by_one(work, inputs)
 

@@ -35,10 +35,10 @@ from keyrecon.keyframes.edge_distance import MAX_MATCH_DISTANCE, half_of
 from keyrecon.keyframes.exemplars import find_exemplars
 from keyrecon.numerics.ragged import ranges
 from keyrecon.numerics.threads import core_count
+from keyrecon.parallel_map import ParallelMap, one_by_one
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import Edges, HalfName, PoseDistances, Track
-from keyrecon.spreading import Spread, one_by_one
 from keyrecon.timeline import take_frames
 
 HALVES: tuple[HalfName, HalfName] = ("upper", "lower")
@@ -93,11 +93,12 @@ def compare_frames(
     track: Track,
     options: CompareOptions = CompareOptions(),
     progress: Progress = silent,
-    spread: Spread = one_by_one,
+    parallel_map: ParallelMap = one_by_one,
 ) -> PoseDistances:
     """C of every two frames for the upper and the lower body (Sections 4.1-4.3).
 
-    Of a long video, `spread` compares parts with the exemplars, and each half of the exemplars.
+    Of a long video, `parallel_map` compares parts with the exemplars, and each half of the
+    exemplars.
     Raises KeyreconError where no frame has edge elements of one half.
     """
     for half in HALVES:
@@ -107,7 +108,7 @@ def compare_frames(
                 "skin in one more frame."
             )
     if len(edges) > options.most:
-        return _compare_exemplars(edges, track, options, progress, spread)
+        return _compare_exemplars(edges, track, options, progress, parallel_map)
     upper, lower = (measure_matrix(edges, track, h, options, progress) for h in HALVES)
     everyone = np.arange(len(edges))
     return PoseDistances(
@@ -127,7 +128,7 @@ def _compare_exemplars(
     track: Track,
     options: CompareOptions,
     progress: Progress,
-    spread: Spread,
+    parallel_map: ParallelMap,
 ) -> PoseDistances:
     """The same by exemplars: linear in the length of the video, but for their own matrix."""
     coarse = replace(options, largest="reach", cell=EXEMPLAR_CELL * options.cell)
@@ -140,13 +141,13 @@ def _compare_exemplars(
             (tuple(edges[t] for t in frames), take_frames(track, frames), coarse, len(known))
             for frames in together
         )
-        return _compare_halves(inputs, spread)
+        return _compare_halves(inputs, parallel_map)
 
     shown = np.array([[half_of(e, half).any() for half in HALVES] for e in edges])
     may_lead = np.asarray(shown.all(axis=1) if shown.all(axis=1).any() else shown.any(axis=1))
     found = find_exemplars(compare, may_lead, options.most, progress)
     kept, track_kept = tuple(edges[t] for t in found.frames), take_frames(track, found.frames)
-    halves = spread(compare_half, ((kept, track_kept, half, options, 0) for half in HALVES))
+    halves = parallel_map(compare_half, ((kept, track_kept, half, options, 0) for half in HALVES))
     upper, lower = progress(halves, "Comparing exemplars", len(HALVES))
     return PoseDistances(
         upper=upper,
@@ -154,7 +155,7 @@ def _compare_exemplars(
         frames=found.frames,
         row=found.row,
         exemplar_distance=found.distance,
-        consecutive_distance=_measure_steps(edges, track, options, progress, spread),
+        consecutive_distance=_measure_steps(edges, track, options, progress, parallel_map),
         visibility_score=score_visibility(edges, track),
         seen=measure_seen(edges),
     )
@@ -165,19 +166,20 @@ def _measure_steps(
     track: Track,
     options: CompareOptions,
     progress: Progress,
-    spread: Spread,
+    parallel_map: ParallelMap,
 ) -> Float32[np.ndarray, "2 S"]:
     """C between each frame and the next, upper and lower body."""
     windows = [
         slice(start, start + WINDOW_FRAMES + 1) for start in range(0, len(edges) - 1, WINDOW_FRAMES)
     ]
     inputs = ((edges[window], take_frames(track, window), options, 0) for window in windows)
-    squares = progress(_compare_halves(inputs, spread), "Comparing neighbours", len(windows))
+    squares = progress(_compare_halves(inputs, parallel_map), "Comparing neighbours", len(windows))
     return np.concatenate([np.diagonal(both, 1, axis1=1, axis2=2) for both in squares], axis=1)
 
 
 def _compare_halves(
-    inputs: Iterable[tuple[tuple[Edges, ...], Track, CompareOptions, int]], spread: Spread
+    inputs: Iterable[tuple[tuple[Edges, ...], Track, CompareOptions, int]],
+    parallel_map: ParallelMap,
 ) -> Iterator[Float32[np.ndarray, "2 N T"]]:
     """C between new frames and all (`measure_matrix`), upper and lower body side by side."""
     pieces = (
@@ -185,7 +187,7 @@ def _compare_halves(
         for edges, track, options, n_known in inputs
         for half in HALVES
     )
-    compared = spread(compare_half, pieces)
+    compared = parallel_map(compare_half, pieces)
     for upper in compared:
         yield np.stack([upper, next(compared)])
 

@@ -35,8 +35,8 @@ from keyrecon.timeline import (
     part_of_marks,
     part_of_path,
     part_of_picks,
-    put_back,
-    spread_edges,
+    scatter_edges,
+    scatter_frames,
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
@@ -249,7 +249,7 @@ def _follow(
     )  # fmt: skip
     player = np.flatnonzero(linked & (joined | (track.confidence > 0)))
     if len(player) < len(edges):  # of somebody else nothing is carried
-        edges = spread_edges([edges[t] for t in player], player, len(edges))
+        edges = scatter_edges([edges[t] for t in player], player, len(edges))
     unlinked = (seen & ~linked)[verification.frames]
     return track, edges, replace(verification, unlinked=unlinked)
 
@@ -279,4 +279,4 @@ def follow_marks(
     followed = work_on_each(keep, track, marked)
     flows = [*progress(followed, "Following marks in each shot", len(marked))]
     frames = [inside[number] for number in marked]
-    return put_back(join_frames(flows), np.concatenate(frames), len(video))
+    return scatter_frames(join_frames(flows), np.concatenate(frames), len(video))

@@ -21,9 +21,9 @@ from keyrecon.timeline import (
     part_of_keyframes,
     part_of_marks,
     part_of_path,
-    spread_distances,
-    spread_edges,
-    spread_track,
+    scatter_distances,
+    scatter_edges,
+    scatter_track,
     take_frames,
 )
 
@@ -40,9 +40,9 @@ def in_file(
     shots, track, edges = followed.shots, followed.track, followed.edges
     if not all(shots.usable):
         frames, count = shots.usable_frames, len(video)
-        track = spread_track(track, frames, count)
-        edges = spread_edges(edges, frames, count)
-        distances = spread_distances(distances, frames, count)
+        track = scatter_track(track, frames, count)
+        edges = scatter_edges(edges, frames, count)
+        distances = scatter_distances(distances, frames, count)
         upper, lower = (
             restore_frames(half, frames, count) for half in (keyframes.upper, keyframes.lower)
         )

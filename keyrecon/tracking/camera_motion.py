@@ -25,11 +25,11 @@ from keyrecon.io.frame_reader import in_threads, read_grey, shrinking
 from keyrecon.io.held_video import with_exposure
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import warp_points
+from keyrecon.parallel_map import ParallelMap
 from keyrecon.progress import Progress, silent
 from keyrecon.ranges import within
 from keyrecon.records import CameraPath, Shots
 from keyrecon.segmentation.static_overlay import StaticOverlay
-from keyrecon.spreading import Spread
 from keyrecon.tracking.exposure import ExposureMeter
 from keyrecon.tracking.key_pictures import Grey, KeyPicture, Match, find_corners, match_key
 from keyrecon.tracking.shots import CutDetector, RecentPictures, find_shots
@@ -168,22 +168,21 @@ def estimate_camera_motion(
     video: Video,
     options: CameraMotionOptions = CameraMotionOptions(),
     progress: Progress = silent,
-    spread: Spread = in_threads,
+    parallel_map: ParallelMap = in_threads,
 ) -> CameraPath:
     """Homographies from every frame to the middle one of its shot, and their confidence.
 
-    Exactly the identity where the camera is static. Where the video cuts to another shot is told
-    beside it (`CameraPath.cuts`); `spread` estimates the motion in shots while the next are looked
-    for.
+    Exactly the identity where the camera is static. Cuts to other shots are in `CameraPath.cuts`;
+    `parallel_map` estimates the motion in shots while the next ones are searched for.
     """
     detector = CutDetector.at_rate(video.fps)
     # what is at hand here is not sent elsewhere, where decoding it again is cheaper
-    recent = RecentPictures(MOST_HELD if spread is in_threads else 0)
+    recent = RecentPictures(MOST_HELD if parallel_map is in_threads else 0)
     watched = recent.watch(detector.watch(_read_reduced(video, options, progress)))
     path = _estimate_motion(video, options, progress, _first_shot(watched, detector), detector)
     if not detector.cuts and not video.joints:
         return path
-    return _estimate_shots(video, options, watched, recent, detector, spread)
+    return _estimate_shots(video, options, watched, recent, detector, parallel_map)
 
 
 def _join_exposures(paths: Sequence[CameraPath]) -> Float[np.ndarray, "T"] | None:
@@ -288,7 +287,7 @@ def _estimate_shots(
     watched: Iterator[Grey],
     recent: RecentPictures,
     detector: CutDetector,
-    spread: Spread,
+    parallel_map: ParallelMap,
 ) -> CameraPath:
     """The motion in each shot, while the next ones are looked for in what is to be watched yet."""
     parts: list[slice] = []
@@ -298,7 +297,7 @@ def _estimate_shots(
             parts.append(part)
             yield video.part(part), options, recent.take(part)
 
-    moved = [*spread(estimate_shot_motion, begun())]
+    moved = [*parallel_map(estimate_shot_motion, begun())]
     known = {part.start: (part.stop, path) for part, path in zip(parts, moved, strict=True)}
     cuts = tuple(sorted({*detector.cuts, *video.joints}))
     paths = []

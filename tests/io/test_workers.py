@@ -60,7 +60,7 @@ def test_what_was_made_here_is_not_made_again_by_workers(tmp_path, processes):
 
 def test_pieces_of_a_stage_come_back_in_their_order(tmp_path, processes):
     store = StageStore(tmp_path, workers=processes)
-    made = store.spread(frames_before, ((FRAMES + n, 12) for n in range(20)))
+    made = store.parallel_map(frames_before, ((FRAMES + n, 12) for n in range(20)))
     for n, own in enumerate(made):
         np.testing.assert_array_equal(own, frames_before(FRAMES + n, 12))
     assert not list(tmp_path.iterdir())

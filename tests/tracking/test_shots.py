@@ -10,7 +10,7 @@ from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workers import open_workers
-from keyrecon.spreading import one_by_one
+from keyrecon.parallel_map import one_by_one
 from keyrecon.tracking import camera_motion
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.tracking.shots import FLASH_FRAMES, CutDetector
@@ -142,5 +142,5 @@ def test_shots_are_handed_to_workers_as_what_can_be_sent(tmp_path):
     video = open_video(tmp_path / "cut.mp4")
     with open_workers("1") as workers:
         store = StageStore(tmp_path / "cache", workers=workers)
-        elsewhere = estimate_camera_motion(video, spread=store.spread)
+        elsewhere = estimate_camera_motion(video, parallel_map=store.parallel_map)
     assert (elsewhere.to_reference == estimate_camera_motion(video).to_reference).all()

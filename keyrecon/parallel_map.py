@@ -1,7 +1,7 @@
-"""How a stage hands out pieces of its work that do not hang on one another.
+"""A map over independent pieces of a stage's work, which workers may do in parallel.
 
-By default they are done here, one after the other; the command line passes one that gives them to
-workers elsewhere.
+By default the pieces are done here, one after the other; the command line passes a map that gives
+them to workers.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -11,7 +11,7 @@ Result = TypeVar("Result")
 
 
 @runtime_checkable
-class Spread(Protocol):
+class ParallelMap(Protocol):
     """Calls a function of a module with many inputs; results in order."""
 
     def __call__(
