@@ -14,8 +14,9 @@ from keyrecon.body import Skeleton
 from keyrecon.lifting.priors.anatomy import anatomy_of, trunk_axes
 from keyrecon.numerics.bone_directions import bone_vectors
 from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.runs import list_runs
 from keyrecon.records import HalfName, Motion
-from keyrecon.uncertainty import LEAST_SECONDS, MERGED_SECONDS, list_runs
+from keyrecon.uncertainty import LEAST_SECONDS, MERGED_SECONDS
 
 MAX_HYPEREXTENSION = 20.0
 """Degrees that a knee may be bent forwards. In 38 captures of tennis, a dance, kicks and jumps, as

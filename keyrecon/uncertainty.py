@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from keyrecon.body import Skeleton
+from keyrecon.numerics.runs import list_runs
 from keyrecon.records import SOURCES, HalfName, Motion, Shots, Track
 
 MEAN_ERROR = 0.0213
@@ -314,7 +315,7 @@ def unsure_track(track: Track, shots: Shots, reach: int, count: int = 3) -> list
     runs = [
         (shot.start + first, shot.start + last)
         for shot in shots.parts
-        for first, last in list_runs(guessed[shot], 0)
+        for first, last in list_runs(guessed[shot])
         if last - first >= reach
     ]
     longest = sorted(runs, key=lambda run: run[0] - run[1])[:count]
@@ -351,16 +352,6 @@ def body_parts(skeleton: Skeleton) -> dict[str, Int[np.ndarray, "_"]]:
         "head": joints[~paired],
     }
     return {name: members for name, members in parts.items() if len(members)}
-
-
-def list_runs(flags: Bool[np.ndarray, "T"], gap: int) -> list[tuple[int, int]]:
-    """First and last frames of runs of True that are more than `gap` frames apart."""
-    frames = np.flatnonzero(flags)
-    if not len(frames):
-        return []
-    breaks = np.flatnonzero(np.diff(frames) > gap + 1)
-    firsts, lasts = frames[np.r_[0, breaks + 1]], frames[np.r_[breaks, len(frames) - 1]]
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 def _taught(doubt: Float[np.ndarray, "T"], reach: int) -> Float[np.ndarray, "T"]:

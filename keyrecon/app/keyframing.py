@@ -24,8 +24,9 @@ from keyrecon.io.held_video import hold_if_small, with_exposure
 from keyrecon.io.option_tables import check_options
 from keyrecon.io.video_writer import write_picture
 from keyrecon.io.workspace import Workspace
-from keyrecon.keyframes.absence import absent_frames, list_stretches, listed_stretches
+from keyrecon.keyframes.absence import absent_frames, format_stretches
 from keyrecon.keyframes.selection import KeyframeOptions
+from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, as_printed, marked_frames, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, MarkGains, Preparation
@@ -213,12 +214,12 @@ def _describe_absence(preparation: Preparation) -> list[str]:
     absent = absent_frames(preparation.pose_distances, reach) & preparation.track.known
     absent &= ~_unlinked_frames(preparation)
     lines = []
-    if stretches := list_stretches(absent):
-        listed = listed_stretches(stretches)
+    if stretches := list_runs(absent):
+        listed = format_stretches(stretches)
         lines.append(f"Nobody seen in frames {listed}: no keyframe is asked for there.")
     legless = np.isnan(preparation.pose_distances.seen[1]) & preparation.track.known & ~absent
-    if stretches := list_stretches(legless):
-        listed = listed_stretches(stretches)
+    if stretches := list_runs(legless):
+        listed = format_stretches(stretches)
         lines.append(
             f"Both legs out of the picture in frames {listed}: no keyframe of the lower body is "
             "asked for there."

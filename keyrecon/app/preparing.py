@@ -19,7 +19,8 @@ from keyrecon.io.formats.picks import write_picks
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.keyframes.absence import MOST_STRETCHES, list_stretches, listed_stretches
+from keyrecon.keyframes.absence import MOST_STRETCHES, format_stretches
+from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
 from keyrecon.records import (
@@ -216,7 +217,7 @@ def describe_identity(
         mark = ", ".join(str((first + last) // 2) for first, last in apart[:MOST_STRETCHES])
         lines.append(
             "The player found jumps to another place, farther than anybody moves: nothing joins "
-            f"frames {listed_stretches(apart)} to the player who was marked, so they are left "
+            f"frames {format_stretches(apart)} to the player who was marked, so they are left "
             "out, and no keyframe is asked for there. Where the player is to be seen there, mark "
             f"the body: frame {mark}."
         )
@@ -235,7 +236,7 @@ def unlinked_stretches(track: Track, verification: TrackVerification) -> list[tu
     if verification.unlinked is None:
         return []
     frames = verification.frames[verification.unlinked]
-    unseen = list_stretches(track.confidence == 0)
+    unseen = list_runs(track.confidence == 0)
     return [s for s in unseen if ((s[0] <= frames) & (frames <= s[1])).any()]
 
 

@@ -18,7 +18,7 @@ from keyrecon.io.held_video import with_exposure
 from keyrecon.io.provenance import RunNotes, camera_evidence, motion_evidence, note_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
-from keyrecon.keyframes.absence import list_stretches, listed_stretches
+from keyrecon.keyframes.absence import format_stretches
 from keyrecon.lens import (
     degrees_across,
     describe_nearness,
@@ -27,6 +27,7 @@ from keyrecon.lens import (
     lens_caveat,
 )
 from keyrecon.library import read_models, reconstruct
+from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, as_printed, with_field_of_view, with_height
 from keyrecon.progress import Progress
 from keyrecon.ranges import SHORTEST, TALLEST
@@ -147,11 +148,11 @@ def describe_unseen(motion: Motion, shots: Shots) -> list[str]:
     """A line where usable shots have frames without a figure."""
     hidden = ~motion.known
     hidden &= np.isin(np.arange(len(hidden)), shots.usable_frames)
-    stretches = list_stretches(hidden)
+    stretches = list_runs(hidden)
     if not stretches:
         return []
     return [
-        f"Nobody seen in frames {listed_stretches(stretches)}: there is no figure there. Where the "
+        f"Nobody seen in frames {format_stretches(stretches)}: there is no figure there. Where the "
         "player is there after all, mark the body."
     ]
 

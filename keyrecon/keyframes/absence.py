@@ -63,14 +63,8 @@ def shot_numbers(comparison: PoseDistances) -> Int[np.ndarray, "T"]:
     return np.append(0, np.cumsum(cut))[: len(comparison.row)]
 
 
-def list_stretches(absent: Bool[np.ndarray, "T"]) -> list[tuple[int, int]]:
-    """First and last frame of every stretch."""
-    turns = np.flatnonzero(np.diff(absent, prepend=False, append=False))
-    return [(int(first), int(end) - 1) for first, end in turns.reshape(-1, 2)]
-
-
-def listed_stretches(stretches: Sequence[tuple[int, int]]) -> str:
-    """The first stretches in words, and how many more there are."""
+def format_stretches(stretches: Sequence[tuple[int, int]]) -> str:
+    """The first stretches as text, such as "3-9, 20-31 and 2 more"."""
     listed = ", ".join(f"{first}-{last}" for first, last in stretches[:MOST_STRETCHES])
     more = len(stretches) - MOST_STRETCHES
     return f"{listed} and {more} more" if more > 0 else listed

@@ -10,12 +10,12 @@ from keyrecon.io.formats.keyframes import keyframes_from_json, keyframes_to_json
 from keyrecon.keyframes.absence import (
     absent_frames,
     legs_outside,
-    list_stretches,
     select_frames,
     without_legs,
 )
 from keyrecon.keyframes.adoption import adopt_keyframes
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
+from keyrecon.numerics.runs import list_runs
 from keyrecon.records import Track
 from keyrecon.report.sections import stands_for
 from keyrecon.segmentation.player_crops import Cropping, Crops
@@ -123,12 +123,12 @@ def test_a_player_missed_for_a_moment_is_not_away():
     assert not absent_frames(for_ten, reach=10).any()
     visibility_score[50] = 0
     for_eleven = comparison_of(poses, visibility_score=visibility_score)
-    assert list_stretches(absent_frames(for_eleven, reach=10)) == [(40, 50)]
+    assert list_runs(absent_frames(for_eleven, reach=10)) == [(40, 50)]
 
 
 def test_stretches_at_either_end_are_listed_whole():
     away = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
-    assert list_stretches(away) == [(0, 1), (3, 3), (6, 6)]
+    assert list_runs(away) == [(0, 1), (3, 3), (6, 6)]
 
 
 def test_what_a_person_marked_counts_wherever_it_is(poses):
