@@ -45,7 +45,7 @@ from keyrecon.propagation import evidence, selection
 from keyrecon.propagation.appearance import regular_frames
 from keyrecon.propagation.body_frame import stabilise_shots
 from keyrecon.propagation.edge_template import EdgeTemplates
-from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
+from keyrecon.propagation.hypotheses import MarkPredictions, PoseHypotheses
 from keyrecon.propagation.propagation import propagate_joints
 from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Annotations, FlowTracks, Preparation
@@ -202,10 +202,10 @@ def collect(known: Known, weight: float) -> dict[str, Sample]:
         templates: EdgeTemplates,
         hypotheses: PoseHypotheses,
         trunk: np.ndarray,
-        ways: MarkedWays | None,
+        predictions: MarkPredictions | None,
         silhouettes: Silhouettes,
     ) -> evidence.LimbEvidence:
-        found = original(templates, hypotheses, trunk, ways, silhouettes)
+        found = original(templates, hypotheses, trunk, predictions, silhouettes)
         half, pairs = templates.half, list(found.of_pairs)
         free = half.joints[np.concatenate(half.sides)]
         rows = np.flatnonzero(

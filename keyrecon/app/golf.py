@@ -278,7 +278,7 @@ def open_golf_project(
         if not (folder / workspace.project["video"]["path"]).is_file():
             workspace.relink(video.path)
         if slow_motion is not None and "slow_motion" not in workspace.project["video"]:
-            workspace.tell_slow_motion(slow_motion)
+            workspace.set_slow_motion(slow_motion)
         if clicks_file is not None:
             keep_clicks(workspace, clicks_file.read_bytes())
         if not workspace.is_golf:

@@ -30,7 +30,7 @@ from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, as_printed, marked_frames, with_marked_keyframes
 from keyrecon.progress import Progress
 from keyrecon.records import Annotations, HalfKeyframes, Keyframes, MarkGains, Preparation
-from keyrecon.report.drawing import point_out
+from keyrecon.report.drawing import draw_brackets
 from keyrecon.shots.following import HELD
 from keyrecon.uncertainty import unsure_track
 
@@ -253,7 +253,7 @@ def write_keyframe_pictures(
     def write(entry: tuple[int, UInt8[np.ndarray, "h w 3"]]) -> None:
         frame, picture = entry
         track, path = preparation.track, workspace.pictures / f"frame_{frame:06d}.png"
-        write_picture(path, point_out(picture, track.box[frame], track.head[frame]))
+        write_picture(path, draw_brackets(picture, track.box[frame], track.head[frame]))
 
     deque(side_by_side(write, zip(frames.tolist(), shown, strict=True)), maxlen=0)
     delete_other_pictures(workspace.pictures, frames)

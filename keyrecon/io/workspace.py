@@ -254,7 +254,7 @@ class Workspace:
         self.project = read_project(self.project_file)
         return together
 
-    def tell_slow_motion(self, factor: float) -> None:
+    def set_slow_motion(self, factor: float) -> None:
         """Keep how many times slower than life the video plays; its times stay as they are."""
         with self.exclusive():
             write_durably(self.project_file, with_slow_motion(self.project_file, factor))

@@ -241,9 +241,9 @@ def measure_matrix(
 class _Directed:
     """Mean distances of the elements of one frame to another frame, between new frames and all."""
 
-    there: Float32[np.ndarray, "N T"]
+    forward: Float32[np.ndarray, "N T"]
     """From each new frame to every frame."""
-    back: Float32[np.ndarray, "K N"]
+    backward: Float32[np.ndarray, "K N"]
     """From each known frame to every new one."""
 
 
@@ -261,17 +261,19 @@ def _accumulate(
         shape=(elements.n_frames, len(cells.center)),
     )
     known, new = members[:n_known], members[n_known:]
-    there = np.empty((n_new, elements.n_frames), dtype=np.float32)
-    back = np.empty((n_known, n_new), dtype=np.float32)
-    matched = np.empty_like(there) if options.largest == "observed" else None
+    forward = np.empty((n_new, elements.n_frames), dtype=np.float32)
+    backward = np.empty((n_known, n_new), dtype=np.float32)
+    matched = np.empty_like(forward) if options.largest == "observed" else None
 
     def measure(first: int) -> None:
         frames = range(first, min(first + FRAMES_PER_BLOCK, elements.n_frames))
-        offered = offer_distances(elements, cells, frames, reach)
-        there[:, frames.start : frames.stop] = new @ offered
+        offered = cell_distances(elements, cells, frames, reach)
+        forward[:, frames.start : frames.stop] = new @ offered
         if n_known and frames.stop > n_known:
             since = max(frames.start, n_known)
-            back[:, since - n_known : frames.stop - n_known] = known @ offered[:, since - first :]
+            backward[:, since - n_known : frames.stop - n_known] = (
+                known @ offered[:, since - first :]
+            )
         if matched is not None:
             near = (offered < np.float32(reach)).astype(np.float32)
             matched[:, frames.start : frames.stop] = new @ near
@@ -281,12 +283,12 @@ def _accumulate(
         for _ in progress(pool.map(measure, blocks), "Comparing frames", len(blocks)):
             pass
     count = np.bincount(elements.frame, minlength=elements.n_frames).astype(np.float32)
-    _take_means(there, count[n_known:], count, reach)
-    _take_means(back, count[:n_known], count[n_known:], reach)
+    _take_means(forward, count[n_known:], count, reach)
+    _take_means(backward, count[:n_known], count[n_known:], reach)
     if matched is not None:
         np.divide(matched, count[:, None], out=matched, where=count[:, None] > 0)
-        there = _with_observed_largest(there, matched, reach)
-    return _Directed(there, back)
+        forward = _with_observed_largest(forward, matched, reach)
+    return _Directed(forward, backward)
 
 
 def _take_means(
@@ -301,7 +303,7 @@ def _take_means(
     total[:, other == 0] = reach
 
 
-def offer_distances(
+def cell_distances(
     elements: BinnedElements, cells: DescriptorBins, frames: range, reach: float
 ) -> Float32[np.ndarray, "G B"]:
     """M for some frames: distance of each cell to each frame.
@@ -336,6 +338,6 @@ def _with_observed_largest(
 
 
 def _symmetric(directed: _Directed, symmetry: str) -> Float32[np.ndarray, "N T"]:
-    there, known = directed.there, len(directed.back)
-    other = np.concatenate([directed.back.T, there[:, known:].T], axis=1)
-    return np.maximum(there, other) if symmetry == "max" else (there + other) / np.float32(2)
+    forward, known = directed.forward, len(directed.backward)
+    other = np.concatenate([directed.backward.T, forward[:, known:].T], axis=1)
+    return np.maximum(forward, other) if symmetry == "max" else (forward + other) / np.float32(2)

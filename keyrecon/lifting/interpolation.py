@@ -42,7 +42,7 @@ def interpolate_poses(
         key = _key_index(half, key_frames)
         residual = reprojection_residual(flat[key][:, member], joints[:, member])
         for shot in shots.parts:
-            control = drop_controls(half, residual, keyframes.reach, shot)
+            control = choose_control_frames(half, residual, keyframes.reach, shot)
             poses = key_directions[key[control]][:, bones]
             count = shot.stop - shot.start
             directions[shot, bones] = slerp_between(poses, control - shot.start, count)
@@ -73,7 +73,7 @@ def reprojection_residual(
     return np.nanmedian(apart, axis=1)
 
 
-def drop_controls(
+def choose_control_frames(
     half: HalfKeyframes, residual: Float[np.ndarray, "T"], reach: int, shot: slice = slice(None)
 ) -> Int[np.ndarray, "u"]:
     """Represented frames of a shot that remain control points; gaps grow to `reach` at most.

@@ -26,7 +26,7 @@ from keyrecon.lifting.limb_lengths import (
 from keyrecon.lifting.motion_fitting import PlayerModel, fit_motion
 from keyrecon.lifting.perspective import (
     relative_distance,
-    seen_from_afar,
+    tracks_without_perspective,
     without_perspective,
 )
 from keyrecon.lifting.preprocessing import (
@@ -131,7 +131,7 @@ def lift_motion(
     """
     _check(tracks, annotations)
     lift = partial(
-        _lift_from_afar,
+        _lift_orthographic,
         keyframes=keyframes,
         height_px=height_px,
         fps=fps,
@@ -144,11 +144,11 @@ def lift_motion(
         return lifted
     distance = relative_distance(lifted.points3d, lifted.scale, priors.focal)
     middle = lifted.points2d.mean(axis=1)
-    lifted = lift(*seen_from_afar(tracks, annotations, middle, distance))
+    lifted = lift(*tracks_without_perspective(tracks, annotations, middle, distance))
     return replace(lifted, points2d=without_perspective(lifted.points2d, middle, 1 / distance))
 
 
-def _lift_from_afar(
+def _lift_orthographic(
     tracks: JointTracks,
     annotations: Annotations,
     keyframes: Keyframes,

@@ -44,7 +44,7 @@ def without_perspective(
     return middle[:, None] + (joints - middle[:, None]) * distance[..., None]
 
 
-def seen_from_afar(
+def tracks_without_perspective(
     tracks: JointTracks,
     annotations: Annotations,
     middle: Float[np.ndarray, "T 2"],

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from keyrecon.propagation.edge_template import AnnotatedPoses, EdgeTemplates
-from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
+from keyrecon.propagation.hypotheses import MarkPredictions, PoseHypotheses
 from keyrecon.propagation.silhouette import (
     Silhouettes,
     find_holding_hand,
@@ -133,7 +133,7 @@ def find_evidence(
     templates: EdgeTemplates,
     hypotheses: PoseHypotheses,
     trunk: Int[np.ndarray, "T"],
-    ways: MarkedWays | None,
+    predictions: MarkPredictions | None,
     silhouettes: Silhouettes | None = None,
 ) -> LimbEvidence:
     """Of all hypotheses; `trunk` is the one that the trunk has."""
@@ -141,8 +141,8 @@ def find_evidence(
     return LimbEvidence(
         (one, other),
         (
-            side_evidence(templates, hypotheses, ways, one),
-            side_evidence(templates, hypotheses, ways, other),
+            side_evidence(templates, hypotheses, predictions, one),
+            side_evidence(templates, hypotheses, predictions, other),
         ),
         pair_evidence(templates, hypotheses, trunk, (one, other), silhouettes),
     )
@@ -161,7 +161,7 @@ def weigh_evidence(half: str, evidence: LimbEvidence) -> LimbCosts:
     return LimbCosts((SCALE * one, SCALE * other), SCALE * pairs)
 
 
-def state_probabilities(costs: LimbCosts) -> tuple[Float[np.ndarray, "T S"], ...]:
+def limb_state_probabilities(costs: LimbCosts) -> tuple[Float[np.ndarray, "T S"], ...]:
     """Of the states of each side, by what is seen in a frame alone and not by the frames around it.
 
     What the weights were fitted to give: exp(-cost), so that of hypotheses that are told to be
@@ -188,7 +188,7 @@ def side_states(hypotheses: PoseHypotheses, templates: EdgeTemplates, side: int)
 def side_evidence(
     templates: EdgeTemplates,
     hypotheses: PoseHypotheses,
-    ways: MarkedWays | None,
+    predictions: MarkPredictions | None,
     states: SideStates,
 ) -> dict[str, Float[np.ndarray, "T S"]]:
     """What speaks against each state of a side."""
@@ -217,12 +217,12 @@ def side_evidence(
         "other side": of_both([np.zeros(shape), np.ones(shape)]),
         "disagreement": _disagreement(hypotheses, states),
     }
-    if ways is not None:
-        flow = np.abs(states.joints - ways.flow[:, None, own]) / FLOW_DISTANCE
-        sure = ways.flow_confidence[:, None, own]
+    if predictions is not None:
+        flow = np.abs(states.joints - predictions.flow[:, None, own]) / FLOW_DISTANCE
+        sure = predictions.flow_confidence[:, None, own]
         evidence["off flow"] = (sure * np.minimum(flow, 2)).sum(axis=2)
-        line = np.abs(states.joints - ways.lines[:, None, own]) / LINE_DISTANCE
-        near = np.exp(-ways.seconds[:, None, own] / LINE_SECONDS)
+        line = np.abs(states.joints - predictions.lines[:, None, own]) / LINE_DISTANCE
+        near = np.exp(-predictions.seconds[:, None, own] / LINE_SECONDS)
         evidence["off lines"] = (near * np.minimum(line, 2)).sum(axis=2)
     return evidence
 
@@ -275,7 +275,7 @@ def pair_evidence(
         np.broadcast_to(1 - np.eye(unexplained_edges.shape[1]), unexplained_edges.shape),
     )
     span = np.abs(one.joints[:, :, None, -1] - other.joints[:, None, :, -1])
-    yield "span", rareness(span, marked_spans(templates.poses))
+    yield "span", span_cost(span, marked_spans(templates.poses))
 
 
 def marked_spans(poses: AnnotatedPoses) -> Float[np.ndarray, "_"]:
@@ -285,7 +285,7 @@ def marked_spans(poses: AnnotatedPoses) -> Float[np.ndarray, "_"]:
     return np.abs(poses.joints[both, ends[0]] - poses.joints[both, ends[1]])
 
 
-def rareness(
+def span_cost(
     span: Float[np.ndarray, "*n"], marked: Float[np.ndarray, "_"]
 ) -> Float[np.ndarray, "*n"]:
     """What speaks against hands, or feet, that are farther apart than they were ever marked, nats.

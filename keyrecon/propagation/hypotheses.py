@@ -92,7 +92,7 @@ class PoseHypotheses:
 
 
 @dataclass(frozen=True, eq=False)
-class MarkedWays:
+class MarkPredictions:
     """Where flow and straight lines lead from marks, player coordinates."""
 
     flow: Complex[np.ndarray, "T J"]
@@ -229,10 +229,13 @@ def fit_poses(
     return replace(fitted, template=np.repeat(similar[:, None], width, axis=1))
 
 
-def follow_marks(
-    templates: EdgeTemplates, index: ElementIndex, ways: MarkedWays, similar: Int[np.ndarray, "T"]
+def fit_mark_predictions(
+    templates: EdgeTemplates,
+    index: ElementIndex,
+    predictions: MarkPredictions,
+    similar: Int[np.ndarray, "T"],
 ) -> PoseHypotheses:
     """Two hypotheses per frame: where flow leads as it is, and straight lines fitted to edges."""
-    flow = fit_poses(templates, index, ways.joints[:, None], similar, ())
-    lines = fit_poses(templates, index, ways.lines[:, None], similar)
+    flow = fit_poses(templates, index, predictions.joints[:, None], similar, ())
+    lines = fit_poses(templates, index, predictions.lines[:, None], similar)
     return join_hypotheses(flow, lines)

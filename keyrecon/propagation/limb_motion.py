@@ -134,7 +134,7 @@ def _filter_gains(
 class _FootMotion:
     """How feet move from one frame to the next."""
 
-    change: Float[np.ndarray, "2 2"]
+    transition: Float[np.ndarray, "2 2"]
     """Probability of each motion (second axis) after each (first axis)."""
     noise: Float[np.ndarray, "2 2 2"]
     """Of place and velocity in a step of each motion."""
@@ -144,16 +144,16 @@ class _FootMotion:
     @classmethod
     def of(cls, spread: float, fps: float) -> "_FootMotion":
         """`spread` is the standard deviation of the second difference of a swinging foot."""
-        change = min(1 / (PHASE_SECONDS * fps), 0.5)
+        transition = min(1 / (PHASE_SECONDS * fps), 0.5)
         standing = np.diag([(STANDING_DRIFT / fps) ** 2, 0.0])
         swinging = _process_noise(np.array([spread]))[0]
         return cls(
-            np.array([[1 - change, change], [change, 1 - change]]),
+            np.array([[1 - transition, transition], [transition, 1 - transition]]),
             np.stack([standing, swinging]),
             SWINGING_SPEED / fps,
         )
 
-    def enter(
+    def predict(
         self, state: Complex[np.ndarray, "*n 2 2"], covariance: Float[np.ndarray, "*n 2 2 2"]
     ) -> tuple[Complex[np.ndarray, "*n 2 2 2"], Float[np.ndarray, "*n 2 2 2 2"]]:
         """The same feet one frame later by each motion (first) that follows on each (second).
@@ -169,7 +169,7 @@ class _FootMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class _FootBelief:
+class _FootEstimate:
     """Place and velocity of feet by either motion, and how probable that motion is."""
 
     state: Complex[np.ndarray, "*n 2 2"]
@@ -187,7 +187,7 @@ def foot_exchange_cost(
     """
     motion = _FootMotion.of(spread, fps)
     both = _filter_feet(np.concatenate([feet, feet[::-1]], axis=1), motion)
-    ahead = motion.enter(both.state[:-1, :2], both.covariance[:-1, :2])
+    ahead = motion.predict(both.state[:-1, :2], both.covariance[:-1, :2])
     back = both.state[::-1, 2:][1:] * REVERSE
     back_spread = both.covariance[::-1, 2:][1:] * np.outer(REVERSE, REVERSE)
     # of a foot that stands afterwards, the velocity before is not asked
@@ -196,7 +196,7 @@ def foot_exchange_cost(
     gap = ahead[0][:, :, None] - back[:, None, :, :, None]
     total = ahead[1][:, :, None] + back_spread[:, None, :, :, None]
     one, other = both.probability[:-1, :2], both.probability[::-1, 2:][1:]
-    chance = one[:, :, None, None] * motion.change.T * other[:, None, :, :, None]
+    chance = one[:, :, None, None] * motion.transition.T * other[:, None, :, :, None]
     square = np.einsum("...a,...ab,...b->...", gap.conj(), np.linalg.inv(total), gap).real
     fit = np.log(np.maximum(chance, LEAST)) - _tail(square) - np.log(np.linalg.det(total))
     likely = np.logaddexp.reduce(fit, axis=(3, 4))
@@ -204,7 +204,7 @@ def foot_exchange_cost(
     return MOTION_WEIGHT * (straight - crossed)
 
 
-def _filter_feet(feet: Complex[np.ndarray, "T f"], motion: _FootMotion) -> _FootBelief:
+def _filter_feet(feet: Complex[np.ndarray, "T f"], motion: _FootMotion) -> _FootEstimate:
     """What all frames up to each say of every foot, by interacting multiple models."""
     count = feet.shape[1]
     state = np.zeros((count, 2, 2), complex)
@@ -212,12 +212,12 @@ def _filter_feet(feet: Complex[np.ndarray, "T f"], motion: _FootMotion) -> _Foot
     covariance = np.zeros((count, 2, 2, 2))
     covariance[..., 0, 0], covariance[:, SWINGING, 1, 1] = PLACE_SPREAD**2, motion.speed**2
     probability = np.full((count, 2), 0.5)
-    beliefs = [(state, covariance, probability)]
+    estimates = [(state, covariance, probability)]
     for places in feet[1:]:
-        before = probability[:, None] * motion.change.T
+        before = probability[:, None] * motion.transition.T
         probability = before.sum(axis=2)
         share = (before / probability[..., None])[..., None]
-        states, covariances = motion.enter(state, covariance)
+        states, covariances = motion.predict(state, covariance)
         state = (share * states).sum(axis=2)
         apart = states - state[:, :, None]
         covariances += (apart[..., None] * apart[..., None, :].conj()).real
@@ -229,5 +229,5 @@ def _filter_feet(feet: Complex[np.ndarray, "T f"], motion: _FootMotion) -> _Foot
         covariance = covariance - gain[..., None] * covariance[..., :1, :]
         fit = np.log(probability) - _tail(np.abs(gap) ** 2 / variance) - np.log(variance)
         probability = np.exp(fit - np.logaddexp.reduce(fit, axis=1)[:, None])
-        beliefs.append((state, covariance, np.maximum(probability, LEAST)))
-    return _FootBelief(*(np.stack(parts) for parts in zip(*beliefs, strict=True)))
+        estimates.append((state, covariance, np.maximum(probability, LEAST)))
+    return _FootEstimate(*(np.stack(parts) for parts in zip(*estimates, strict=True)))

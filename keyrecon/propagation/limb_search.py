@@ -109,7 +109,7 @@ def _score_limbs(
     return residual.reshape(limbs.shape[:2])
 
 
-def search_by_looks(
+def search_by_appearance(
     appearance: JointAppearance,
     colors: BoneColors,
     poses: AnnotatedPoses,

@@ -10,7 +10,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.propagation.body_frame import BodyFrame, PlayerMarks
 from keyrecon.propagation.edge_template import AnnotatedPoses
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.hypotheses import MarkedWays
+from keyrecon.propagation.hypotheses import MarkPredictions
 from keyrecon.records import FlowTracks, HalfName, PoseDistances, Preparation
 
 LEAST_MARKED = 0.5
@@ -62,14 +62,14 @@ def distances_to(
     return result
 
 
-def find_ways(
+def predict_from_marks(
     marks: PlayerMarks,
     flow: FlowTracks | None,
     body_frame: BodyFrame,
     half: BodyHalf,
     fixed: Complex[np.ndarray, "T G"],
     preparation: Preparation,
-) -> MarkedWays:
+) -> MarkPredictions:
     """Joints of one half where flow and straight lines in time lead from the marks of a shot.
 
     Without a mark in its shot a joint is where the nearest one in another is, and that is worth
@@ -95,7 +95,7 @@ def find_ways(
         sure = np.isfinite(flowed) & flow.joined[:, half.joints]
         followed[sure] = flowed[sure]
         confidence[sure] = flow.confidence[:, half.joints][sure]
-    return MarkedWays(followed, confidence, lines, seconds)
+    return MarkPredictions(followed, confidence, lines, seconds)
 
 
 def nearest_distance(

@@ -50,12 +50,12 @@ from keyrecon.propagation.evidence import COLOR_EVIDENCE, WEIGHTS
 from keyrecon.propagation.flow_agreement import with_flow
 from keyrecon.propagation.half_body import split_body
 from keyrecon.propagation.hypotheses import (
-    MarkedWays,
+    MarkPredictions,
     PoseHypotheses,
     fit_limbs,
+    fit_mark_predictions,
     fit_poses,
     fit_similar,
-    follow_marks,
     join_hypotheses,
     track_from_keyframes,
 )
@@ -66,8 +66,8 @@ from keyrecon.propagation.limb_identity import (
     identify_in_shots,
     template_log_odds,
 )
-from keyrecon.propagation.limb_search import search_by_edges, search_by_looks
-from keyrecon.propagation.marked_poses import distances_to, find_ways, gather_poses
+from keyrecon.propagation.limb_search import search_by_appearance, search_by_edges
+from keyrecon.propagation.marked_poses import distances_to, gather_poses, predict_from_marks
 from keyrecon.propagation.registration import ChosenHypotheses
 from keyrecon.propagation.selection import choose_limbs
 from keyrecon.propagation.silhouette import (
@@ -145,7 +145,7 @@ class HalfStart:
     """Pose distance of every frame to the annotated ones, player heights."""
     fixed: Complex[np.ndarray, "T G"]
     """Joints that the other half has estimated."""
-    ways: MarkedWays
+    predictions: MarkPredictions
     """Where flow and straight lines lead from marks."""
     arms: ArmEvidence | None = None
     """What the whole body says of its arms, which are propagated after the legs."""
@@ -277,7 +277,7 @@ def _start_half(
         at[:, None] - at[poses.frames],
         distances_to(preparation.pose_distances, half.name, poses.frames),
         fixed,
-        find_ways(player.marks, player.flow, player.body_frame, half, fixed, preparation),
+        predict_from_marks(player.marks, player.flow, player.body_frame, half, fixed, preparation),
     )
 
 
@@ -300,14 +300,16 @@ def propagate_half(
         trunk, count = fitted.best_joints, LIMB_HYPOTHESES
         limbs = search_by_edges(templates, index, trunk, count)
         parts = [fit_limbs(templates, index, fitted, limbs)]
-        parts.append(follow_marks(templates, index, start.ways, nearest))
+        parts.append(fit_mark_predictions(templates, index, start.predictions, nearest))
         searched = [search_by_silhouette(player.silhouettes, poses, trunk)]
         if half.middle:
-            searched.append(search_by_looks(appearance, colors, poses, trunk, count))
+            searched.append(search_by_appearance(appearance, colors, poses, trunk, count))
         parts += [fit_poses(templates, index, p, nearest) for p in searched if p.shape[1]]
     hypotheses = join_hypotheses(fitted, tracked.result(), *parts)
-    hypotheses = _with_looks(hypotheses, appearance, colors)
-    limbs_chosen = choose_limbs(templates, hypotheses, shots, fps, start.ways, player.silhouettes)
+    hypotheses = _with_appearance(hypotheses, appearance, colors)
+    limbs_chosen = choose_limbs(
+        templates, hypotheses, shots, fps, start.predictions, player.silhouettes
+    )
     limbs_chosen.joints[:, half.fixed] = start.fixed
     log_odds = template_log_odds(half, limbs_chosen.joints, fitted.joints, fps)
     if half.name == "upper":
@@ -329,7 +331,7 @@ def propagate_half(
     return PropagatedHalf(joints, confidence, template, elsewhere, identity.exchange_evidence)
 
 
-def _with_looks(
+def _with_appearance(
     hypotheses: PoseHypotheses, appearance: JointAppearance, colors: BoneColors
 ) -> PoseHypotheses:
     """The same with how unlike marks they look."""

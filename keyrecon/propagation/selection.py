@@ -20,11 +20,11 @@ from keyrecon.propagation.evidence import (
     LimbCosts,
     SideStates,
     find_evidence,
-    state_probabilities,
+    limb_state_probabilities,
     weigh_evidence,
 )
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.propagation.hypotheses import MarkedWays, PoseHypotheses
+from keyrecon.propagation.hypotheses import MarkPredictions, PoseHypotheses
 from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Shots
 
@@ -59,7 +59,7 @@ class LimbStates:
     first: frozenset[int] = frozenset()
     """Frames that shots begin with: any state follows on any other there."""
 
-    def steps(self, t: int) -> Float[np.ndarray, "S S"]:
+    def transition_costs(self, t: int) -> Float[np.ndarray, "S S"]:
         """Cost of going from each state of frame t - 1 to each of frame t."""
         if t in self.first:
             return np.zeros((self.joints.shape[1], self.joints.shape[1]))
@@ -107,7 +107,7 @@ def choose_limbs(
     hypotheses: PoseHypotheses,
     shots: Shots,
     fps: float,
-    ways: MarkedWays | None = None,
+    predictions: MarkPredictions | None = None,
     silhouettes: Silhouettes | None = None,
 ) -> ChosenLimbs:
     """The cheapest limbs of every frame."""
@@ -117,7 +117,7 @@ def choose_limbs(
     unlikeness = hypotheses.unlikeness[:, 0].copy()
     trunk = _choose_trunk(templates, hypotheses, shots, fps)
     middle = half.middle
-    evidence = find_evidence(templates, hypotheses, trunk, ways, silhouettes)
+    evidence = find_evidence(templates, hypotheses, trunk, predictions, silhouettes)
     costs = weigh_evidence(half.name, evidence)
     joints[:, middle] = hypotheses.joints[frames, trunk][:, middle]
     joints[templates.poses.frames[:, None], middle] = templates.poses.joints[:, middle]
@@ -134,11 +134,11 @@ def choose_limbs(
     of_one, of_other = (
         LimbProbabilities(np.array(group), state.joints, probability)
         for group, state, probability in zip(
-            half.sides, (one, other), state_probabilities(weighed), strict=True
+            half.sides, (one, other), limb_state_probabilities(weighed), strict=True
         )
     )
     for state, group, path in zip(
-        (one, other), half.sides, choose_two(one, other, clash), strict=True
+        (one, other), half.sides, choose_limb_pair(one, other, clash), strict=True
     ):
         joints[:, group] = state.joints[frames, path]
         unlikeness[..., group] = state.unlikeness[frames, path]
@@ -164,7 +164,7 @@ def _choose_trunk(
     joints = _with_annotations(templates, hypotheses.joints[:, :, members], half.middle)
     unlikeness = hypotheses.unlikeness[..., members]
     spread = _step_spread(half, members, fps)
-    return choose_one(LimbStates(joints, cost, unlikeness, spread, frozenset(shots.first)))
+    return choose_limb(LimbStates(joints, cost, unlikeness, spread, frozenset(shots.first)))
 
 
 def _with_annotations(
@@ -252,12 +252,12 @@ def _breadth_costs(
     return cost
 
 
-def choose_one(states: LimbStates) -> Int[np.ndarray, "T"]:
+def choose_limb(states: LimbStates) -> Int[np.ndarray, "T"]:
     """Cheapest path of one limb."""
-    return find_cheapest_path(list(states.cost), lambda _, t: states.steps(t))
+    return find_cheapest_path(list(states.cost), lambda _, t: states.transition_costs(t))
 
 
-def choose_two(
+def choose_limb_pair(
     one: LimbStates, other: LimbStates, clash: Float[np.ndarray, "T S S"]
 ) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "T"]]:
     """Cheapest paths of both sides together; `clash` is the cost of pairs of states.
@@ -272,7 +272,7 @@ def choose_two(
 
     def transition(_: int, turn: int) -> Float[np.ndarray, "S 1 S"]:
         side = one if turn % 2 else other
-        return side.steps((turn + 1) // 2)[:, None]
+        return side.transition_costs((turn + 1) // 2)[:, None]
 
     path = find_cheapest_path(unary, transition)
     return path[::2], path[1::2]

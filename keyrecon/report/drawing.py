@@ -190,7 +190,7 @@ def _fixed_point(points: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
     return np.round(np.clip(points, -30000, 30000) * 2**SUBPIXEL).astype(np.int32)
 
 
-def point_out(
+def draw_brackets(
     picture: UInt8[np.ndarray, "h w 3"], box: Float[np.ndarray, "4"], head: Float[np.ndarray, "2"]
 ) -> UInt8[np.ndarray, "h w 3"]:
     """A copy of a picture with brackets at the corners of a player's box (x0, y0, x1, y1), px, and

@@ -40,12 +40,12 @@ from keyrecon.timeline import (
 )
 from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.mark_flow import FlowOptions, track_marked_joints
-from keyrecon.tracking.scale import SizeEvidence, measured
+from keyrecon.tracking.scale import SizeEvidence, with_standing_height
 from keyrecon.tracking.shot_sorting import (
+    PlayerDetection,
     ShotOptions,
-    Sighting,
+    detect_in_shot,
     numbered_shots,
-    sight_player,
     sort_shots,
 )
 from keyrecon.tracking.tracker import TrackOptions, track_player
@@ -110,7 +110,7 @@ class _Shot:
         joined = replace(track, confidence=track.confidence * linked)
         window = round(envelope * self.video.fps)
         evidence = SizeEvidence.of(self.camera, self.video, self.anchors)
-        return measured(joined, evidence, window, joined.confidence > 0)
+        return with_standing_height(joined, evidence, window, joined.confidence > 0)
 
 
 def follow_player(
@@ -138,30 +138,30 @@ def follow_player(
         )  # fmt: skip
         return FollowedPlayer(shots, *_follow(only, detected, options, keep, progress))
     each = [_shot(part, video, camera, colors, clicks, anchors) for part in shots.parts]
-    sightings = _sight_each(each, asked, options.find, keep, progress)
+    detections = _detect_each(each, asked, options.find, keep, progress)
     picked = np.array([bool(shot.picks) for shot in each])
-    shots = sort_shots(shots, sightings, picked, video.fps, options.shots, camera.dissolves)
+    shots = sort_shots(shots, detections, picked, video.fps, options.shots, camera.dissolves)
     usable = np.flatnonzero(shots.usable).tolist()
-    found = [_found(sightings[number]) for number in usable]
+    found = [_found(detections[number]) for number in usable]
     followed = _follow_each([each[number] for number in usable], found, options, keep, progress)
     return FollowedPlayer(shots, *followed)
 
 
-def _sight_each(
+def _detect_each(
     shots: Sequence[_Shot],
     asked: set[int],
     options: FindOptions,
     keep: Keep,
     progress: Progress,
-) -> list[Sighting]:
+) -> list[PlayerDetection]:
     """What was found of the player in each shot; in those that are `asked` for by number a person
     vouches for the player, however few frames show the head."""
 
-    def sight(number: int) -> Sighting:
+    def sight(number: int) -> PlayerDetection:
         shot = shots[number]
         shown = hold_if_small(shot.video, HELD)
         return keep(
-            f"find{shot.name}", sight_player, shown, shot.colors, shot.camera, shot.anchors,
+            f"find{shot.name}", detect_in_shot, shown, shot.colors, shot.camera, shot.anchors,
             options=replace(options, detected=0.0) if number in asked else options,
             progress=silent,
         )  # fmt: skip
@@ -170,7 +170,7 @@ def _sight_each(
     return [*progress(looked, "Looking for the player in each shot", len(shots))]
 
 
-def _found(sighting: Sighting) -> Track:
+def _found(sighting: PlayerDetection) -> Track:
     assert sighting.track is not None  # a usable shot has one
     return sighting.track
 

@@ -40,7 +40,7 @@ from keyrecon.tracking.foot_pairs import (
     foot_pose_cost,
 )
 from keyrecon.tracking.linking import MAX_GAP_SECONDS
-from keyrecon.tracking.scale import SizeEvidence, measured
+from keyrecon.tracking.scale import SizeEvidence, with_standing_height
 from keyrecon.tracking.smoothing import (
     fill_gaps,
     state_confidence,
@@ -206,7 +206,7 @@ def _link(
     # Places that were missed are on the way between those that were not, of head and feet each by
     # itself: a head that jumps to somebody else and feet that stay are no body.
     found = np.interp(np.arange(len(head)), numbers, (chosen >= 0) & (taken >= 0)) == 1
-    return measured(track, evidence, frames, found)
+    return with_standing_height(track, evidence, frames, found)
 
 
 def _pair(

@@ -107,7 +107,7 @@ def standing_height(
     return np.interp(np.arange(len(head)), known, smooth) * magnification
 
 
-def measured(
+def with_standing_height(
     track: Track, evidence: SizeEvidence, frames: int, seen: Bool[np.ndarray, "T"]
 ) -> Track:
     """The track with standing height and box by the frames in which the player was `seen`, and

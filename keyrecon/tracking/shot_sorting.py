@@ -76,7 +76,7 @@ class ShotOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class PlayerDetection:
     """What was found of the player in one shot."""
 
     track: Track | None
@@ -91,24 +91,24 @@ class Sighting:
     """Share of the frames that show the picture of the one before."""
 
 
-def sight_player(
+def detect_in_shot(
     video: Video,
     colors: Colors,
     camera: CameraPath,
     anchors: TrackAnchors,
     options: FindOptions = FindOptions(),
     progress: Progress = silent,
-) -> Sighting:
+) -> PlayerDetection:
     """Look for the player in one shot of several: there may be none."""
     nothing = np.zeros((0, len(colors.names) + 1, *CELLS), np.float32)
     plain, repeated = _look_over(video)
     if plain:
-        return Sighting(None, "", nothing, plain, repeated)
+        return PlayerDetection(None, "", nothing, plain, repeated)
     try:
         track = find_player(video, colors, camera, anchors, options, progress)
     except KeyreconError as missing:
-        return Sighting(None, str(missing), nothing, plain, repeated)
-    return Sighting(track, "", _layouts(video, colors, track), plain, repeated)
+        return PlayerDetection(None, str(missing), nothing, plain, repeated)
+    return PlayerDetection(track, "", _layouts(video, colors, track), plain, repeated)
 
 
 def _look_over(video: Video) -> tuple[bool, float]:
@@ -144,7 +144,7 @@ def _layouts(video: Video, colors: Colors, track: Track) -> Float[np.ndarray, "n
 
 def sort_shots(
     shots: Shots,
-    sightings: Sequence[Sighting],
+    detections: Sequence[PlayerDetection],
     picked: Bool[np.ndarray, "S"],
     fps: float,
     options: ShotOptions = ShotOptions(),
@@ -155,12 +155,12 @@ def sort_shots(
 
     Raises KeyreconError where a person's shot is asked for that is none, or where no shot is left.
     """
-    likeness = _likeness(sightings, picked)
-    repeats = [seen.repeated for seen, tell in zip(sightings, picked, strict=True) if tell]
+    likeness = _likeness(detections, picked)
+    repeats = [seen.repeated for seen, tell in zip(detections, picked, strict=True) if tell]
     usual = float(np.median(repeats)) if repeats else 0.0
     used, skipped = (numbered_shots(text, len(picked)) for text in (options.use, options.skip))
     shows = []
-    for number, (part, seen) in enumerate(zip(shots.parts, sightings, strict=True)):
+    for number, (part, seen) in enumerate(zip(shots.parts, detections, strict=True)):
         if number in skipped:
             shows.append("left out by --shots.skip")
         elif number in used or picked[number]:
@@ -179,19 +179,19 @@ def sort_shots(
             shows.append(PLAYER if likeness[number] >= options.alike else "somebody else")
     if PLAYER not in shows:
         first = next(
-            s for s, tell in zip(sightings, picked, strict=True) if tell or not picked.any()
+            s for s, tell in zip(detections, picked, strict=True) if tell or not picked.any()
         )
         raise KeyreconError(f"No shot of the video shows the player. {first.why}".strip())
     return Shots(shots.first, shots.n_frames, tuple(shows))
 
 
 def _likeness(
-    sightings: Sequence[Sighting], picked: Bool[np.ndarray, "S"]
+    detections: Sequence[PlayerDetection], picked: Bool[np.ndarray, "S"]
 ) -> Float[np.ndarray, "S"]:
     """Of each shot with those that a person told of, relative to what these have themselves."""
-    known = [s.layout for s, tell in zip(sightings, picked, strict=True) if tell and len(s.layout)]
+    known = [s.layout for s, tell in zip(detections, picked, strict=True) if tell and len(s.layout)]
     if not known:
-        return np.ones(len(sightings))
+        return np.ones(len(detections))
     usual = np.concatenate(known)
     expected = _centred(np.median(usual, axis=0)[None])[0]
     reference = float(np.median(_centred(usual) @ expected))
@@ -200,7 +200,7 @@ def _likeness(
             float(np.median(_centred(s.layout) @ expected)) / max(reference, 1e-6)
             if len(s.layout)
             else 0.0
-            for s in sightings
+            for s in detections
         ]
     )
 

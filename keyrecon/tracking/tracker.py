@@ -46,7 +46,7 @@ from keyrecon.tracking.linking import (
     link_head,
 )
 from keyrecon.tracking.radial_symmetry import find_peaks
-from keyrecon.tracking.scale import SizeEvidence, measured
+from keyrecon.tracking.scale import SizeEvidence, with_standing_height
 from keyrecon.tracking.visibility import is_visible
 
 Record = TypeVar("Record", Crops, Track)
@@ -283,14 +283,14 @@ def _link(
     confidence = np.sqrt(head_confidence * np.where(cut, head_confidence, feet_confidence))
     window = round(options.envelope * fps)
     rough = Track(head, feet, frames.rough.height, frames.rough.box, confidence)
-    track = measured(rough, frames.evidence, window, np.ones(len(head), dtype=bool))
+    track = with_standing_height(rough, frames.evidence, window, np.ones(len(head), dtype=bool))
     # beyond the edge of the picture nothing is seen
     strip = replace(track, feet=np.minimum(track.feet, (np.inf, frames.evidence.rows - 1)))
     visible = is_visible(frames.crops, cropping, strip, frames.rough.confidence > 0)
     if visible.all():
         return track
     track = replace(rough, confidence=confidence * visible)
-    return measured(track, frames.evidence, window, visible)
+    return with_standing_height(track, frames.evidence, window, visible)
 
 
 def detect_in_crop(

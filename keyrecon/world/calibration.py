@@ -26,7 +26,7 @@ from keyrecon.world.clicked_points import (
     ContradictoryClicks,
     camera_from_points,
     check_click,
-    click_blame,
+    describe_wrong_click,
 )
 from keyrecon.world.court import CourtModel, CourtOptions, tennis_court
 from keyrecon.world.court_finding import (
@@ -41,9 +41,9 @@ from keyrecon.world.court_finding import (
 )
 from keyrecon.world.court_tracking import (
     TrackedViews,
-    between,
-    carried,
+    carry_camera,
     check_still,
+    homography_between,
     is_seen,
     track_court,
 )
@@ -282,7 +282,9 @@ def _likely_frames(pictures: _Pictures, clicks: Sequence[CourtClick]) -> Iterato
 def _clicked(pictures: _Pictures, clicks: Sequence[CourtClick], frame: int) -> ClickedPixels:
     """All clicks as they would lie in one frame."""
     pixels = [
-        warp_points(between(pictures.path, click.frame, frame), np.array([click.x, click.y]))
+        warp_points(
+            homography_between(pictures.path, click.frame, frame), np.array([click.x, click.y])
+        )
         for click in clicks
     ]
     return ClickedPixels(tuple(click.name for click in clicks), np.array(pixels))
@@ -327,7 +329,7 @@ def _against_lines(
     wrong = int(away.argmax())
     if away[wrong] <= TOLERANCE or (np.delete(away, wrong) > TOLERANCE).any():
         return None
-    return ContradictoryClicks(click_blame(clicked.names[wrong], away[wrong]))
+    return ContradictoryClicks(describe_wrong_click(clicked.names[wrong], away[wrong]))
 
 
 def _fit_together(
@@ -340,7 +342,9 @@ def _fit_together(
     for frame in [] if pictures.still else others:
         grey = pictures.at(frame)
         nearest = min(range(len(frames)), key=lambda k: abs(frames[k] - frame))
-        guess = carried(cameras[nearest], between(pictures.path, frames[nearest], frame))
+        guess = carry_camera(
+            cameras[nearest], homography_between(pictures.path, frames[nearest], frame)
+        )
         fit = fit_lines(grey, guess, court, free=FIXED_CENTRE, spread=LOOSE)
         if not is_seen(fit) and anew:
             anew -= 1

@@ -125,7 +125,7 @@ def _contradiction(
                 blame.append((float(error.max()), k, float(away)))
         if blame:
             _, k, away = min(blame)
-            return click_blame(names[k], away / shape[1])
+            return describe_wrong_click(names[k], away / shape[1])
         return "The clicks contradict one another, more than one of them; click them again."
     return (
         f"The {len(names)} clicks ({', '.join(names)}) contradict one another; check their names, "
@@ -133,7 +133,7 @@ def _contradiction(
     )
 
 
-def click_blame(name: str, away: float) -> str:
+def describe_wrong_click(name: str, away: float) -> str:
     """What is said of a click that lies so many widths of the picture beside its point."""
     far = f"{away:.1%} of the picture's width away" if away < 1 else "far outside the picture"
     return (

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, UInt8
 from keyrecon.io.frame_reader import reduce_picture
 from keyrecon.world.clicked_points import TOLERANCE, point_errors
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, CourtModel
-from keyrecon.world.court_hypotheses import guess_cameras, views_differ
+from keyrecon.world.court_hypotheses import find_camera_hypotheses, views_differ
 from keyrecon.world.line_fit import LineFit, evaluate, fit_lines
 from keyrecon.world.line_measurement import measure_offsets
 from keyrecon.world.line_pixels import find_line_pixels, find_lines
@@ -93,7 +93,7 @@ def find_in_picture(
     scale = grey.shape[1] / small.shape[1]
     pixels = find_line_pixels(small)
     lines = find_lines(pixels, small.shape, MOST_LINES)
-    guesses = guess_cameras(lines, pixels, court, small.shape, MOST_GUESSES)
+    guesses = find_camera_hypotheses(lines, pixels, court, small.shape, MOST_GUESSES)
     fits = [fit_lines(grey, guess.camera.resized(scale), court) for guess in guesses]
     fits = [fit for fit in fits if fit.camera.centre[2] > LOWEST and len(fit.residual)]
     if clicks is not None:

@@ -45,7 +45,7 @@ MOST_GUESSES = 400_000
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
+class CameraHypothesis:
     """A camera for one picture, and how much speaks for it."""
 
     camera: Pinhole
@@ -53,13 +53,13 @@ class Guess:
     """Log likelihood ratio against line pixels lying anywhere."""
 
 
-def guess_cameras(
+def find_camera_hypotheses(
     lines: list[ImageLine],
     pixels: LinePixels,
     court: CourtModel,
     shape: tuple[int, int],
     count: int,
-) -> list[Guess]:
+) -> list[CameraHypothesis]:
     """The `count` best guesses that differ, best first."""
     if len(lines) < 4:
         return []
@@ -72,14 +72,14 @@ def guess_cameras(
     order = np.argsort(-scores)[: 12 * count]
     finer = score_homographies(homographies[order], pixels, court, 2)
     order = order[np.argsort(-finer)]
-    guesses: list[Guess] = []
+    guesses: list[CameraHypothesis] = []
     for k, score in zip(order, -np.sort(-finer), strict=True):
         camera = pinhole_from_homography(homographies[k], principal, float(focal[k]))
         away = float(np.linalg.norm(camera.centre[:2]))
         if not (0.3 < camera.centre[2] < HIGHEST and away < FARTHEST):
             continue
         if all(views_differ(camera, other.camera, shape) for other in guesses):
-            guesses.append(Guess(camera, float(score)))
+            guesses.append(CameraHypothesis(camera, float(score)))
         if len(guesses) == count:
             break
     return guesses

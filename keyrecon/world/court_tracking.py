@@ -47,7 +47,7 @@ class TrackedViews:
     found: np.ndarray
 
 
-def carried(camera: Pinhole, homography: Float[np.ndarray, "3 3"]) -> Pinhole:
+def carry_camera(camera: Pinhole, homography: Float[np.ndarray, "3 3"]) -> Pinhole:
     """The camera of another frame, from the homography of the picture into that frame's."""
     shift = np.array([[1, 0, -camera.principal[0]], [0, 1, -camera.principal[1]], [0, 0, 1.0]])
     moved = shift @ homography @ np.linalg.inv(shift)
@@ -59,7 +59,7 @@ def carried(camera: Pinhole, homography: Float[np.ndarray, "3 3"]) -> Pinhole:
     return replace(camera, focal=focal, rotation=left @ right)
 
 
-def between(path: CameraPath, start: int, end: int) -> Float[np.ndarray, "3 3"]:
+def homography_between(path: CameraPath, start: int, end: int) -> Float[np.ndarray, "3 3"]:
     """Homography from the pixels of one frame to those of another."""
     homography = np.linalg.solve(path.to_reference[end], path.to_reference[start])
     return homography / homography[2, 2]
@@ -120,10 +120,10 @@ def _follow(
     grey: Grey, path: CameraPath, t: int, nearest: _Neighbours, court: CourtModel
 ) -> LineFit:
     """The camera of frame t from that of the nearest one known."""
-    guess = carried(nearest.cameras[0], between(path, nearest.frame, t))
+    guess = carry_camera(nearest.cameras[0], homography_between(path, nearest.frame, t))
     guesses = [guess, nearest.cameras[0]]
     if len(nearest.cameras) > 1:
-        guesses.append(_going_on(nearest.cameras[1], nearest.cameras[0]))
+        guesses.append(_extrapolated(nearest.cameras[1], nearest.cameras[0]))
     spread = _spread(guess, path, nearest.frame, t)
     fit = _correct(grey, guesses, court, spread)
     if not is_seen(fit):
@@ -131,7 +131,7 @@ def _follow(
     return fit
 
 
-def _going_on(before: Pinhole, last: Pinhole) -> Pinhole:
+def _extrapolated(before: Pinhole, last: Pinhole) -> Pinhole:
     """The camera that turns and zooms on as it did between the last two frames."""
     turn = last.rotation @ before.rotation.T
     return replace(last, focal=last.focal**2 / before.focal, rotation=turn @ last.rotation)

@@ -15,7 +15,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.records import CameraPath, Motion
 from keyrecon.world.clicked_points import CLICK_NOISE
-from keyrecon.world.court_tracking import between, carried
+from keyrecon.world.court_tracking import carry_camera, homography_between
 from keyrecon.world.ground_evidence import (
     LEANING,
     GroundState,
@@ -173,7 +173,7 @@ def _camera_in_frames(
     first = np.flatnonzero(moves)
     for start, end in zip(first, np.append(first[1:], len(usable)), strict=True):
         if usable[start]:
-            view = carried(camera, between(path, frame, int(start)))
+            view = carry_camera(camera, homography_between(path, frame, int(start)))
             yield slice(int(start), int(end)), view
 
 

@@ -212,6 +212,6 @@ def lean_residuals(camera: Pinhole, stances: Stances, lean: float) -> Float[np.n
     return np.arctan2(cross, (up * way).sum(axis=1)) - lean
 
 
-def robust(residuals: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+def cauchy_residuals(residuals: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
     """Residuals whose squares are Cauchy's loss."""
     return OUTLIERS * np.sign(residuals) * np.sqrt(np.log1p((residuals / OUTLIERS) ** 2))

@@ -19,9 +19,9 @@ from keyrecon.world.ground_evidence import (
     GroundState,
     MarkedEnds,
     Stances,
+    cauchy_residuals,
     lean_residuals,
     mark_residuals,
-    robust,
     size_residuals,
 )
 
@@ -62,7 +62,7 @@ class GroundEvidence:
             once = 1 / np.sqrt(SIZE_MEMORY)
             sizes = size_residuals(camera, self.stances, state.log_size) / self.noise
             leans = lean_residuals(camera, self.stances, state.lean) / LEAN
-            parts += [once * robust(sizes), once * robust(leans)]
+            parts += [once * cauchy_residuals(sizes), once * cauchy_residuals(leans)]
         return np.concatenate(parts)
 
 
@@ -72,7 +72,7 @@ class GroundPosterior:
 
     weight: Float[np.ndarray, "n"]
     mean: Float[np.ndarray, "n 6"]
-    root: Float[np.ndarray, "n 5 5"]
+    covariance_root: Float[np.ndarray, "n 5 5"]
     """Of the covariance of all but the focal length."""
 
     @property
@@ -86,7 +86,7 @@ class GroundPosterior:
         chosen = rng.choice(len(self.weight), SAMPLES, p=self.weight)
         drawn = self.mean[chosen].copy()
         drawn[:, 1:] += np.einsum(
-            "sij,sj->si", self.root[chosen], rng.standard_normal((SAMPLES, 5))
+            "sij,sj->si", self.covariance_root[chosen], rng.standard_normal((SAMPLES, 5))
         )
         return drawn
 

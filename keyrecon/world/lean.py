@@ -25,7 +25,7 @@ MIN_STANCE = 0.75
 """Height of legs and trunk, in their median, from which a lean is read."""
 
 
-def put_upright(
+def remove_lean(
     directions: Float[np.ndarray, "T B 3"], figure: Figure
 ) -> Float[np.ndarray, "T B 3"]:
     """Directions without the lean along the line of sight that all frames share.

@@ -26,7 +26,7 @@ from keyrecon.world.refinement import (
     Shots,
     Standing,
     refine_placed,
-    without_moments,
+    without_short_runs,
 )
 from keyrecon.world.sight import sight_axes, sight_lines, unseen_joints
 
@@ -72,7 +72,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class _Stances:
+class _StanceFrames:
     """Which frame and foot belongs to which spell of standing."""
 
     frame: np.ndarray
@@ -110,10 +110,10 @@ def place_motion(motion: Motion, camera: WorldCamera) -> WorldMotion | None:
     slow = _long_enough(slow, motion.fps, shots)
     ankle = ANKLE_SHARE * ratio * stature_in_units(motion)
     evidence = _Evidence(at_root, ratio * pose[:, ankles], ground, seen, ratio, ankle)
-    root = _solve(motion, camera, evidence, _spells(still, shots), shots)
+    root = _solve(motion, camera, evidence, _number_stances(still, shots), shots)
     stature = ratio * stature_in_units(motion)
     placed = Placed(motion, camera, seen, root, ratio, stature, ankle, shots)
-    return _refined(_filled(placed), still, slow)
+    return _refined(_with_gaps_filled(placed), still, slow)
 
 
 def _refined(
@@ -135,7 +135,7 @@ def _refined(
     return WorldMotion(points, points[:, hips].mean(axis=1), contact, ratio)
 
 
-def _filled(placed: Placed) -> Placed:
+def _with_gaps_filled(placed: Placed) -> Placed:
     """Frames that are not known have the camera and the pose of the nearest one that is.
 
     In a shot it is the nearest one of the shot.
@@ -245,7 +245,7 @@ def _long_enough(
     """Without spells that are too short to stand, shot by shot."""
     kept = np.zeros_like(standing)
     for shot in shots:
-        kept[shot] = without_moments(standing[shot], max(2, round(SPELL * fps)))
+        kept[shot] = without_short_runs(standing[shot], max(2, round(SPELL * fps)))
     return kept
 
 
@@ -271,7 +271,7 @@ def _size(
     return float(np.nanmedian((depth / by_size[:, None])[contact]))
 
 
-def _spells(contact: Bool[np.ndarray, "T 2"], shots: Shots) -> _Stances:
+def _number_stances(contact: Bool[np.ndarray, "T 2"], shots: Shots) -> _StanceFrames:
     """Number every spell of standing; none goes on from one shot to the next."""
     frames, feet, spells, count = [], [], [], 0
     shot_of = np.zeros(len(contact), dtype=int)
@@ -286,7 +286,9 @@ def _spells(contact: Bool[np.ndarray, "T 2"], shots: Shots) -> _Stances:
         feet.append(np.full(len(standing), foot))
         spells.append(number)
         count = int(number[-1]) + 1 if len(standing) else count
-    return _Stances(np.concatenate(frames), np.concatenate(feet), np.concatenate(spells), count)
+    return _StanceFrames(
+        np.concatenate(frames), np.concatenate(feet), np.concatenate(spells), count
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,12 +307,15 @@ class _Evidence:
 
 
 def _solve(
-    motion: Motion, camera: WorldCamera, evidence: _Evidence, stances: _Stances, shots: Shots
+    motion: Motion, camera: WorldCamera, evidence: _Evidence, stances: _StanceFrames, shots: Shots
 ) -> Float[np.ndarray, "T 3"]:
     """The root in all frames, and with it the places on which feet stand."""
     count = len(motion.time)
     size = 3 * count + 2 * stances.count
-    steady = [*_sight_rows(motion, camera, evidence, size), _calm_rows(motion.fps, size, shots)]
+    steady = [
+        *_sight_rows(motion, camera, evidence, size),
+        _smoothness_rows(motion.fps, size, shots),
+    ]
     weight = np.ones(len(stances.frame))
     solution = np.zeros(size)
     for _ in range(ROUNDS):
@@ -367,7 +372,7 @@ def _sight_rows(motion: Motion, camera: WorldCamera, evidence: _Evidence, size: 
     return made
 
 
-def _calm_rows(fps: float, size: int, shots: Shots) -> Rows:
+def _smoothness_rows(fps: float, size: int, shots: Shots) -> Rows:
     """Accelerations are about zero."""
     middle = np.concatenate([np.arange(shot.start + 1, shot.stop - 1) for shot in shots])
     pace = fps**2 / ACCELERATION
@@ -380,7 +385,7 @@ def _calm_rows(fps: float, size: int, shots: Shots) -> Rows:
 def _stance_rows(
     camera: WorldCamera,
     evidence: _Evidence,
-    stances: _Stances,
+    stances: _StanceFrames,
     weight: Float[np.ndarray, "n"],
     size: int,
 ) -> list[Rows]:

@@ -31,7 +31,7 @@ from keyrecon.body import Skeleton
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
 from keyrecon.world import world_terms as terms
-from keyrecon.world.lean import facing, put_upright, sight_on_ground
+from keyrecon.world.lean import facing, remove_lean, sight_on_ground
 from keyrecon.world.motion_solver import DirectionPrior, Figure, Term, WorldState, solve
 from keyrecon.world.records import WorldCamera
 from keyrecon.world.sight import sight_axes, unseen_joints
@@ -224,7 +224,7 @@ def _lifted_body(placed: Placed) -> _LiftedBody:
     figure = Figure(skeleton, skeleton.ancestry * lengths, axes)
     apart = [points[:, pair.left] - points[:, pair.right] for pair in skeleton.breadths]
     breadths = np.array([np.median(np.linalg.norm(pair, axis=1)) for pair in apart])
-    return _LiftedBody(figure, put_upright(unit_vectors(bones), figure), breadths)
+    return _LiftedBody(figure, remove_lean(unit_vectors(bones), figure), breadths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +281,7 @@ def _by_joint(values: Mapping[str, float], names: Sequence[str], other: float) -
     return [next((values[key] for key in values if key in name), other) for name in names]
 
 
-def _lasting(seconds: float, fps: float) -> float:
+def _correlated_frames(seconds: float, fps: float) -> float:
     """Frames over which an error counts once.
 
     An error c whose cost is that of `DirectionPrior` has the autocorrelation of white noise behind
@@ -294,7 +294,7 @@ def _direction_prior(before: Float[np.ndarray, "T B 3"], motion: Motion) -> Dire
     ends = [motion.skeleton.names[child] for child in motion.skeleton.bones[:, 1]]
     depths = _by_joint(DEPTH_ERROR, ends, OTHER_DEPTH_ERROR)
     spread = np.array([[FLAT_ERROR, FLAT_ERROR, depth] for depth in depths])
-    weight = 1 / (spread**2 * _lasting(MEMORY, motion.fps))
+    weight = 1 / (spread**2 * _correlated_frames(MEMORY, motion.fps))
     return DirectionPrior(before, weight, MEMORY * motion.fps)
 
 
@@ -304,16 +304,18 @@ def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list
     joints, fps = len(skeleton.names), motion.fps
     far = np.linalg.norm(placed.root - camera.centre, axis=1)
     off = PIXEL_ERROR * placed.stature * camera.focal / far
-    off = np.where(placed.seen, off * np.sqrt(_lasting(PIXEL_MEMORY, fps)), np.inf)
+    off = np.where(placed.seen, off * np.sqrt(_correlated_frames(PIXEL_MEMORY, fps)), np.inf)
     made = [terms.reprojection(camera, motion.points2d, np.repeat(off[:, None], joints, axis=1))]
-    spread = BREADTH_ERROR * np.sqrt(_lasting(MEMORY, fps))
+    spread = BREADTH_ERROR * np.sqrt(_correlated_frames(MEMORY, fps))
     for pair, length in zip(skeleton.breadths, body.breadths, strict=True):
         made.append(terms.breadth(pair.left, pair.right, float(length), spread, joints))
     masses = terms.joint_masses(skeleton.names)
     grounded = standing.still[:, 0] | standing.still[:, 1]
     feet = [skeleton.index(f"{side}_ankle") for side in ("right", "left")]
     feet_seen = placed.seen & ~unseen_joints(motion)[:, feet].any(axis=1)
-    flying = without_moments((feet_seen & ~grounded)[:, None], max(3, round(SHORTEST_FLIGHT * fps)))
+    flying = without_short_runs(
+        (feet_seen & ~grounded)[:, None], max(3, round(SHORTEST_FLIGHT * fps))
+    )
     expected = np.where(flying, [0.0, 0.0, -GRAVITY], np.zeros(3))
     weight = np.where(flying, 1 / FALL_ERROR, np.full(3, 1 / ACCELERATION))
     made.append(terms.body_acceleration(masses, expected, weight, fps))
@@ -321,7 +323,7 @@ def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list
     ahead = FOOT_AHEAD * facing(body.directions, body.figure)
     support = np.zeros((len(along), joints))
     support[:, feet] = 0.5
-    spread = BALANCE_ERROR * np.sqrt(_lasting(BALANCE_MEMORY, fps))
+    spread = BALANCE_ERROR * np.sqrt(_correlated_frames(BALANCE_MEMORY, fps))
     made.append(terms.balance(masses, support, along, ahead, grounded / spread))
     return made
 
@@ -340,14 +342,14 @@ def _foot_terms(
     stay[..., 2] = 0
     off = feet[..., 2] - placed.ankle
     held = standing.flat / (1 + (np.maximum(off, 0) / HEEL_UP) ** 2)  # no foot sinks in
-    held = held / (HEIGHT_ERROR * np.sqrt(_lasting(MEMORY, fps)))
+    held = held / (HEIGHT_ERROR * np.sqrt(_correlated_frames(MEMORY, fps)))
     return [
         terms.slip(ankles, stay, joints),
         terms.foot_height(ankles, placed.ankle, held, joints),
     ]
 
 
-def without_moments(standing: Bool[np.ndarray, "T n"], shortest: int) -> Bool[np.ndarray, "T n"]:
+def without_short_runs(standing: Bool[np.ndarray, "T n"], shortest: int) -> Bool[np.ndarray, "T n"]:
     """Without spells shorter than so many frames."""
     kept = standing.copy()
     for foot in range(standing.shape[1]):

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter1d
 from keyrecon.body import LSP14
 from keyrecon.lifting import terms
 from keyrecon.lifting.foreshortening import INCLINATIONS, depth_share, log_densities
-from keyrecon.lifting.interpolation import drop_controls, slerp, slerp_between
+from keyrecon.lifting.interpolation import choose_control_frames, slerp, slerp_between
 from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
 from keyrecon.lifting.priors.anatomy import sideways_spread
@@ -86,14 +86,14 @@ def test_directions_are_held_outside_the_control_frames():
 def test_control_points_never_part_further_than_their_reach():
     rng = np.random.default_rng(4)
     nearest = np.repeat(rng.permutation(20), 6)
-    kept = drop_controls(half_keyframes(nearest, np.ones(120)), rng.random(120), 5)
+    kept = choose_control_frames(half_keyframes(nearest, np.ones(120)), rng.random(120), 5)
     assert np.diff(kept).max() <= 5
     assert set(nearest[kept]) == set(nearest), "every run keeps a frame"
 
 
 def test_the_best_frame_of_a_run_stays_and_the_worst_go_first():
     residual = np.array([0.0, 5, 4, 1, 4, 5, 0.0])
-    kept = drop_controls(half_keyframes([0, 1, 1, 1, 1, 1, 2], np.ones(7)), residual, 10)
+    kept = choose_control_frames(half_keyframes([0, 1, 1, 1, 1, 1, 2], np.ones(7)), residual, 10)
     np.testing.assert_array_equal(kept, [0, 3, 6])
 
 

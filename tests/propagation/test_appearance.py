@@ -21,7 +21,7 @@ from keyrecon.propagation.appearance import describe_player, learn_appearance, r
 from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.bone_color import learn_bone_colors
 from keyrecon.propagation.limb_identity import appearance_log_odds
-from keyrecon.propagation.limb_search import search_by_looks
+from keyrecon.propagation.limb_search import search_by_appearance
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_limbs_are_found_where_they_look_like_marked_ones(appearance):
     trunk = JOINTS.copy()
     trunk[:, [*ONE[1:], *OTHER[1:]]] = 9
     colors = learn_bone_colors(appearance.features, marked_poses(), JOINTS)
-    found = search_by_looks(appearance, colors, marked_poses(), trunk, 3)
+    found = search_by_appearance(appearance, colors, marked_poses(), trunk, 3)
     away = np.abs(found - JOINTS[:, None])[..., [*ONE, *OTHER]].max(axis=2)
     apart = np.abs(JOINTS[:, ONE[0]] - JOINTS[:, OTHER[0]]) > 0.15
     assert (away.min(axis=1)[apart] < 0.08).all()

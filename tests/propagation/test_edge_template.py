@@ -26,7 +26,7 @@ from keyrecon.propagation.registration import (
     point_equations,
     register_templates,
 )
-from keyrecon.propagation.selection import LimbStates, choose_two
+from keyrecon.propagation.selection import LimbStates, choose_limb_pair
 from keyrecon.propagation.trajectory_smoothing import solve_smooth
 
 LOWER, UPPER = split_body(LSP14)
@@ -129,7 +129,7 @@ def test_sides_are_chosen_for_continuity():
     spread = np.array([0.2])
     unlikeness = np.zeros((21, 2, 2, 1))
     clash = 9 * np.tile(np.eye(2), (21, 1, 1))
-    a, b = choose_two(
+    a, b = choose_limb_pair(
         LimbStates(joints, cost, unlikeness, spread),
         LimbStates(joints, cost[:, ::-1].copy(), unlikeness, spread),
         clash,

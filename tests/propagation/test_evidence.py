@@ -12,10 +12,10 @@ from keyrecon.propagation.evidence import (
     WEIGHTS,
     LimbCosts,
     find_evidence,
-    state_probabilities,
+    limb_state_probabilities,
 )
 from keyrecon.propagation.half_body import split_body
-from keyrecon.propagation.hypotheses import MarkedWays
+from keyrecon.propagation.hypotheses import MarkPredictions
 from keyrecon.propagation.selection import ELSEWHERE, choose_limbs
 from keyrecon.propagation.silhouette import Silhouettes
 from keyrecon.records import Shots
@@ -39,10 +39,10 @@ def poses(half):
     )
 
 
-def ways(joints, confidence=0.0, seconds=10.0):
+def predictions(joints, confidence=0.0, seconds=10.0):
     """Flow and lines that lead to the same joints in all frames."""
     places = np.tile(joints, (FRAMES, 1))
-    return MarkedWays(
+    return MarkPredictions(
         places, np.full(places.shape, confidence), places, np.full(places.shape, seconds)
     )
 
@@ -52,7 +52,7 @@ def ways(joints, confidence=0.0, seconds=10.0):
 def test_a_limb_is_where_flow_and_near_marks_lead(half, sure):
     here, there, scene = poses(half)
     for pose in (here, there):
-        found = choose_limbs(*scene, ONE_SHOT, 50.0, ways(pose, **sure)).joints
+        found = choose_limbs(*scene, ONE_SHOT, 50.0, predictions(pose, **sure)).joints
         side = list(half.sides[0])
         np.testing.assert_array_equal(found[2, side], pose[side])
 
@@ -82,7 +82,7 @@ def test_every_weight_is_of_some_evidence_and_none_is_negative():
         here = hypotheses.joints[0, 0]
         nothing = Silhouettes(np.zeros((FRAMES, 1), complex), np.zeros((FRAMES, 1), bool))
         trunk = np.zeros(FRAMES, int)
-        found = find_evidence(templates, hypotheses, trunk, ways(here), nothing)
+        found = find_evidence(templates, hypotheses, trunk, predictions(here), nothing)
         names = {*found.of_sides[0], *(name for name, _ in found.of_pairs)}
         assert {*WEIGHTS[half.name]} <= names
         assert min(WEIGHTS[half.name].values()) >= 0
@@ -92,7 +92,7 @@ def test_probabilities_of_states_are_those_of_the_pairs_that_they_are_in():
     random = np.random.default_rng(4)
     one, other, pairs = (random.uniform(0, 9, (2, *n)) for n in ((3,), (3,), (3, 3)))
     one[1, 2] = np.inf
-    chances = state_probabilities(LimbCosts((one, other), pairs))
+    chances = limb_state_probabilities(LimbCosts((one, other), pairs))
     for t in range(2):
         every = {
             (a, b): np.exp(-(one[t, a] + other[t, b] + pairs[t, a, b]) / SCALE)
@@ -109,7 +109,7 @@ def test_probabilities_of_states_are_those_of_the_pairs_that_they_are_in():
 @pytest.mark.parametrize("half", [LEGS, ARMS], ids=["legs", "arms"])
 def test_a_joint_is_elsewhere_by_as_much_as_speaks_for_limbs_that_have_it_there(half):
     here, there, scene = poses(half)
-    chosen = choose_limbs(*scene, ONE_SHOT, 50.0, ways(here, confidence=0.9))
+    chosen = choose_limbs(*scene, ONE_SHOT, 50.0, predictions(here, confidence=0.9))
     side, other = (list(members) for members in half.sides)
     elsewhere = chosen.elsewhere(np.tile(here, (FRAMES, 1)))
     assert (elsewhere[2, side] < 0.5).all() and (elsewhere[2, side] > 0).all()

@@ -13,10 +13,10 @@ from keyrecon.report.drawing import (
     LEFT,
     RIGHT,
     bone_sides,
+    draw_brackets,
     draw_pose,
     drawn_bones,
     head_bone,
-    point_out,
     trunk_outline,
 )
 from keyrecon.report.overlay import GROUND, PAPER, OverlayOptions, overlay_frames, write_overlay
@@ -232,7 +232,7 @@ def test_no_court_is_drawn_where_there_is_none(tmp_path):
 
 
 def test_brackets_and_an_arrow_point_out_a_player_and_leave_what_is_in_the_box_alone():
-    drawn = point_out(GREY, np.array([60.0, 40.0, 180.0, 240.0]), np.array([120.0, 90.0]))
+    drawn = draw_brackets(GREY, np.array([60.0, 40.0, 180.0, 240.0]), np.array([120.0, 90.0]))
     changed = (drawn != GREY).any(axis=2)
     assert changed[40, 60] and changed[40, 180] and changed[238, 60]
     assert changed[66, 120]

@@ -5,7 +5,7 @@ import pytest
 
 from keyrecon.errors import KeyreconError
 from keyrecon.records import PLAYER, Shots, Track
-from keyrecon.tracking.shot_sorting import CELLS, ShotOptions, Sighting, sort_shots
+from keyrecon.tracking.shot_sorting import CELLS, PlayerDetection, ShotOptions, sort_shots
 
 FPS = 50.0
 
@@ -15,7 +15,9 @@ def seen(layout, repeated=0.0, plain=False, found=True):
     track = Track(nowhere, np.zeros((4, 2, 2)), np.ones(4), np.zeros((4, 4)), np.ones(4))
     rng = np.random.default_rng(0)
     maps = layout + 0.1 * rng.random((8, *layout.shape))
-    return Sighting(track if found else None, "", maps if found else maps[:0], plain, repeated)
+    return PlayerDetection(
+        track if found else None, "", maps if found else maps[:0], plain, repeated
+    )
 
 
 @pytest.fixture
@@ -28,11 +30,11 @@ def somebody():
     return np.random.default_rng(2).random((3, *CELLS))
 
 
-def sort(sightings, length=100, told=(0,), **options):
-    count = len(sightings)
+def sort(detections, length=100, told=(0,), **options):
+    count = len(detections)
     shots = Shots.between(tuple(length * n for n in range(1, count)), length * count)
     marked = np.isin(np.arange(count), told)
-    return sort_shots(shots, sightings, marked, FPS, ShotOptions(**options)).shows
+    return sort_shots(shots, detections, marked, FPS, ShotOptions(**options)).shows
 
 
 def test_a_shot_like_the_marked_one_shows_the_player_and_another_somebody_else(player, somebody):
@@ -76,7 +78,7 @@ def test_a_video_without_the_player_is_refused(player):
 
 def test_a_dissolve_is_no_shot_of_the_player(player):
     shots = Shots.between((100, 140), 300)
-    sightings = [seen(player), seen(player), seen(player)]
+    detections = [seen(player), seen(player), seen(player)]
     told = np.array([True, False, False])
-    shown = sort_shots(shots, sightings, told, FPS, dissolves=(100,)).shows
+    shown = sort_shots(shots, detections, told, FPS, dissolves=(100,)).shows
     assert shown == (PLAYER, "a dissolve", PLAYER)

@@ -11,7 +11,7 @@ from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_calibration, write_camera
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath
-from keyrecon.world.court_tracking import between, carried
+from keyrecon.world.court_tracking import carry_camera, homography_between
 from keyrecon.world.pinhole import Pinhole
 
 SIZE = (640, 360)
@@ -64,7 +64,7 @@ def test_a_camera_that_pans_stands_in_one_place(panned):
 
 def test_a_camera_carried_along_the_motion_between_two_frames_is_the_other_camera(panned):
     cameras, path, _ = panned
-    moved = carried(cameras[2], between(path, 2, 9))
+    moved = carry_camera(cameras[2], homography_between(path, 2, 9))
     assert court_error(moved, cameras[9], SIZE).max() < 1e-6
 
 
