@@ -10,7 +10,7 @@ from command_line import keyrecon
 from court_walker import court_camera
 from painted_court import camera_at
 
-from keyrecon.annotate.assist.answers import evidence_of_project
+from keyrecon.annotate.assist.answers import project_motion_digest
 from keyrecon.app import running
 from keyrecon.app.annotator import job_commands
 from keyrecon.body import LSP14
@@ -124,7 +124,7 @@ def test_a_second_run_makes_no_stage_again(clip, solved):
     chosen = running.settings(workspace, Options(), 1.7)
     running.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
-    assert read_run(workspace).evidence == evidence_of_project(workspace.folder)
+    assert read_run(workspace).evidence == project_motion_digest(workspace.folder)
 
 
 def test_why_there_is_no_way_on_the_court_is_in_the_report_and_on_the_page(clip, solved, tmp_path):

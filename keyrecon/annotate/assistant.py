@@ -28,7 +28,7 @@ class Assistant:
     bodies: Callable[[], list[Json] | None] | None = None
     """Frames in which a whole body, marked before there are keyframes, would teach most, as
     {"frame", "box"}; None before the player was followed."""
-    evidence: Callable[[], str | None] | None = None
+    motion_digest: Callable[[], str | None] | None = None
     """A digest of what a motion would be made from now; None while project.toml is damaged."""
     suggestion: Callable[[Annotations, int], Json] | None = None
     """Where the joints of a frame probably are, from the frames annotated so far."""

@@ -48,7 +48,7 @@ from keyrecon.io.option_tables import check_options
 from keyrecon.io.project_videos import relative_path
 from keyrecon.io.provenance import (
     forget_run,
-    golf_evidence,
+    golf_digest,
     motion_stamp,
     note_exports,
     note_fitted,
@@ -161,7 +161,7 @@ def fit_project(
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
-    video, folder, evidence = workspace.video(), workspace.folder, golf_evidence(workspace)
+    video, folder, digest = workspace.video(), workspace.folder, golf_digest(workspace)
     clicks = kept_clicks(workspace)
     options = settings.over(workspace.options(options, GolfOptions(), GOLF), folder)
     model = read_prior(options, folder)
@@ -176,7 +176,7 @@ def fit_project(
         fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)
-    note_fitted(workspace, evidence)
+    note_fitted(workspace, digest)
     spent = time.perf_counter() - began
     return "\n".join(
         [

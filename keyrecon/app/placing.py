@@ -14,7 +14,7 @@ from keyrecon.io.formats.motion_file import (
     read_whole_motion,
     write_motion,
 )
-from keyrecon.io.provenance import camera_evidence, read_run
+from keyrecon.io.provenance import camera_digest, read_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import Motion
 from keyrecon.report.court_drawing import draw_way, write_court_picture
@@ -173,7 +173,7 @@ def old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
         return []
     run, command = read_run(workspace), f"keyrecon run {quoted(workspace.folder)}"
     if placed.court is not None:
-        if run is not None and run.camera == camera_evidence(workspace):
+        if run is not None and run.camera == camera_digest(workspace):
             return []
         return [f"For a report with the {placed.court[1].origin}: {command}"]
     return [f"For a report without the {placed.before}: {command}"] if placed.before else []

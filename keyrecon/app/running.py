@@ -15,7 +15,7 @@ from keyrecon.errors import KeyreconError, quoted
 from keyrecon.hyperextension import hyperextended_stretches
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.held_video import with_exposure
-from keyrecon.io.provenance import RunNotes, camera_evidence, motion_evidence, note_run
+from keyrecon.io.provenance import RunNotes, camera_digest, motion_digest, note_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import format_stretches
@@ -79,14 +79,14 @@ def run(
     video = workspace.video()
     if options.lift.field_of_view is None and (lens := known_lens(workspace, video)):
         options = with_field_of_view(options, degrees_across(lens, video))
-    evidence = motion_evidence(workspace, given, Options())
+    digest = motion_digest(workspace, given, Options())
     asked = asked_for(workspace, video)
     annotations = annotated(workspace, video, asked, partial)
     with workspace.remembering(given, Options()):
         automatic = prepare_project(workspace, video, annotations, options, progress)
         preparation = replace(automatic.preparation, keyframes=asked)
         motion = reconstruct(preparation, annotations, options, workspace.stages, progress)
-    camera = camera_evidence(workspace)
+    camera = camera_digest(workspace)
     placed = write_placed_motion(workspace, motion)
     doubts = automatic.warnings()
     shots = describe_shots(preparation.shots) + describe_unseen(motion, preparation.shots)
@@ -108,7 +108,7 @@ def run(
         lens=None if near is None else lens_caveat(near),
     )
     wrong = _write_report(workspace.report_file, preparation, material, doubts, progress)
-    note_run(workspace, RunNotes(evidence, tuple(doubts), advice, camera))
+    note_run(workspace, RunNotes(digest, tuple(doubts), advice, camera))
     seconds = time.perf_counter() - started
     unsure = [*(one.text for one in hyperextended_stretches(motion)), *describe_uncertainty(motion)]
     lines = [*placed.lines, *shots, *doubts, *wrong, *unsure, *advice]

@@ -1,6 +1,6 @@
 """What results were made from, so that a page can tell whether a person changed anything since.
 
-A digest of what a person told is kept beside the results in the project's cache. It is of what the
+A digest of a person's input is kept beside the results in the project's cache. It is of what the
 files say, not of their bytes: a file that is written anew with the same marks changes nothing.
 """
 
@@ -18,7 +18,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.reading import parse_json, read_text
 
 CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
-"""What golf_clicks.json tells."""
+"""Keys of golf_clicks.json that count."""
 
 
 @dataclass(frozen=True)
@@ -26,25 +26,25 @@ class RunNotes:
     """What is kept of the run that made the motion."""
 
     evidence: str
-    """Digest of what it was made from."""
+    """`motion_digest` of what it was made from."""
     doubts: tuple[str, ...]
     """What spoke against the track, line by line."""
     advice: tuple[str, ...] = ()
     """What would make the motion better, line by line."""
     camera: str | None = None
-    """Digest of the camera that the report knows, empty for none; None in older notes."""
+    """`camera_digest` of the camera that the report knows, empty for none; None in older notes."""
 
 
-def marks_evidence(workspace: Workspace) -> str:
+def marks_digest(workspace: Workspace) -> str:
     """A digest of all joints that a person marked: what older versions noted of a run."""
     return _digest([_parts_of(workspace.annotations_file, ("annotations",))])
 
 
-def motion_evidence(workspace: Workspace, options: OptionRecord, defaults: OptionRecord) -> str:
-    """A digest of all that a person told a run: marks, keyframes, picks, frames of videos, and the
-    options that are not as usual.
+def motion_digest(workspace: Workspace, options: OptionRecord, defaults: OptionRecord) -> str:
+    """A digest of all input to a run: marks, keyframes, picks, frames of videos, and the options
+    that are not the defaults.
 
-    Where a video lies tells nothing, nor does the order of clicks.
+    The path of a video and the order of clicks do not count.
     """
     (picks,) = _parts_of(workspace.picks_file, ("picks",))
     videos = [{n: v for n, v in table.items() if n != "path"} for table in workspace.videos]
@@ -60,7 +60,7 @@ def motion_evidence(workspace: Workspace, options: OptionRecord, defaults: Optio
     )
 
 
-def camera_evidence(workspace: Workspace) -> str:
+def camera_digest(workspace: Workspace) -> str:
     """A digest of the camera; empty where there is none."""
     try:
         return hashlib.sha256(workspace.camera_file.read_bytes()).hexdigest()
@@ -68,8 +68,8 @@ def camera_evidence(workspace: Workspace) -> str:
         return ""
 
 
-def golf_evidence(workspace: Workspace) -> str:
-    """A digest of all that a person told a golf fit."""
+def golf_digest(workspace: Workspace) -> str:
+    """A digest of all input to a golf fit: clicks, marks and annotations."""
     return _digest(
         [
             _parts_of(workspace.golf_clicks_file, CLICK_PARTS),
@@ -100,16 +100,16 @@ def forget_run(workspace: Workspace) -> None:
     _run_file(workspace).unlink(missing_ok=True)
 
 
-def note_fitted(workspace: Workspace, evidence: str) -> None:
+def note_fitted(workspace: Workspace, digest: str) -> None:
     """Keep what the last golf fit was made from."""
     _fitted_file(workspace).parent.mkdir(exist_ok=True)
-    write_durably(_fitted_file(workspace), evidence)
+    write_durably(_fitted_file(workspace), digest)
 
 
 def is_fitted(workspace: Workspace) -> bool:
-    """Whether the last golf fit was made from all that a person has told by now."""
+    """Whether the last golf fit was made from the present input."""
     noted = _fitted_file(workspace)
-    return noted.is_file() and noted.read_bytes() == golf_evidence(workspace).encode()
+    return noted.is_file() and noted.read_bytes() == golf_digest(workspace).encode()
 
 
 def motion_stamp(workspace: Workspace) -> int:

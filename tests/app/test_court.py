@@ -20,7 +20,7 @@ from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.motion_file import write_motion
-from keyrecon.io.provenance import RunNotes, camera_evidence, note_run
+from keyrecon.io.provenance import RunNotes, camera_digest, note_run
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import COURT, Workspace
 from keyrecon.pipeline import Options
@@ -70,7 +70,7 @@ def test_a_report_does_not_know_a_camera_that_came_after_it(bare, motion):
     placed = write_placed_motion(workspace, motion)
     assert old_report(workspace, placed) == []  # there is no report
     workspace.report_file.write_text("a report")
-    for camera, lacks, count in (("", "court", 1), (camera_evidence(workspace), None, 0)):
+    for camera, lacks, count in (("", "court", 1), (camera_digest(workspace), None, 0)):
         note_run(workspace, RunNotes("marks", (), (), camera))
         assert describe_run(workspace, 1, None)["report_lacks"] == lacks
         lines = old_report(workspace, placed)

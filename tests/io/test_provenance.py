@@ -9,8 +9,8 @@ from keyrecon.io.provenance import (
     RunNotes,
     current_exports,
     is_fitted,
-    marks_evidence,
-    motion_evidence,
+    marks_digest,
+    motion_digest,
     motion_stamp,
     note_exports,
     note_fitted,
@@ -34,11 +34,11 @@ def write_marks(workspace, rows, **layout):
 def test_marks_written_anew_in_other_bytes_are_the_same_evidence(workspace):
     rows = [{"id": 1, "keypoints": [1, 2, 2]}]
     write_marks(workspace, rows)
-    before = marks_evidence(workspace)
+    before = marks_digest(workspace)
     write_marks(workspace, rows, indent=3)
-    assert marks_evidence(workspace) == before
+    assert marks_digest(workspace) == before
     write_marks(workspace, [{"id": 1, "keypoints": [1, 3, 2]}])
-    assert marks_evidence(workspace) != before
+    assert marks_digest(workspace) != before
 
 
 PROJECT = """[video]
@@ -60,7 +60,7 @@ def evidence(folder, name="project.toml", text=PROJECT):
     for file in FILES:
         (folder / file).write_text(text if file == name else FILES[file])
     workspace = Workspace(folder)
-    return motion_evidence(workspace, workspace.options(Options(), Options()), Options())
+    return motion_digest(workspace, workspace.options(Options(), Options()), Options())
 
 
 @pytest.mark.parametrize(
@@ -106,9 +106,9 @@ def test_what_changes_no_motion_is_no_evidence(bare, name, old, new):
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"[" * 100_000, b"1e999", b"{"])
 def test_damaged_marks_are_left_to_their_reader(workspace, content):
     """Who reads the file says in one line what is wrong with it."""
-    without = marks_evidence(workspace)
+    without = marks_digest(workspace)
     workspace.annotations_file.write_bytes(content)
-    assert marks_evidence(workspace) == without
+    assert marks_digest(workspace) == without
 
 
 @pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff"])

@@ -13,7 +13,7 @@ from keyrecon.io.formats.clicks import write_clicks
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.formats.swing_file import write_swing
-from keyrecon.io.provenance import golf_evidence, note_fitted
+from keyrecon.io.provenance import golf_digest, note_fitted
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 from keyrecon.records import HalfKeyframes, Keyframes, Motion
@@ -160,7 +160,7 @@ def make_golf_project(folder, video_file, doubts=(), first=0):
         doubts=tuple(doubts),
     )
     workspace = Workspace(folder)
-    note_fitted(workspace, golf_evidence(workspace))
+    note_fitted(workspace, golf_digest(workspace))
     (folder / "report.html").write_text("<!doctype html><body>A report</body>")
     write_swing(folder / "motion.npz", swing)
     return folder

@@ -47,7 +47,7 @@ from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.hyperextension import HyperextendedStretch, hyperextended_stretches
-from keyrecon.io.provenance import motion_evidence
+from keyrecon.io.provenance import motion_digest
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, frames_to_mark, marked_frames
 from keyrecon.records import Annotations, Pick
@@ -63,7 +63,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
     return Assistant(
         keyframes=partial(describe_keyframes, cache),
         bodies=partial(describe_bodies, cache),
-        evidence=partial(evidence_of_project, workspace.folder),
+        motion_digest=partial(project_motion_digest, workspace.folder),
         suggestion=partial(describe_suggestion, cache),
         pose=partial(describe_pose, cache),
         checks=partial(describe_checks, cache),
@@ -132,14 +132,14 @@ def describe_bodies(cache: ProjectCache) -> list[Json] | None:
     return [{"frame": int(t), "box": _rounded(track.box[t], 1)} for t in frames]
 
 
-def evidence_of_project(folder: Path) -> str | None:
+def project_motion_digest(folder: Path) -> str | None:
     """What a motion would be made from now; None while the options cannot be read."""
     try:
         workspace = Workspace(folder)
         options = workspace.options(Options(), Options())
     except KeyreconError:  # the next step that needs them says what is wrong
         return None
-    return motion_evidence(workspace, options, Options())
+    return motion_digest(workspace, options, Options())
 
 
 def describe_suggestion(cache: ProjectCache, annotations: Annotations, frame: int) -> Json:

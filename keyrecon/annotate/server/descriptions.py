@@ -15,7 +15,7 @@ from keyrecon.annotation_budget import usual_budget
 from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import read_camera
-from keyrecon.io.provenance import RunNotes, camera_evidence, marks_evidence, read_run
+from keyrecon.io.provenance import RunNotes, camera_digest, marks_digest, read_run
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.lens import degrees_across, known_lens
@@ -178,13 +178,14 @@ def _describe_lens(workspace: Workspace, video: Video) -> Json | None:
 
 
 def describe_run(
-    workspace: Workspace, revision: int, evidence: Callable[[], str | None] | None
+    workspace: Workspace, revision: int, motion_digest: Callable[[], str | None] | None
 ) -> Json:
-    """What spoke against the track when the motion was made and what would make it better, in the
-    words of the page, whether it was made from marks, keyframes, picks, videos and options as they
-    are now (true where that is not known), and what told a camera, "court" or "ground", that the
-    report does not know. `evidence` tells what one would be made from now; notes of former versions
-    know of the marks alone.
+    """The notes of the run that made the motion, as JSON in the words of the page.
+
+    What spoke against the track, what would make the motion better, whether it was made from the
+    present marks, keyframes, picks, videos and options (true where that is not known), and the
+    origin of a camera, "court" or "ground", that is newer than the report. `motion_digest` is of
+    the present input; notes of former versions have a digest of the marks alone.
 
     `revision` is that of the marks before their files are read: newer marks are not vouched for.
     """
@@ -197,11 +198,11 @@ def describe_run(
             "report_lacks": None,
             "revision": revision,
         }
-    now = None if evidence is None else evidence()
+    now = None if motion_digest is None else motion_digest()
     return {
         "doubts": [in_page_words(line) for line in notes.doubts],
         "advice": [in_page_words(line) for line in notes.advice],
-        "is_current": notes.evidence in (now, marks_evidence(workspace)),
+        "is_current": notes.evidence in (now, marks_digest(workspace)),
         "report_lacks": _camera_not_in_report(workspace, notes),
         "revision": revision,
     }
@@ -209,7 +210,7 @@ def describe_run(
 
 def _camera_not_in_report(workspace: Workspace, notes: RunNotes) -> str | None:
     """What told a camera that was found after the report was written; None where none was."""
-    there = camera_evidence(workspace)
+    there = camera_digest(workspace)
     if not there or notes.camera in (None, there) or not workspace.report_file.is_file():
         return None
     try:

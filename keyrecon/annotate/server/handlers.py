@@ -213,8 +213,8 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
 
 def run(session: Session, request: ApiRequest) -> Json:
     """Whether the motion was made from marks, keyframes and options as they are."""
-    evidence = session.assistant.evidence
-    return describe_run(session.workspace, session.store.state.revision, evidence)
+    motion_digest = session.assistant.motion_digest
+    return describe_run(session.workspace, session.store.state.revision, motion_digest)
 
 
 def swing(session: Session, request: ApiRequest) -> Json:

@@ -98,7 +98,7 @@ def describe_project(session: Session) -> Json:
         "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder), session.frames.video),
-        "run": describe_run(session.workspace, revision, session.assistant.evidence),
+        "run": describe_run(session.workspace, revision, session.assistant.motion_digest),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),

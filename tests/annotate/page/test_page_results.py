@@ -30,8 +30,8 @@ from keyrecon.io.formats.camera_file import write_camera
 from keyrecon.io.formats.export import SUFFIXES
 from keyrecon.io.provenance import (
     RunNotes,
-    camera_evidence,
-    marks_evidence,
+    camera_digest,
+    marks_digest,
     note_run,
     read_run,
 )
@@ -104,7 +104,7 @@ def run_and_tell(folder, text, options, progress):
     run_at_once(folder, options, progress)
     workspace = Workspace(folder)
     (folder / "cache").mkdir(exist_ok=True)
-    note_run(workspace, RunNotes(marks_evidence(workspace), tuple(text.splitlines()[1:])))
+    note_run(workspace, RunNotes(marks_digest(workspace), tuple(text.splitlines()[1:])))
     return text
 
 
@@ -364,8 +364,8 @@ def run_before_court(folder, options, progress):
     (folder / "report.html").write_text("<p>A report</p>")
     run_at_once(folder, options, progress)
     workspace = Workspace(folder)
-    camera = camera_evidence(workspace)
-    note_run(workspace, RunNotes(marks_evidence(workspace), (), (), camera))
+    camera = camera_digest(workspace)
+    note_run(workspace, RunNotes(marks_digest(workspace), (), (), camera))
     return ""
 
 

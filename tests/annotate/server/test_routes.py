@@ -12,7 +12,7 @@ from annotator import CREDENTIALS, HEADERS, ask, call, run_apart
 from annotator_edits import edit, mark, submit
 from small_motion import make_motion
 
-from keyrecon.annotate.assist.answers import evidence_of_project
+from keyrecon.annotate.assist.answers import project_motion_digest
 from keyrecon.annotate.assistant import Assistant
 from keyrecon.annotate.server.address import listen, make_credentials
 from keyrecon.annotate.server.descriptions import marking_order
@@ -24,7 +24,7 @@ from keyrecon.app.annotator import PageServer
 from keyrecon.body import LSP14
 from keyrecon.io.formats.keyframes import keyframes_to_json
 from keyrecon.io.formats.motion_file import write_motion
-from keyrecon.io.provenance import RunNotes, marks_evidence, motion_evidence, note_run
+from keyrecon.io.provenance import RunNotes, marks_digest, motion_digest, note_run
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.records import HalfKeyframes, Keyframes
@@ -193,16 +193,16 @@ def test_the_page_is_told_where_the_motion_goes_on_in_another_shot(opened, folde
 
 def test_a_motion_is_out_of_date_when_what_it_was_made_from_has_changed(opened, folder):
     workspace = Workspace(folder)
-    session = opened(Assistant(evidence=partial(evidence_of_project, folder)))
+    session = opened(Assistant(motion_digest=partial(project_motion_digest, folder)))
     (folder / "cache").mkdir(exist_ok=True)
 
     def is_current():
         return ask(session, "GET", "/api/run").json()["is_current"]
 
-    for evidence in (motion_evidence(workspace, Options(), Options()), marks_evidence(workspace)):
-        note_run(workspace, RunNotes(evidence, ()))  # of this version, and of former ones
+    for digest in (motion_digest(workspace, Options(), Options()), marks_digest(workspace)):
+        note_run(workspace, RunNotes(digest, ()))  # of this version, and of former ones
         assert is_current()
-    note_run(workspace, RunNotes(motion_evidence(workspace, Options(), Options()), ()))
+    note_run(workspace, RunNotes(motion_digest(workspace, Options(), Options()), ()))
     with (folder / "project.toml").open("a") as file:
         file.write('[options]\nshots.skip = "2"\n')
     assert not is_current()

@@ -8,7 +8,7 @@ from annotator_edits import golf, golf_click, key_posture, shaft
 from keyrecon.annotate.assist.answers import make_assistant
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.project import start
-from keyrecon.io.provenance import golf_evidence, is_fitted, note_fitted
+from keyrecon.io.provenance import golf_digest, is_fitted, note_fitted
 from keyrecon.io.video_writer import write_video
 from keyrecon.io.workspace import Workspace
 
@@ -93,7 +93,7 @@ def test_a_fit_is_fresh_until_something_else_is_told(session):
     click(session)
     folder = session.workspace
     assert not is_fitted(folder)
-    note_fitted(folder, golf_evidence(folder))
+    note_fitted(folder, golf_digest(folder))
     assert is_fitted(folder)
     edit(session, shaft(4, [1, 2, 3, 4]))
     assert not is_fitted(folder)
