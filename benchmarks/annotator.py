@@ -144,7 +144,7 @@ def mark_all(
 def reconstruct(folder: Path, truth: Path, height: float) -> str:
     """Run what follows the marks, and its accuracy."""
     workspace = Workspace(folder)
-    options = running.settings(workspace, Options(), height)
+    options = running.run_options(workspace, Options(), height)
     running.run(workspace, options, show, partial=True)
     return project.evaluate(folder, truth)
 

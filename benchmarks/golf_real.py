@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 from real import DEVELOP, TRUTH, VIDEOS, Clip, load_clip
 
-from keyrecon.app.golf import GolfFit, believe_speed, fit_video
+from keyrecon.app.golf import GolfFit, fit_video, without_slow_motion_search
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks
@@ -92,7 +92,7 @@ def fit(swing: Swing, told: bool, work: Path) -> tuple[GolfFit, float]:
     store = StageStore(work / swing.clip.name / "cache")
     model = read_motion_model(BUILT_IN_SWING_PRIOR)
     began = time.perf_counter()
-    options = believe_speed(GolfOptions()) if told else GolfOptions()
+    options = without_slow_motion_search(GolfOptions()) if told else GolfOptions()
     found = fit_video(hold_frames(video), click(swing), model, options, store.keep)
     return found, time.perf_counter() - began
 

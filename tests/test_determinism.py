@@ -39,7 +39,7 @@ def make(video, folder):
     seen, nearer = np.ones(places.shape[:2], bool), np.zeros((len(frames), 13), np.int64)
     marks = Annotations(LSP14, frames, places, seen, nearer)
     write_coco(workspace.annotations_file, marks, (320, 180))
-    running.run(workspace, running.settings(workspace, Options(), 1.8), silent)
+    running.run(workspace, running.run_options(workspace, Options(), 1.8), silent)
     names = ["m.bvh", "m.trc", "m.csv", "m.glb", "m.json", "m.npz", "m.mp4", "m.c3d"]
     exporting.export(workspace, [folder / name for name in names], silent)
     few, assistant = Annotations(LSP14, frames[:2], places[:2], seen[:2], nearer[:2]), None

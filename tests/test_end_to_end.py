@@ -121,7 +121,7 @@ def test_the_report_and_exports_are_written(clip, solved, tmp_path):
 
 def test_a_second_run_makes_no_stage_again(clip, solved):
     workspace = Workspace(clip / "project")
-    chosen = running.settings(workspace, Options(), 1.7)
+    chosen = running.run_options(workspace, Options(), 1.7)
     running.run(workspace, chosen, silent)
     assert set(workspace.stages.seconds) <= {"lift"}
     assert read_run(workspace).evidence == project_motion_digest(workspace.folder)
@@ -162,7 +162,7 @@ def test_a_run_by_the_paper_takes_the_keyframes_that_the_paper_chose(clip, tmp_p
     )
     write_coco(made / "annotations.json", marks, SIZE)
     workspace = Workspace(made)
-    options = running.settings(workspace, Options())
+    options = running.run_options(workspace, Options())
     assert options.keyframes.method == "coverage"  # a run by our forms is not bound
     said = running.run(workspace, options, silent, printed=True)
     assert "Eq. 2-4" not in said

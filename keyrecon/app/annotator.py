@@ -35,7 +35,7 @@ from keyrecon.io.durable import make_folder
 from keyrecon.io.formats.coco import write_coco
 from keyrecon.io.provenance import motion_stamp, note_exports
 from keyrecon.io.video import Video
-from keyrecon.io.work_lock import at_work
+from keyrecon.io.work_lock import lock_project
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, marked_frames, with_field_of_view, with_height
@@ -141,13 +141,13 @@ _Job = Callable[[Workspace, dict[str, Any], Progress], str]
 
 def _work_alone(job: _Job, folder: Path, options: dict[str, Any], progress: Progress) -> str:
     """A job during which no command works on the project."""
-    with at_work(folder, "The page of keyrecon annotate"):
+    with lock_project(folder, "The page of keyrecon annotate"):
         return job(Workspace(folder), options, progress)
 
 
 def _work_side_by_side(job: _Job, folder: Path, options: dict[str, Any], progress: Progress) -> str:
     """The same with shots worked on side by side, as the command line does."""
-    with at_work(folder, "The page of keyrecon annotate"), open_workers(None) as made_by:
+    with lock_project(folder, "The page of keyrecon annotate"), open_workers(None) as made_by:
         return job(Workspace(folder, workers=made_by), options, progress)
 
 
@@ -184,7 +184,7 @@ def _find_keyframes(workspace: Workspace, options: dict[str, Any], progress: Pro
 
 def _run(workspace: Workspace, options: dict[str, Any], progress: Progress) -> str:
     height, fov = options.get("height"), options.get("field_of_view")
-    settings = running.settings(workspace, Options(), height, fov=fov)
+    settings = running.run_options(workspace, Options(), height, fov=fov)
     if options.get("height", settings.lift.height) is None:  # its field was cleared
         settings = with_height(settings, None)
     if options.get("field_of_view", settings.lift.field_of_view) is None:
@@ -202,10 +202,10 @@ def _find_court(workspace: Workspace, _: dict[str, Any], progress: Progress) -> 
         raise KeyreconError(
             said.split(" Clicked so far")[0].split(" Clicks of former")[0]
         ) from fault
-    return "\n".join(part for part in (*_of_motion(text), _warnings(text)) if part)
+    return "\n".join(part for part in (*_motion_notes(text), _warnings(text)) if part)
 
 
-def _of_motion(output: str) -> list[str]:
+def _motion_notes(output: str) -> list[str]:
     """What a new camera has made of the motion that there is; the page has no file of the way."""
     lines = [line for line in output.splitlines() if line.startswith(OF_MOTION)]
     return [re.sub(r"; \S.* shows the way\.", ".", line) for line in lines]
@@ -216,7 +216,7 @@ def _find_ground(workspace: Workspace, _: dict[str, Any], progress: Progress) ->
     motion."""
     text = find_ground(workspace, GroundMarks(), progress)
     open_lines = [line for line in text.splitlines() if line.startswith(OPEN_GROUND)]
-    return "\n".join([*_of_motion(text), *open_lines])
+    return "\n".join([*_motion_notes(text), *open_lines])
 
 
 def _fit_swing(workspace: Workspace, _: dict[str, Any], progress: Progress) -> str:

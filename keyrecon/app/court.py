@@ -6,7 +6,7 @@ from dataclasses import asdict
 import numpy as np
 from jaxtyping import Bool
 
-from keyrecon.app.placing import date_after, old_report, place_again
+from keyrecon.app.placing import outdated_report_lines, place_stored_motion, touch_after
 from keyrecon.errors import KeyreconError, quoted
 from keyrecon.io.durable import put_aside
 from keyrecon.io.formats.camera_file import read_camera, write_camera
@@ -65,22 +65,22 @@ def calibrate(
         with workspace.remembering(options, CalibrationOptions(), COURT):
             camera, cuts = _find_camera(workspace, video, together, options, progress)
     except ContradictoryClicks as fault:
-        raise KeyreconError(f"{fault}{_whose(clicks, kept)}") from fault
+        raise KeyreconError(f"{fault}{_former_input_note(clicks, kept)}") from fault
     except KeyreconError as fault:
         workspace.change_court_clicks(clicks, dropped)
         aside = _set_aside_camera(workspace) if dropped or _lost_all_clicks(workspace) else ""
         painted = f" Looked for with {widths}." if widths else ""
-        raise KeyreconError(f"{fault}{_how_many(together)}{painted}{aside}") from fault
+        raise KeyreconError(f"{fault}{_click_count_note(together)}{painted}{aside}") from fault
     workspace.change_court_clicks(clicks, dropped)
     write_camera(workspace.camera_file, camera)
     if workspace.court_clicks() != together:
-        date_after(workspace.court_points_file, workspace.camera_file)
+        touch_after(workspace.court_points_file, workspace.camera_file)
     seen = np.flatnonzero(camera.found)
     frame = int(seen[len(seen) // 2])
     drawn = draw_court(video.frame(frame), camera, frame, tennis_court(options.court))
     picture = workspace.folder / "court.jpg"
     write_court_picture(picture, drawn)
-    placed = place_again(workspace)
+    placed = place_stored_motion(workspace)
     return "\n".join(
         [
             *describe_camera(camera, cuts),
@@ -91,7 +91,7 @@ def calibrate(
             f"court {quoted(workspace.folder)} --point NAME:FRAME:X,Y for four points or more.",
             *([f"By {len(together)} clicked points; they are kept."] if together else []),
             *placed.lines,
-            *old_report(workspace, placed),
+            *outdated_report_lines(workspace, placed),
         ]
     )
 
@@ -111,7 +111,7 @@ def _set_aside_camera(workspace: Workspace) -> str:
         return ""
     copy = put_aside(file)
     file.unlink()
-    lines = old_report(workspace, place_again(workspace))
+    lines = outdated_report_lines(workspace, place_stored_motion(workspace))
     return " ".join(
         [
             f" The camera found with clicks that were taken out was set aside as {copy.name}; "
@@ -154,7 +154,7 @@ def _unusual_widths(options: CourtOptions) -> str:
     )
 
 
-def _whose(new: Sequence[CourtClick], kept: Sequence[CourtClick]) -> str:
+def _former_input_note(new: Sequence[CourtClick], kept: Sequence[CourtClick]) -> str:
     """What becomes of clicks that contradict one another."""
     if not kept:
         return ""
@@ -165,7 +165,7 @@ def _whose(new: Sequence[CourtClick], kept: Sequence[CourtClick]) -> str:
     )
 
 
-def _how_many(clicks: Sequence[CourtClick]) -> str:
+def _click_count_note(clicks: Sequence[CourtClick]) -> str:
     names = ", ".join(click.name for click in clicks)
     return f" Clicked so far, and kept: {names}." if clicks else ""
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from keyrecon.app.keyframing import KeyframeSettings, find_keyframes
 from keyrecon.app.project import evaluate, start
-from keyrecon.app.running import prepared, run, settings
+from keyrecon.app.running import prepared, run, run_options
 from keyrecon.body import LSP14
 from keyrecon.io.durable import put_aside, write_durably
 from keyrecon.io.formats.annotations import marks_asked_for, merge_annotations, missing_marks
 from keyrecon.io.formats.coco import coco_text, read_coco
 from keyrecon.io.formats.picks import read_picks
-from keyrecon.io.work_lock import at_work
+from keyrecon.io.work_lock import lock_project
 from keyrecon.io.workspace import Workspace
 from keyrecon.metrics import read_truth
 from keyrecon.pipeline import Options
@@ -47,11 +47,11 @@ def run_demo(name: str, out: Path, progress: Progress, say: Callable[[str], None
     rendered = time.perf_counter() - began
     truth = read_truth(sequence / "truth.npz")
     workspace = _project(sequence / "video.mp4", out / "project")
-    with at_work(workspace.folder, "keyrecon demo"):
+    with lock_project(workspace.folder, "keyrecon demo"):
         workspace.add_picks(read_picks(KEPT / f"demo_{name}.picks.json"))
         say(find_keyframes(workspace, Options(), KeyframeSettings(), progress).split("\nNext")[0])
         say(_mark(workspace, truth, KEPT / f"demo_{name}.json", progress))
-        options = settings(workspace, Options(), round(float(truth["height_m"]), 2))
+        options = run_options(workspace, Options(), round(float(truth["height_m"]), 2))
         say(run(workspace, options, progress, truth=truth))
     say("\nAccuracy against the truth")
     say(evaluate(workspace.folder, sequence / "truth.npz"))

@@ -113,8 +113,8 @@ def _check_place(file: Path, workspace: Workspace) -> None:
     if not file.parent.is_dir():
         raise KeyreconError(f"There is no folder {file.parent} to write {file.name} into; make it.")
     others = another_projects_file(file) and not file.parent.samefile(workspace.folder)
-    kept = workspace.keeps(file) and not _is_export(file)
-    if others or kept or workspace.needs(file):
+    kept = workspace.is_kept(file) and not _is_export(file)
+    if others or kept or workspace.reserves(file):
         owner = f"the project in {file.parent}" if others else "the project"
         raise KeyreconError(
             f"{file} belongs to {owner} and would be lost; export to another name or folder."

@@ -54,7 +54,7 @@ from keyrecon.io.provenance import (
     note_fitted,
 )
 from keyrecon.io.video import Video, open_video
-from keyrecon.io.work_lock import hold_folder
+from keyrecon.io.work_lock import lock_folder
 from keyrecon.io.workspace import GOLF, GOLF_RESULTS, Workspace
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
@@ -101,7 +101,7 @@ class GolfSettings:
     prior: Path | None = None
     """A swing prior of `keyrecon golf train`, or BUILT_IN."""
 
-    def over(self, options: GolfOptions, folder: Path) -> GolfOptions:
+    def applied_to(self, options: GolfOptions, folder: Path) -> GolfOptions:
         """The options of the project in a folder with what is told."""
         components = options.fit.components if self.components is None else self.components
         prior = options.prior if self.prior is None else relative_path(self.prior, folder)
@@ -128,7 +128,7 @@ def fit_file(
     Without a file of clicks those are taken that the project has. `settings` override `options`,
     and these what the project remembers.
     """
-    model = read_prior(settings.over(options, folder), folder)
+    model = read_prior(settings.applied_to(options, folder), folder)
     factor = 1.0 if slow_motion is None else slow_motion
     is_new = not (folder / "project.toml").is_file()
     video = open_video(video_file, slow_motion=factor, square_only=is_new)
@@ -136,8 +136,8 @@ def fit_file(
         check_evidence(read_clicks(clicks_file), video, model, factor, str(clicks_file))
     else:
         check_length(video, factor)
-    check_options(settings.over(options, folder))
-    with hold_folder(folder, "keyrecon golf fit"):
+    check_options(settings.applied_to(options, folder))
+    with lock_folder(folder, "keyrecon golf fit"):
         workspace = open_golf_project(folder, video, clicks_file, slow_motion, force)
         return fit_project(workspace, options, progress, settings)
 
@@ -163,7 +163,7 @@ def fit_project(
     began = time.perf_counter()
     video, folder, digest = workspace.video(), workspace.folder, golf_digest(workspace)
     clicks = kept_clicks(workspace)
-    options = settings.over(workspace.options(options, GolfOptions(), GOLF), folder)
+    options = settings.applied_to(workspace.options(options, GolfOptions(), GOLF), folder)
     model = read_prior(options, folder)
     slow_motion = workspace.project["video"].get("slow_motion")
     check_evidence(clicks, video, model, slow_motion or 1.0, str(workspace.golf_clicks_file))
@@ -171,7 +171,7 @@ def fit_project(
     marks = kept_marks(workspace, video)
     fitting = replace(options, prior="")  # stages know the prior by its content
     if slow_motion is not None:
-        fitting = believe_speed(fitting)
+        fitting = without_slow_motion_search(fitting)
     with workspace.remembering(options, GolfOptions(), GOLF):
         fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
@@ -189,7 +189,7 @@ def fit_project(
     )
 
 
-def believe_speed(options: GolfOptions) -> GolfOptions:
+def without_slow_motion_search(options: GolfOptions) -> GolfOptions:
     """Options for a film of which a person told how fast it plays: no slow motion is searched."""
     return replace(options, observation=replace(options.observation, find_slow_motion=False))
 

@@ -4,7 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from keyrecon.app.placing import date_after, most_tilt_error, old_report, place_again
+from keyrecon.app.placing import (
+    most_tilt_error,
+    outdated_report_lines,
+    place_stored_motion,
+    touch_after,
+)
 from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import read_camera, write_camera
 from keyrecon.io.formats.ground_marks import merge_marks
@@ -72,7 +77,7 @@ def find_ground(
     kept = merge_marks(before, GroundMarks(), dropped)
     _check_new(new, video)
     together = merge_marks(kept, new)
-    _keep_court(workspace)
+    _check_no_court(workspace)
     motion = _motion_of(workspace, video)
     known = known_focal(video, together.field_of_view)
     options = workspace.options(Options(), Options()).camera
@@ -82,15 +87,17 @@ def find_ground(
     try:
         found = calibrate_ground(motion, path, (video.width, video.height), together.marks, known)
     except ContradictoryMarks as fault:
-        raise KeyreconError(f"{_with_names(str(fault), kept)}{_whose(kept, new)}") from fault
+        raise KeyreconError(
+            f"{_with_names(str(fault), kept)}{_former_input_note(kept, new)}"
+        ) from fault
     workspace.change_ground_marks(new, dropped)
     write_camera(workspace.camera_file, found.camera)
     if workspace.ground_marks() != together:
-        date_after(workspace.ground_marks_file, workspace.camera_file)
+        touch_after(workspace.ground_marks_file, workspace.camera_file)
     picture = workspace.folder / "ground.jpg"
     drawn = draw_grid(video.frame(found.reference), found.camera, found.reference, _height(found))
     write_court_picture(picture, drawn)
-    placed = place_again(workspace)
+    placed = place_stored_motion(workspace)
     return "\n".join(
         [
             *describe_ground(found, together, known),
@@ -100,7 +107,7 @@ def find_ground(
             "lie flat and upright.",
             *_list_marks(together),
             *placed.lines,
-            *old_report(workspace, placed),
+            *outdated_report_lines(workspace, placed),
         ]
     )
 
@@ -129,7 +136,7 @@ def _motion_of(workspace: Workspace, video: Video) -> Motion:
     return motion
 
 
-def _keep_court(workspace: Workspace) -> None:
+def _check_no_court(workspace: Workspace) -> None:
     """Raise KeyreconError where a court has told the camera, which it does far better."""
     file = workspace.camera_file
     if file.is_file() and read_camera(file).origin == COURT:
@@ -139,7 +146,7 @@ def _keep_court(workspace: Workspace) -> None:
         )
 
 
-def _whose(kept: GroundMarks, new: GroundMarks) -> str:
+def _former_input_note(kept: GroundMarks, new: GroundMarks) -> str:
     """What becomes of marks that contradict one another."""
     if not kept.marks:
         return ""

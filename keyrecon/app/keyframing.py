@@ -46,7 +46,7 @@ class KeyframeSettings:
     coverage: float | None = None
     reach: int | None = None
 
-    def over(self, options: KeyframeOptions) -> KeyframeOptions:
+    def applied_to(self, options: KeyframeOptions) -> KeyframeOptions:
         """Options with those that are given here in their place.
 
         Raises KeyreconError for what cannot be, named as it is typed.
@@ -82,7 +82,7 @@ def find_keyframes(
     workspace.check_writable()
     choices = workspace.shot_choices()
     options = with_chosen_shots(workspace.options(options, Options(), typed=typed), choices)
-    options = replace(options, keyframes=chosen.over(options.keyframes))
+    options = replace(options, keyframes=chosen.applied_to(options.keyframes))
     check_options(options)
     forms = as_printed(options) if printed else options
     video = hold_if_small(workspace.video(), HELD)  # camera, player and pictures read it

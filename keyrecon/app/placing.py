@@ -53,7 +53,7 @@ class PlacedMotion:
         return () if self.court else self.lines
 
 
-def place_again(workspace: Workspace) -> PlacedMotion:
+def place_stored_motion(workspace: Workspace) -> PlacedMotion:
     """The motion that there is in the world of a new camera; what else its file holds stays."""
     if not workspace.motion_file.is_file():
         return PlacedMotion()
@@ -166,7 +166,7 @@ def _doubt(world: WorldMotion | None, motion: Motion, camera: WorldCamera) -> st
     return ""
 
 
-def old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
+def outdated_report_lines(workspace: Workspace, placed: PlacedMotion) -> list[str]:
     """The way to a report with the motion in the world, or in none any more; nothing where the
     report knows this camera."""
     if not workspace.report_file.is_file():
@@ -179,7 +179,7 @@ def old_report(workspace: Workspace, placed: PlacedMotion) -> list[str]:
     return [f"For a report without the {placed.before}: {command}"] if placed.before else []
 
 
-def date_after(file: Path, other: Path) -> None:
+def touch_after(file: Path, other: Path) -> None:
     """Let clicks and marks that were changed while a camera was made count as newer than it."""
     time = other.stat().st_mtime_ns + 1_000_000
     os.utime(file, ns=(time, time))

@@ -38,7 +38,7 @@ from keyrecon.uncertainty import describe_uncertainty
 from keyrecon.world.ground_marks import check_field_of_view
 
 
-def settings(
+def run_options(
     workspace: Workspace,
     given: Options,
     height: float | None = None,

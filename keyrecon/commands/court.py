@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 from keyrecon.app.console import show
 from keyrecon.app.court import calibrate, court_click
 from keyrecon.commands.arguments import Project, Switch, typed_options
-from keyrecon.io.work_lock import at_work
+from keyrecon.io.work_lock import lock_project
 from keyrecon.io.workspace import Workspace
 from keyrecon.world.calibration import CalibrationOptions
 
@@ -36,5 +36,5 @@ def court(
     """
     clicks = [court_click(text) for text in point]
     typed = {f"court.{name}" for name in typed_options(sys.argv)}
-    with at_work(project, "keyrecon court"):
+    with lock_project(project, "keyrecon court"):
         print(calibrate(Workspace(project, force), clicks, options, show, forget, typed))

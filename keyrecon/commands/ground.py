@@ -35,11 +35,11 @@ def ground(
     """
     from keyrecon.app.console import show
     from keyrecon.app.ground import find_ground, ground_mark
-    from keyrecon.io.work_lock import at_work
+    from keyrecon.io.work_lock import lock_project
     from keyrecon.io.workspace import Workspace
     from keyrecon.world.records import KINDS, GroundMarks
 
     typed = zip(KINDS, (vertical, length, horizon), strict=True)
     marks = tuple(ground_mark(kind, text) for kind, texts in typed for text in texts)
-    with at_work(project, "keyrecon ground"):
+    with lock_project(project, "keyrecon ground"):
         print(find_ground(Workspace(project), GroundMarks(marks, fov), show, forget))

@@ -33,9 +33,9 @@ def demo(
         out: Folder for the video, the project and the report.
     """
     from keyrecon.app.console import show
-    from keyrecon.io.work_lock import hold_folder
+    from keyrecon.io.work_lock import lock_folder
 
-    with hold_folder(out, "keyrecon demo"):
+    with lock_folder(out, "keyrecon demo"):
         if name == "golf":
             from keyrecon.app.golf_demo import run_golf_demo
 
@@ -96,14 +96,14 @@ def pick(
         region: A point on a region of one colour, with the region's name.
     """
     from keyrecon.app import project as work
-    from keyrecon.io.work_lock import at_work
+    from keyrecon.io.work_lock import lock_project
     from keyrecon.io.workspace import Workspace
     from keyrecon.records import Pick
 
     picks = [Pick(frame, "head", *work.point(p, "--head")) for p in head]
     picks += [Pick(frame, "foot", *work.point(p, "--foot")) for p in foot]
     picks += [work.region_pick(frame, text) for text in region]
-    with at_work(project, "keyrecon pick"):
+    with lock_project(project, "keyrecon pick"):
         print(work.add_picks(Workspace(project), picks))
 
 
@@ -149,10 +149,10 @@ def import_(
         replace: Let marks from the file replace different ones in the project.
     """
     from keyrecon.app.project import import_annotations
-    from keyrecon.io.work_lock import at_work
+    from keyrecon.io.work_lock import lock_project
     from keyrecon.io.workspace import Workspace
 
-    with at_work(project, "keyrecon import"):
+    with lock_project(project, "keyrecon import"):
         print(import_annotations(Workspace(project), file, replace))
 
 
@@ -192,10 +192,10 @@ def add(
         slowmo: How many times slower than life the video plays.
     """
     from keyrecon.app.project import add_video
-    from keyrecon.io.work_lock import at_work
+    from keyrecon.io.work_lock import lock_project
     from keyrecon.io.workspace import Workspace
 
-    with at_work(project, "keyrecon add"):
+    with lock_project(project, "keyrecon add"):
         print(add_video(Workspace(project), video, (start, end), slowmo))
 
 
@@ -206,9 +206,9 @@ def relink(project: Project, video: VideoFile) -> None:
         project: Project folder.
         video: The same video in its new place.
     """
-    from keyrecon.io.work_lock import at_work
+    from keyrecon.io.work_lock import lock_project
     from keyrecon.io.workspace import Workspace
 
-    with at_work(project, "keyrecon relink"):
+    with lock_project(project, "keyrecon relink"):
         Workspace(project).relink(video)
     print(f"{project} now uses {video}.")

@@ -18,7 +18,7 @@ from keyrecon.commands.arguments import (
 )
 from keyrecon.errors import KeyreconError
 from keyrecon.io.option_tables import changed_options
-from keyrecon.io.work_lock import at_work
+from keyrecon.io.work_lock import lock_project
 from keyrecon.io.workers import open_workers
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options, as_printed
@@ -60,7 +60,7 @@ def keyframes(
 
     printed = _is_printed(method, options)
     chosen = keyframing.KeyframeSettings(budget, coverage, reach)
-    with at_work(project, "keyrecon keyframes"), open_workers(workers) as made_by:
+    with lock_project(project, "keyrecon keyframes"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
         typed = typed_options(sys.argv)
         print(keyframing.find_keyframes(workspace, options, chosen, show, printed, typed))
@@ -99,10 +99,10 @@ def run(
     from keyrecon.app import running  # and all that draws the report
 
     printed = _is_printed(method, options)
-    with at_work(project, "keyrecon run"), open_workers(workers) as made_by:
+    with lock_project(project, "keyrecon run"), open_workers(workers) as made_by:
         workspace = Workspace(project, force, made_by)
         metres = None if height is None else body_height(height)
-        chosen = running.settings(workspace, options, metres, typed_options(sys.argv), fov)
+        chosen = running.run_options(workspace, options, metres, typed_options(sys.argv), fov)
         print(running.run(workspace, chosen, show, partial, printed=printed))
 
 

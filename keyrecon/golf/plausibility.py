@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import (
     SightLines,
-    pass_capsules,
+    find_closest_points,
     place_capsules,
     sample_distance,
     sight_directions,
@@ -214,7 +214,7 @@ def _doubt_rest(fitted: FittedSwing, observations: Observations) -> list[SwingDo
         return []
     frame = np.repeat(np.arange(during.start, during.stop), counts)
     lines = SightLines(sight_directions(np.concatenate(samples), observations.camera), frame)
-    passing = pass_capsules(lines, place_capsules(fitted.capsules, fitted.pose))
+    passing = find_closest_points(lines, place_capsules(fitted.capsules, fitted.pose))
     beside = passing.distance.min(axis=1) > BESIDE * observations.stature
     if beside.mean() <= MOST_BESIDE:
         return []

@@ -26,7 +26,7 @@ then, and one that stays has told who it is."""
 
 
 @contextmanager
-def at_work(folder: Path, command: str) -> Iterator[None]:
+def lock_project(folder: Path, command: str) -> Iterator[None]:
     """Have a project to oneself; others are told that this `command` is working on it.
 
     Raises KeyreconError where another command has it, where there is no project, or where the
@@ -34,14 +34,14 @@ def at_work(folder: Path, command: str) -> Iterator[None]:
     """
     if not (folder / "project.toml").is_file():
         raise no_project(folder)
-    with hold_folder(folder, command):
+    with lock_folder(folder, command):
         for file in (folder / "cache").glob("inputs-*.npz"):  # workers that were killed had them
             file.unlink(missing_ok=True)
         yield
 
 
 @contextmanager
-def hold_folder(folder: Path, command: str) -> Iterator[None]:
+def lock_folder(folder: Path, command: str) -> Iterator[None]:
     """The same for a folder in which a project may only be begun; it is made if need be."""
     make_folder(folder)
     note = folder / ".work.note"

@@ -371,14 +371,14 @@ class Workspace:
         places = possible_places(self.folder, self.videos)
         return files + [file for file in places if file.is_file()]
 
-    def needs(self, file: Path) -> bool:
+    def reserves(self, file: Path) -> bool:
         """Whether a file's place is one of the project's own, whether there is a file or not."""
         inside = file.parent.exists() and file.parent.samefile(self.folder)
         videos = [(self.folder / table["path"]).resolve() for table in self.videos]
         own = (*OWN_NAMES, *(GOLF_RESULTS if self.is_golf else ()))
         return (inside and file.name.lower() in own) or file.resolve() in videos
 
-    def keeps(self, file: Path) -> bool:
+    def is_kept(self, file: Path) -> bool:
         """Whether a file is one of `kept_files`."""
         return file.exists() and any(kept.samefile(file) for kept in self.kept_files())
 

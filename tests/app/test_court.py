@@ -12,9 +12,9 @@ from keyrecon.annotate.assist.court_views import describe_court
 from keyrecon.annotate.server.descriptions import describe_run
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.app import court as appcourt
-from keyrecon.app.annotator import _of_motion, job_commands
+from keyrecon.app.annotator import _motion_notes, job_commands
 from keyrecon.app.court import calibrate, court_click, describe_camera
-from keyrecon.app.placing import old_report, place_again, write_placed_motion
+from keyrecon.app.placing import outdated_report_lines, place_stored_motion, write_placed_motion
 from keyrecon.app.project import start
 from keyrecon.commands import court as commands
 from keyrecon.errors import KeyreconError
@@ -68,14 +68,14 @@ def test_a_report_does_not_know_a_camera_that_came_after_it(bare, motion):
     (bare / "cache").mkdir(exist_ok=True)
     write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
     placed = write_placed_motion(workspace, motion)
-    assert old_report(workspace, placed) == []  # there is no report
+    assert outdated_report_lines(workspace, placed) == []  # there is no report
     workspace.report_file.write_text("a report")
     for camera, lacks, count in (("", "court", 1), (camera_digest(workspace), None, 0)):
         note_run(workspace, RunNotes("marks", (), (), camera))
         assert describe_run(workspace, 1, None)["report_lacks"] == lacks
-        lines = old_report(workspace, placed)
+        lines = outdated_report_lines(workspace, placed)
         assert len(lines) == count
-    (line,) = _of_motion("\n".join(["Court found in 100.0% of 7 frames.", *placed.lines]))
+    (line,) = _motion_notes("\n".join(["Court found in 100.0% of 7 frames.", *placed.lines]))
     assert "m run, top speed" in line and "way.jpg" not in line
 
 
@@ -275,14 +275,14 @@ def test_a_motion_that_comes_off_the_court_leaves_no_way_and_an_old_report(grey)
     assert (grey.folder / "way.jpg").is_file()
     far = replace(PINHOLE, centre=PINHOLE.centre * [1, 1, 2.0])
     write_camera(grey.camera_file, court_camera(far, 150))
-    placed = place_again(grey)
+    placed = place_stored_motion(grey)
     assert not (grey.folder / "way.jpg").exists()
-    assert old_report(grey, placed) == [
+    assert outdated_report_lines(grey, placed) == [
         f"For a report without the court: keyrecon run {grey.folder}"
     ]
-    assert old_report(grey, place_again(grey)) == []
+    assert outdated_report_lines(grey, place_stored_motion(grey)) == []
     grey.camera_file.unlink()
-    assert old_report(grey, place_again(grey)) == []
+    assert outdated_report_lines(grey, place_stored_motion(grey)) == []
 
 
 def test_a_camera_of_more_frames_than_the_motion_asks_for_the_motion(bare, motion):

@@ -100,7 +100,7 @@ def test_it_can_be_run_again(folder):
     workspace = Workspace(folder)
     former = read_motion(workspace.motion_file)
     workspace.motion_file.unlink()
-    options = running.settings(workspace, Options())
+    options = running.run_options(workspace, Options())
     running.run(workspace, options, silent, partial=True)
     motion = read_motion(workspace.motion_file)
     assert motion.points3d.shape == former.points3d.shape

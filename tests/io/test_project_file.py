@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from keyrecon import KeyreconError
-from keyrecon.app.running import settings
+from keyrecon.app.running import run_options
 from keyrecon.io.option_tables import former_names
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.selection import KeyframeOptions
@@ -95,7 +95,7 @@ def test_what_a_person_wrote_that_an_option_cannot_be_is_named_in_one_line(bare,
     file = bare / "project.toml"
     file.write_text(f"{VIDEO}\n[options]\nkeyframes.budget = {word}\n")
     with pytest.raises(KeyreconError, match=r"options\.keyframes\.budget") as told:
-        settings(Workspace(bare), Options())
+        run_options(Workspace(bare), Options())
     assert "\n" not in str(told.value)
 
 

@@ -16,7 +16,7 @@ from keyrecon.io import work_lock
 from keyrecon.io.durable import hold_lock
 from keyrecon.io.formats.motion_file import write_motion
 from keyrecon.io.video import open_video
-from keyrecon.io.work_lock import at_work
+from keyrecon.io.work_lock import lock_project
 from keyrecon.io.workspace import Workspace
 from keyrecon.progress import silent
 
@@ -90,11 +90,11 @@ def test_what_only_reads_a_project_is_not_refused(project, holder):
 
 
 def test_a_process_that_is_killed_leaves_the_project_free(project, holder):
-    with pytest.raises(KeyreconError, match=f"process {holder.pid}"), at_work(project, "x"):
+    with pytest.raises(KeyreconError, match=f"process {holder.pid}"), lock_project(project, "x"):
         pass
     holder.send_signal(signal.SIGKILL)
     holder.wait()
-    with at_work(project, "x"):
+    with lock_project(project, "x"):
         pass
 
 
@@ -102,7 +102,7 @@ def test_what_workers_that_were_killed_were_given_is_cleared(project):
     left = project / "cache" / "inputs-track@3-0123.npz"
     left.parent.mkdir()
     left.write_bytes(b"")
-    with at_work(project, "keyrecon run"):
+    with lock_project(project, "keyrecon run"):
         assert not left.exists()
 
 
@@ -121,16 +121,19 @@ def test_marks_are_taken_while_a_command_works(project, holder):
 
 
 def test_who_works_is_not_named_by_who_worked_before(project):
-    with at_work(project, "keyrecon keyframes"):
+    with lock_project(project, "keyrecon keyframes"):
         pass
     lock = hold_lock(project / ".work.lock")
-    with pytest.raises(KeyreconError, match="Another command is working"), at_work(project, "x"):
+    with (
+        pytest.raises(KeyreconError, match="Another command is working"),
+        lock_project(project, "x"),
+    ):
         pass
     lock.release()
 
 
 def test_the_page_says_it_without_a_command(project, holder):
-    with pytest.raises(KeyreconError) as told, at_work(project, "x"):
+    with pytest.raises(KeyreconError) as told, lock_project(project, "x"):
         pass
     said = in_page_words(str(told.value))
     assert said.startswith(f"A command in a terminal (process {holder.pid}, since ")

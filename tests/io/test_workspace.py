@@ -4,7 +4,7 @@ import pytest
 
 from keyrecon import KeyreconError
 from keyrecon.app.project import add_video
-from keyrecon.app.running import settings
+from keyrecon.app.running import run_options
 from keyrecon.commands.arguments import typed_options
 from keyrecon.io.formats.picks import read_picks
 from keyrecon.io.video import open_video
@@ -83,7 +83,7 @@ def test_a_video_is_added_behind_the_first_and_what_a_person_wrote_stays(project
     again = Workspace(project.folder)
     assert again.video().joints == (15,)
     assert "# my note" in project.project_file.read_text()
-    assert again.needs(second)
+    assert again.reserves(second)
 
 
 def test_another_part_of_the_same_file_may_be_added_once(project, tmp_path):
@@ -170,9 +170,9 @@ def test_what_is_told_now_goes_before_what_the_project_has_set(project):
 
 
 def test_an_option_that_may_be_without_a_value_is_unset_by_none(project):
-    project.remember(settings(project, Options(), 1.8), Options())
+    project.remember(run_options(project, Options(), 1.8), Options())
     typed = typed_options(["keyrecon", "--lift.height", "None"])
-    unset = settings(Workspace(project.folder), Options(), typed=typed)
+    unset = run_options(Workspace(project.folder), Options(), typed=typed)
     assert unset.lift.height is None
     Workspace(project.folder).remember(unset, Options())
     assert Workspace(project.folder).options(Options(), Options()).lift.height is None
@@ -180,8 +180,8 @@ def test_an_option_that_may_be_without_a_value_is_unset_by_none(project):
 
 def test_the_athletes_height_is_remembered(project):
     for height in (1.7, 0.5, 2.6):
-        project.remember(settings(project, Options(), height), Options())
-        assert settings(Workspace(project.folder), Options()).lift.height == height
+        project.remember(run_options(project, Options(), height), Options())
+        assert run_options(Workspace(project.folder), Options()).lift.height == height
 
 
 def test_options_are_remembered_while_they_are_worked_with_and_not_when_refused(project):
@@ -192,16 +192,16 @@ def test_options_are_remembered_while_they_are_worked_with_and_not_when_refused(
         pytest.raises(KeyreconError, match="refused"),
         workspace.remembering(with_height(Options(), 1.7), Options()),
     ):
-        assert settings(Workspace(project.folder), Options()) == with_height(Options(), 1.7)
+        assert run_options(Workspace(project.folder), Options()) == with_height(Options(), 1.7)
         raise KeyreconError("refused")
     assert file.read_text() == before
-    assert settings(workspace, Options()).keyframes.budget == 0.05
+    assert run_options(workspace, Options()).keyframes.budget == 0.05
     with (
         pytest.raises(KeyboardInterrupt),
         workspace.remembering(with_height(Options(), 1.7), Options()),
     ):
         raise KeyboardInterrupt
-    assert settings(workspace, Options()).lift.height == 1.7
+    assert run_options(workspace, Options()).lift.height == 1.7
 
 
 def test_what_somebody_writes_meanwhile_is_kept_where_options_are_refused(
@@ -220,8 +220,8 @@ def test_what_somebody_writes_meanwhile_is_kept_where_options_are_refused(
 @pytest.mark.parametrize("height", [0.2, 170.0])
 def test_a_height_that_nobody_has_is_not_remembered(project, height):
     with pytest.raises(KeyreconError, match="height in metres"):
-        settings(project, Options(), height)
-    assert settings(Workspace(project.folder), Options()) == Options()
+        run_options(project, Options(), height)
+    assert run_options(Workspace(project.folder), Options()) == Options()
 
 
 @pytest.mark.parametrize(

@@ -200,7 +200,7 @@ def foreground_residuals(
     pixels = np.concatenate([*observations.foreground, np.zeros((0, 2))])
     lines = SightLines(sight_directions(pixels, observations.camera), frame)
     axes = place_capsules(capsules, pose)
-    passing = pass_capsules(lines, axes)
+    passing = find_closest_points(lines, axes)
     nearest = passing.distance.argmin(axis=1)
     rows = np.flatnonzero(passing.distance.min(axis=1) > 0)
     frame, nearest = frame[rows], nearest[rows]
@@ -246,7 +246,7 @@ def match_residuals(observations: Observations, capsules: Capsules, pose: RootPo
     matches = observations.matches
     axes, at = place_capsules(capsules, pose), matches.frame
     lines = SightLines(sight_directions(matches.start, observations.camera), at)
-    hits = _first_hits(pass_capsules(lines, axes), axes.radii)
+    hits = _first_hits(find_closest_points(lines, axes), axes.radii)
     rows = np.flatnonzero(np.isfinite(hits.depth))
     at, segment = at[rows], capsules.segment[hits.capsule[rows]]
     surface = hits.depth[rows, None] * lines.directions[rows] - pose.origins[at, segment]
@@ -275,7 +275,7 @@ class CapsuleAxes:
 
 
 @dataclass(frozen=True, eq=False)
-class Passing:
+class ClosestPoints:
     """Where lines of sight pass capsules."""
 
     place: Float[np.ndarray, "n Q"]
@@ -315,7 +315,7 @@ def place_capsules(capsules: Capsules, pose: RootPose) -> CapsuleAxes:
     )
 
 
-def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
+def find_closest_points(lines: SightLines, axes: CapsuleAxes) -> ClosestPoints:
     """Where along each axis a line of sight is nearest to the surface, and how near it is there.
 
     With e^2 = h^2 + g u^2, u counted from where the axis is nearest to the line, the slope of e - r
@@ -343,7 +343,7 @@ def pass_capsules(lines: SightLines, axes: CapsuleAxes) -> Passing:
     parts = [slice(a, a + LINES_AT_ONCE) for a in range(0, max(1, len(first)), LINES_AT_ONCE)]
     done = list(side_by_side(pass_some, parts) if len(parts) > 1 else map(pass_some, parts))
     place, distance = (np.concatenate(of_parts) for of_parts in zip(*done, strict=True))
-    return Passing(place, distance, first, along)
+    return ClosestPoints(place, distance, first, along)
 
 
 def _along(lines: SightLines, vectors: Float[np.ndarray, "T Q 3"]) -> Float[np.ndarray, "n Q"]:
@@ -362,7 +362,7 @@ def _dot(
     return np.einsum("tqi,tqi->tq", one, other)
 
 
-def _first_hits(passing: Passing, radii: Float[np.ndarray, "Q 2"]) -> _Hits:
+def _first_hits(passing: ClosestPoints, radii: Float[np.ndarray, "Q 2"]) -> _Hits:
     """The capsule that each line of sight meets first."""
     q, distance = passing.place, passing.distance
     radius = radii[:, 0] + q * (radii[:, 1] - radii[:, 0])

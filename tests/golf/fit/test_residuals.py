@@ -8,9 +8,9 @@ from golf_truth import observe
 
 from keyrecon.golf.fit.residuals import (
     SightLines,
+    find_closest_points,
     foreground_residuals,
     match_residuals,
-    pass_capsules,
     place_capsules,
     project,
     sight_directions,
@@ -103,7 +103,7 @@ def test_a_line_of_sight_through_the_body_misses_nothing():
 def test_the_distance_of_a_line_of_sight_is_that_of_the_nearest_point_of_the_surface():
     placed, ways = pose(1), sight_directions(samples(), CAMERA)
     lines = SightLines(ways, np.zeros(60, int))
-    distances = pass_capsules(lines, place_capsules(CAPSULES, placed)).distance
+    distances = find_closest_points(lines, place_capsules(CAPSULES, placed)).distance
     starts = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.start)
     ends = placed.origins + np.einsum("tqij,qj->tqi", placed.rotations, CAPSULES.end)
     share = np.linspace(0, 1, 2001)[:, None, None]
