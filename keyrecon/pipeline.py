@@ -56,11 +56,11 @@ from keyrecon.shots.groups import propagate_in_groups
 from keyrecon.shots.usable import in_file, marks_in_shots, usable_part
 from keyrecon.timeline import (
     cut_motion,
-    end_at_cuts,
     motion_in_file,
     part_of_marks,
     scatter_frames,
     take_frames,
+    without_steps_over_cuts,
 )
 from keyrecon.tracking.anchors import frames_off_anchors, least_sure_frames
 from keyrecon.tracking.camera_motion import CameraMotionOptions, estimate_camera_motion
@@ -161,7 +161,7 @@ def prepare(
         progress=progress,
         parallel_map=parallel_map_of(keep),
     )
-    distances = end_at_cuts(distances, followed.shots.joined())
+    distances = without_steps_over_cuts(distances, followed.shots.joined())
     outside = legs_outside(followed.track, video.height)
     if outside.any():
         distances = without_legs(distances, outside)

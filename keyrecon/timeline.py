@@ -144,7 +144,7 @@ def scatter_edges(
     return tuple(spread)
 
 
-def end_at_cuts(distances: PoseDistances, shots: Shots) -> PoseDistances:
+def without_steps_over_cuts(distances: PoseDistances, shots: Shots) -> PoseDistances:
     """Pose distances whose steps from one shot to the next are not known."""
     steps = distances.consecutive_distance.copy()
     steps[:, [first - 1 for first in shots.first[1:]]] = np.nan

@@ -66,11 +66,11 @@ def _add_occurrence(
     frames = np.arange(len(height))
     hover = "frame %{x}: keyframe at frame %{customdata}<extra></extra>"
     well = half.represented | ~shown
-    places, broken = end_at_cuts(height, cuts)
+    places, broken = break_at_cuts(height, cuts)
     figure.add_scatter(
         x=places,
         y=broken,
-        customdata=end_at_cuts(half.nearest, cuts)[1],
+        customdata=break_at_cuts(half.nearest, cuts)[1],
         hovertemplate=hover,
         row=row,
         col=1,
@@ -138,7 +138,7 @@ def angle_chart(motion: Motion) -> go.Figure:
     figure = stack_charts(tuple(title.capitalize() for title in titles), len(degrees))
     for column, joint in enumerate(joints):
         row = titles.index(_pair_name(skeleton, joint)) + 1
-        places, bends = end_at_cuts(degrees[:, column].round(1), motion.cuts)
+        places, bends = break_at_cuts(degrees[:, column].round(1), motion.cuts)
         figure.add_scatter(
             x=places,
             y=bends,
@@ -207,7 +207,7 @@ def source_chart(motion: Motion) -> go.Figure:
 def doubt_chart(values: Float[np.ndarray, "T"], motion: Motion, title: str) -> go.Figure:
     """One number of every frame that tells how good it is, with the annotated frames marked."""
     figure, keyframes = stack_charts((title,), len(values)), motion.keyframes
-    places, broken = end_at_cuts(values.astype(np.float32).round(4), motion.cuts)
+    places, broken = break_at_cuts(values.astype(np.float32).round(4), motion.cuts)
     figure.add_scatter(
         x=places,
         y=broken,
@@ -237,7 +237,7 @@ def _names_below(figure: go.Figure) -> go.Figure:
     )
 
 
-def end_at_cuts(
+def break_at_cuts(
     values: Num[np.ndarray, "T"], cuts: Int[np.ndarray, "C"] | None
 ) -> tuple[Num[np.ndarray, "P"], Num[np.ndarray, "P"]]:
     """Frames and their values as a line that ends with every shot: between two of them lies a

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter
 
 from keyrecon.records import Motion
-from keyrecon.report.charts import end_at_cuts, stack_charts, style_chart
+from keyrecon.report.charts import break_at_cuts, stack_charts, style_chart
 from keyrecon.report.court_drawing import metre_grid
 from keyrecon.report.markup import ReportMaterial, note, pack, section, text, thinning
 from keyrecon.world.court import HALF_DOUBLES, HALF_LENGTH, tennis_court
@@ -124,7 +124,7 @@ def run_chart(material: ReportMaterial) -> go.Figure | None:
     titles = (f"Speed over the {material.court[1].origin}, m/s", "Acceleration, m/s²")
     figure = stack_charts(titles, len(way.speed))
     for row, values in enumerate((way.speed, way.acceleration), start=1):
-        places, broken = end_at_cuts(values.astype(np.float32).round(3), material.motion.cuts)
+        places, broken = break_at_cuts(values.astype(np.float32).round(3), material.motion.cuts)
         figure.add_scatter(
             x=places,
             y=broken,

@@ -10,7 +10,7 @@ from keyrecon.keyframes.coverage import TIME_UNIT
 from keyrecon.keyframes.pose_time import elapsed_time, pose_change
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
 from keyrecon.records import Shots
-from keyrecon.timeline import end_at_cuts
+from keyrecon.timeline import without_steps_over_cuts
 
 STROKES = np.concatenate([np.arange(120, 140), np.arange(420, 440)])
 
@@ -99,6 +99,8 @@ def test_a_cut_is_no_motion():
     """Two shots in which nobody moves, seen from two sides."""
     poses = np.repeat([[0.0, 0.0], [0.1, 0.0]], 150, axis=0)
     whole = comparison_of(poses)
-    time = np.diff(elapsed_time(end_at_cuts(whole, Shots.between((150,), 300)), 0, 10, 0.35))
+    time = np.diff(
+        elapsed_time(without_steps_over_cuts(whole, Shots.between((150,), 300)), 0, 10, 0.35)
+    )
     assert (time == TIME_UNIT).all()
     assert np.diff(elapsed_time(whole, 0, 10, 0.35)).max() > 10 * TIME_UNIT

@@ -39,9 +39,9 @@ from keyrecon.annotate.assist.pose_estimate import (
     PoseEstimate,
     estimate_pose,
 )
-from keyrecon.annotate.assist.preview import find_player, tint_part
+from keyrecon.annotate.assist.preview import find_player_in_strip, tint_part
 from keyrecon.annotate.assist.project_cache import ProjectCache
-from keyrecon.annotate.assist.shot_strip import choose_shot, describe_shots
+from keyrecon.annotate.assist.shot_strip import choose_shot, project_shots
 from keyrecon.annotate.assist.side_checks import evidence_of_motion
 from keyrecon.annotate.assistant import Assistant, Json, Marks, Signs
 from keyrecon.body import Skeleton
@@ -61,7 +61,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
     """What needs the automatic part answers with nothing before that was run."""
     cache = ProjectCache(workspace)
     return Assistant(
-        keyframes=partial(describe_keyframes, cache),
+        keyframes=partial(describe_reasons, cache),
         bodies=partial(describe_bodies, cache),
         motion_digest=partial(project_motion_digest, workspace.folder),
         suggestion=partial(describe_suggestion, cache),
@@ -71,7 +71,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
         stretches=partial(describe_stretches, cache),
         preview=partial(describe_preview, cache),
         backprojection=partial(show_part, cache),
-        shots=partial(describe_shots, cache, workspace),
+        shots=partial(project_shots, cache, workspace),
         choose_shot=partial(choose_shot, cache, workspace),
         court=partial(describe_court, workspace),
         court_view=partial(describe_court_view, workspace),
@@ -92,7 +92,7 @@ def _describe_swing(workspace: Workspace, *marked: Any) -> Json:
     return describe_swing(workspace, *marked)
 
 
-def describe_keyframes(cache: ProjectCache, added: dict[int, str]) -> Json:
+def describe_reasons(cache: ProjectCache, added: dict[int, str]) -> Json:
     """Why each keyframe is one, and where the player is on it."""
     preparation = cache.preparation()
     if preparation is None:
@@ -318,7 +318,7 @@ def describe_stretches(cache: ProjectCache, annotations: Annotations) -> list[Js
 def describe_preview(cache: ProjectCache, picks: tuple[Pick, ...], frames: tuple[int, ...]) -> Json:
     """Head, feet and box that these picks find on some frames; no places where not found."""
     strip, camera = cache.strip(frames)
-    player = find_player(strip, cache.colors(picks), camera, frames)
+    player = find_player_in_strip(strip, cache.colors(picks), camera, frames)
     rows = zip(player.frames.tolist(), player.head, player.feet, player.box, strict=True)
     strip_rows = [
         {

@@ -11,7 +11,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.records import Shots
 
 
-def describe_shots(cache: ProjectCache, workspace: Workspace) -> list[Json]:
+def project_shots(cache: ProjectCache, workspace: Workspace) -> list[Json]:
     """Every shot with what it shows, and whether it is used now and in the next run."""
     preparation = cache.preparation()
     return [] if preparation is None else list_shots(preparation.shots, workspace)
@@ -38,9 +38,9 @@ def list_shots(shots: Shots, workspace: Workspace) -> list[Json]:
 
 def choose_shot(cache: ProjectCache, workspace: Workspace, number: int, used: bool) -> list[Json]:
     """Keep whether a shot is used in the next run; the shots anew."""
-    listed = describe_shots(cache, workspace)
+    listed = project_shots(cache, workspace)
     clicked = next((shot for shot in listed if shot["number"] == number), None)
     if clicked is None:
         raise KeyreconError(f"There is no shot {number}; there are {len(listed)}.")
     workspace.choose_shot(number, None if clicked["used"] == used else used)
-    return describe_shots(cache, workspace)
+    return project_shots(cache, workspace)
