@@ -193,7 +193,7 @@ def test_parts_of_a_long_video_may_be_compared_elsewhere(clip, by_exemplars, tmp
             save_record(tmp_path / "inputs.npz", arguments)
             yield work(*load_record(tmp_path / "inputs.npz"))
 
-    there = compare_frames(*clip, CompareOptions(most=75), spread=elsewhere)
+    there = compare_frames(*clip, CompareOptions(most=75), parallel_map=elsewhere)
     for field in fields(there):
         here = getattr(by_exemplars, field.name)
         np.testing.assert_array_equal(here, getattr(there, field.name))

@@ -6,7 +6,7 @@ import pytest
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath, Track, TrackAnchors
-from keyrecon.tracking.scale import SizeEvidence, measured
+from keyrecon.tracking.scale import SizeEvidence, with_standing_height
 
 COUNT, ROWS = 120, 360
 
@@ -32,7 +32,7 @@ def evidence(told, footless=True):
 def test_a_player_whose_feet_the_picture_cuts_off_is_as_tall_as_marked_bones_tell():
     height, track = approaching()
     # proportions are not quite the table's: what is told is a tenth too much everywhere
-    found = measured(track, evidence(1.1 * height), 30, np.ones(COUNT, bool))
+    found = with_standing_height(track, evidence(1.1 * height), 30, np.ones(COUNT, bool))
     assert found.height == pytest.approx(height, rel=0.12)
     assert found.mid_feet[-1] == pytest.approx([200.0, 150.0 + found.height[-1]])
 
@@ -40,14 +40,14 @@ def test_a_player_whose_feet_the_picture_cuts_off_is_as_tall_as_marked_bones_tel
 def test_without_marked_bones_head_and_feet_tell():
     _, track = approaching()
     unknown = np.full(COUNT, np.nan)
-    found = measured(track, evidence(unknown), 30, np.ones(COUNT, bool))
+    found = with_standing_height(track, evidence(unknown), 30, np.ones(COUNT, bool))
     assert found.height.max() < 210
     assert (found.feet == track.feet).all()
 
 
 def test_no_feet_are_cut_off_where_every_marked_body_has_them():
     height, track = approaching()
-    found = measured(track, evidence(height, footless=False), 30, np.ones(COUNT, bool))
+    found = with_standing_height(track, evidence(height, footless=False), 30, np.ones(COUNT, bool))
     assert (found.feet == track.feet).all()
 
 

@@ -125,7 +125,7 @@ def test_pictures_at_hand_give_the_same_motion_as_decoding_every_shot_again(monk
         "_read_reduced",
         lambda shot, *more: decoded.append(len(shot)) or read(shot, *more),
     )
-    elsewhere = estimate_camera_motion(video, spread=one_by_one)
+    elsewhere = estimate_camera_motion(video, parallel_map=one_by_one)
     assert decoded == [120, 40, 40, 40]
     decoded.clear()
     here = estimate_camera_motion(video)

@@ -100,7 +100,7 @@ def find_player_in_strip(
     strip: Strip, colors: Colors, camera: CameraPath, frames: tuple[int, ...]
 ) -> PreviewedParts:
     """Head, feet and box on `frames`; KeyreconError where the head is hardly ever found."""
-    track: Track = find.find_player_in_strip(strip, colors, camera, TrackAnchors.none())
+    track: Track = find.find_player(strip, colors, camera, TrackAnchors.none())
     rows = np.searchsorted(strip.numbers, np.unique(frames))
     tracked = track.confidence > 0
     missing = ~tracked[rows]
