@@ -60,7 +60,7 @@ class KeepWithWorkers(Keep, Protocol):
 def work_on_each(
     keep: Keep, work: Callable[[Item], Result], items: Iterable[Item], large: bool = False
 ) -> Iterator[Result]:
-    """`work`, which calls stages by `keep`, done for shots that do not hang on one another."""
+    """`work`, which calls stages by `keep`, done for independent items; results in order."""
     if isinstance(keep, KeepWithWorkers):
         return keep.each(work, items, large)
     return map(work, items)

@@ -1,4 +1,4 @@
-"""What a project knows of its camera's lens without looking at the picture."""
+"""The focal length of a project's video, as far as it is known without its pictures."""
 
 from pathlib import Path
 

@@ -74,7 +74,7 @@ from keyrecon.unseen import without_hidden_legs, without_unseen
 
 @dataclass(frozen=True)
 class Options:
-    """What every stage can be told."""
+    """The options of every stage."""
 
     camera: CameraMotionOptions = field(default_factory=CameraMotionOptions)
     shots: ShotOptions = field(default_factory=ShotOptions)

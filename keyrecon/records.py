@@ -127,7 +127,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class TrackVerification:
-    """What some frames of the video say of the track."""
+    """Checks of the track against some frames of the video."""
 
     frames: Int[np.ndarray, "n"]
     """Those looked at."""
@@ -329,7 +329,7 @@ class Preparation:
     keyframes: Keyframes
     shots: Shots
     verification: TrackVerification | None = None
-    """What the video says of the track; None where it was not held against it."""
+    """Checks of the track against the video; None where they were not made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,8 +367,8 @@ class JointTracks:
     keyframe: Int[np.ndarray, "T J"]
     """Frame number of the keyframe that each joint comes from."""
     exchange_evidence: Float[np.ndarray, "T 2"] | None = None
-    """What motion says for left and right being exchanged in the marks of the lower body, and of
-    the upper, nats; 0 in frames without marks, None where nobody looked."""
+    """Log odds by the motion that left and right are exchanged in the marks of the lower body, and
+    of the upper, nats; 0 in frames without marks, None where not computed."""
     elsewhere: Float[np.ndarray, "T J"] | None = None
     """Probability that a joint of a limb is a fifth of a trunk and more from here, by the limbs
     that a frame might show (0 of the trunk); None where there is one choice only."""

@@ -92,7 +92,7 @@ BUILT_IN = Path("built-in")
 
 @dataclass(frozen=True)
 class GolfSettings:
-    """What is told of a fit; None leaves it as the project has it, or as it usually is."""
+    """Options that are given for one fit; None takes the project's, or the default."""
 
     method: Literal["swing", "windows"] | None = None
     """How the model is fitted."""
@@ -102,7 +102,7 @@ class GolfSettings:
     """A swing prior of `keyrecon golf train`, or BUILT_IN."""
 
     def applied_to(self, options: GolfOptions, folder: Path) -> GolfOptions:
-        """The options of the project in a folder with what is told."""
+        """The options of the project in a folder with those given here in their place."""
         components = options.fit.components if self.components is None else self.components
         prior = options.prior if self.prior is None else relative_path(self.prior, folder)
         return replace(

@@ -1,4 +1,4 @@
-"""What `keyrecon keyframes` does to a project folder, and what it tells of the keyframes."""
+"""What `keyrecon keyframes` does to a project folder, and the lines that it prints."""
 
 from collections import deque
 from collections.abc import Collection, Sequence

@@ -233,7 +233,7 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals of one type of observation, and how each changes with the point it hangs on."""
+    """Residuals of one type of observation, and their derivatives by the points they depend on."""
 
     values: Float[np.ndarray, "n"]
     """px or metres, one unit per record."""

@@ -269,7 +269,7 @@ class Workspace:
         self.project = read_project(self.project_file)
 
     def picks(self) -> tuple[Pick, ...]:
-        """What a person clicked, in one order: stage results do not hang on who clicked first.
+        """What a person clicked, in a fixed order, so that stage results do not depend on it.
 
         Raises KeyreconError when there is nothing yet.
         """

@@ -48,7 +48,7 @@ class Exemplars:
 def find_exemplars(
     compare: Compare, may_lead: Bool[np.ndarray, "T"], most: int, progress: Progress = silent
 ) -> Exemplars:
-    """At most `most` of the frames that `may_lead`, and what they stand for.
+    """At most `most` of the frames that `may_lead`, and which frames each stands for.
 
     A frame that may not lead, as nothing is seen of one half of the body, is given one like any
     other.

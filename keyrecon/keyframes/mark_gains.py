@@ -1,4 +1,4 @@
-"""What each mark brings: keyframes in the order in which they cover most (Section 4.3).
+"""The gain in coverage of each mark: keyframes in greedy order (Section 4.3).
 
 Chosen keyframes cover a video together, and in no order. A person who marks one after the other
 wants the one first that covers most, then the one that adds most to it, and to know what one more

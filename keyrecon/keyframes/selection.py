@@ -134,7 +134,7 @@ class KeyframeOptions:
 
 @dataclass(frozen=True, eq=False)
 class HalfDistances:
-    """What is known of one half of the body, and what is asked of its keyframes."""
+    """Pose distances of one half of the body, and the coverage that its keyframes must reach."""
 
     pose_distances: PoseDistances
     matched: Float[np.ndarray, "M M"]
@@ -157,11 +157,11 @@ class HalfDistances:
 
     @cached_property
     def sufficient_goal(self) -> CoverageGoal:
-        """What keyframes have to represent at the distance that is near enough."""
+        """The coverage goal at `KeyframeOptions.sufficient_beta`."""
         return self.goal(self.options.sufficient_beta)
 
     def goal(self, beta: float) -> CoverageGoal:
-        """What keyframes with `beta` represent, and have to."""
+        """The coverage goal of keyframes that represent frames within `beta`."""
         hoods = find_neighborhoods(
             self.distances(beta), self.pose_distances, self.exemplar_distance, beta
         )

@@ -1,4 +1,4 @@
-"""Depth signs: the weights of the evidence, what the picture tells of bones, and the signs."""
+"""Depth signs: the weights of the evidence, foreshortened bones, and the signs."""
 
 from dataclasses import dataclass, replace
 from itertools import product

@@ -1,4 +1,4 @@
-"""A multilayer perceptron that was learnt before: what it tells of what it is shown."""
+"""Inference by a multilayer perceptron that was trained before."""
 
 from collections.abc import Sequence
 from itertools import pairwise

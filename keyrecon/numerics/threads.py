@@ -28,7 +28,7 @@ _SHARING = _Sharing()
 
 
 def core_count() -> int:
-    """Cores that this process has to itself; results do not hang on it."""
+    """Cores that this process has to itself; results do not depend on it."""
     return max(1, (os.cpu_count() or 1) // _SHARING.processes)
 
 

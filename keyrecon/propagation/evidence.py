@@ -1,4 +1,4 @@
-"""What speaks for a limb of a hypothesis, and how much each is worth.
+"""Evidence for the limbs of a hypothesis, and its weights.
 
 Evidence of one limb: do edges lie on its outline (`residual`), do its joints and the middles of its
 bones look like marked ones (`unlikeness`), have its bones the colours of marked ones
@@ -113,7 +113,7 @@ class SideStates:
 
 @dataclass(frozen=True, eq=False)
 class LimbEvidence:
-    """What speaks against the states of both sides and their pairs."""
+    """Evidence against the states of both sides and their pairs: costs before they are weighted."""
 
     sides: tuple[SideStates, SideStates]
     of_sides: tuple[dict[str, Float[np.ndarray, "T S"]], dict[str, Float[np.ndarray, "T S"]]]
@@ -191,7 +191,7 @@ def side_evidence(
     predictions: MarkPredictions | None,
     states: SideStates,
 ) -> dict[str, Float[np.ndarray, "T S"]]:
-    """What speaks against each state of a side."""
+    """Evidence against each state of a side."""
     half, own = templates.half, states.members[0]
     bones = [np.isin(half.bones[:, 1], side) for side in states.members]
     ends = [half.bones[:, 1] == side[-1] for side in states.members]
@@ -248,7 +248,7 @@ def pair_evidence(
     sides: tuple[SideStates, SideStates],
     silhouettes: Silhouettes | None,
 ) -> Iterator[tuple[str, Float[np.ndarray, "T S S"]]]:
-    """What speaks against each pair of states of both sides, one after the other."""
+    """Evidence against each pair of states of both sides, one kind after the other."""
     frames, (one, other) = np.arange(len(trunk)), sides
     count = np.maximum((templates.frame_elements >= 0).sum(axis=1), 1)
     unexplained = hypotheses.unexplained
@@ -288,7 +288,7 @@ def marked_spans(poses: AnnotatedPoses) -> Float[np.ndarray, "_"]:
 def span_cost(
     span: Float[np.ndarray, "*n"], marked: Float[np.ndarray, "_"]
 ) -> Float[np.ndarray, "*n"]:
-    """What speaks against hands, or feet, that are farther apart than they were ever marked, nats.
+    """Cost of hands, or feet, that are farther apart than they were ever marked, nats.
 
     Hands that hold one club are never far apart, and where they were on all marks, they are taken
     to hold one. Where they were not, marks tell little of how far apart they come: to ask it of

@@ -93,7 +93,7 @@ class PoseHypotheses:
 
 @dataclass(frozen=True, eq=False)
 class MarkPredictions:
-    """Where flow and straight lines lead from marks, player coordinates."""
+    """Joints predicted from marks by optical flow and by straight lines, player coordinates."""
 
     flow: Complex[np.ndarray, "T J"]
     """0 where flow says nothing."""

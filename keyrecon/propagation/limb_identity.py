@@ -108,8 +108,8 @@ class LimbIdentity:
     probability: Float[np.ndarray, "T"]
     """Of these sides, 0-1."""
     exchange_evidence: Float[np.ndarray, "T"]
-    """What motion says for left and right being exchanged in the marks of a frame, nats; 0 without
-    marks."""
+    """Log odds by the motion that left and right are exchanged in the marks of a frame, nats; 0
+    without marks."""
 
     def apply(self, half: BodyHalf, values: Shaped[np.ndarray, "T J"]) -> Shaped[np.ndarray, "T J"]:
         """Values of joints, those of the sides exchanged where the sides are."""
@@ -150,7 +150,7 @@ class ArmEvidence:
 
 @dataclass(frozen=True, eq=False)
 class IdentityEvidence:
-    """What tells which limb is the left one, besides motion and marks."""
+    """Evidence of which limb is the left one, other than motion and marks."""
 
     log_odds: Float[np.ndarray, "T"]
     """Of the sides as they are against the exchanged, by likeness to marks, nats."""
@@ -245,7 +245,7 @@ def motion_cost(
     fps: float,
     ground: Complex[np.ndarray, "T"] | None,
 ) -> Float[np.ndarray, "S"]:
-    """What motion says against exchanging two limbs between frames t and t + 1, nats; S is T - 1.
+    """Cost of exchanging two limbs between frames t and t + 1 by their motion, nats; S is T - 1.
 
     Of legs that stand on the ground only knees and ankles are asked: a hypothesis has its hips on
     the sides of the annotated pose that it comes from, whichever legs it found, so that they speak

@@ -22,8 +22,8 @@ def exchange_evidence(
     exchange_costs: Float[np.ndarray, "S"],
     marked: Int[np.ndarray, "K"],
 ) -> Float[np.ndarray, "T"]:
-    """What motion says for left and right of a pair of limbs being exchanged on a marked frame, and
-    against it where negative, nats; 0 elsewhere.
+    """Log odds by the motion that left and right of a pair of limbs are exchanged on a marked
+    frame, nats; 0 elsewhere.
 
     Two trajectories pass through all frames; where they are `crossed` the sides of the marks are
     those of the other trajectory. `exchange_costs` are of an exchange between two frames, nats,

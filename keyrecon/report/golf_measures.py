@@ -138,7 +138,7 @@ def record_swing(
 
 
 def measure_swing(swing: RecordedSwing) -> SwingMeasures:
-    """The numbers of a swing; NaN where they hang on a key posture that its film does not show."""
+    """The numbers of a swing; NaN where they need a key posture that its film does not show."""
     curves = measure_curves(swing)
     keys = _measure_tempo(swing)
     for curve in curves:

@@ -55,7 +55,7 @@ class Cropping:
 
     @classmethod
     def below_heads(cls, track: Track, player: float) -> "Cropping":
-        """Crops that hang on the head, the player `player` px tall; quick to Fourier-transform."""
+        """Crops placed by the head, the player `player` px tall; sizes are quick to transform."""
         rows, columns = (ABOVE_HEAD + BELOW_HEAD) * player, 2 * ASIDE * player
         size = 2 * next_fast_len(round(rows / 2)), 2 * next_fast_len(round(columns / 2))
         corner, scale = np.array([(size[1] - 1) / 2, ABOVE_HEAD * player]), player / track.height

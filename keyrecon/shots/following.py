@@ -59,7 +59,7 @@ HELD = 1e9
 
 @dataclass(frozen=True)
 class FollowOptions:
-    """What the stages that follow the player can be told."""
+    """Options of the stages that follow the player."""
 
     shots: ShotOptions = field(default_factory=ShotOptions)
     find: FindOptions = field(default_factory=FindOptions)
@@ -82,7 +82,7 @@ class FollowedPlayer:
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
-    """What the stages are given of one shot."""
+    """Inputs of the stages for one shot."""
 
     name: str
     """Appended to those of its stages; nothing for the only one."""

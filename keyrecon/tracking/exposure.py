@@ -1,4 +1,4 @@
-"""How bright each frame is: clouds pass, cameras set their exposure anew, lamps flicker.
+"""Exposure of each frame relative to its shot: clouds, automatic exposure, flicker of lamps.
 
 Colours of the player and of the scene are compared over the whole video, and following marks by
 optical flow takes it that brightness stays. So every frame is held against a reference of its

@@ -1,4 +1,4 @@
-"""Which parts of a track are surely the player's: those joined to a place that a person told.
+"""Which tracklets of a track are surely the player's: those linked to a marked or clicked head.
 
 A path through candidates pays for a jump once and is then as sure of somebody else as of the
 player; where the player has left the picture, or has not come yet, there is nobody else to follow.

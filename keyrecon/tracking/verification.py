@@ -1,15 +1,16 @@
-"""Hold the track against the video: whether all of the player is seen, and who else is there.
+"""Check the track against the video: truncation, occlusion by overlays, and distractors.
 
-A path through candidates goes on wherever there are any, and is as sure of a knee at the lower edge
-as of a shoe, and of another player in the same clothes as of the one meant. Both show elsewhere.
-What is found here is told; neither the track nor the motion changes with it.
-Feet that are in the picture have ground beneath them; where they are cut off, the player's colours
-reach the last row. So does a shadow: where feet were marked, the size of the player tells whether
-the picture ends above them. And another player of the same clothes looks like this one from head to
-feet: the mean of the player's own part maps is a template, its response away from the player,
-against that on the player, tells of a distractor, where the colours from top to bottom are the
-player's too (matched filter; a figure of other clothes responds as well, since back-projection is
-coarse).
+The tracker's path passes through any candidates that there are: its confidence is as high for a
+knee at the lower edge as for a shoe, and for another player in the same clothes as for the right
+one. What is found here is reported; neither the track nor the motion changes.
+
+Truncation: feet that are in the picture have ground beneath them; where they are cut off, the
+player's colours reach the last row. So does a shadow: where feet were marked, the size of the
+player decides whether the picture ends above them.
+
+Distractors: the mean of the player's own part maps is a template for a matched filter. Its response
+away from the player, relative to that on the player, finds figures alike; since back-projection is
+coarse, the colours from top to bottom must be the player's too.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The camera of every frame: foretold by the camera's motion, corrected by the court's lines.
+"""The camera of every frame: predicted by the camera's motion, corrected by the court's lines.
 
 Between two frames a camera that turns and zooms maps the background by a homography
 (`CameraPath`); the camera of the last frame carried along by it is off by a pixel or so, and one or

@@ -1,4 +1,4 @@
-"""What tells where the ground is when there is no court.
+"""Residuals of a camera over level ground, without a court.
 
 A camera over level ground has four numbers: focal length, tilt, roll and height (it stands over the
 origin and looks along y). Each kind of evidence is a function from such a camera to residuals in
@@ -6,7 +6,7 @@ standard deviations:
 
 - Things that stand upright run towards the vertical vanishing point.
 - The horizon is where lines of sight are level.
-- A length on the ground, or an upright thing of known length that stands on it, is as long as told.
+- A length on the ground, or an upright thing that stands on it, has the length that was given.
 - The player is as tall wherever he stands: the distance at which his foot meets the ground is the
   one at which he is as small as he is. His size is taken from the lifted motion, so that he need
   not stand straight, and moves in depth as he walks about (Lv, Zhao and Nevatia, "Self-calibration
@@ -65,7 +65,7 @@ class Stances:
     foot: Float[np.ndarray, "N 2"]
     """The standing ankle, px."""
     behind: Float[np.ndarray, "N"]
-    """How much farther away than that ankle the middle of the hips is, units of the motion."""
+    """Depth of the middle of the hips beyond that ankle, units of the motion."""
     scale: Float[np.ndarray, "N"]
     """px per unit of the motion at the middle of the hips."""
     feet: Float[np.ndarray, "N 2"]

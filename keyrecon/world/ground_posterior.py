@@ -1,11 +1,10 @@
-"""How likely every camera over level ground is, given the evidence.
+"""The posterior of the camera over level ground, given the evidence.
 
-For every focal length of a wide range the other numbers are fitted to all evidence together
-(`ground_evidence`), which tells how likely that focal length is (Laplace's approximation in the
-others: Tierney and Kadane, JASA 81, 1986). The range is gone over twice, the second time where it
-matters. So the spread is right also where the focal length stays open over a factor of three, as it
-does where the player stays on one spot, and what follows from that for tilt, height and place is in
-their spreads.
+For every focal length of a grid the other parameters are fitted to all evidence together
+(`ground_evidence`), and Laplace's approximation over them gives the posterior of that focal length
+(Tierney and Kadane, JASA 81, 1986). The grid is refined once around the likely values. So the
+spread is right also where the focal length is uncertain by a factor of three, as it is for a player
+who stays on one spot, and the spreads of tilt, height and place include that uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +40,7 @@ COARSE, FINE, SAMPLES = 11, 11, 600
 
 @dataclass(frozen=True, eq=False)
 class GroundEvidence:
-    """All that is held against a camera."""
+    """Observations and prior of a camera."""
 
     marks: MarkedEnds
     stances: Stances
@@ -68,7 +67,7 @@ class GroundEvidence:
 
 @dataclass(frozen=True, eq=False)
 class GroundPosterior:
-    """What is left open: normal distributions, one for each focal length tried."""
+    """A mixture of normal distributions, one for each focal length tried."""
 
     weight: Float[np.ndarray, "n"]
     mean: Float[np.ndarray, "n 6"]
@@ -99,7 +98,8 @@ def state_vector(state: GroundState) -> Float[np.ndarray, "6"]:
 def explore_cameras(
     evidence: GroundEvidence, longer: int
 ) -> tuple[GroundPosterior, GroundEvidence]:
-    """All focal lengths, coarsely, then the likely ones; with the noise that the fit tells."""
+    """The posterior on a coarse grid of focal lengths, then on a fine one; and the evidence with
+    the noise estimated from the fit."""
     grid = np.log(np.geomspace(*FOCAL_LENGTHS, COARSE) * longer)
     posterior = _laplace_posterior(evidence, grid)
     for _ in range(2):
@@ -126,7 +126,7 @@ def _laplace_posterior(
     log_focals: Float[np.ndarray, "n"],
     near: Float[np.ndarray, "6"] | None = None,
 ) -> GroundPosterior:
-    """How likely each focal length is, and the rest given it, which is not far from `near`."""
+    """By Laplace's approximation at each focal length; searches start at `near` where given."""
     usual = state_vector(evidence.prior[0])[1:]
     start = usual if near is None else near[1:]
     cost, means, roots = [], [], []

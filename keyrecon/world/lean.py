@@ -1,4 +1,4 @@
-"""How a lifted body leans along the line of sight, and what of it is the lifting's error.
+"""The lean of a lifted body along the line of sight, most of which is an error of the lifting.
 
 A lifting guesses how far a camera looks down; on the court that is known. What legs or trunk lean
 in the median of a clip, beyond what players do, is taken out.

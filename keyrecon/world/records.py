@@ -35,12 +35,12 @@ class WorldCamera:
     sd_focal: Float[np.ndarray, "T"]
     """Standard deviation of the focal length, px."""
     sd_tilt: Float[np.ndarray, "T"]
-    """Standard deviation of the direction of the vertical, radians; NaN where nobody told."""
+    """Standard deviation of the direction of the vertical, radians; NaN where unknown."""
     origin: Origin = COURT
     elsewhere: tuple[int, ...] = ()
     """First frames of shots that show the court from another place: they have no camera."""
     stature: float | None = None
-    """Metres of the player where his height alone told what a metre is; None where another did."""
+    """The player's height, metres, where it alone set the scale; None where something else did."""
 
     @property
     def centre(self) -> Float[np.ndarray, "T 3"]:
@@ -104,7 +104,7 @@ class GroundMark:
 
 @dataclass(frozen=True)
 class GroundMarks:
-    """All that a person told."""
+    """All that a person marked of the ground and the camera."""
 
     marks: tuple[GroundMark, ...] = ()
     field_of_view: float | None = None

@@ -1,4 +1,4 @@
-"""The motion on the court refined: what camera and ground tell changes the pose.
+"""The pose refined by the camera and the ground that the player stands on.
 
 A lifted pose has the picture right and guesses much of its depth. On the court more is known: the
 true perspective, metres, the vertical, the ground. One least squares over the motion, in the
@@ -299,7 +299,7 @@ def _direction_prior(before: Float[np.ndarray, "T B 3"], motion: Motion) -> Dire
 
 
 def _steady_terms(placed: Placed, body: _LiftedBody, standing: Standing) -> list[Term]:
-    """What does not hang on where the feet are."""
+    """Terms that do not depend on where the feet are."""
     motion, camera, skeleton = placed.motion, placed.camera, placed.motion.skeleton
     joints, fps = len(skeleton.names), motion.fps
     far = np.linalg.norm(placed.root - camera.centre, axis=1)

@@ -1,4 +1,4 @@
-"""Moments in which the player stands, told from the picture and the lifted motion alone.
+"""Moments in which the player stands, from the picture and the lifted motion alone.
 
 A foot stands whose ankle does not move against the background and is not the upper one; of one that
 was not seen nothing is known. The stillest frame of every half second is taken: neighbouring frames

@@ -257,7 +257,7 @@ def _longest_beside(
 
 
 def _displaced(annotations: Annotations, residuals: MarkResiduals) -> Iterator[Check]:
-    """Joints by the sum of their residuals; a long bone counts for the end that is told first."""
+    """Joints by the sum of their residuals; a long bone counts for one of its ends alone."""
     skeleton = annotations.skeleton
     at_joint = (skeleton.bones[:, :, None] == np.arange(len(skeleton.names))).any(axis=1)
     for row, frame in enumerate(annotations.frames.tolist()):

@@ -75,7 +75,7 @@ def marking_order(skeleton: Skeleton) -> list[int]:
 
 
 def _chain(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and all that hang on it."""
+    """A joint and all its descendants."""
     children = [c for c, parent in enumerate(skeleton.parents) if parent == joint]
     return [joint, *(outer for child in children for outer in _chain(skeleton, child))]
 

@@ -134,7 +134,7 @@ def _half(data: dict[str, Any], name: str) -> HalfKeyframes:
 
 
 def _of_half(data: dict[str, Any], key: str, name: str) -> Any:
-    """What is told of one half under a key."""
+    """The value of one half of the body under a key."""
     if not isinstance(data[key], dict) or data[key].get(name) is None:
         raise ValueError(f"'{key}' tells nothing of {name}")
     return data[key][name]

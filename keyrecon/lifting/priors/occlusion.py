@@ -1,4 +1,4 @@
-"""What hides an arm lies before it.
+"""Occlusion: what hides an arm lies before it.
 
 A person marks elbows and wrists that are hidden where they must be. Within the outline of the
 trunk it is nearly always the trunk that hides them, so they are behind it: of all that a mark
