@@ -212,10 +212,17 @@ def _last_at_address(ends: Float[np.ndarray, "T 2 2"], top: int, low: int, addre
     if not down.any():
         return 0
     frames, poses = np.flatnonzero(down), ends[:top][down]
-    apart = np.linalg.norm(poses[:, None] - poses, axis=3).sum(axis=2)
-    rest = int((apart < address).sum(axis=1).argmax())
-    noise = float(np.median(apart[rest][apart[rest] < LARGEST_NOISE]))
-    return int(frames[np.flatnonzero(apart[rest] <= address + noise)[-1]])
+    # One row of distances at a time: somebody may stand at address for minutes.
+    rest = int(np.argmax([(_distances(poses, pose) < address).sum() for pose in poses]))
+    apart = _distances(poses, poses[rest])
+    noise = float(np.median(apart[apart < LARGEST_NOISE]))
+    return int(frames[np.flatnonzero(apart <= address + noise)[-1]])
+
+
+def _distances(
+    poses: Float[np.ndarray, "N 2 2"], pose: Float[np.ndarray, "2 2"]
+) -> Float[np.ndarray, "N"]:
+    return np.linalg.norm(poses - pose, axis=2).sum(axis=1)
 
 
 def _first_rest(resting: np.ndarray, speed: np.ndarray, hit: int, pause: int) -> int:
