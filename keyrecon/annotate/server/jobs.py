@@ -84,7 +84,7 @@ class Jobs:
                 self._jobs[number] = replace(self._jobs[number], state="cancelled")
                 self._process.terminate()
             job = self._jobs[number]
-        self._publish(job)
+            self._publish(job)
         return job
 
     def close(self) -> None:
@@ -108,7 +108,7 @@ class Jobs:
             if self._jobs[job.id].state != "running":
                 return
             self._jobs[job.id] = job
-        self._publish(job)
+            self._publish(job)  # not later: what is published last is the last
 
 
 _spawning = multiprocessing.get_context("spawn")

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -52,6 +53,24 @@ def test_a_job_can_be_cancelled_and_begun_again(jobs):
         (second.id, "done"),
         (first.id, "cancelled"),
     ]
+
+
+def test_what_is_heard_last_of_a_job_is_its_end():
+    heard, slow = [], threading.Event()
+
+    def publish(job):
+        if job.state == "running":
+            slow.set()
+            time.sleep(0.5)
+        heard.append(job.state)
+
+    jobs = Jobs({"count": counting}, publish)
+    job = jobs.start("count", {"steps": 1000, "seconds": 0.1})
+    assert slow.wait(20)
+    jobs.cancel(job.id)
+    until(lambda: {"running", "cancelled"} <= {*heard})
+    jobs.close()
+    assert heard.index("cancelled") > heard.index("running")
 
 
 SERVER = """
