@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from typing import Any
 
@@ -32,13 +32,14 @@ class Events:
         """End all streams; called in the server's own thread."""
         self._put(None)
 
-    async def stream(self, first: Json) -> AsyncIterator[str]:
-        """The text of an event stream; `first` is for the new page itself."""
+    async def stream(self, first: Callable[[], Json]) -> AsyncIterator[str]:
+        """The text of an event stream; `first` is for the new page itself, and made when no news
+        can be missed any more."""
         self._loop = asyncio.get_running_loop()
         queue: asyncio.Queue[Json | None] = asyncio.Queue()
         self._queues.add(queue)
         try:
-            news: Json | None = first
+            news: Json | None = first()
             while news is not None:
                 yield f"data: {json.dumps(news)}\n\n"
                 news = await self._next(queue)

@@ -23,7 +23,7 @@ from starlette.types import ASGIApp
 from keyrecon.annotate.server import handlers, world_handlers
 from keyrecon.annotate.server.page_words import in_page_words
 from keyrecon.annotate.server.security import Credentials, SecurityMiddleware
-from keyrecon.annotate.server.session import Session
+from keyrecon.annotate.server.session import Session, describe_files
 from keyrecon.annotate.store.edits import EditList
 from keyrecon.annotate.store.journal import NotSaved
 from keyrecon.errors import KeyreconError
@@ -104,7 +104,10 @@ def make_routes(session: Session, files: dict[str, Response]) -> list[Route]:
     """All routes there are."""
 
     async def events(request: Request) -> Response:
-        first = {"revision": session.store.state.revision}
+        def first() -> dict[str, Any]:
+            files = describe_files(session.workspace)
+            return {"revision": session.store.state.revision, "files": files}
+
         return StreamingResponse(session.events.stream(first), media_type="text/event-stream")
 
     async def frame(request: Request) -> Response:

@@ -77,6 +77,9 @@ def open_session(
 
 def describe_project(session: Session) -> Json:
     """What does not change from one edit to the next."""
+    files = describe_files(
+        session.workspace
+    )  # before they are read: newer ones are not vouched for
     revision = session.store.state.revision
     keyframes, cells = session.keyframes.current(), session.store.state.cells
     added = {int(frame): half for frame, half in by_frame(cells, "own").items()}
@@ -89,6 +92,7 @@ def describe_project(session: Session) -> Json:
         **describe_skeleton(skeleton),
         "id": f"{name}-{session.frames.identity}",
         "version": session.frames.identity,
+        "files": files,
         "keyframes": describe_keyframes(
             keyframes, cells, skeleton, explained.get("frames", {}), bodies or ()
         ),
@@ -109,13 +113,29 @@ def describe_project(session: Session) -> Json:
     }
 
 
+def describe_files(workspace: Workspace) -> str:
+    """When the project's kind was told, and when each thing that is described was made: other text
+    where any of it changed."""
+    files = (
+        workspace.project_file,
+        workspace.keyframes_file,
+        workspace.motion_file,
+        workspace.camera_file,
+        workspace.report_file,
+        *note_files(workspace),
+        *workspace.golf_results(),
+        workspace.exports,
+    )
+    return " ".join(str(_stamp(file)) for file in files)
+
+
 class ProjectWatch:
     """Checks an open project's files, and publishes what other programs changed."""
 
     def __init__(self, session: Session) -> None:
         """Begin to watch."""
         self._session, self._ended = session, Event()
-        self._stamps = self._file_stamps()
+        self._files = describe_files(session.workspace)
         self._trouble: str | None = None
         self._thread = Thread(target=self._run, name="watch", daemon=True)
         self._thread.start()
@@ -143,24 +163,9 @@ class ProjectWatch:
         if trouble != self._trouble:
             self._trouble = trouble
             self._session.events.publish({"trouble": trouble})
-        if (stamps := self._file_stamps()) != self._stamps:
-            self._stamps = stamps
+        if (files := describe_files(self._session.workspace)) != self._files:
+            self._files = files
             self._session.events.publish({"project": True})
-
-    def _file_stamps(self) -> list[int]:
-        """When the project's kind was told, and when each thing that is described was made."""
-        workspace = self._session.workspace
-        files = (
-            workspace.project_file,
-            workspace.keyframes_file,
-            workspace.motion_file,
-            workspace.camera_file,
-            workspace.report_file,
-            *note_files(workspace),
-            *workspace.golf_results(),
-            workspace.exports,
-        )
-        return [_stamp(file) for file in files]
 
 
 def _stamp(file: Path) -> int:

@@ -1,6 +1,7 @@
 // What the page knows of long work, whichever of answers and news comes first.
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { noteJob } from "../../../keyrecon/annotate/page/state/model.js";
 import { createJobs } from "../../../keyrecon/annotate/page/views/shell.js";
 
 // Jobs of a page whose server answers `listed` once `arrive()` is called; `said` are its notices.
@@ -12,6 +13,7 @@ function createTrial() {
     });
   const model = {
     jobs: trial.jobs,
+    noteJob: (job) => noteJob(trial.jobs, job),
     redraw() {},
     notify: (text) => trial.said.push(text),
     readProject: async () => {},

@@ -18,7 +18,7 @@ from keyrecon.annotate.server.address import listen, make_credentials
 from keyrecon.annotate.server.descriptions import marking_order
 from keyrecon.annotate.server.events import Events
 from keyrecon.annotate.server.routes import make_app
-from keyrecon.annotate.server.session import ProjectWatch
+from keyrecon.annotate.server.session import ProjectWatch, describe_files
 from keyrecon.annotate.store.cells import by_frame
 from keyrecon.app.annotator import PageServer
 from keyrecon.body import LSP14
@@ -214,7 +214,7 @@ def test_a_motion_is_out_of_date_when_what_it_was_made_from_has_changed(opened, 
 def test_every_open_page_hears_the_news():
     async def listen():
         events = Events()
-        pages = [events.stream({"revision": 0}) for _ in range(2)]
+        pages = [events.stream(lambda: {"revision": 0}) for _ in range(2)]
         first = [await anext(page) for page in pages]
         threading.Thread(target=events.publish, args=({"revision": 1},)).start()
         later = [await anext(page) for page in pages]
@@ -259,6 +259,14 @@ def test_whatever_another_program_makes_of_the_project_is_news(opened, folder):
         assert heard.pop() == {"project": True}, name
         watch.check()
         assert heard == []
+
+
+def test_a_project_tells_of_which_files_it_was_read(opened, folder):
+    session = opened()
+    read = ask(session, "GET", "/api/project").json()["files"]
+    assert read == describe_files(session.workspace)
+    (folder / "motion.npz").write_text("written")
+    assert read != describe_files(session.workspace)
 
 
 def test_a_frame_beyond_the_last_one_and_a_joint_that_nobody_has_are_refused(opened):

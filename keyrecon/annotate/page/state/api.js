@@ -39,6 +39,44 @@ export function listen(handlers) {
   source.addEventListener("message", (event) => news(JSON.parse(event.data)));
 }
 
+let keeping = 0; // requests that keep something, and have no answer yet
+export const isKeeping = () => keeping > 0;
+
+// Makes requests one after the other, in the order in which they are wanted. While one waits, answers to
+// earlier ones are old: `take` gets the newest when nothing waits any more. `ask` gives a promise of when
+// its request is done; `keep` asks, too, and is not saved until then. `failed` is told of each request
+// without an answer.
+export function oneByOne(take, failed) {
+  let last = Promise.resolve(),
+    waiting = 0,
+    newest = null;
+  async function work(request) {
+    try {
+      newest = { answer: await request() };
+    } catch (fault) {
+      failed(fault);
+    }
+    waiting -= 1;
+    if (waiting || !newest) return;
+    const { answer } = newest;
+    newest = null;
+    take(answer);
+  }
+  function inTurn(request) {
+    waiting += 1;
+    last = last.then(() => work(request));
+    return last;
+  }
+  return {
+    ask: inTurn,
+    keep(request) {
+      keeping += 1;
+      return inTurn(() => request().finally(() => (keeping -= 1)));
+    },
+    rest: () => last,
+  };
+}
+
 // Makes at most one request at a time; of those that wait only the newest is made. The promise is
 // fulfilled when nothing waits any more; `failed` is called where the server answered with an error.
 export function latestOnly(request, failed) {

@@ -8,7 +8,7 @@ const CACHE_BYTES = 260e6; // of decoded pictures
 const PREFETCH_REQUESTS = 2;
 const URGENT_REQUESTS = 3;
 const MAX_URGENT = 16; // pictures that were to be drawn and are not here yet
-const RETRY = 1000; // milliseconds until a picture that did not come is asked for again
+const RETRY = 1000; // milliseconds until what did not come is asked for again
 const CHUNK = 250; // frames of the motion asked for at a time
 const AHEAD = 100; // frames before the next of them in which it is asked for
 
@@ -110,7 +110,10 @@ export function createMotionCache(project, arrived) {
       to = Math.min(project.n_frames, from + CHUNK);
     const answer = await api.read(`motion?from=${from}&to=${to}`).catch(() => null);
     if (answer?.points3d) current.set(number, answer);
-    else current.delete(number); // loaded again when it is needed again
+    else {
+      await new Promise((done) => setTimeout(done, RETRY));
+      current.delete(number); // loaded again when it is needed again
+    }
     arrived();
   }
 

@@ -216,6 +216,20 @@ export function rebased(state, edit) {
   }
 }
 
+// Edits that wait, of which `state` knows already, as if they had been made after others that were done
+// before them: what they take to stand there is what those left.
+export function madeAfter(state, waiting, earlier) {
+  const touched = new Set(earlier.flatMap(cellsOf));
+  if (!waiting.some((edit) => cellsOf(edit).some((cell) => touched.has(cell)))) return [];
+  const without = waiting.toReversed().map(inverse).reduce(apply, state);
+  let now = earlier.reduce(apply, without);
+  return waiting.map((edit) => {
+    const made = { ...rebased(now, edit), id: edit.id };
+    now = apply(now, made);
+    return made;
+  });
+}
+
 // What a person is told of edits that the server did not take, {edit, error}, and those of them that can be
 // made anew because another page was faster; `earlier` are some that are still offered.
 export function describeRefused(failed, earlier = []) {

@@ -8,6 +8,7 @@ import {
   editFromChange,
   emptyState,
   inverse,
+  madeAfter,
   marksOf,
   nearerOf,
   newId,
@@ -21,7 +22,13 @@ import { createPoses } from "./poses.js";
 import { allKeyframes, isDone, isMarked, sidesOf } from "./workflow.js";
 
 const NOTICE_MS = 10000; // that a notice is shown
+const AGAIN_MS = 2000; // after which what did not come is asked for again
 const IDLE_MS = 800; // without an edit, after which what is computed from edits is asked for anew
+
+// An end is an end, whichever of news and answers comes first.
+export function noteJob(jobs, job) {
+  if ((jobs.get(job.id)?.state ?? "running") === "running") jobs.set(job.id, job);
+}
 
 export async function createModel() {
   const model = {
@@ -63,10 +70,20 @@ export async function createModel() {
   }
 
   model.onProject = (react) => projectListeners.push(react);
+  // Answers may overtake one another: what was asked for last counts.
+  let asked = 0,
+    projectOf = 0, // number of the question of which the project is
+    runOf = 0;
+  // Done when the swing that belongs to the project is here, too.
   model.readProject = async () => {
-    model.project = await api.read("project");
+    const number = ++asked,
+      fresh = await api.read("project");
+    if (number < projectOf) return;
+    projectOf = number;
+    model.project = number < runOf ? { ...fresh, run: model.project.run } : fresh;
     projectListeners.forEach((react) => react());
     model.redraw();
+    await model.readSwing();
   };
   model.sides = sidesOf(model.project);
 
@@ -91,6 +108,8 @@ export async function createModel() {
   model.readState = async () => {
     const fresh = await readNewest();
     if (!same([fresh.marks, fresh.nearer], [model.state.marks, model.state.nearer])) marksRevision = fresh.revision;
+    changedAt.clear();
+    readAt = fresh.revision;
     model.state = outbox.waiting().reduce(apply, { ...emptyState(), ...fresh });
     model.redraw();
   };
@@ -99,7 +118,10 @@ export async function createModel() {
   // taken back may be what it was made from.
   const readRun = api.latestOnly(
     async () => {
-      const run = await api.read("run");
+      const number = ++asked,
+        run = await api.read("run");
+      if (number < projectOf) return;
+      runOf = number;
       model.project = { ...model.project, run };
       model.redraw();
     },
@@ -118,7 +140,6 @@ export async function createModel() {
   );
   model.readSwing = () => (model.project.golf ? readSwing() : null);
   model.onIdle(model.readSwing);
-  model.onProject(model.readSwing);
   // Whether the fit knows all that is marked at this moment.
   model.swingIsFresh = () =>
     Boolean(model.swing?.fresh) && model.swing.revision === model.state.revision && !outbox.waiting().length;
@@ -139,14 +160,26 @@ export async function createModel() {
   // Whether the marks are still those of a revision.
   model.marksAreOf = (revision) => marksRevision <= revision;
 
+  // News of changes may come after answers that are newer: of each cell the last change counts.
+  const changedAt = new Map(); // cell -> revision of the last change of it that is known
+  let readAt = 0; // revision of the state that was read last
+  const isNew = (revision, edit) =>
+    cellsOf(edit).every((cell) => revision >= (changedAt.get(cell) ?? readAt));
+  function noteChanges(revision, edits) {
+    for (const cell of edits.flatMap(cellsOf)) changedAt.set(cell, revision);
+    noteMarks(revision, edits);
+  }
+  // How many edits there are, and how many can be taken back, unless more is known already.
+  const counted = ({ revision, undo, redo }) =>
+    revision < model.state.revision ? {} : { revision, ...(undo === undefined ? {} : { undo, redo }) };
+
   function delivered({ revision, results, undo, redo }, batch) {
-    noteMarks(revision, batch);
-    model.state = {
-      ...model.state,
+    noteChanges(
       revision,
-      undo: undo ?? model.state.undo + batch.length,
-      redo: redo ?? 0,
-    };
+      batch.filter((_, n) => results[n].ok),
+    );
+    const counts = { revision, undo: undo ?? model.state.undo + batch.length, redo: redo ?? 0 };
+    model.state = { ...model.state, ...counted(counts) };
     const failed = results
       .map((result, n) => ({ ...result, edit: batch[n] }))
       .filter(({ ok }) => !ok);
@@ -156,17 +189,22 @@ export async function createModel() {
 
   // Somebody else was faster, or the server does not take it: its version stays, ours is one click away.
   function yieldTo(failed) {
-    const { text, overruled } = describeRefused(failed, model.notice?.offer?.overruled);
-    const act = () => overruled.forEach((edit) => model.edit(rebased(model.state, edit)));
+    const { text, overruled } = describeRefused(failed, model.notice?.offer?.overruled),
+      read = model.readState().catch(model.disconnected);
+    async function act() {
+      await read; // they are made on what stands there
+      overruled.forEach((edit) => model.edit(rebased(model.state, edit)));
+    }
     model.notify(text, overruled.length ? { text: "Use mine", overruled, act } : null);
-    model.readState().catch(model.disconnected);
   }
 
-  // Work begins with what is on the disk; a server that is gone says so itself.
-  model.whenSaved = async () => {
-    for (let n = 0; n < 50 && outbox.waiting().length; n++)
-      await new Promise((done) => setTimeout(done, 100));
-  };
+  // Work begins with what is on the disk; Gone where that may take long.
+  model.whenSaved = () =>
+    outbox
+      .inTurn(async () => {})
+      .catch((fault) => {
+        if (outbox.waiting().length) throw fault;
+      });
 
   model.notify = (text, offer = null) => {
     model.notice = { text, offer, since: performance.now() };
@@ -184,14 +222,16 @@ export async function createModel() {
 
   // Changes that the server reports; those of cells that an edit of ours still waits for are left to
   // the answer to that edit.
-  function merge({ revision, undo, redo }, changes) {
+  function merge(counts, entries) {
     const ours = new Set(outbox.waiting().flatMap(cellsOf));
-    const free = changes
-      .map(editFromChange)
-      .filter((edit) => !cellsOf(edit).some((cell) => ours.has(cell)));
-    noteMarks(revision, free);
-    const counts = undo === undefined ? {} : { undo, redo };
-    model.state = { ...free.reduce(apply, model.state), revision, ...counts };
+    for (const { revision, changes } of entries) {
+      const free = changes
+        .map(editFromChange)
+        .filter((edit) => isNew(revision, edit) && !cellsOf(edit).some((cell) => ours.has(cell)));
+      noteChanges(revision, free);
+      model.state = free.reduce(apply, model.state);
+    }
+    model.state = { ...model.state, ...counted(counts) };
     model.redraw();
     edited();
   }
@@ -217,8 +257,8 @@ export async function createModel() {
       model.redraw();
     }
     try {
-      const { changes, ...counts } = await outbox.inTurn(() => api.send(direction, { id }));
-      merge(counts, changes);
+      const { changes, ...counts } = await outbox.inTurn(() => turn(direction, id));
+      merge(counts, [{ revision: counts.revision, changes }]);
       const edits = changes.map(editFromChange);
       return edits.length > 1 ? together(edits) : (edits[0] ?? null);
     } catch (fault) {
@@ -226,33 +266,60 @@ export async function createModel() {
       return takeBack(last);
     }
   }
+  // Edits made meanwhile come after it.
+  async function turn(direction, id) {
+    const answer = await api.send(direction, { id });
+    outbox.amend(madeAfter(model.state, outbox.waiting(), answer.changes.map(editFromChange)));
+    return answer;
+  }
   model.undo = () => step("undo");
   model.redo = () => step("redo");
 
-  model.disconnected = (fault) => outbox.disconnected(fault);
+  model.noteJob = (job) => noteJob(model.jobs, job);
+
+  // What should have come and did not is asked for again, and with it all that may have been missed;
   // `connected` is done each time that the server answers anew.
-  model.listen = (connected) =>
-    api.listen({
-      opened: () =>
-        model
-          .readState()
-          .then(connected)
-          .then(() => outbox.reconnected())
-          .catch(model.disconnected),
-      closed: () => outbox.disconnected(),
-      news({ job, project, trouble, edits, ...counts }) {
-        if (job) model.jobs.set(job.id, job);
-        if (project) model.readProject().catch(model.disconnected);
-        if (trouble !== undefined) model.notify(trouble);
-        const others = edits?.filter(({ id }) => !sent.has(id));
-        if (others?.length)
-          merge(
-            counts,
-            others.flatMap(({ changes }) => changes),
-          );
-        model.redraw();
-      },
-    });
+  let connected = async () => {},
+    missed = null; // timer of the next try
+  model.disconnected = (fault) => {
+    outbox.disconnected(fault);
+    clearTimeout(missed);
+    missed = setTimeout(catchUp, AGAIN_MS, true);
+  };
+  async function catchUp(withProject = false) {
+    clearTimeout(missed);
+    try {
+      await model.readState();
+      await connected();
+      if (withProject) await model.readProject();
+      model.poses.askAgain();
+      outbox.reconnected();
+    } catch (fault) {
+      model.disconnected(fault);
+    }
+  }
+
+  let trouble = null; // with the files of the project, as it was told last
+  function tellTrouble(text) {
+    if (text || model.notice?.text === trouble) model.notify(text);
+    trouble = text;
+  }
+
+  // `files` tells the files of the project from what they were: what changed before the stream was opened is
+  // in no news.
+  function hear(news) {
+    const { job, project, files = model.project.files, edits, ...counts } = news;
+    if (job) model.noteJob(job);
+    if (project || files !== model.project.files) model.readProject().catch(model.disconnected);
+    if (news.trouble !== undefined) tellTrouble(news.trouble);
+    const others = edits?.filter(({ id }) => !sent.has(id));
+    if (others?.length) merge(counts, others);
+    model.redraw();
+  }
+  model.listen = (work) => {
+    connected = work;
+    api.listen({ opened: () => catchUp(), closed: () => outbox.disconnected(), news: hear });
+  };
 
   model.marks = (frame = model.ui.frame) => marksOf(model.state, frame);
   model.nearer = (frame = model.ui.frame) => nearerOf(model.state, frame);

@@ -24,6 +24,10 @@ export function pendingEdits(storage, project) {
         .filter((key) => ids.has(key.split("/").at(-1)))
         .forEach((key) => storage.removeItem(key));
     },
+    // Keeps an edit in the place of the one of its id.
+    replace(edit) {
+      for (const key of keys()) if (key.endsWith(`/${edit.id}`)) storage.setItem(key, JSON.stringify(edit));
+    },
     all: () => keys().map((key) => JSON.parse(storage.getItem(key))),
   };
 }
@@ -136,6 +140,12 @@ export function createOutbox({ send, pending, status, delivered, rejected, stumb
       flush();
     },
     waiting: () => waiting,
+    // Edits that wait, by id, as they are to be sent instead.
+    amend(edits) {
+      const byId = new Map(edits.map((edit) => [edit.id, edit]));
+      waiting = waiting.map((edit) => byId.get(edit.id) ?? edit);
+      edits.forEach(pending.replace);
+    },
     // The answer of `work`, which is done once the edits made so far are on the disk and before any later
     // one is sent; Gone where that may take long.
     inTurn(work) {

@@ -6,12 +6,19 @@ export function createPoses(model) {
   const poses = new Map(), // frame -> answer
     suggestions = new Map();
   let asked = "",
+    lost = false, // whether an answer did not come
     pending = Promise.resolve();
+
+  function noteLost(fault) {
+    lost ||= fault instanceof api.Gone;
+    throw fault;
+  }
 
   const request = api.latestOnly(
     async (frame, marks, nearer) => {
-      const began = performance.now();
-      poses.set(frame, await api.send("pose", { frame, marks, nearer }));
+      const began = performance.now(),
+        answer = await api.send("pose", { frame, marks, nearer }).catch(noteLost);
+      poses.set(frame, answer);
       model.redraw();
       performance.measure("pose", { start: began, end: performance.now() });
     },
@@ -23,7 +30,7 @@ export function createPoses(model) {
 
   const requestSuggestion = api.latestOnly(
     async (frame) => {
-      const answer = await api.read(`suggestion/${frame}`);
+      const answer = await api.read(`suggestion/${frame}`).catch(noteLost);
       suggestions.set(frame, answer.joints ? answer : null);
       model.redraw();
     },
@@ -45,6 +52,13 @@ export function createPoses(model) {
   return {
     refresh,
     requestSuggestion,
+    // Asks again for what did not come while the server was gone.
+    askAgain() {
+      if (!lost) return;
+      lost = false;
+      asked = "";
+      if (model.ui.frame !== null) requestSuggestion(model.ui.frame);
+    },
     // Whether no later request has been made than the one of this promise.
     isLatest: (promise) => promise === pending,
     current: () => poses.get(model.ui.frame) ?? null,

@@ -107,12 +107,11 @@ export function createMotion(model, { frames, shell, actions, colors }) {
     keepTyped();
   }
 
-  async function makeMotion() {
+  function makeMotion() {
     const { height, fov } = typed();
     if (height.wrong) byId("height").focus();
     else if (fov.wrong) byId("fov").focus();
     if (height.wrong || fov.wrong || shell.runningJob()) return;
-    await model.whenSaved();
     shell.startJob("run", { height: height.metres, field_of_view: fov.degrees });
   }
 
@@ -137,7 +136,7 @@ export function createMotion(model, { frames, shell, actions, colors }) {
 
   fillFields();
   for (const field of ["height", "fov"]) byId(field).addEventListener("input", keepTyped);
-  model.onProject(() => shell.runningJob() || fillFields());
+  model.onProject(() => shell.runningJob()?.state === "running" || fillFields());
   slider.max = last;
   slider.addEventListener("input", () => go(Number(slider.value)));
   byId("play").addEventListener("click", play);

@@ -15,6 +15,7 @@ const LASTING = { isRead: true }; // an offer of nothing: the notice stays until
 const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
 const GOOD_NEWS = /^(Player found in|Note: |Wrote |On the (court|ground): |For a report )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
+const RESULTS = { follow: "bodies", keyframes: "keyframes", golf: "swing", run: "motion" }; // where they are seen
 const TITLES = { any: "Everywhere", keyframes: "Keyframes", address: "Address", swing: "Swing", bodies: "Body", pick: "Colours", motion: "Motion", files: "Files", court: "Court", ground: "Ground" };
 
 function keyElements(keys) {
@@ -63,7 +64,7 @@ function keysTable(project) {
 }
 
 export function createShell(model, go) {
-  const jobs = createJobs(model);
+  const jobs = createJobs(model, go);
   document
     .querySelectorAll("[data-go]")
     .forEach((button) => button.addEventListener("click", () => go(button.dataset.go)));
@@ -90,16 +91,16 @@ export function createShell(model, go) {
   });
   byId("job-cancel").addEventListener("click", () => {
     const job = jobs.runningJob();
-    if (job) api.remove(`jobs/${job.id}`).catch((fault) => model.notify(fault.message));
+    if (job?.state === "running") api.remove(`jobs/${job.id}`).catch((fault) => model.notify(fault.message));
   });
   addEventListener("beforeunload", (event) => {
-    if (model.saving.status !== "saved") event.preventDefault();
+    if (model.saving.status !== "saved" || api.isKeeping()) event.preventDefault();
   });
 
   function drawJob() {
     const job = jobs.runningJob();
-    byId("job").hidden = !job;
-    if (!job) return;
+    byId("job").hidden = job?.state !== "running";
+    if (byId("job").hidden) return;
     setText(byId("job-text"), job.text || "Starting");
     if (job.total) byId("job-progress").value = job.done / job.total;
     else byId("job-progress").removeAttribute("value");
@@ -143,7 +144,8 @@ export function createShell(model, go) {
   }
 
   function draw() {
-    const { status, waiting, why } = model.saving,
+    const { waiting, why } = model.saving,
+      status = model.saving.status === "saved" && api.isKeeping() ? "saving" : model.saving.status,
       { undo, redo } = model.state;
     const { view } = model.ui;
     document.body.dataset.view = view;
@@ -176,20 +178,35 @@ export function createShell(model, go) {
 }
 
 // Long work on the server: starting it, and what its end means for the page.
-export function createJobs(model) {
+export function createJobs(model, go = () => {}) {
   const isOver = (job) => job !== undefined && job.state !== "running";
   const states = new Map(); // job -> last state that was acted on
-  let listed = false; // whether it is known which jobs are older than the page
+  const settling = new Set(); // jobs that are done, and of which what they made was not read yet
+  let listed = false, // whether it is known which jobs are older than the page
+    beginning = null; // what was asked for and has not begun yet: {what, begun}
 
-  async function startJob(kind, options = {}) {
+  // A second press before the first is answered asks for nothing more.
+  function startJob(kind, options = {}) {
+    const what = JSON.stringify([kind, options]);
+    if (beginning?.what === what) return beginning.begun;
+    const begun = begin(kind, options).finally(() => {
+      if (beginning?.begun === begun) beginning = null;
+    });
+    beginning = { what, begun };
+    return begun;
+  }
+
+  async function begin(kind, options) {
     try {
       await model.whenSaved();
-      await api.send("jobs", { kind, options });
+      const { job } = await api.send("jobs", { kind, options });
+      states.set(job.id, "running"); // its end is news, however early it comes
+      model.noteJob(job);
       await refreshJobs();
     } catch (fault) {
       model.notify(
         fault instanceof api.Gone
-          ? "The server does not answer; is keyrecon annotate still running?"
+          ? fault.message || "The server does not answer; is keyrecon annotate still running?"
           : fault.message,
       );
     }
@@ -201,8 +218,8 @@ export function createJobs(model) {
     const before = [...model.jobs.values()],
       jobs = await api.read("jobs");
     for (const job of jobs) {
-      if (!isOver(model.jobs.get(job.id))) model.jobs.set(job.id, job);
-      if (!listed) states.set(job.id, job.state);
+      model.noteJob(job);
+      if (!listed && !states.has(job.id)) states.set(job.id, job.state);
     }
     for (const job of before) {
       if (!isOver(model.jobs.get(job.id)) && !jobs.some(({ id }) => id === job.id))
@@ -223,13 +240,21 @@ export function createJobs(model) {
     const news = job.text?.split("\n") ?? [];
     const read = news.every((line) => GOOD_NEWS.test(line)) ? LASTING : KEPT;
     if (job.text) model.notify(job.text, /make the motion anew/.test(job.text) ? toMotion : read);
-    const shown = model.readProject().then(() => {
-      if (job.kind === "follow") model.update({ view: "bodies" });
-      if (job.kind === "keyframes") model.update({ view: "keyframes" });
-      if (job.kind === "golf") model.update({ view: "swing" });
-      if (job.kind === "run") model.update({ view: "motion" });
-    });
-    shown.catch(model.disconnected);
+    takeIn(job, model.ui.view);
+  }
+
+  // Until what a job made was read it is still at work; whoever went to another page meanwhile stays there.
+  async function takeIn(job, view) {
+    settling.add(job.id);
+    try {
+      await model.readProject();
+      if (RESULTS[job.kind] && model.ui.view === view) go(RESULTS[job.kind]);
+    } catch (fault) {
+      model.disconnected(fault);
+    } finally {
+      settling.delete(job.id);
+      model.redraw();
+    }
   }
 
   // Ends that happened before the page was opened are no news; what ends at once is never seen to run.
@@ -242,7 +267,8 @@ export function createJobs(model) {
     }
   }
 
-  const runningJob = () => [...model.jobs.values()].find(({ state }) => state === "running");
+  const runningJob = () =>
+    [...model.jobs.values()].find(({ id, state }) => state === "running" || settling.has(id));
 
   // Has the keyframes chosen, as many as a field for the share of the frames says.
   function chooseKeyframes(field) {
