@@ -152,3 +152,59 @@ test("an undo of many joints tells of all of them", async () => {
   assert.equal(await told(...body(5), ...body(9)), "8 joints in 2 frames");
   assert.equal(await told({ kind: "key", name: "top", to: 9 }), "top of the swing");
 });
+
+// A promise, and what fulfils it.
+function late() {
+  let arrive = null;
+  return { promise: new Promise((done) => (arrive = done)), arrive: (value) => arrive(value) };
+}
+
+// A keyframe of which all is marked, and another; its pose is still to come.
+function marked() {
+  const { model, actions } = trial({ marks: { 5: SIDE }, own: { 9: "lower", 13: "lower" } }),
+    { promise, arrive } = late();
+  model.project = { ...PROJECT, limbs: [{ name: "left_hip", parent: "right_hip" }] };
+  model.poses.latest = () => promise;
+  return { model, actions, arrive };
+}
+
+test("Enter before the pose is there does not pass by the question of the depths", async () => {
+  const { model, actions, arrive } = marked();
+  assert.equal(actions.next().do, "next");
+  const pressed = actions.primary();
+  model.poses.current = () => ({ limbs: { left_hip: { sign: 1 } } });
+  arrive();
+  await pressed;
+  assert.deepEqual([model.ui.frame, actions.next().do], [5, "depth"]);
+  assert.deepEqual(model.nearer(), {}); // nobody has seen which
+});
+
+test("Enter twice before the pose is there goes to the next keyframe, not beyond", async () => {
+  const { model, actions, arrive } = marked();
+  const pressed = [actions.primary(), actions.primary()];
+  arrive();
+  await Promise.all(pressed);
+  assert.equal(model.ui.frame, 9);
+});
+
+test("an undo that is late takes nobody away from what was gone to or is dragged meanwhile", async () => {
+  for (const meanwhile of [
+    ({ ui }) => (ui.frame = 9),
+    ({ ui }) => (ui.dragged = { joint: "left_hip", at: [1, 1] }),
+    () => null,
+  ]) {
+    const { model, actions } = trial({ own: { 7: "both", 9: "lower" } }),
+      { promise, arrive } = late();
+    model.ui.dragged = null;
+    model.undo = () => promise;
+    const undone = actions.undo();
+    meanwhile(model);
+    const { frame, dragged } = model.ui,
+      wentOn = frame === 9 || dragged;
+    arrive({ kind: "mark", frame: 7, joint: "left_hip", to: null });
+    await undone;
+    assert.equal(model.ui.frame, wentOn ? frame : 7);
+    assert.equal(model.ui.dragged, dragged);
+    if (wentOn) assert.match(model.told, /Taken back: left hip, frame 7/);
+  }
+});

@@ -171,11 +171,18 @@ export function createActions(model, { middle, opened, showInSwing }) {
     place() {},
   };
 
-  function primary() {
+  async function primary() {
     if (ui.dragged?.floating) return placing.placeFloating();
     if (offKeyframe()) return navigation.scrub(0);
     dropDragged();
+    if (next().do === "next" && !(await isDone())) return undefined;
     return steps[next().do]();
+  }
+  // Whether nothing is left to be asked here: of depths nothing is asked before there is a pose.
+  async function isDone() {
+    const { view, frame } = ui;
+    await model.poses.latest();
+    return ui.view === view && ui.frame === frame && next().do === "next";
   }
 
   // The other answer to a question that has two.
@@ -350,17 +357,19 @@ function createNavigation(model, placing, { opened, showInSwing }) {
     if (OF_THE_WORLD.includes(ui.view))
       return model.notify("Points of this page are not undone here: Backspace or ✕ takes one away.");
     placing.dropDragged();
-    const edit = await turn();
+    const { view, frame } = ui,
+      edit = await turn();
     if (!edit) return undefined;
-    const [part] = partsOf(edit);
-    const isKeyframe = model.keyframes().some(({ frame }) => frame === part.frame);
-    if (!SEEN[ui.view]?.includes(part.kind)) {
+    const [part] = partsOf(edit),
+      wentOn = ui.view !== view || ui.frame !== frame || ui.dragged !== null;
+    const isKeyframe = model.keyframes().some((keyframe) => keyframe.frame === part.frame);
+    if (!SEEN[ui.view]?.includes(part.kind) || (wentOn && part.frame !== ui.frame)) {
       const offer = isKeyframe && { text: `Show frame ${part.frame}`, act: () => open(part.frame) };
       return model.notifyOfEdit(told(describeEdit(edit)), offer || null);
     }
     if (ui.view === "swing") return showInSwing(part.kind === "key" ? part.to : part.frame);
     if (part.frame !== ui.frame && isKeyframe) open(part.frame);
-    if (part.kind === "mark" && part.frame === ui.frame) model.update({ joint: part.joint });
+    if (part.kind === "mark" && part.frame === ui.frame && !wentOn) model.update({ joint: part.joint });
     return undefined;
   }
 
