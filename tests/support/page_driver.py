@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import time
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
@@ -146,6 +147,13 @@ class Person:
             arg=[selector, pattern],
         )
 
+    def await_fact(self, holds):
+        """Until something holds that the server does by and by."""
+        ends = time.monotonic() + SOON / 1000
+        while not holds():
+            assert time.monotonic() < ends
+            self.page.wait_for_timeout(50)
+
     def await_drawn(self):
         """Until what was done shows: two animation frames."""
         self.page.evaluate(
@@ -174,6 +182,7 @@ class Person:
 
     def mark_joints(self, place_of):
         """Click every joint that is asked for where `place_of(joint)` says."""
+        self.page.wait_for_selector(f"#picture[data-frame='{self.frame()}']")
         while self.asked():
             self.mark_one(place_of)
 
@@ -270,6 +279,29 @@ class Person:
         """What an expression on a module of the page gives; the module is called `m`."""
         address = f"/annotate/page/{module}.js"
         return self.page.evaluate(f"import('{address}').then((m) => ({expression}))")
+
+
+class Held:
+    """Requests that wait until they are let go, the oldest first."""
+
+    def __init__(self, person, pattern, method="GET"):
+        self.person, self.routes, self.method = person, [], method
+        person.page.route(pattern, self._take)
+
+    def _take(self, route):
+        if route.request.method == self.method:
+            self.routes.append(route)
+        else:
+            route.continue_()
+
+    def wait_for(self, count):
+        """Until so many have come."""
+        self.person.await_fact(lambda: len(self.routes) >= count)
+
+    def let_go(self):
+        """Let one go, when it has come."""
+        self.wait_for(1)
+        self.routes.pop(0).continue_()
 
 
 def clearest_place(limb, place_of):

@@ -1,10 +1,9 @@
 """Shots of a video on the page: told by pictures, corrected by a click, known by the next run."""
 
-import time
 from functools import partial
 
 import pytest
-from page_driver import BROWSER, SOON, Person, serving
+from page_driver import BROWSER, Held, Person, serving
 from page_project import FRAMES, make_project, write_numbered_video
 
 from keyrecon.annotate.assist.shot_strip import list_shots
@@ -40,14 +39,6 @@ def open_page(chromium, server):
     return person
 
 
-def until(holds):
-    """Wait for what the page does by and by."""
-    ends = time.monotonic() + SOON / 1000
-    while not holds():
-        assert time.monotonic() < ends
-        time.sleep(0.05)
-
-
 def words(person):
     return [text.split("\n") for text in person.page.locator("#shots .shot").all_inner_texts()]
 
@@ -68,13 +59,14 @@ def test_a_click_says_which_shots_show_the_player_and_outlives_the_page(chromium
         assert [row[-1] for row in words(person)] == ["used", "somebody else", "used"]
         assert pressed(person) == ["true", "false", "true"]
         loaded = "[...document.querySelectorAll('.shot img')].every((one) => one.naturalWidth > 0)"
-        until(lambda: person.page.evaluate(loaded))
+        person.await_fact(lambda: person.page.evaluate(loaded))
         person.page.click("#shots .shot:nth-child(2)")
         person.page.wait_for_selector(".shot:nth-child(2)[aria-pressed=true]")
         person.page.click("#shots .shot:nth-child(3)")
         person.page.wait_for_selector(".shot:nth-child(3)[aria-pressed=false]")
         assert words(person)[1][-1] == "to be used"
         assert "again" in person.page.inner_text("#shots-note")
+        person.await_saved()
         person.page.reload()
         person.page.wait_for_selector("#saving[data-status]", state="attached")
         person.press("Alt+1")
@@ -82,7 +74,30 @@ def test_a_click_says_which_shots_show_the_player_and_outlives_the_page(chromium
         assert pressed(person) == ["true", "true", "false"]
         person.page.click("#shots .shot:nth-child(3)")
         person.page.wait_for_selector(".shot:nth-child(3)[aria-pressed=true]")
+        person.await_saved()
     assert Workspace(folder).shot_choices() == ShotChoices(use=(2,))
+
+
+def test_a_second_click_takes_the_first_back_though_that_is_not_kept_yet(chromium, folder):
+    workspace = Workspace(folder)
+    told = Assistant(
+        shots=partial(list_shots, SHOTS, workspace), choose_shot=partial(keep, workspace)
+    )
+    with serving(folder, told) as server:
+        person = open_page(chromium, server)
+        held = Held(person, "**/api/shots", "POST")
+        for shot, times in ((2, 2), (3, 1)):
+            for _ in range(times):
+                before = pressed(person)[shot - 1]
+                person.page.click(f"#shots .shot:nth-child({shot})")
+                person.page.wait_for_selector(
+                    f".shot:nth-child({shot}):not([aria-pressed={before}])"
+                )
+        for _ in range(3):
+            held.let_go()
+        person.await_saved()
+        assert pressed(person) == ["true", "false", "false"]
+    assert Workspace(folder).shot_choices() == ShotChoices(skip=(3,))
 
 
 def test_a_video_of_one_shot_has_no_strip(chromium, folder):

@@ -83,6 +83,17 @@ def test_no_golfer_stands_in_frames_to_which_nothing_was_fitted(visit):
     assert not (folder / "golf_marks.json").exists() or not marks(folder)["frames"]
 
 
+def test_a_swing_that_is_on_its_way_says_so(visit):
+    person, _ = visit()
+    held = []
+    person.page.route("**/api/motion?*", lambda route: held.append(route))
+    person.page.reload()
+    person.await_text("#swing-empty", "on its way")
+    for route in held:
+        route.continue_()
+    person.page.wait_for_selector("#swing-empty", state="hidden")
+
+
 def test_the_report_of_the_first_fit_can_be_opened_at_once(visit):
     person, folder = visit()
     report = (folder / "report.html").rename(folder / "kept.html")
@@ -99,6 +110,7 @@ def test_joint_club_and_key_postures_are_put_right_and_taken_back(visit):
     person.await_text("#swing-text", "The swing is found")
     person.press("2")
     person.await_frame("swing", 40)
+    person.page.wait_for_selector("#swing-empty", state="hidden")  # there is a body to drag
     wrist, aside = truth()[1][40, WRIST], truth()[1][40, WRIST] + (12, 8)
     person.drag(wrist, aside)
     person.await_text("#swing-marks", "Frame 40: left wrist")

@@ -22,10 +22,13 @@ const SURROUNDINGS = 0.12; // share of a box's size shown around it
 export function createViewer({ root, project, frames, redraw }) {
   const [below, above] = root.querySelectorAll("canvas");
   const picture = [project.width, project.height];
-  let view = null,
+  let view = null, // made when it is drawn: a hidden canvas has no size
     box = null,
+    press = null, // of the pointer, until it is released: {start, last, moved, grabbed, shown}
     drawn = null, // what is on the canvas
     shown = null; // the frame that is on the canvas
+
+  let cancel = () => {}; // of the listener, where what is dragged is let go
 
   const size = () => [above.clientWidth, above.clientHeight];
   const whole = () => fit(pictureBox(picture), size());
@@ -71,21 +74,36 @@ export function createViewer({ root, project, frames, redraw }) {
   );
   new ResizeObserver(() => view && setView(near())).observe(root);
 
-  // grab(at) -> what is dragged, or null to pan; drag(grabbed, at), drop(grabbed, at), click(at, event).
-  function listen({ grab, drag, drop, click, hover }) {
-    let press = null;
+  // What is held is of the picture it was taken hold of in: in another one, or on another page, it is let go.
+  function forgetPress() {
+    if (press?.grabbed && (press.shown !== shown || !root.clientWidth)) letGo();
+  }
+  function letGo() {
+    const dragged = press?.grabbed && press.moved;
+    press = null;
+    if (dragged) cancel();
+  }
+
+  // grab(at) -> what is dragged, or null to pan; drag(grabbed, at), drop(grabbed, at), click(at, event);
+  // cancelled() where a drag ends without a drop.
+  function listen({ grab, drag, drop, click, hover, cancelled = () => {} }) {
+    cancel = cancelled;
     const at = (event) => [event.offsetX, event.offsetY];
     above.addEventListener("pointerdown", (event) => {
+      if (!view) return;
       above.setPointerCapture(event.pointerId);
       press = {
         start: at(event),
         last: at(event),
         moved: false,
+        shown,
         grabbed: event.button === 0 ? grab(at(event)) : null,
       };
     });
     above.addEventListener("pointermove", (event) => {
       const now = at(event);
+      if (!view) return undefined;
+      forgetPress();
       if (!press) return hover(now);
       const [dx, dy] = [now[0] - press.last[0], now[1] - press.last[1]];
       press.moved ||= Math.hypot(now[0] - press.start[0], now[1] - press.start[1]) > CLICK_SLOP;
@@ -94,15 +112,14 @@ export function createViewer({ root, project, frames, redraw }) {
       return press.grabbed ? drag(press.grabbed, toPicture(view, now)) : setView(pan(view, [dx, dy]));
     });
     above.addEventListener("pointerup", (event) => {
+      forgetPress();
       const done = press;
       press = null;
       if (!done) return;
       if (done.moved && done.grabbed) drop(done.grabbed, toPicture(view, at(event)));
       else if (!done.moved && event.button === 0) click(at(event), event);
     });
-    above.addEventListener("pointercancel", () => {
-      press = null;
-    });
+    above.addEventListener("pointercancel", letGo);
     above.addEventListener("pointerleave", () => press || hover(null));
     above.addEventListener("contextmenu", (event) => event.preventDefault());
   }
@@ -113,7 +130,7 @@ export function createViewer({ root, project, frames, redraw }) {
     zoom,
     overlay: () => prepareCanvas(above),
     toScreen: (place) => toScreen(view ?? whole(), place),
-    toPicture: (at) => toPicture(view, at),
+    toPicture: (at) => toPicture(view ?? whole(), at),
     // What is in the middle of the canvas; before the first picture, the middle of that.
     middle: () =>
       view
@@ -130,7 +147,8 @@ export function createViewer({ root, project, frames, redraw }) {
     // Shows the surroundings of a box, or the whole picture.
     frameBox(next) {
       box = next ?? null;
-      view = null; // made when it is drawn: a hidden canvas has no size
+      view = null;
+      letGo();
       redraw();
     },
     toggleZoom() {

@@ -98,6 +98,9 @@ export function createAddress(model, { frames, shell, colors }) {
       dragged = null;
       put(joint, at, clicks()[joint]?.[2] ?? 2);
     },
+    cancelled() {
+      dragged = null;
+    },
     click(at, event) {
       const next = step();
       if (under(at)) return;

@@ -35,15 +35,22 @@ export function createCourt(model, { frames, shell }) {
     model.redraw();
   }, failed);
 
-  async function load() {
-    court = await api.read("court");
-    if (!court.clicks) court = null;
+  // A click shows at once; what the server says of it comes later.
+  const requests = api.oneByOne(take, failed);
+  function take(answer) {
+    court = answer.clicks ? { ...court, ...answer } : null;
     if (!court) return;
-    const agreed = court.found !== null && !court.changed;
-    selection.point = agreed ? null : (selection.point ?? nextPoint(court.clicks));
     loadView(selection.frame);
     model.redraw();
   }
+  function opened() {
+    requests.ask(() => api.read("court")).then(() => {
+      if (!court) return;
+      selection.point = isFound() ? null : (selection.point ?? nextPoint(court.clicks));
+      model.redraw();
+    });
+  }
+  const isFound = () => court.found !== null && !court.changed;
 
   function show(frame) {
     selection.frame = Math.max(0, Math.min(last, frame));
@@ -57,21 +64,24 @@ export function createCourt(model, { frames, shell }) {
     model.redraw();
   }
 
-  async function keep(request) {
-    try {
-      Object.assign(court, await api.send("court", request));
-    } catch (fault) {
-      failed(fault);
-    }
-    loadView(selection.frame);
+  // Keeps a click of a point in a frame; takes it away where there is no place.
+  function keep({ name, frame, place }) {
+    const others = court.clicks.filter((click) => click.name !== name || click.frame !== frame),
+      clicks = place ? [...others, { name, frame, x: place[0], y: place[1] }] : others;
+    court = { ...court, clicks };
+    requests.keep(() => api.send("court", { name, frame, place }).catch(refused));
     model.redraw();
   }
+  function refused(fault) {
+    failed(fault);
+    return api.read("court");
+  }
 
-  async function put(name, at) {
+  function put(name, at) {
     if (viewer.shown() !== selection.frame || name === null) return;
     const place = placeIn([project.width, project.height], at);
     if (!place) return;
-    await keep({ name, frame: selection.frame, place });
+    keep({ name, frame: selection.frame, place });
     choose(nextPoint(court.clicks));
   }
 
@@ -91,10 +101,13 @@ export function createCourt(model, { frames, shell }) {
       selection.dragged = { name, place };
       model.redraw();
     },
-    async drop(name, place) {
-      await put(name, place);
+    drop(name, place) {
       selection.dragged = null;
+      put(name, place);
       model.redraw();
+    },
+    cancelled() {
+      selection.dragged = null;
     },
     click(at) {
       if (!court) return;
@@ -116,8 +129,10 @@ export function createCourt(model, { frames, shell }) {
   byId("court-ahead").addEventListener("click", () => show(selection.frame + 1));
   byId("court-primary").addEventListener("click", primary);
 
-  function primary() {
-    if (shell.runningJob()) return;
+  // A page that has just opened, and a point that was clicked last, are waited for.
+  async function primary() {
+    await requests.rest();
+    if (shell.runningJob() || !court || isFound()) return;
     searched = true;
     shell.startJob("court");
   }
@@ -200,7 +215,7 @@ export function createCourt(model, { frames, shell }) {
   // When the work has ended, what it found is shown.
   function watchWork() {
     const running = shell.runningJob()?.kind === "court";
-    if (working && !running) load().catch(failed);
+    if (working && !running) opened();
     working = running;
   }
 
@@ -213,7 +228,7 @@ export function createCourt(model, { frames, shell }) {
     setText(byId("court-where"), `frame ${selection.frame} of ${project.n_frames}`);
     setText(byId("court-text"), text);
     setText(byId("court-more"), more);
-    button.hidden = Boolean(shell.runningJob()) || (court.found !== null && !court.changed);
+    button.hidden = Boolean(shell.runningJob()) || isFound();
     setText(button, court.clicks.length ? "Find the court with these points" : "Find the court");
     setText(byId("court-chosen"), selection.point ? `To click: ${namedInWords(selection.point)}` : "");
     drawClicks();
@@ -222,14 +237,14 @@ export function createCourt(model, { frames, shell }) {
   }
 
   const commands = {
-    primary: () => !byId("court-primary").hidden && primary(),
-    clear: () => here().length && keep({ name: here().at(-1).name, frame: selection.frame }),
+    primary,
+    clear: () => court && here().length && keep({ name: here().at(-1).name, frame: selection.frame }),
     step: ({ index, shift }) =>
       show(selection.frame + (index ? 1 : -1) * (shift ? Math.round(project.fps) : 1)),
     zoom: viewer.toggleZoom,
     zoomBy: ({ index }) => viewer.zoom(viewer.toScreen(viewer.middle()), index ? 0.8 : 1.25),
   };
-  return { draw, commands, opened: () => load().catch(failed) };
+  return { draw, commands, opened };
 }
 
 function drawDot(pen, [x, y], color, radius) {

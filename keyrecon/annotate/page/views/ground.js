@@ -44,10 +44,14 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
     model.redraw();
   }
 
-  const load = async () => take(await api.read("ground"));
-  let changing = Promise.resolve(); // what was opened or typed last, on its way
-  const opened = () => (changing = load().catch(failed));
-  const change = (request) => (changing = api.send("ground", request).then(take, failed));
+  const requests = api.oneByOne(take, failed),
+    load = () => api.read("ground"),
+    opened = () => requests.ask(load);
+  const change = (request) => requests.keep(() => api.send("ground", request).catch(refused));
+  function refused(fault) {
+    failed(fault);
+    return load();
+  }
 
   function show(frame) {
     selection.frame = Math.max(0, Math.min(last, frame));
@@ -127,7 +131,7 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
 
   // A number that Enter ended in its field is used, too, and a page that has just opened is waited for.
   async function primary() {
-    await changing;
+    await requests.rest();
     if (shell.runningJob() || !ground?.motion || ground.court || isFound()) return;
     if (!waitsForHeight()) shell.startJob("ground");
     else
@@ -188,8 +192,13 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
     viewer.cursor("crosshair");
   }
 
-  const remove = ({ kind, frame, ends, metres: length }) =>
+  // It is gone at once, so that the next press means the next one.
+  function remove(mark) {
+    const { kind, frame, ends, metres: length } = mark;
+    ground = { ...ground, marks: ground.marks.filter((other) => other !== mark) };
     change({ removed: { kind, frame, ends, metres: length } });
+    model.redraw();
+  }
 
   function markRow(mark) {
     const { name, frame, metres: length } = mark,
@@ -213,7 +222,7 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
   // When the work has ended, what it found is shown.
   function watchWork() {
     const running = shell.runningJob()?.kind === "ground";
-    if (working && !running) load().catch(failed);
+    if (working && !running) opened();
     working = running;
   }
 
@@ -233,7 +242,7 @@ export function createGround(model, { frames, shell, go, heightWaits }) {
 
   const commands = {
     primary,
-    clear: () => here().length && remove(here().at(-1)),
+    clear: () => ground && here().length && remove(here().at(-1)),
     kind: ({ index }) => choose(Object.keys(KINDS)[index]),
     back: () => choose(selection.kind),
     step: ({ index, shift }) =>

@@ -63,6 +63,7 @@ export function createKeyframePicture(model, { actions, viewer, colors }) {
       else if (target?.limb) actions.flip(target.limb);
       else actions.select(null);
     },
+    cancelled: () => actions.dropDragged(),
     hover: (at) => {
       pointer = at;
       model.update({ hovered: hit(at) });

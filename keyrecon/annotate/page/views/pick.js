@@ -69,15 +69,17 @@ export function createPick(model, { frames, shell }) {
     choose(pick.part);
   }
 
+  let mapOf = 0; // number of the map that was asked for last
   async function loadMap() {
+    const number = ++mapOf;
     map = null;
-    if (!byId("show-map").checked) return;
+    model.redraw();
     const { frame, part } = selection;
-    if (part === null) return;
+    if (!byId("show-map").checked || part === null) return;
     const query = new URLSearchParams({ part, revision: model.state.revision });
     const response = await fetch(`/api/backprojection/${frame}?${query}`).catch(() => null);
     const picture = response?.status === 200 && (await createImageBitmap(await response.blob()));
-    if (picture && frame === selection.frame && part === selection.part) map = picture;
+    if (picture && number === mapOf) map = picture;
     model.redraw();
   }
 

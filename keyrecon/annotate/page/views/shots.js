@@ -8,13 +8,23 @@ const WIDTH = 160; // of a picture, px
 export function createShots(model, { address, show, isBusy }) {
   const strip = byId("shots");
 
-  async function choose({ number, wanted }) {
-    try {
-      model.project.shots = await api.send("shots", { number, used: !wanted });
-    } catch (fault) {
-      model.notify(fault.message || "The server does not answer.");
-    }
+  const take = (shots) => {
+    model.project = { ...model.project, shots };
     model.redraw();
+  };
+  const requests = api.oneByOne(take, (fault) => model.notify(fault.message || "The server does not answer."));
+
+  // A choice shows at once, and is taken back where it was not kept.
+  function choose({ number, wanted }) {
+    const before = model.project.shots,
+      used = !wanted;
+    take(before.map((shot) => (shot.number === number ? { ...shot, wanted: used } : shot)));
+    requests.keep(() =>
+      api.send("shots", { number, used }).catch((fault) => {
+        take(before);
+        throw fault;
+      }),
+    );
   }
 
   function tile(shot) {

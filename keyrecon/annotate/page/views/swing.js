@@ -23,6 +23,8 @@ const ENDS_NAMED = { hands: "the club between the hands", head: "the club's head
 const BEFORE_FIT = "The body in space appears here when the swing is fitted.";
 const OUTSIDE = "Nothing is fitted to this frame: it lies before or after the swing that was found.";
 
+const COMING = "The swing is on its way.";
+
 const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
 
 export function createSwing(model, { frames, shell, actions, colors, go, heightIsWrong }) {
@@ -187,6 +189,9 @@ export function createSwing(model, { frames, shell, actions, colors, go, heightI
       dragged = asked = first = null;
       put(name, at, marks()[name]?.[2] || 2);
     },
+    cancelled() {
+      dragged = null;
+    },
     click(at, event) {
       const name = under(at);
       if (asked) placeAsked(viewer.toPicture(at), event.shiftKey ? 1 : 2);
@@ -243,6 +248,11 @@ export function createSwing(model, { frames, shell, actions, colors, go, heightI
       more: ENDS.includes(asked) ? "Both ends tell where the shaft is. Esc leaves it." : "Left and right are the player's own. Shift-click if it is hidden. Esc leaves it.",
       button: WORDS[next.do]().button,
     };
+  }
+
+  function whyEmpty() {
+    if (!exists()) return BEFORE_FIT;
+    return isFitted(frame) && !motion.isHere(frame) ? COMING : OUTSIDE;
   }
 
   function drawClub(pen, club) {
@@ -317,8 +327,8 @@ export function createSwing(model, { frames, shell, actions, colors, go, heightI
     viewer.drawPicture(frame, player.playing() ? [WIDTH] : [undefined, WIDTH]);
     drawFigure();
     const points = isFitted(frame) ? motion.points(frame, "points3d") : null;
-    byId("swing-empty").hidden = isFitted(frame);
-    setText(byId("swing-empty"), exists() ? OUTSIDE : BEFORE_FIT);
+    byId("swing-empty").hidden = points !== null;
+    setText(byId("swing-empty"), whyEmpty());
     figure.show(points, null, points && groundBelow(motion.ground(frame), points));
   }
 
