@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from page_driver import BROWSER, SCREEN, Person, far, serving
+from page_driver import BROWSER, SCREEN, Held, Person, far, serving
 from page_project import (
     FPS,
     FRAMES,
@@ -320,6 +320,7 @@ def test_a_new_project_begins_with_whole_bodies_and_no_colour(context, tmp_path,
         person.await_text("#bodies-text", "shows the player clearly")
         person.page.wait_for_selector("#bodies-picture[data-frame]")
         person.press("Enter")
+        person.await_text("#position", r"frame \d+ of")
         first = person.frame()
         assert "top of the skull" in person.text("#prompt-more").lower()
         person.mark_joints(partial(place_of, first))
@@ -634,17 +635,14 @@ INK = """
 """Whether anything is drawn over the picture."""
 
 
-def test_before_the_project_is_read_there_is_nothing_to_press(person, context):
-    held = []
-    context.route("**/api/state", lambda route: held.append(route))
+def test_before_the_project_is_read_there_is_nothing_to_press(person):
+    held = Held(person, "**/api/state")
     person.page.reload()
-    for _ in range(100):
-        person.page.wait_for_timeout(20)
-        if held:
-            break
+    held.wait_for(1)
     person.press("Alt+3")
     assert person.page.evaluate("() => document.body.inert")
-    context.unroute("**/api/state")
+    person.page.unroute("**/api/state")
+    held.let_go()
     person.page.wait_for_selector("body[data-view=keyframes]")
     person.press("Alt+3")
     person.page.wait_for_selector("body[data-view=motion]")
@@ -657,7 +655,7 @@ def test_a_picture_that_did_not_come_is_asked_for_again(person, context):
     person.await_text("#position", "frame 70 of")
     person.page.wait_for_timeout(3000)
     context.unroute("**/api/frame/*")
-    person.page.wait_for_selector("#picture[data-frame='70']", timeout=10_000)
+    person.page.wait_for_selector("#picture[data-frame='70']")
 
 
 def test_marks_wait_for_the_picture_they_belong_to(person, context):

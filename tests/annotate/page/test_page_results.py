@@ -9,7 +9,7 @@ from typing import get_args
 import av
 import pytest
 from court_walker import court_camera
-from page_driver import BROWSER, Person, serving
+from page_driver import BROWSER, Held, Person, serving
 from page_project import (
     FPS,
     FRAMES,
@@ -118,11 +118,12 @@ def test_good_news_go_when_they_were_read_and_doubts_stay_until_they_are_closed(
     run = partial(run_and_tell, folder, f"Player found in 99 % of 100 frames.{more}")
     with serving(folder, commands={"run": run}) as server:
         person = visit(server)
+        person.page.evaluate("() => { window.time = 0; performance.now = () => time; }")
         mark_and_run(person)
         person.await_text("#notice-text", "99 %")
         person.press("Alt+4")
         assert person.page.is_visible("#notice")  # nobody has read it yet
-        person.page.wait_for_timeout(3100)
+        person.page.evaluate("() => { time = 3100; }")
         person.press("Alt+3")
         person.await_drawn()
         assert person.page.is_visible("#notice") == stays
@@ -273,11 +274,10 @@ def test_a_height_that_waits_for_the_next_motion_is_kept_and_said_to(folder, vis
         person.page.wait_for_function(
             "() => !document.querySelector('#height-said').innerText.includes('counts')"
         )
-        assert "height" not in person.page.evaluate("() => Object.keys(localStorage).join()")
+        person.page.wait_for_function("() => !/height/.test(Object.keys(localStorage).join())")
 
 
 def test_a_press_before_the_ground_is_there_is_not_lost(folder, visit):
-    held = []
     write_true_motion(folder)
     assistant = make_assistant(Workspace(folder))
     with serving(folder, assistant, {"run": partial(run_at_once, folder)}) as server:
@@ -286,11 +286,10 @@ def test_a_press_before_the_ground_is_there_is_not_lost(folder, visit):
         person.press("Alt+3")
         person.page.fill("#height", "183")
         person.await_text("#height-said", "counts when it is made anew")
-        person.page.route("**/api/ground", lambda route: held.append(route))
+        held = Held(person, "**/api/ground")
         person.press("Alt+6")
         person.page.click("#ground-primary")
-        person.page.wait_for_timeout(300)
-        held.pop().continue_()
+        held.let_go()
         person.await_text("#notice-text", "height that is typed in 3 Motion counts when")
 
 
@@ -311,6 +310,10 @@ def test_a_height_that_cannot_be_is_refused_before_any_work(folder, visit):
             assert person.page.is_disabled("#motion-primary")
 
 
+def begins_work(response):
+    return response.url.endswith("/api/jobs") and response.request.method == "POST"
+
+
 def test_a_field_of_view_is_remembered_told_to_the_run_and_cleared(folder, visit):
     Workspace(folder).remember(with_field_of_view(Options(), 62.5), Options())
     with serving(folder, commands={"run": partial(run_at_once, folder)}) as server:
@@ -325,7 +328,7 @@ def test_a_field_of_view_is_remembered_told_to_the_run_and_cleared(folder, visit
         for typed, said, degrees in (("70°", "degrees", 70), ("", "not told", None)):
             person.page.fill("#fov", typed)
             person.await_text("#fov-said", said)
-            with person.page.expect_response("**/api/jobs") as answer:
+            with person.page.expect_response(begins_work) as answer:
                 person.page.press("#fov", "Enter")
             told = answer.value.request.post_data_json["options"]
             assert answer.value.ok and told == {"height": None, "field_of_view": degrees}
