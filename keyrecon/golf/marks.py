@@ -3,8 +3,8 @@
 A mark is worth more than anything observed: the search passes the marked key postures, the club of
 a marked frame is the marked one, tracks of joints run through the marks, and the fit is drawn to
 them (`fit.fitting`); those between the frames that are fitted go along with the fit to the nearest
-one. What limbs of fixed length leave between the fit and a mark, `hold_joints` closes at last,
-fading over the frames around, so that a marked joint is where it was marked.
+one. What limbs of fixed length leave between the fit and a mark, `hold_joints` and `hold_club`
+close at last, fading over the frames around, so that what was marked is where it was marked.
 """
 
 from dataclasses import replace
@@ -173,9 +173,37 @@ def hold_joints(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedS
     return replace(fitted, motion=held)
 
 
+def hold_club(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedSwing:
+    """The swing with its club where it was marked, in the file's frames and px.
+
+    As joints do, the hands shift; the shaft turns and stretches about them, since what is off aside
+    in one frame of a fast club would be off along it a few frames later.
+    """
+    rows = np.flatnonzero(np.isfinite(marks.shafts).all(axis=(1, 2)))
+    if not len(rows):
+        return fitted
+    ends, frames = fitted.club2d, marks.frames[rows]
+    way, marked = ends[:, 1] - ends[:, 0], marks.shafts[rows]
+    length, angle = np.linalg.norm(way, axis=1), np.arctan2(way[:, 1], way[:, 0])
+    aim = marked[:, 1] - marked[:, 0]
+    turn = np.arctan2(aim[:, 1], aim[:, 0]) - angle[frames]
+    off = np.column_stack([
+        marked[:, 0] - ends[frames, 0],
+        np.linalg.norm(aim, axis=1) - length[frames],
+        (turn + np.pi) % (2 * np.pi) - np.pi,
+    ])  # fmt: skip
+    moved = _spread_in_time(off, frames, fitted.motion.time)
+    length, angle = np.maximum(length + moved[:, 2], 0.0), angle + moved[:, 3]
+    hands = ends[:, 0] + moved[:, :2]
+    head = hands + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    held, space = np.stack([hands, head], axis=1), fitted.club.copy()
+    space[..., :2] += (held - ends) * space[..., 2:] / focal
+    return replace(fitted, club=space, club2d=held)
+
+
 def _spread_in_time(
-    off: Float[np.ndarray, "n 2"], frames: Int[np.ndarray, "n"], time: Float[np.ndarray, "T"]
-) -> Float[np.ndarray, "T 2"]:
+    off: Float[np.ndarray, "n d"], frames: Int[np.ndarray, "n"], time: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "T d"]:
     """Offsets at some frames in all frames."""
 
     def alike(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -184,5 +212,5 @@ def _spread_in_time(
 
     at = time[frames]
     weights = solve(alike(at, at) + SAME_MOMENT * np.eye(len(at)), off, assume_a="pos")
-    spread: Float[np.ndarray, "T 2"] = alike(time, at) @ weights
+    spread: Float[np.ndarray, "T d"] = alike(time, at) @ weights
     return spread

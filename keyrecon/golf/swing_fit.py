@@ -26,7 +26,7 @@ from keyrecon.golf.fit.in_file import observations_in_file, swing_in_file
 from keyrecon.golf.fit.initial_pose import initial_fit
 from keyrecon.golf.fit.proportions import ProportionOptions, refit_proportions
 from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.marks import carry_marks, hold_joints, hold_keys, hold_observations
+from keyrecon.golf.marks import carry_marks, hold_club, hold_joints, hold_keys, hold_observations
 from keyrecon.golf.observation import ObservationOptions, ObservedSwing
 from keyrecon.golf.observe.guided_club_detection import GuidedDetectionOptions, detect_club_guided
 from keyrecon.golf.observe.motion_timing import TimeShift
@@ -203,6 +203,7 @@ def swing_found(
         fitted = swing_in_file(fitted, observations, film, time, model)
         observations = replace(observations_in_file(observations, film), marks=marks)
     fitted = hold_joints(fitted, marks, observations.camera.focal)
+    fitted = hold_club(fitted, marks, observations.camera.focal)
     keys = np.clip(hold_keys(fitted.keys, marks), 0, len(video) - 1)
     fitted = replace(fitted, keys=keys)
     return FoundSwing(fitted, observations, doubts, notes, (start, top, hit, finish))

@@ -8,8 +8,9 @@ import pytest
 
 from keyrecon.golf import swing_fit
 from keyrecon.golf.fit.handedness import mirror_marks
+from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.marks import carry_marks, correct_tracks, join_marks, place_marks
+from keyrecon.golf.marks import carry_marks, correct_tracks, hold_club, join_marks, place_marks
 from keyrecon.golf.observe.film import Film, frame_step
 from keyrecon.golf.observe.swing_timing import interpolate_times
 from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
@@ -134,3 +135,26 @@ def test_a_fit_with_guided_detection_has_the_marks_that_go_along(monkeypatch):
     guided = swing_fit.fit_guided(seen, fitted, video, read_motion_model())
     for held in (guided.club, guided.update(seen).club):
         assert turned(held[98:99], fitted.club2d[98:99])[0] < 1
+
+
+def test_a_marked_shaft_is_where_it_was_marked_and_those_around_turn_along():
+    """The head moves by tens of px a frame there, so that the angle is carried on, not the px."""
+    fitted = swing_at(np.arange(FRAMES))
+    at, turn = 280, np.radians(20)
+    hands, head = fitted.club2d[at]
+    rotated = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    beside = hands + np.array([4, -3])
+    marked = np.array([[beside, beside + 1.1 * rotated @ (head - hands)]])
+    marks = SwingMarks(np.array([at]), np.full((1, 14, 2), np.nan), marked, np.full(4, np.nan))
+    held = hold_club(fitted, marks, 1000.0)
+    np.testing.assert_allclose(held.club2d[at], marked[0], atol=1e-3)
+    around = turned(held.club2d, fitted.club2d)
+    assert around[at - 8 : at + 9].min() > 15 and around[[0, -1]].max() < 0.1
+    camera = Camera(1000.0, np.array([639.5, 359.5]))
+    np.testing.assert_allclose(project(held.club[at], camera)[0], marked[0], atol=1e-3)
+
+
+def test_a_swing_without_marked_shafts_keeps_its_club():
+    fitted = swing_at(np.arange(0, FRAMES, 8))
+    joints = SwingMarks.of_joints(np.array([3]), np.full((1, 14, 2), 5.0))
+    assert hold_club(fitted, joints, 1000.0) is fitted
