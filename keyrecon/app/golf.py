@@ -180,7 +180,7 @@ def fit_project(
     spent = time.perf_counter() - began
     return "\n".join(
         [
-            describe_tempo(record_swing(fit.fitted, fit.observations, shown=fit.shown)),
+            describe_tempo(_record(fit)),
             *(f"Note: {note}." for note in fit.notes),
             *describe_doubts(fit.doubts, folder),
             f"{folder}/motion.npz, golf.csv, overlay.mp4, report.html: {len(video)} frames, "
@@ -326,8 +326,7 @@ def write_results(
 ) -> None:
     """Overlay, report and table, then the motion, whose presence tells that all are written."""
     folder = workspace.folder
-    reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
-    swing = record_swing(fit.fitted, fit.observations, reasons, fit.notes, fit.shown)
+    swing = _record(fit)
     write_golf_overlay(folder / OVERLAY_FILE, video, fit.fitted, fit.observations.camera, progress)
     write_golf_report(
         workspace.report_file, swing, fit.fitted, fit.observations, model, video, progress
@@ -337,6 +336,12 @@ def write_results(
     write_swing(workspace.motion_file, swing)
     exports = [folder / name for name in (OVERLAY_FILE, TABLE_FILE)]
     note_exports(workspace, exports, motion_stamp(workspace))
+
+
+def _record(fit: GolfFit) -> RecordedSwing:
+    """What is kept of a fit."""
+    reasons = tuple(f"{doubt.text} (frame {doubt.frame})" for doubt in fit.doubts)
+    return record_swing(fit.fitted, fit.observations, reasons, fit.notes, fit.shown)
 
 
 def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:
@@ -349,7 +354,8 @@ def _is_written(workspace: Workspace, fitted: FittedSwing) -> bool:
 
 
 def describe_tempo(swing: RecordedSwing) -> str:
-    """Key postures and tempo in words; a fit without a downswing has no tempo."""
+    """Key postures and tempo in words; a fit without a downswing has no tempo, and a doubtful one
+    no times that would pass for measurements."""
     start, top, hit, finish = swing.keys
     measures = measure_swing(swing)
     up, down, tempo = (measures.key(name) for name in ("upswing", "downswing", "tempo"))
@@ -361,9 +367,10 @@ def describe_tempo(swing: RecordedSwing) -> str:
     ]
     missing = [name for name, shown in zip(KEYS, swing.shown, strict=True) if not shown]
     not_shown = f" ({' and '.join(missing)} not shown)" if missing else ""
+    times = "" if swing.doubts else f"; {', '.join(known)}"
     return (
         f"Upswing from frame {start:.0f}, top {top:.0f}, hit {hit:.0f}, finish {finish:.0f}"
-        f"{not_shown}; {', '.join(known)}."
+        f"{not_shown}{times}."
     )
 
 

@@ -12,9 +12,9 @@ DOUBT_NOTE = (
     "numbers were off on rendered swings of players that the motion model had not seen: from one "
     "camera depth comes from the model, so angles that turn in depth are the least sure. The "
     "second is when the key posture was: half a frame either way (a frame / &radic;12) and what "
-    "finding it adds (14 ms at the hit, 36 at the top, about 0.1 s at start and finish, as marked by "
-    "eye in ten real swings), times how fast the number changes there. Tempo is timing alone; at 30 "
-    "frames a second, 0.75 s up and 0.25 s down, one frame at the hit moves it by 0.4."
+    "finding it adds (14 ms at the hit, 36 at the top, about 0.1 s at start and finish, as marked "
+    "by eye in ten real swings), times how fast the number changes there. Tempo is timing alone; "
+    "at 30 frames a second, 0.75 s up and 0.25 s down, one frame at the hit moves it by 0.4."
 )
 
 
