@@ -54,6 +54,8 @@ same scenes (`python benchmarks/golf_measures.py OUT` prints them). The model kn
 there, and his shoulders at the top are largely what it tells: 11 to 26 degrees too far for the one,
 16 to 27 too short for the other. Most of the head's sway at the finish is one scene's, down the
 line, where sway is depth; angles are as wrong from there as face-on, to a quarter."""
+DEPTH_SWAY = {"hip_sway": (0.0, 15.0, 3.0, 5.0), "head_sway": (0.0, 13.0, 18.0, 5.0)}
+"""What a sway along the line of sight is off besides, centimetres: DTLNOTE"""
 RATE_WINDOW = 0.05
 """Seconds to either side over which it is measured how fast a number changes."""
 
@@ -174,13 +176,25 @@ def measure_curves(swing: RecordedSwing) -> tuple[Curve, ...]:
     return tuple(
         Curve(
             name, *LABELS[name], fitted * of_name,
-            fitted * _spread_errors(swing, MEASURE_ERRORS[name]),
+            fitted * _spread_errors(swing, _key_errors(swing, name)),
         )
         for name, of_name in values.items()
     )  # fmt: skip
 
 
-def _spread_errors(swing: RecordedSwing, at_keys: tuple[float, ...]) -> Float[np.ndarray, "T"]:
+def _key_errors(swing: RecordedSwing, name: str) -> Float[np.ndarray, "4"]:
+    """Usual errors of a number at the key postures, as this camera stands."""
+    usual = np.array(MEASURE_ERRORS[name])
+    if name not in DEPTH_SWAY:
+        return usual
+    start = _nearest(swing, swing.keys[0])
+    across, _, _ = _player_axes(swing, start)
+    sight = unit_vectors(_mid(swing, "hip")[start], 1e-9)
+    errors: Float[np.ndarray, "4"] = np.hypot(usual, np.array(DEPTH_SWAY[name]) * (across @ sight))
+    return errors
+
+
+def _spread_errors(swing: RecordedSwing, at_keys: Float[np.ndarray, "4"]) -> Float[np.ndarray, "T"]:
     """Errors of the key postures over all frames."""
     frames = np.arange(len(swing.motion.time))
     spread: Float[np.ndarray, "T"] = np.interp(frames, np.nan_to_num(swing.keys), at_keys)
@@ -236,7 +250,9 @@ def _measure_key(swing: RecordedSwing, curve: Curve, posture: int) -> KeyMeasure
     before, after = np.interp(around, time, values)
     rate = (after - before) / max(around[1] - around[0], 1e-9)
     doubt = float(
-        np.hypot(MEASURE_ERRORS[curve.name][posture], rate * key_time_errors(swing)[posture])
+        np.hypot(
+            _key_errors(swing, curve.name)[posture], rate * key_time_errors(swing)[posture]
+        )
     )
     doubt = doubt if np.isfinite(value) else np.nan
     return KeyMeasure(

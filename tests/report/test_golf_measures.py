@@ -181,6 +181,22 @@ def test_a_neck_towards_the_ball_bends_the_spine_ahead():
     np.testing.assert_allclose(spine.curve("spine_aside").values, 0, atol=1e-6)
 
 
+def test_a_sway_along_the_line_of_sight_is_less_sure():
+    """From behind the hands, towards the target is away from the camera."""
+    doubts = []
+    for degrees in (0, 45, 90):
+        front, turn = still(), Rotation.from_euler("y", degrees, degrees=True).as_matrix()
+        middle = np.array([0.0, 0.0, 4.0])
+        points = (front.motion.points3d - middle) @ turn.T + middle
+        measures = measured(replace(front, motion=motion_of(points)))
+        doubts.append([measures.key("hip_sway", posture).doubt for posture in ("Top", "Hit")])
+        assert measures.curve("hip_sway").error[0] == 0
+        assert measures.key("hip_lift", "Top").doubt < 2
+    (front, *_), (askew, *_), (behind, *_) = doubts
+    assert front < 6 < askew < behind - 3 and behind > 14
+    assert doubts[0][1] < doubts[2][1]
+
+
 def test_a_right_hander_who_faces_the_camera_sways_to_the_right_of_the_picture():
     """Towards the target, which lies on the player's left; a left-hander's lies on the right."""
     fitted = moved(still(), ["left_hip", "right_hip"], [0.1, -0.02, 0.0])
