@@ -60,6 +60,8 @@ FARTHEST_CLICK = 0.1
 FARTHEST_MARK = 0.1
 """Distance of a marked joint from the fit that was drawn to it, body heights, at most: beyond it
 the mark is of another posture, or the fit of another swing."""
+LEAST_SHAFT = 0.1
+"""A club that seems shorter points at the camera: its angle tells nothing. Body heights."""
 MOST_SHIFT, LEAST_AGREEMENT = 0.15, 0.15
 """Share of the downswing by which it may be off from what moves in the pictures, and how well it
 agrees with that after the shift, as a correlation, at least. Right fits of five real swings are off
@@ -101,6 +103,7 @@ def find_doubts(
         *_doubt_club(fitted, observations),
         *_doubt_clicks(fitted, observations),
         *_doubt_marks(fitted, observations),
+        *_doubt_shafts(fitted, observations),
     ]
 
 
@@ -248,8 +251,7 @@ def _doubt_club(fitted: FittedSwing, observations: Observations) -> list[SwingDo
     if seen.mean() < LEAST_DETECTED:
         text = f"the club was detected in {seen.mean():.0%} of the frames of the swing"
         return [SwingDoubt(text, during.start)]
-    cross = detected[:, 0] * expected[:, 1] - detected[:, 1] * expected[:, 0]
-    angle = np.abs(np.arctan2(cross, (detected * expected).sum(axis=1)))
+    angle = _angles(detected, expected)
     agreed = angle[seen] < CLUB_ANGLE
     if agreed.mean() >= LEAST_CLUB_AGREED:
         return []
@@ -285,3 +287,27 @@ def _doubt_marks(fitted: FittedSwing, observations: Observations) -> list[SwingD
     row, joint = np.unravel_index(far.argmax(), far.shape)
     frame, name = int(marks.frames[row]), LSP14.names[joint]
     return [SwingDoubt(f"{name} was marked {far.max():.0%} of the body height away", frame)]
+
+
+def _doubt_shafts(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
+    """No marked shaft is turned far from the club of the fit."""
+    marks = carry_marks(observations.marks, fitted)
+    marked, expected = (
+        ends[:, 1] - ends[:, 0] for ends in (marks.shafts, fitted.club2d[marks.frames])
+    )
+    length = np.fmin(np.linalg.norm(marked, axis=1), np.linalg.norm(expected, axis=1))
+    seen = np.isfinite(marked).all(axis=1) & (length > LEAST_SHAFT * observations.height)
+    angle = np.where(seen, np.nan_to_num(_angles(marked, expected)), 0)
+    if not angle.size or angle.max() < CLUB_ANGLE:
+        return []
+    text = f"the club was marked {np.degrees(angle.max()):.0f} degrees from where the fit has it"
+    return [SwingDoubt(text, int(marks.frames[angle.argmax()]))]
+
+
+def _angles(
+    one: Float[np.ndarray, "n 2"], other: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n"]:
+    """Between vectors, rad."""
+    cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    angles: Float[np.ndarray, "n"] = np.abs(np.arctan2(cross, (one * other).sum(axis=1)))
+    return angles

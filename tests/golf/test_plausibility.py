@@ -15,7 +15,7 @@ from keyrecon.golf.plausibility import find_doubts, shown_keys
 from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingState
+from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingMarks, SwingState
 from keyrecon.io.formats.model_file import read_motion_model
 
 CAMERA = Camera(1000.0, np.array([640.0, 360.0]))
@@ -184,3 +184,18 @@ def test_a_finish_that_is_held_in_pictures_that_repeat_is_shown():
     )
     in_file = held.keys_in_file(np.array([10.0, 30.0, 38.0, 50.0]))
     assert shown_keys(in_file, held) == (True, True, True, True)
+
+
+def test_a_shaft_that_was_marked_far_from_the_fitted_club_is_told(played):
+    """The club is shown where it was marked in any case: only this tells of a mark beside it."""
+    fitted, observations = played
+    at = np.array([10, 30])
+    shafts = fitted.club2d[at].copy()
+    nothing = np.full((2, 14, 2), np.nan), np.full(4, np.nan)
+    right = replace(observations, marks=SwingMarks(at, nothing[0], shafts, nothing[1]))
+    assert find_doubts(fitted, right) == []
+    turned = shafts.copy()
+    turned[1, 1] = shafts[1, 0] + (shafts[1, 1] - shafts[1, 0])[::-1] * [1, -1]
+    wrong = replace(right, marks=replace(right.marks, shafts=turned))
+    (doubt,) = find_doubts(fitted, wrong)
+    assert "the club was marked 90 degrees" in doubt.text and doubt.frame == 30
