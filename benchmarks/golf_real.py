@@ -1,10 +1,14 @@
 """`keyrecon golf fit` on real swings, from six clicks alone.
 
 Run: python benchmarks/golf_real.py [--half develop|report|all] [--only NAME ...] [--slowmo told]
+         [--correct N]
 
 Clips and marks by eye are those of `benchmarks/real.py`. Six joints are clicked in the first frame
 in which all of them were marked; nothing else is told, unless `--slowmo told` gives slow motion's
-factor, from the marked downswing and the .25 s that a tour player's takes.
+factor, from the marked downswing and the .25 s that a tour player's takes. With `--correct N` a
+second row is of the fit after a coach corrected it: visible joints and shaft of its N worst frames
+at least .08 s apart, or in their stead top or hit where they are off by more than two frames, are
+given as marked by eye.
 
 Columns: share of the visible marked joints that the fitted ones are near to, within a fifth of the
 trunk (PCK.2); share of the fitted joints that lie on the marked figure (body), at most a limb's
@@ -28,6 +32,7 @@ from keyrecon.app.golf import GolfFit, fit_video, without_slow_motion_search
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.clicks import GolfClicks
+from keyrecon.golf.records import NO_MARKS, SwingMarks
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.held_video import hold_frames
@@ -41,6 +46,8 @@ TOUR_DOWNSWING = 0.25
 """Seconds from the top to the hit, by which slow motion's factor is told."""
 LIMB = 0.035
 """Half the width of a limb with its sleeve, and the error of a mark, player heights."""
+FARTHEST_KEY, CORRECTIONS_APART = 2.0, 0.08
+"""Frames at 30 per second by which a key posture may be off, and seconds between corrections."""
 SLOW = 1.6
 """A clip whose downswing takes so many times a tour player's is slow motion."""
 
@@ -84,8 +91,10 @@ def click(swing: Swing) -> GolfClicks:
     )  # fmt: skip
 
 
-def fit(swing: Swing, told: bool, work: Path) -> tuple[GolfFit, float]:
-    """A fit from six clicks, and its seconds."""
+def fit(
+    swing: Swing, told: bool, work: Path, marks: SwingMarks = NO_MARKS
+) -> tuple[GolfFit, float]:
+    """A fit from six clicks and corrections, and its seconds."""
     video = open_video(
         VIDEOS / f"{swing.clip.name}.mp4", slow_motion=swing.slow_motion if told else 1.0
     )
@@ -93,8 +102,35 @@ def fit(swing: Swing, told: bool, work: Path) -> tuple[GolfFit, float]:
     model = read_motion_model(BUILT_IN_SWING_PRIOR)
     began = time.perf_counter()
     options = without_slow_motion_search(GolfOptions()) if told else GolfOptions()
-    found = fit_video(hold_frames(video), click(swing), model, options, store.keep)
+    frames = hold_frames(video)
+    found = fit_video(frames, click(swing), model, options, store.keep, marks=marks)
     return found, time.perf_counter() - began
+
+
+def correct(swing: Swing, found: GolfFit, most: int) -> SwingMarks:
+    """What a coach would mark in the worst frames of a fit."""
+    figures, clip = measure(swing, found), swing.clip
+    off = [abs(figures[k]) > FARTHEST_KEY and k in ("top", "hit") for k in KEY_NAMES]
+    keys = np.array([swing.events[k] if o else np.nan for k, o in zip(KEY_NAMES, off, strict=True)])
+    away = np.linalg.norm(
+        found.fitted.motion.points2d[clip.truth.frames] - clip.truth.joints, axis=2
+    )
+    missed = ((away > 0.2 * clip.torso) & clip.seen).sum(axis=1)
+    wrong = dict(zip(clip.truth.frames.tolist(), missed.astype(float).tolist(), strict=True))
+    for t, angle in zip(sorted(swing.clubs), club_angles(swing, found.fitted.club2d), strict=True):
+        wrong[t] = wrong.get(t, 0.0) + (2 * min(angle / 15, 2.0) if angle > 5 else 0.0)
+    apart = CORRECTIONS_APART * clip.video.fps * swing.slow_motion
+    frames: list[int] = []
+    for t in sorted(wrong, key=lambda t: -wrong[t]):
+        if len(frames) < most - sum(off) and wrong[t] and all(abs(t - o) >= apart for o in frames):
+            frames.append(t)
+    at = np.array(sorted(frames), dtype=np.int64)
+    joints, shafts = np.full((len(at), 14, 2), np.nan), np.full((len(at), 2, 2), np.nan)
+    for row, t in enumerate(at.tolist()):
+        shafts[row] = swing.clubs.get(t, np.nan)
+        for k in np.flatnonzero(clip.truth.frames == t):
+            joints[row, clip.seen[k]] = clip.truth.joints[k, clip.seen[k]]
+    return SwingMarks(at, joints, shafts, keys)
 
 
 def figure_distance(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
@@ -195,6 +231,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names of clips")
     parser.add_argument("--slowmo", choices=("told", "found"), default="found")
     parser.add_argument("--work", type=Path, default=Path("benchmarks/work/golf_real"))
+    parser.add_argument("--correct", type=int, default=0, help="frames that are corrected at most")
     parser.add_argument("--sheets", action="store_true", help="write contact sheets")
     words = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="  %(message)s")
@@ -210,6 +247,10 @@ def main() -> None:
             print(f"{file.stem:<21}{fault}", flush=True)
             continue
         print(describe(swing, found, seconds), flush=True)
+        if words.correct:
+            marks = correct(swing, found, words.correct)
+            found, seconds = fit(swing, words.slowmo == "told", words.work, marks)
+            print(f"{describe(swing, found, seconds)}  {marks.frames.tolist()}", flush=True)
         if words.sheets:
             write_sheet(swing, found, words.work / f"{file.stem}.png")
 
