@@ -193,11 +193,11 @@ class _Problem:
         """Turns close to none and smooth; the player moves like a random walk."""
         count = len(knots)
         seconds = len(self.spline) / self.fps / count
-        spread = np.repeat([SPREADS[_part(s.name)] for s in SEGMENTS], 3)
+        spread = np.repeat([SPREADS[part_name(s.name)] for s in SEGMENTS], 3)
         near = np.zeros(CHANNELS)
         near[:-ROOT] = min(1.0, DEPARTURES_PER_SECOND * seconds) / spread**2
         near[-ROOT:] = 1e-2 / ROOT_WALK**2
-        bends = np.repeat([BENDS.get(_part(s.name), BEND) for s in SEGMENTS], 3)
+        bends = np.repeat([BENDS.get(part_name(s.name), BEND) for s in SEGMENTS], 3)
         bend = np.zeros(CHANNELS)
         bend[:-ROOT] = 1 / (bends * seconds**2) ** 2
         walk = np.zeros(CHANNELS)
@@ -230,7 +230,8 @@ class _Problem:
         return knots - solveh_banded(band, here.gradient.ravel(), lower=True).reshape(knots.shape)
 
 
-def _part(segment: str) -> str:
+def part_name(segment: str) -> str:
+    """The part of the body that a segment is, left or right."""
     return segment.removeprefix("right_").removeprefix("left_")
 
 

@@ -11,11 +11,12 @@ from keyrecon.body import LSP14
 from keyrecon.golf.fit.fitting import FitOptions, fit_swing, surface_blocks
 from keyrecon.golf.fit.handedness import mirror_initial, mirror_observations
 from keyrecon.golf.fit.initial_pose import Placement, estimate_initial_pose, repeat_pose
+from keyrecon.golf.fit.residuals import project
 from keyrecon.golf.fit.result import describe_fit
 from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingState
+from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingMarks, SwingState
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.metrics import mpjpe
 
@@ -121,3 +122,20 @@ def test_what_is_an_outlier_does_not_depend_on_the_size_of_the_pictures(played):
     blocks = [surface_blocks(o, size_body(1.8), FitOptions()) for o in (small, large)]
     shares = [two.robust / one.robust for one, two in zip(*blocks, strict=True)]
     assert shares == [1, 2, 2]  # lines of sight are in metres, masks and matches in px
+
+
+def test_postures_that_no_capture_has_do_not_move_the_time(model, played):
+    """Hands lead the club by a tenth of a metre; club and legs tell the time."""
+    state, joints, club = played
+    seen = observe(joints, club, CAMERA, noise=0.5)
+    initial = SwingFit(model, size_body(1.8), late(state, 0.0))
+    arms = [LSP14.index(f"{side}_{n}") for side in ("right", "left") for n in ("wrist", "elbow")]
+    frames = np.array([14, 17, 20])
+    marked = joints[frames].copy()
+    way = (joints[frames + 1] - joints[frames])[:, arms]
+    marked[:, arms] += 0.1 * way / np.linalg.norm(way, axis=2, keepdims=True)
+    places = np.full((3, 14, 2), np.nan)
+    places[:, arms] = project(marked[:, arms].reshape(-1, 3), CAMERA)[0].reshape(3, -1, 2)
+    marks = SwingMarks.of_joints(frames, places)
+    phases = [fit_swing(o, initial, FPS).state.phase for o in (seen, replace(seen, marks=marks))]
+    assert np.abs(phases[1] - phases[0]).max() < 0.01

@@ -4,16 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from golf_truth import camera_before, even_times
+from golf_truth import camera_before, even_times, observe
 
 from keyrecon.body import LSP14
 from keyrecon.golf.clicks import NEEDED
-from keyrecon.golf.fit.proportions import PARTS, clicked_joints, fit_proportions, scale_body
+from keyrecon.golf.fit import proportions
+from keyrecon.golf.fit.fitting import FitOptions
+from keyrecon.golf.fit.proportions import (
+    PARTS,
+    ProportionOptions,
+    clicked_joints,
+    fit_proportions,
+    refit_proportions,
+    scale_body,
+)
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.prior.kinematics import find_joints, place_body
+from keyrecon.golf.prior.kinematics import find_club, find_joints, place_body
 from keyrecon.golf.prior.motion_model import posture_at
 from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, InitialJoints, SwingMarks, SwingState
+from keyrecon.golf.records import Camera, InitialJoints, SwingFit, SwingMarks, SwingState
 from keyrecon.io.formats.model_file import read_motion_model
 
 CAMERA = Camera(1000.0, np.array([640.0, 360.0]))
@@ -73,3 +82,34 @@ def test_six_clicks_tell_how_trunk_and_legs_share_the_height(posed):
     share = lengths(fit_proportions(body, pose, clicks, CAMERA)) / lengths(body)
     trunk, thigh = (share[LSP14.index(name)] for name in ("neck", "right_knee"))
     assert 1.02 < thigh / trunk < 1.06 / 0.96
+
+
+def test_a_corrected_joint_leaves_the_proportions_that_clicks_told(posed, monkeypatch):
+    body, pose, marks = posed
+    model, (rotation, position) = read_motion_model(), camera_before(180.0)
+    state = SwingState(
+        np.zeros(0), even_times(40, 5), np.tile(rotation, (40, 1, 1)), np.tile(position, (40, 1))
+    )
+    fit = SwingFit(model, body, state)
+    monkeypatch.setattr(
+        proportions, "refit_swing",
+        lambda seen, initial, state, *_: SwingFit(model, initial.body, state),
+    )  # fmt: skip
+    first, hips = marks.joints[0], [LSP14.index("right_hip"), LSP14.index("left_hip")]
+    places = [first[hips].mean(axis=0) if n == "root" else first[LSP14.index(n)] for n in NEEDED]
+    seen = replace(
+        observe(find_joints(body, pose), find_club(body, pose), CAMERA, 0.0),
+        initial=InitialJoints(0, NEEDED, np.array(places)),
+    )
+    wrist = replace(marks, joints=np.full_like(marks.joints, np.nan))
+    wrist.joints[2, LSP14.index("left_wrist")] = marks.joints[2, LSP14.index("left_wrist")]
+    by_clicks, with_wrist = (
+        lengths(refit_proportions(fit, o, fit, 25.0, FitOptions(), ProportionOptions()).body)
+        for o in (seen, replace(seen, marks=wrist))
+    )
+    assert np.abs(by_clicks / lengths(body) - 1).max() > 0.015
+    legs = [LSP14.index(f"{side}_{joint}") for side in SIDES for joint in ("knee", "ankle")]
+    np.testing.assert_allclose(with_wrist[legs], by_clicks[legs], rtol=0.005)
+
+
+SIDES = ("right", "left")
