@@ -134,7 +134,7 @@ UNFOLLOWED = 0.1
 the joints that fits of five real swings have worst, .05 to .17. Were they due within `MODEL_ERROR`,
 elbows and wrists that no capture has would be met by another time, and by other proportions
 (`proportions`): with four corrected frames joints of the five within a fifth of the trunk were .95,
-.93, .98, .95 and .97 so, and are .97, .94, .99, .96 and .99."""
+.93, .98, .95 and .97 so, and are .96, .94, .99, .96 and .99."""
 HELD = 100.0
 """Standard deviations beyond which a mark counts less where the fit follows the picture: no mark is
 an outlier, however far the model was from it."""
