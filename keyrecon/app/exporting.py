@@ -24,10 +24,16 @@ from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     motion_on_court,
 )
+from keyrecon.io.video_writer import comment_of
 from keyrecon.io.workspace import Workspace, another_projects_file
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
-from keyrecon.report.overlay import OverlayOptions, check_overlay, write_overlay
+from keyrecon.report.overlay import (
+    OVERLAY_COMMENT,
+    OverlayOptions,
+    check_overlay,
+    write_overlay,
+)
 from keyrecon.timeline import cut_motion
 
 OVERLAY, CALIBRATION = ".mp4", ".toml"
@@ -113,27 +119,31 @@ def _check_place(file: Path, workspace: Workspace) -> None:
     if not file.parent.is_dir():
         raise KeyreconError(f"There is no folder {file.parent} to write {file.name} into; make it.")
     others = another_projects_file(file) and not file.parent.samefile(workspace.folder)
-    kept = workspace.is_kept(file) and not _is_export(file)
+    kept = workspace.is_kept(file) and not _is_export(file, workspace)
     if others or kept or workspace.reserves(file):
         owner = f"the project in {file.parent}" if others else "the project"
         raise KeyreconError(
             f"{file} belongs to {owner} and would be lost; export to another name or folder."
         )
-    if file.is_file() and not _is_export(file):
+    if file.is_file() and not _is_export(file, workspace):
         raise KeyreconError(
             f"{file} is there already and no export has written it; delete it or choose another "
             "name."
         )
 
 
-def _is_export(file: Path) -> bool:
+def _is_export(file: Path, workspace: Workspace) -> bool:
     """Whether a file that is there holds nothing, or what an export has written.
 
-    Of what people write by hand or mark: whatever has another suffix is taken for a result.
+    Of what people write by hand, mark or film: whatever has another suffix is taken for a result.
+    Overlays of former versions do not say that they are; those in the folder of exports are.
     """
     suffix = file.suffix.lower()
-    if suffix not in (".json", ".csv", CALIBRATION) or file.stat().st_size == 0:
+    if suffix not in (".json", ".csv", CALIBRATION, OVERLAY) or file.stat().st_size == 0:
         return True
+    if suffix == OVERLAY:
+        in_exports = file.parent.resolve() == workspace.exports.resolve()
+        return in_exports or comment_of(file) == OVERLAY_COMMENT
     if suffix == ".json":
         return is_coco_motion(file)
     with file.open("rb") as opened:

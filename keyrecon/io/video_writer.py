@@ -22,19 +22,23 @@ def write_video(
     fps: float,
     crf: int = 23,
     seek_every: int | None = None,
+    comment: str = "",
 ) -> int:
     """Encode RGB pictures of one size as they come (8 bit 4:2:0); returns how many there were.
 
     `crf` is x264's constant quality, 18 very good to 28 coarse. An odd last row or column is left
     out, because 4:2:0 needs even sizes. `seek_every` so many frames there is one that players can
-    jump to at once; by default one in 250. The file appears when it is whole. Raises KeyreconError
-    when there are no frames, or where the file cannot be written.
+    jump to at once; by default one in 250. A `comment` stands in the file (`comment_of`). The file
+    appears when it is whole. Raises KeyreconError when there are no frames, or where the file
+    cannot be written.
     """
     import av
 
     count = 0
     stream = None
     with replacing(path) as file, av.open(file, "w", format="mp4") as container:
+        if comment:
+            container.metadata["comment"] = comment
         for count, picture in enumerate(frames, start=1):  # noqa: B007
             height, width = (n - n % 2 for n in picture.shape[:2])
             if stream is None:
@@ -55,6 +59,17 @@ def write_video(
             raise KeyreconError(f"No frames came to be written to {path}; give at least one.")
         container.mux(stream.encode())
     return count
+
+
+def comment_of(path: Path) -> str:
+    """The comment that a video was written with; empty for one without, and for what is none."""
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            return container.metadata.get("comment", "")
+    except av.FFmpegError:
+        return ""
 
 
 def write_picture(path: Path, picture: UInt8[np.ndarray, "h w 3"]) -> None:

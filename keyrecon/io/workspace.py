@@ -369,7 +369,7 @@ class Workspace:
         """Files of `KEPT`, and the videos."""
         files = [file for name in KEPT for file in self.folder.glob(name)]
         places = possible_places(self.folder, self.videos)
-        return files + [file for file in places if file.is_file()]
+        return [file for file in (*files, *places) if file.is_file()]
 
     def reserves(self, file: Path) -> bool:
         """Whether a file's place is one of the project's own, whether there is a file or not."""

@@ -46,6 +46,8 @@ GROUND, PAPER = (150, 152, 156), (206, 208, 212)
 """Colours of the floor and of what is behind, dark enough for a white trunk."""
 LARGEST = 4096
 """Largest height of an overlay, px; players go no further."""
+OVERLAY_COMMENT = "keyrecon overlay"
+"""Stands in the file, which is told by it from a film."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def write_overlay(
     """
     check_overlay(options)
     pictures = overlay_frames(video, motion, progress, options, frames, court, club)
-    write_video(path, pictures, video.fps / options.slowmo)
+    write_video(path, pictures, video.fps / options.slowmo, comment=OVERLAY_COMMENT)
 
 
 def check_overlay(options: OverlayOptions) -> None:

@@ -122,6 +122,29 @@ def test_a_file_that_no_export_has_written_is_not_replaced(project, name, text):
     assert_refused(project, "a.bvh", name, match=match)
 
 
+def test_a_film_is_told_from_an_overlay_wherever_it_lies(project, write_numbered):
+    """It may be the video of another project, whose folder lies elsewhere."""
+    folder = project.folder.parent
+    shutil.copy(write_numbered("w.mp4", list(range(0, 240, 12))), folder / "second.mp4")
+    assert_refused(project, "second.mp4", match="second.mp4 is there already and no export has")
+    (folder / "none.mp4").write_text("no video at all")
+    assert_refused(project, "none.mp4", match="no export has written it")
+    for _ in range(2):
+        export(project, [folder / "overlay.mp4"], silent)
+
+
+def test_an_overlay_of_a_former_version_among_the_exports_is_replaced(project, write_numbered):
+    project.exports.mkdir()
+    shutil.copy(write_numbered("w.mp4", [5, 9]), project.exports / "p.mp4")
+    export(project, [project.exports / "p.mp4"], silent)
+    assert frames_of(project.exports / "p.mp4") == 20
+
+
+def test_a_folder_is_no_file_to_write(project):
+    (project.folder / "coco.json").mkdir()
+    assert_refused(project, "p/coco.json", match="could not be written")
+
+
 def test_marks_are_told_from_an_export_and_an_export_is_replaced(project):
     folder = project.folder.parent
     marks = Annotations(
@@ -382,7 +405,7 @@ def test_suffixes_may_be_written_in_capitals(project):
 
 def test_an_overlay_that_breaks_off_leaves_the_one_there_was(project):
     folder = project.folder.parent
-    (folder / "overlay.mp4").write_bytes(b"the last one")
+    export(project, [folder / "overlay.mp4"], silent)
 
     def impatient(items, *_):
         yield from (item for n, item in enumerate(items) if n < 5 or stop())

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from keyrecon.io.video_writer import write_video
+from keyrecon.io.video_writer import comment_of, write_video
 
 
 def test_the_same_pictures_make_the_same_file(tmp_path):
@@ -18,3 +18,12 @@ def test_the_same_pictures_make_the_same_file(tmp_path):
         write_video(tmp_path / f"{turn}.mp4", pictures, 30.0)
         files.add((tmp_path / f"{turn}.mp4").read_bytes())
     assert len(files) == 1
+
+
+def test_a_comment_is_read_as_it_was_written(tmp_path):
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    write_video(tmp_path / "told.mp4", [picture], 25.0, comment="of a test")
+    write_video(tmp_path / "bare.mp4", [picture], 25.0)
+    (tmp_path / "text.mp4").write_text("no video")
+    names = ("told.mp4", "bare.mp4", "text.mp4")
+    assert [comment_of(tmp_path / name) for name in names] == ["of a test", "", ""]
