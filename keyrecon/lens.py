@@ -9,6 +9,7 @@ from keyrecon.io.formats.camera_file import read_camera
 from keyrecon.io.lens_metadata import lens_focal
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
+from keyrecon.pipeline import Options, with_field_of_view
 from keyrecon.records import Motion
 from keyrecon.uncertainty import player_height
 from keyrecon.world.ground_calibration import USUAL_FOCAL, FieldOfView
@@ -43,6 +44,14 @@ def known_lens(workspace: Workspace, video: Video) -> FieldOfView | None:
     none of them has it."""
     known = known_focal(video, workspace.ground_marks().field_of_view)
     return _calibrated_lens(workspace) if known is None else known
+
+
+def with_known_lens(options: Options, workspace: Workspace, video: Video) -> Options:
+    """The options of a run with what is known of the lens, where they do not tell it."""
+    if options.lift.field_of_view is not None:
+        return options
+    lens = known_lens(workspace, video)
+    return options if lens is None else with_field_of_view(options, degrees_across(lens, video))
 
 
 def degrees_across(lens: FieldOfView, video: Video) -> float:

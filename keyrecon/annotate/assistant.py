@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from keyrecon.io.video import Video
 from keyrecon.records import Annotations, Pick
 
 Json = dict[str, Any]
@@ -28,8 +29,9 @@ class Assistant:
     bodies: Callable[[], list[Json] | None] | None = None
     """Frames in which a whole body, marked before there are keyframes, would teach most, as
     {"frame", "box"}; None before the player was followed."""
-    motion_digest: Callable[[], str | None] | None = None
-    """A digest of what a motion would be made from now; None while project.toml is damaged."""
+    motion_digest: Callable[[Video], str | None] | None = None
+    """A digest of what a motion of this video would be made from now; None while a file that tells
+    it is damaged."""
     suggestion: Callable[[Annotations, int], Json] | None = None
     """Where the joints of a frame probably are, from the frames annotated so far."""
     pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None

@@ -19,13 +19,7 @@ from keyrecon.io.provenance import RunNotes, camera_digest, motion_digest, note_
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import format_stretches
-from keyrecon.lens import (
-    degrees_across,
-    describe_nearness,
-    known_lens,
-    lens_advice,
-    lens_caveat,
-)
+from keyrecon.lens import describe_nearness, lens_advice, lens_caveat, with_known_lens
 from keyrecon.library import read_models, reconstruct
 from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, as_printed, with_field_of_view, with_height
@@ -75,11 +69,10 @@ def run(
     workspace.check_writable()
     read_models(options)  # a file that is none is told of before any stage
     started = time.perf_counter()
-    given, options = options, as_printed(options) if printed else options
-    video = workspace.video()
-    if options.lift.field_of_view is None and (lens := known_lens(workspace, video)):
-        options = with_field_of_view(options, degrees_across(lens, video))
-    digest = motion_digest(workspace, given, Options())
+    given, video = options, workspace.video()
+    options = with_known_lens(options, workspace, video)
+    digest = motion_digest(workspace, options, Options())
+    options = as_printed(options) if printed else options
     asked = asked_for(workspace, video)
     annotations = annotated(workspace, video, asked, partial)
     with workspace.remembering(given, Options()):

@@ -42,7 +42,7 @@ def marks_digest(workspace: Workspace) -> str:
 
 def motion_digest(workspace: Workspace, options: OptionRecord, defaults: OptionRecord) -> str:
     """A digest of all input to a run: marks, keyframes, picks, frames of videos, and the options
-    that are not the defaults.
+    that are not the defaults, with the lens that a run would take.
 
     The path of a video and the order of clicks do not count.
     """

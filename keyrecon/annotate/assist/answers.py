@@ -48,7 +48,9 @@ from keyrecon.body import Skeleton
 from keyrecon.errors import KeyreconError
 from keyrecon.hyperextension import HyperextendedStretch, hyperextended_stretches
 from keyrecon.io.provenance import motion_digest
+from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
+from keyrecon.lens import with_known_lens
 from keyrecon.pipeline import Options, frames_to_mark, marked_frames
 from keyrecon.records import Annotations, Pick
 from keyrecon.uncertainty import UncertainStretch, uncertain_stretches, unsure_track
@@ -132,11 +134,11 @@ def describe_bodies(cache: ProjectCache) -> list[Json] | None:
     return [{"frame": int(t), "box": _rounded(track.box[t], 1)} for t in frames]
 
 
-def project_motion_digest(folder: Path) -> str | None:
-    """What a motion would be made from now; None while the options cannot be read."""
+def project_motion_digest(folder: Path, video: Video) -> str | None:
+    """What a motion would be made from now; None while options or camera cannot be read."""
     try:
         workspace = Workspace(folder)
-        options = workspace.options(Options(), Options())
+        options = with_known_lens(workspace.options(Options(), Options()), workspace, video)
     except KeyreconError:  # the next step that needs them says what is wrong
         return None
     return motion_digest(workspace, options, Options())

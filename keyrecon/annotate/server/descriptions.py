@@ -183,9 +183,9 @@ def describe_run(
     """The notes of the run that made the motion, as JSON in the words of the page.
 
     What spoke against the track, what would make the motion better, whether it was made from the
-    present marks, keyframes, picks, videos and options (true where that is not known), and the
-    origin of a camera, "court" or "ground", that is newer than the report. `motion_digest` is of
-    the present input; notes of former versions have a digest of the marks alone.
+    present marks, keyframes, picks, videos, options and lens (true where that is not known), and
+    the origin of a camera, "court" or "ground", that is newer than the report. `motion_digest` is
+    of the present input; notes of former versions have a digest of the marks alone.
 
     `revision` is that of the marks before their files are read: newer marks are not vouched for.
     """

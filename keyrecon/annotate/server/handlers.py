@@ -213,8 +213,7 @@ def stretches(session: Session, request: ApiRequest) -> list[Json]:
 
 def run(session: Session, request: ApiRequest) -> Json:
     """Whether the motion was made from marks, keyframes and options as they are."""
-    motion_digest = session.assistant.motion_digest
-    return describe_run(session.workspace, session.store.state.revision, motion_digest)
+    return describe_run(session.workspace, session.store.state.revision, session.motion_digest)
 
 
 def swing(session: Session, request: ApiRequest) -> Json:

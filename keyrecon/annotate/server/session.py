@@ -48,6 +48,11 @@ class Session:
     keyframes: KeptKeyframes
     assistant: Assistant
 
+    def motion_digest(self) -> str | None:
+        """A digest of what a motion would be made from now; None where nothing can tell it."""
+        find = self.assistant.motion_digest
+        return None if find is None else find(self.frames.video)
+
     def close(self) -> None:
         """End its threads and let go of its files."""
         self.jobs.close()
@@ -102,7 +107,7 @@ def describe_project(session: Session) -> Json:
         "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder), session.frames.video),
-        "run": describe_run(session.workspace, revision, session.assistant.motion_digest),
+        "run": describe_run(session.workspace, revision, session.motion_digest),
         "has": {
             "picks": bool(picks_of(cells)),
             "keyframes": bool(halves_by_frame(keyframes)),

@@ -28,6 +28,7 @@ from keyrecon.io.provenance import RunNotes, marks_digest, motion_digest, note_r
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.records import HalfKeyframes, Keyframes
+from keyrecon.world.records import GroundMarks
 
 
 def write_keyframes(folder, upper, lower, n_frames=50):
@@ -209,6 +210,23 @@ def test_a_motion_is_out_of_date_when_what_it_was_made_from_has_changed(opened, 
     with (folder / "project.toml").open("a") as file:
         file.write("shots.skpi = 3\n")
     assert not is_current()
+
+
+def test_a_motion_is_out_of_date_when_more_is_known_of_the_lens(opened, folder):
+    """A run takes the angle that was told for the ground: it moves joints by centimetres."""
+    workspace, video = Workspace(folder), Workspace(folder).video()
+    session = opened(Assistant(motion_digest=partial(project_motion_digest, folder)))
+    (folder / "cache").mkdir(exist_ok=True)
+
+    def is_current():
+        return ask(session, "GET", "/api/run").json()["is_current"]
+
+    note_run(workspace, RunNotes(project_motion_digest(folder, video), ()))
+    assert is_current()
+    workspace.change_ground_marks(GroundMarks(field_of_view=62.0), GroundMarks())
+    assert not is_current()
+    note_run(workspace, RunNotes(project_motion_digest(folder, video), ()))
+    assert is_current()
 
 
 def test_every_open_page_hears_the_news():
