@@ -161,18 +161,18 @@ def fit_project(
 ) -> str:
     """Fit a swing in a project that has its clicks; returns what to print."""
     began = time.perf_counter()
-    video, folder, digest = workspace.video(), workspace.folder, golf_digest(workspace)
-    clicks = kept_clicks(workspace)
+    video, folder = workspace.video(), workspace.folder
     options = settings.applied_to(workspace.options(options, GolfOptions(), GOLF), folder)
     model = read_prior(options, folder)
     slow_motion = workspace.project["video"].get("slow_motion")
-    check_evidence(clicks, video, model, slow_motion or 1.0, str(workspace.golf_clicks_file))
-    video = hold_frames(video)
-    marks = kept_marks(workspace, video)
     fitting = replace(options, prior="")  # stages know the prior by its content
     if slow_motion is not None:
         fitting = without_slow_motion_search(fitting)
     with workspace.remembering(options, GolfOptions(), GOLF):
+        digest, clicks = golf_digest(workspace), kept_clicks(workspace)
+        check_evidence(clicks, video, model, slow_motion or 1.0, str(workspace.golf_clicks_file))
+        video = hold_frames(video)
+        marks = kept_marks(workspace, video)
         fit = fit_video(video, clicks, model, fitting, workspace.stages.keep, progress, marks)
     if workspace.stages.seconds or not _is_written(workspace, fit.fitted):
         write_results(workspace, video, fit, model, progress)

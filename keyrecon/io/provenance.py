@@ -12,9 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import write_durably
-from keyrecon.io.option_tables import OptionRecord, changed_options
-from keyrecon.io.workspace import Workspace
+from keyrecon.io.option_tables import OptionRecord, changed_options, flat_options
+from keyrecon.io.project_file import read_project
+from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.reading import parse_json, read_text
 
 CLICK_PARTS = ("frame", "size", "joints", "hidden", "left_handed", "stature", "focal", "principal")
@@ -69,14 +71,27 @@ def camera_digest(workspace: Workspace) -> str:
 
 
 def golf_digest(workspace: Workspace) -> str:
-    """A digest of all input to a golf fit: clicks, marks and annotations."""
+    """A digest of all input to a golf fit: clicks, marks, annotations, and the options kept."""
+    options = _golf_options(workspace)
     return _digest(
         [
             _parts_of(workspace.golf_clicks_file, CLICK_PARTS),
             _parts_of(workspace.golf_marks_file, ("keys", "frames")),
             _parts_of(workspace.annotations_file, ("annotations",)),
+            *([options] if options else []),
         ]
     )
+
+
+def _golf_options(workspace: Workspace) -> dict[str, Any]:
+    """By dotted names; that no slow motion is searched for among them, as the film plays at its own
+    speed. Another speed is told once and for all."""
+    try:
+        project = read_project(workspace.project_file)
+    except KeyreconError:  # who reads the file says what is wrong with it
+        return {}
+    options = flat_options(project.get("options", {}).get(GOLF, {}))
+    return options | ({"slow_motion": 1} if project["video"].get("slow_motion") == 1 else {})
 
 
 def note_run(workspace: Workspace, notes: RunNotes) -> None:
@@ -87,7 +102,7 @@ def note_run(workspace: Workspace, notes: RunNotes) -> None:
 def read_run(workspace: Workspace) -> RunNotes | None:
     """What was kept of the run; None for the motion of a golf fit or of an older version."""
     try:
-        noted = parse_json(read_text(_run_file(workspace)))
+        noted = dict(parse_json(read_text(_run_file(workspace))))
         advice = noted.get("advice", ())  # older versions kept none
         doubts, helps = (tuple(map(str, lines)) for lines in (noted["doubts"], advice))
         return RunNotes(str(noted["evidence"]), doubts, helps, noted.get("camera"))

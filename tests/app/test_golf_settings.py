@@ -13,6 +13,7 @@ from keyrecon.app.project import start
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.swing_fit import GolfOptions
 from keyrecon.io.formats.model_file import read_motion_model, write_motion_model
+from keyrecon.io.provenance import golf_digest, is_fitted, note_fitted
 from keyrecon.io.video import open_video
 from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.progress import silent
@@ -48,6 +49,28 @@ def test_a_method_that_is_told_counts_also_where_it_is_the_usual_one(swing, fitt
     assert fitted_with[-1][0].fit.components == most
     remembered = Workspace(swing / "project").options(GolfOptions(), GolfOptions(), GOLF)
     assert remembered == replace(QUICK, fit=replace(QUICK.fit, components=most))
+
+
+def test_a_fit_that_was_interrupted_leaves_the_one_before_out_of_date(swing, monkeypatch):
+    """The project keeps what was told of the new one, which made nothing yet."""
+    project = Workspace(swing / "project")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(app, "fit_video", interrupted)
+    note_fitted(project, golf_digest(project))
+    assert is_fitted(project)
+    with pytest.raises(KeyboardInterrupt):
+        fit_file(swing / "video.mp4", None, project.folder, settings=GolfSettings("windows"))
+    assert not is_fitted(project)
+
+
+def test_a_fit_is_out_of_date_when_slow_motion_is_said_not_to_be(swing):
+    project = Workspace(swing / "project")
+    note_fitted(project, golf_digest(project))
+    project.tell_slow_motion(1.0)
+    assert not is_fitted(project)
 
 
 def test_a_fit_on_the_page_goes_on_with_the_prior_of_the_project(swing, fitted_with):

@@ -111,7 +111,7 @@ def test_damaged_marks_are_left_to_their_reader(workspace, content):
     assert marks_digest(workspace) == without
 
 
-@pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff"])
+@pytest.mark.parametrize("content", [b"", b"[" * 100_000, b'{"evidence": 1}', b"\xff", b"[]", b"1"])
 def test_torn_notes_are_none(workspace, content):
     noted = RunNotes("marks", ("a doubt",), ("what helps",), "camera")
     note_run(workspace, noted)
