@@ -154,15 +154,18 @@ def describe_next(
 
 
 def count_different(keyframes: Keyframes, marks: Annotations | None) -> str:
-    """How many frames there are to mark; those marked before they were asked for exceed the
-    budget."""
+    """How many frames there are to mark; those marked already may exceed the budget."""
     frames = counted(len(keyframes.frames), "different frame")
     before = () if marks is None else np.concatenate(marked_frames(marks))
     count = len(np.intersect1d(keyframes.frames, before))
     if count == 0:
         return frames
     marked = "is marked already and comes" if count == 1 else "are marked already and come"
-    return f"{frames} ({count} of them {marked} on top of the budget)"
+    stands = "it stands" if count == 1 else "they stand"
+    return (
+        f"{frames} ({count} of them {marked} on top of the budget, unless {stands} for one that "
+        "would be asked for)"
+    )
 
 
 def _compare_with_printed(keyframes: Keyframes, half: HalfKeyframes) -> str:

@@ -49,7 +49,8 @@ def keyframes(
     Args:
         project: Project folder.
         budget: Share of frames that you will mark (default: as many as needed, at most 1.5 %; up
-            to 6 % of short videos). Frames that are marked already come on top.
+            to 6 % of short videos). Frames that are marked already come on top, unless they
+            stand for one that would be asked for.
         coverage: Share of frames that the keyframes must stand for (default: 0.95).
         reach: Longest gap to interpolate, in frames at 50 frames a second (default: 10).
         method: 'paper' does it as printed, for `keyrecon run --method paper`.
