@@ -168,10 +168,10 @@ def _doubt(world: WorldMotion | None, motion: Motion, camera: WorldCamera) -> st
 
 def outdated_report_lines(workspace: Workspace, placed: PlacedMotion) -> list[str]:
     """The way to a report with the motion in the world, or in none any more; nothing where the
-    report knows this camera."""
-    if not workspace.report_file.is_file():
-        return []
+    report knows this camera, or is that of a golf fit, which knows none."""
     run, command = read_run(workspace), f"keyrecon run {quoted(workspace.folder)}"
+    if not workspace.report_file.is_file() or (workspace.is_golf and run is None):
+        return []
     if placed.court is not None:
         if run is not None and run.camera == camera_digest(workspace):
             return []

@@ -79,6 +79,19 @@ def test_a_report_does_not_know_a_camera_that_came_after_it(bare, motion):
     assert "m run, top speed" in line and "way.jpg" not in line
 
 
+def test_no_run_is_asked_for_to_mend_the_report_of_a_golf_fit(bare, motion):
+    """It would make another motion, of keyframes, and no report of a swing knows a camera."""
+    workspace = Workspace(bare)
+    workspace.become_golf()
+    workspace.report_file.write_text("the report of a fit")
+    write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
+    placed = write_placed_motion(workspace, motion)
+    assert old_report(workspace, placed) == []
+    (bare / "cache").mkdir(exist_ok=True)
+    note_run(workspace, RunNotes("marks", (), (), ""))  # the motion and the report are of a run
+    assert len(old_report(workspace, placed)) == 1
+
+
 def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bare, motion):
     workspace = Workspace(bare)
     far = replace(PINHOLE, centre=PINHOLE.centre * [1, 1, 2.0])
