@@ -96,16 +96,18 @@ def frame_of_picture(name: str, path: Path) -> int:
     """The frame number with which a picture's name ends: 'img0123.png' is frame 123.
 
     Where the name has it as keyframes' pictures do, frame_000123, that counts, whatever a person
-    or a program put behind it. Roboflow puts '_png.rf.' and a hash there.
+    or a program put behind it, but for a number with more digits: 'frame2_000123.png' is of
+    another count. Roboflow puts '_png.rf.' and a hash there.
     """
     stem = re.sub(r"([._](png|jpe?g|bmp|tiff?|webp))?(\.rf\.\w+)?\.\w+$", "", _last_part(name))
-    number = re.search(r"(?<![a-z])frame[_ -]?(\d+)", stem, re.I) or re.search(r"(\d+)$", stem)
-    if not number:
+    forms = (r"(?<![a-z])frame[_ -]?(\d+)", r"(\d+)$")
+    numbers = [found[1] for form in forms if (found := re.search(form, stem, re.I))]
+    if not numbers:
         raise KeyreconError(
             f"{path}: the picture '{name[:60]}' does not say which frame it shows; its name must "
             "end in the frame number, as in frame_000123.png."
         )
-    return int(number[1])
+    return int(max(numbers, key=len))
 
 
 def _last_part(name: str) -> str:
