@@ -15,7 +15,7 @@ import numpy as np
 
 from keyrecon.app.court import load_camera
 from keyrecon.app.project import load_whole_motion
-from keyrecon.errors import KeyreconError
+from keyrecon.errors import KeyreconError, counted, quoted
 from keyrecon.io.formats.camera_file import write_calibration
 from keyrecon.io.formats.coco import is_coco_motion
 from keyrecon.io.formats.conventions import NO_MOTION
@@ -77,7 +77,21 @@ def export(
             lines.append(_write_overlay(file, chosen, workspace, progress, overlay))
         else:
             lines.append(_write(file, chosen, workspace))
-    return lines
+    return lines + _describe_growth(workspace, len(chosen.motion.time))
+
+
+def _describe_growth(workspace: Workspace, frames: int) -> list[str]:
+    """That the video has more frames than the motion; a video that is gone tells nothing."""
+    try:
+        now = len(workspace.video())
+    except KeyreconError:
+        return []
+    if now == frames:
+        return []
+    return [
+        f"The motion is of the first {counted(frames, 'frame')}, and the video has {now} by now: "
+        f"make it anew with keyrecon run {quoted(workspace.folder)}."
+    ]
 
 
 @dataclass(frozen=True, eq=False)

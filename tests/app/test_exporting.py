@@ -15,7 +15,7 @@ from small_motion import make_motion
 from keyrecon.app import exporting
 from keyrecon.app.annotator import job_commands
 from keyrecon.app.exporting import export
-from keyrecon.app.project import start
+from keyrecon.app.project import add_video, start
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
 from keyrecon.io.formats.camera_file import write_camera
@@ -159,6 +159,18 @@ def test_marks_are_told_from_an_export_and_an_export_is_replaced(project):
     whole = (folder / "a.json").read_bytes()
     export(project, files, silent, "5-11")
     assert len((folder / "a.json").read_bytes()) < len(whole)
+
+
+def test_a_motion_of_a_video_that_has_grown_is_told_of(project, write_numbered):
+    files = [project.folder.parent / "a.csv"]
+    assert len(export(project, files, silent)) == 1
+    add_video(project, write_numbered("w.mp4", list(range(0, 120, 12))), (0, None))
+    told = export(Workspace(project.folder), files, silent)[-1]
+    assert told.startswith(
+        "The motion is of the first 20 frames, and the video has 30 by now: make"
+    )
+    project.video().path.unlink()
+    assert len(export(Workspace(project.folder), files, silent)) == 1
 
 
 def test_fbx_is_refused_with_the_way_there(project):
