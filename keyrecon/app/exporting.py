@@ -90,7 +90,7 @@ def _describe_growth(workspace: Workspace, frames: int) -> list[str]:
         return []
     return [
         f"The motion is of the first {counted(frames, 'frame')}, and the video has {now} by now: "
-        f"make it anew with keyrecon run {quoted(workspace.folder)}."
+        f"make it anew: keyrecon run {quoted(workspace.folder)}"
     ]
 
 

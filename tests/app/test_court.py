@@ -86,10 +86,10 @@ def test_no_run_is_asked_for_to_mend_the_report_of_a_golf_fit(bare, motion):
     workspace.report_file.write_text("the report of a fit")
     write_camera(workspace.camera_file, court_camera(PINHOLE, len(motion.time)))
     placed = write_placed_motion(workspace, motion)
-    assert old_report(workspace, placed) == []
+    assert outdated_report_lines(workspace, placed) == []
     (bare / "cache").mkdir(exist_ok=True)
     note_run(workspace, RunNotes("marks", (), (), ""))  # the motion and the report are of a run
-    assert len(old_report(workspace, placed)) == 1
+    assert len(outdated_report_lines(workspace, placed)) == 1
 
 
 def test_a_camera_that_makes_a_giant_of_the_player_puts_nothing_on_the_court(bare, motion):

@@ -69,7 +69,7 @@ def test_a_fit_that_was_interrupted_leaves_the_one_before_out_of_date(swing, mon
 def test_a_fit_is_out_of_date_when_slow_motion_is_said_not_to_be(swing):
     project = Workspace(swing / "project")
     note_fitted(project, golf_digest(project))
-    project.tell_slow_motion(1.0)
+    project.set_slow_motion(1.0)
     assert not is_fitted(project)
 
 
