@@ -23,8 +23,8 @@ from keyrecon.progress import silent
 HOLD = """
 import sys
 from pathlib import Path
-from keyrecon.io.work_lock import at_work
-with at_work(Path(sys.argv[1]), "keyrecon run"):
+from keyrecon.io.work_lock import lock_project
+with lock_project(Path(sys.argv[1]), "keyrecon run"):
     print("holds", flush=True)
     sys.stdin.read()
 """
