@@ -160,7 +160,7 @@ def test_an_interrupted_fit_goes_on_where_it_stopped(swing, tmp_path):
 def test_a_fit_forgets_what_was_noted_of_the_run_whose_motion_it_replaces(bare, monkeypatch):
     (bare / "cache").mkdir()
     note_run(Workspace(bare), RunNotes("of another motion", ("The player found jumps",)))
-    writers = ("record_swing", "write_golf_overlay", "write_golf_report", "write_golf_table")
+    writers = ("_record", "write_golf_overlay", "write_golf_report", "write_golf_table")
     for name in (*writers, "write_swing"):
         monkeypatch.setattr(app, name, lambda *_: None)
     inputs = [MagicMock() for _ in range(3)]
