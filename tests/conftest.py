@@ -85,6 +85,24 @@ def chromium():
 
 
 @pytest.fixture
+def visit(chromium):
+    """Opens the page of a project, for somebody whom nothing may disturb."""
+    from page_driver import SCREEN, Person
+
+    visits = []
+
+    def go(server, screen=SCREEN):
+        context = chromium.new_context(viewport=screen)
+        visits.append((context, Person(context, server.credentials.address)))
+        return visits[-1][1]
+
+    yield go
+    for context, person in visits:
+        context.close()
+        assert person.complaints == []
+
+
+@pytest.fixture
 def folder(tmp_path, write_numbered):
     """A project for a video of 50 numbered pictures, without picks or keyframes."""
     from annotator import new_project

@@ -41,7 +41,7 @@ def run_options(
 ) -> Options:
     """The project's options and what is told now: height in metres, angle of the camera in degrees.
 
-    Options `warnings` by dotted names count also where they are as usual.
+    `typed` options, by dotted names, count also where their value is the default.
     """
     if height is not None and not SHORTEST <= height <= TALLEST:
         raise KeyreconError(f"--height is the athlete's height in metres; {height:g} cannot be.")

@@ -75,15 +75,17 @@ def refit_proportions(
     .0305 and .0304.
     """
     average, marks, camera = fit.body, observations.marks, observations.camera
+    is_marked = bool(np.isfinite(marks.joints).any())
 
     def proportions(fit: SwingFit) -> Body:
         pose = fitted_pose(fit)
         clicks = clicked_joints(fit.body, pose, observations.initial, camera)
-        told = join_marks(marks, clicks)
-        rate = fps if len(marks.frames) else None
-        return fit_proportions(average, pose, told, camera, options.spread, rate)
+        if not is_marked:
+            return fit_proportions(average, pose, clicks, camera, options.spread)
+        places = join_marks(marks, clicks)
+        return fit_proportions(average, pose, places, camera, options.spread, fps)
 
-    if not np.isfinite(marks.joints).any():
+    if not is_marked:
         return replace(fit, body=proportions(fit))
     for _ in range(options.rounds):
         body = proportions(fit)
@@ -143,8 +145,7 @@ def fit_proportions(
 def scale_body(body: Body, factors: Float[np.ndarray, "n"]) -> Body:
     """A body with its parts longer or shorter."""
     by_part = dict(zip(PARTS, factors, strict=True))
-    names = [name.removeprefix("right_").removeprefix("left_") for name in NAMES]
-    factor = np.array([by_part.get(name, 1.0) for name in names])
+    factor = np.array([by_part.get(part_name(name), 1.0) for name in NAMES])
     above = np.maximum(PARENTS, 0)
     return replace(
         body,

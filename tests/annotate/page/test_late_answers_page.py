@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from page_driver import BROWSER, SCREEN, Held, Person, serving
+from page_driver import BROWSER, Held, serving
 from page_project import (
     SIZE,
     follow_at_once,
@@ -35,22 +35,6 @@ def video(tmp_path_factory):
 @pytest.fixture
 def folder(tmp_path, video):
     return make_project(tmp_path / "rally", video)
-
-
-@pytest.fixture
-def visit(chromium):
-    """Opens the page of a project, for somebody whom nothing may disturb."""
-    opened = []
-
-    def go(server):
-        context = chromium.new_context(viewport=SCREEN)
-        opened.append((context, Person(context, server.credentials.address)))
-        return opened[-1][1]
-
-    yield go
-    for context, person in opened:
-        context.close()
-        assert person.complaints == []
 
 
 def aim(person, picture, share=(0.5, 0.5)):

@@ -2,7 +2,7 @@
 
 import pytest
 from numbered_videos import turn
-from page_driver import BROWSER, SCREEN, Person, serving
+from page_driver import BROWSER, serving
 from page_project import make_project, write_numbered_video
 
 from keyrecon import KeyreconError
@@ -23,20 +23,6 @@ UPRIGHT = """
 @pytest.fixture(scope="module")
 def video(tmp_path_factory):
     return write_numbered_video(tmp_path_factory.mktemp("pictures") / "numbered.mp4")
-
-
-@pytest.fixture
-def visit(chromium):
-    """Opens the page of a project, for somebody whom nothing may disturb."""
-    context, people = chromium.new_context(viewport=SCREEN), []
-
-    def go(server):
-        people.append(Person(context, server.credentials.address))
-        return people[0]
-
-    yield go
-    context.close()
-    assert people[0].complaints == []
 
 
 def test_small_pictures_of_an_upright_video_keep_their_shape(tmp_path, video, visit):

@@ -9,7 +9,7 @@ from typing import get_args
 import av
 import pytest
 from court_walker import court_camera
-from page_driver import BROWSER, Held, Person, serving
+from page_driver import BROWSER, Held, serving
 from page_project import (
     FPS,
     FRAMES,
@@ -44,7 +44,7 @@ from keyrecon.report.overlay import Limbs, View
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
 )
-SCREENS = ((1440, 900), (1920, 1080))
+SCREENS = ({"width": 1440, "height": 900}, {"width": 1920, "height": 1080})
 POINTS2D = truth()[1]
 COURT_CAMERA = camera_at((0.4, -32, 9), (0, -2, 0), 1.5, SIZE)
 INK = """
@@ -67,22 +67,6 @@ def video(tmp_path_factory):
 @pytest.fixture
 def folder(tmp_path, video):
     return make_project(tmp_path / "rally", video)
-
-
-@pytest.fixture
-def visit(chromium):
-    """Opens the page of a project, for somebody whom nothing may disturb."""
-    opened = []
-
-    def go(server, size=SCREENS[0]):
-        context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
-        opened.append((context, Person(context, server.credentials.address)))
-        return opened[-1][1]
-
-    yield go
-    for context, person in opened:
-        context.close()
-        assert person.complaints == []
 
 
 def place(joint):

@@ -84,7 +84,9 @@ def test_six_clicks_tell_how_trunk_and_legs_share_the_height(posed):
     assert 1.02 < thigh / trunk < 1.06 / 0.96
 
 
-def test_a_corrected_joint_leaves_the_proportions_that_clicks_told(posed, monkeypatch):
+@pytest.fixture
+def proportions_with(posed, monkeypatch):
+    """Finds bone lengths by six clicks and further marks, without fitting anew."""
     body, pose, marks = posed
     model, (rotation, position) = read_motion_model(), camera_before(180.0)
     state = SwingState(
@@ -101,15 +103,31 @@ def test_a_corrected_joint_leaves_the_proportions_that_clicks_told(posed, monkey
         observe(find_joints(body, pose), find_club(body, pose), CAMERA, 0.0),
         initial=InitialJoints(0, NEEDED, np.array(places)),
     )
+
+    def find(marks=None):
+        observed = seen if marks is None else replace(seen, marks=marks)
+        options = FitOptions(), ProportionOptions()
+        return lengths(refit_proportions(fit, observed, fit, 25.0, *options).body)
+
+    return find
+
+
+def test_a_corrected_joint_leaves_the_proportions_that_clicks_told(posed, proportions_with):
+    body, _, marks = posed
     wrist = replace(marks, joints=np.full_like(marks.joints, np.nan))
     wrist.joints[2, LSP14.index("left_wrist")] = marks.joints[2, LSP14.index("left_wrist")]
-    by_clicks, with_wrist = (
-        lengths(refit_proportions(fit, o, fit, 25.0, FitOptions(), ProportionOptions()).body)
-        for o in (seen, replace(seen, marks=wrist))
-    )
+    by_clicks, with_wrist = proportions_with(), proportions_with(wrist)
     assert np.abs(by_clicks / lengths(body) - 1).max() > 0.015
     legs = [LSP14.index(f"{side}_{joint}") for side in SIDES for joint in ("knee", "ankle")]
     np.testing.assert_allclose(with_wrist[legs], by_clicks[legs], rtol=0.005)
+
+
+def test_a_marked_shaft_tells_nothing_of_the_proportions(posed, proportions_with):
+    marks = posed[2]
+    shaft = replace(
+        marks, joints=np.full_like(marks.joints, np.nan), shafts=np.full_like(marks.shafts, 400.0)
+    )
+    np.testing.assert_array_equal(proportions_with(shaft), proportions_with())
 
 
 SIDES = ("right", "left")
