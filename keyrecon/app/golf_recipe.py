@@ -1,11 +1,16 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from keyrecon.errors import KeyreconError
 from keyrecon.golf.candidates import find_candidates, find_slowed_keys, place_in_film
 from keyrecon.golf.click_checks import check_hand, measure_hands
 from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.fit.swing_search import SwingHypothesis
+from keyrecon.golf.marks import unrefuted_shafts
 from keyrecon.golf.observation import ObservedSwing, observe_swing
 from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.observe.motion_timing import TimeShift, measure_time_shift
@@ -52,6 +57,11 @@ def find_swing(
         hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
         check_hand(hands, clicked, "The clicks")
     candidates = keep("search", find_candidates, scene, pose, marks, model)
+    if np.isfinite(marks.shafts).any():
+        earlier = _earlier_shafts(
+            lambda: find_swing(video, camera, clicked, model, options, keep, progress), marks
+        )
+        candidates = tuple(replace(candidate, earlier=earlier) for candidate in candidates)
 
     def attempt(candidate: SwingHypothesis, suffix: str) -> _Tried:
         observed = keep(
@@ -76,6 +86,18 @@ def find_swing(
         "found", swing_found, best.fitted, best.observations, best.doubts, best.observed, marks,
         video, model,
     )  # fmt: skip
+
+
+def _earlier_shafts(find: Callable[[], FoundSwing], marks: SwingMarks) -> SwingMarks:
+    """The club of a fit without the marks, which a person saw and corrected.
+
+    None where there is no such fit, or something speaks against it.
+    """
+    try:
+        found = find()
+    except KeyreconError:  # the clicks alone show no swing: what the marks are for
+        return NO_MARKS
+    return NO_MARKS if found.doubts else unrefuted_shafts(found.fitted, found.observations, marks)
 
 
 RETIMINGS = 2

@@ -25,6 +25,11 @@ SURE_WEIGHT = 2.0
 """Weight of a marked shaft among those detected, player heights: more than any club is long."""
 FADING = 0.15
 """Seconds over which a mark's correction fades: half a downswing."""
+MISSED_ANGLE = np.radians(15)
+"""A fitted club this far from a marked one was another one."""
+CONFIRMED, CONFIRMED_DOUBT = np.radians(5), 0.1
+"""A fitted club within so much of the detected one is right there, whatever a mark turns it by a
+few frames away; the variance of that, as a share of what marks turn clubs by."""
 SAME_MOMENT = 1e-6
 """Keeps marks in neighbouring frames apart in the equations."""
 
@@ -106,6 +111,39 @@ def hold_shafts(shafts: list[ShaftHypotheses], marks: SwingMarks) -> list[ShaftH
     return held
 
 
+def unrefuted_shafts(
+    earlier: FittedSwing, observations: Observations, marks: SwingMarks
+) -> SwingMarks:
+    """The club that was detected for an earlier fit without the marks, as shafts that may be true.
+
+    A person marks where a fit is wrong, and leaves what is right; detections near in time to a
+    marked shaft that the fit missed may be wrong as it is, and stay away. All in the file's frames.
+    """
+    club, time = observations.club, earlier.motion.time
+    rows = np.flatnonzero(np.isfinite(marks.shafts).all(axis=(1, 2)))
+    turns = _turns(earlier.club2d[marks.frames[rows]], marks.shafts[rows])
+    missed = time[marks.frames[rows[np.abs(turns) > MISSED_ANGLE]]]
+    near = (np.abs(time[:, None] - missed) < FADING).any(axis=1)
+    frames = np.flatnonzero(np.isfinite(club).all(axis=(1, 2)) & ~near)
+    unknown = SwingMarks.of_joints(frames, np.full((len(frames), 14, 2), np.nan))
+    return replace(unknown, shafts=club[frames])
+
+
+def add_shafts(
+    shafts: list[ShaftHypotheses], earlier: SwingMarks, height: float
+) -> list[ShaftHypotheses]:
+    """What may be the club, and besides it `earlier` detections, which weigh what they are long."""
+    added = list(shafts)
+    for t, ends in zip(earlier.frames.tolist(), earlier.shafts, strict=True):
+        weight = float(np.linalg.norm(ends[1] - ends[0])) / height
+        now = shafts[t]
+        added[t] = ShaftHypotheses(
+            np.concatenate([now.ends, ends[None]]), np.append(now.weight, weight),
+            np.append(now.tip, False),
+        )  # fmt: skip
+    return added
+
+
 def hold_observations(observations: Observations) -> Observations:
     """The observations with the club and the key postures where they were marked."""
     marks = observations.marks
@@ -173,27 +211,29 @@ def hold_joints(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedS
     return replace(fitted, motion=held)
 
 
-def hold_club(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedSwing:
+def hold_club(
+    fitted: FittedSwing, marks: SwingMarks, detected: Float[np.ndarray, "T 2 2"], focal: float
+) -> FittedSwing:
     """The swing with its club where it was marked, in the file's frames and px.
 
     As joints do, the hands shift; the shaft turns and stretches about them, since what is off aside
-    in one frame of a fast club would be off along it a few frames later.
+    in one frame of a fast club would be off along it a few frames later. Where the club was
+    `detected` as it was fitted, it hardly turns.
     """
     rows = np.flatnonzero(np.isfinite(marks.shafts).all(axis=(1, 2)))
     if not len(rows):
         return fitted
     ends, frames = fitted.club2d, marks.frames[rows]
-    way, marked = ends[:, 1] - ends[:, 0], marks.shafts[rows]
+    way, marked, time = ends[:, 1] - ends[:, 0], marks.shafts[rows], fitted.motion.time
     length, angle = np.linalg.norm(way, axis=1), np.arctan2(way[:, 1], way[:, 0])
-    aim = marked[:, 1] - marked[:, 0]
-    turn = np.arctan2(aim[:, 1], aim[:, 0]) - angle[frames]
-    off = np.column_stack([
-        marked[:, 0] - ends[frames, 0],
-        np.linalg.norm(aim, axis=1) - length[frames],
-        (turn + np.pi) % (2 * np.pi) - np.pi,
-    ])  # fmt: skip
-    moved = _spread_in_time(off, frames, fitted.motion.time)
-    length, angle = np.maximum(length + moved[:, 2], 0.0), angle + moved[:, 3]
+    aim = np.linalg.norm(marked[:, 1] - marked[:, 0], axis=1)
+    off = np.column_stack([marked[:, 0] - ends[frames, 0], aim - length[frames]])
+    moved = _spread_in_time(off, frames, time)
+    confirmed = np.setdiff1d(np.flatnonzero(np.abs(_turns(ends, detected)) < CONFIRMED), frames)
+    turn = np.concatenate([_turns(ends[frames], marked), np.zeros(len(confirmed))])
+    doubt = np.repeat([SAME_MOMENT, CONFIRMED_DOUBT], [len(frames), len(confirmed)])
+    turned = _spread_in_time(turn[:, None], np.concatenate([frames, confirmed]), time, doubt)
+    length, angle = np.maximum(length + moved[:, 2], 0.0), angle + turned[:, 0]
     hands = ends[:, 0] + moved[:, :2]
     head = hands + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     held, space = np.stack([hands, head], axis=1), fitted.club.copy()
@@ -201,16 +241,28 @@ def hold_club(fitted: FittedSwing, marks: SwingMarks, focal: float) -> FittedSwi
     return replace(fitted, club=space, club2d=held)
 
 
+def _turns(
+    first: Float[np.ndarray, "n 2 2"], second: Float[np.ndarray, "n 2 2"]
+) -> Float[np.ndarray, "n"]:
+    """By how much shafts are turned from one to the other, radians, -pi to pi."""
+    angles = [np.arctan2(*np.moveaxis(s[:, 1] - s[:, 0], 1, 0)[::-1]) for s in (first, second)]
+    turned: Float[np.ndarray, "n"] = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
+    return turned
+
+
 def _spread_in_time(
-    off: Float[np.ndarray, "n d"], frames: Int[np.ndarray, "n"], time: Float[np.ndarray, "T"]
+    off: Float[np.ndarray, "n d"],
+    frames: Int[np.ndarray, "n"],
+    time: Float[np.ndarray, "T"],
+    doubt: Float[np.ndarray, "n"] | float = SAME_MOMENT,
 ) -> Float[np.ndarray, "T d"]:
-    """Offsets at some frames in all frames."""
+    """Offsets at some frames in all frames; `doubt` is their variance, as a share of offsets'."""
 
     def alike(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         apart = np.sqrt(3) * np.abs(one[:, None] - other) / FADING
         return (1 + apart) * np.exp(-apart)
 
     at = time[frames]
-    weights = solve(alike(at, at) + SAME_MOMENT * np.eye(len(at)), off, assume_a="pos")
+    weights = solve(alike(at, at) + doubt * np.eye(len(at)), off, assume_a="pos")
     spread: Float[np.ndarray, "T d"] = alike(time, at) @ weights
     return spread

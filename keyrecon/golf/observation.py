@@ -20,6 +20,7 @@ from keyrecon.golf.clicks import ClickedPose
 from keyrecon.golf.fit.residuals import SILHOUETTE_STEP
 from keyrecon.golf.fit.swing_search import SwingHypothesis
 from keyrecon.golf.marks import (
+    add_shafts,
     correct_tracks,
     hold_keys,
     hold_observations,
@@ -191,7 +192,9 @@ def _time_swing(
 ) -> _TimedSwing:
     """The club that was detected where a hypothesis has it, and key postures by that."""
     fps, chosen = seen.film.fps, seen.chosen
-    shafts = hold_shafts([seen.scene.shafts[t] for t in chosen], seen.marks)
+    earlier = place_marks(hypothesis.earlier, seen.film)
+    shafts = add_shafts([seen.scene.shafts[t] for t in chosen], earlier, seen.height)
+    shafts = hold_shafts(shafts, seen.marks)
     step = int(chosen[1] - chosen[0]) if len(chosen) > 1 else 1
     keys = (hypothesis.keys - chosen[0]) / step
     expected = ExpectedSwing(hypothesis.club[chosen], keys)

@@ -203,7 +203,7 @@ def swing_found(
         fitted = swing_in_file(fitted, observations, film, time, model)
         observations = replace(observations_in_file(observations, film), marks=marks)
     fitted = hold_joints(fitted, marks, observations.camera.focal)
-    fitted = hold_club(fitted, marks, observations.camera.focal)
+    fitted = hold_club(fitted, marks, observations.club, observations.camera.focal)
     keys = np.clip(hold_keys(fitted.keys, marks), 0, len(video) - 1)
     fitted = replace(fitted, keys=keys)
     return FoundSwing(fitted, observations, doubts, notes, (start, top, hit, finish))

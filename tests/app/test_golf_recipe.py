@@ -10,12 +10,15 @@ from keyrecon.app.golf_recipe import find_swing
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.click_checks import HandCosts
 from keyrecon.golf.clicks import clicked_pose
+from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.records import NO_MARKS
+from keyrecon.golf.swing_fit import FoundSwing
 from keyrecon.io.formats.clicks import GolfClicks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.video import open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.records import CameraPath
+from tests.support.golf_truth import FRAMES, observed, swing_at
 
 JOINTS = {
     "head_top": (160.0, 40.0), "root": (160.0, 142.0), "right_knee": (142.0, 192.0),
@@ -45,3 +48,24 @@ def test_who_marks_is_believed_whichever_way_the_swing_seems_to_go(tmp_path, mon
     top = replace(NO_MARKS, keys=np.array([np.nan, 12.0, np.nan, np.nan]))
     with pytest.raises(SearchBegan):
         find_swing(*swing, keep=keep, marks=top)
+
+
+def found_swing(*doubts):
+    numbers = np.arange(0, FRAMES, 8)
+    shown = True, True, True, True
+    return FoundSwing(swing_at(numbers), observed(numbers), doubts, (), shown)
+
+
+def test_the_club_of_an_earlier_fit_is_believed_where_nothing_speaks_against_that():
+    doubtful = found_swing(SwingDoubt("the player is beside the figure", 3))
+    assert golf_recipe._earlier_shafts(lambda: doubtful, NO_MARKS) is NO_MARKS
+    found = found_swing()
+    earlier = golf_recipe._earlier_shafts(lambda: found, NO_MARKS)
+    np.testing.assert_array_equal(earlier.shafts, found.observations.club)
+
+
+def test_marks_are_held_to_where_the_clicks_alone_show_no_swing():
+    def find():
+        raise KeyreconError("No swing was found.")
+
+    assert golf_recipe._earlier_shafts(find, NO_MARKS) is NO_MARKS

@@ -9,16 +9,21 @@ import pytest
 from keyrecon.golf import swing_fit
 from keyrecon.golf.fit.handedness import mirror_marks
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.fit.result import describe_fit
-from keyrecon.golf.marks import carry_marks, correct_tracks, hold_club, join_marks, place_marks
+from keyrecon.golf.marks import (
+    add_shafts,
+    carry_marks,
+    correct_tracks,
+    hold_club,
+    join_marks,
+    place_marks,
+    unrefuted_shafts,
+)
 from keyrecon.golf.observe.film import Film, frame_step
-from keyrecon.golf.observe.swing_timing import interpolate_times
-from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
-from keyrecon.golf.prior.skeleton import size_body
-from keyrecon.golf.records import Camera, SwingFit, SwingMarks, SwingState
+from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
+from keyrecon.golf.records import Camera, SwingMarks
 from keyrecon.io.formats.model_file import read_motion_model
 from keyrecon.io.video import Video
-from tests.support.golf_truth import camera_before, observe
+from tests.support.golf_truth import FPS, FRAMES, observed, swing_at
 
 
 def test_marks_of_two_makers_are_joined_and_the_first_counts():
@@ -67,30 +72,6 @@ def test_from_a_click_outside_of_the_film_nothing_drifts():
     np.testing.assert_allclose(corrected[:, 0, 0], 140)
 
 
-FRAMES, FPS = 480, 240.0
-KEYS = np.array([60.0, 250.0, 310.0, 430.0])
-
-
-def swing_at(frames):
-    """Some frames of a swing that takes 60 from the top to the hit."""
-    fit, seen = played(frames)
-    return describe_fit(fit, seen, frames / FPS)
-
-
-def observed(frames):
-    return played(frames)[1]
-
-
-def played(frames):
-    model, body = read_motion_model(), size_body(1.75)
-    phase = interpolate_times(KEYS, model.keys, FRAMES)[frames]
-    rotation, position = camera_before(180.0)
-    turns, places = np.tile(rotation, (len(frames), 1, 1)), np.tile(position, (len(frames), 1))
-    fit = SwingFit(model, body, SwingState(np.zeros(4), phase, turns, places))
-    pose, camera = fitted_pose(fit), Camera(1000.0, np.array([639.5, 359.5]))
-    return fit, observe(find_joints(body, pose), find_club(body, pose), camera, 0.0)
-
-
 def film_of(numbers):
     place = np.interp(np.arange(FRAMES), numbers, np.arange(len(numbers)))
     still, whole = np.tile(np.eye(3), (FRAMES, 1, 1)), (0, FRAMES - 1)
@@ -137,24 +118,63 @@ def test_a_fit_with_guided_detection_has_the_marks_that_go_along(monkeypatch):
         assert turned(held[98:99], fitted.club2d[98:99])[0] < 1
 
 
-def test_a_marked_shaft_is_where_it_was_marked_and_those_around_turn_along():
-    """The head moves by tens of px a frame there, so that the angle is carried on, not the px."""
-    fitted = swing_at(np.arange(FRAMES))
-    at, turn = 280, np.radians(20)
+def shaft_marked(fitted, at, degrees):
+    """A mark of the shaft of one frame, turned from the fitted one, held a little beside it."""
     hands, head = fitted.club2d[at]
+    turn = np.radians(degrees)
     rotated = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     beside = hands + np.array([4, -3])
     marked = np.array([[beside, beside + 1.1 * rotated @ (head - hands)]])
-    marks = SwingMarks(np.array([at]), np.full((1, 14, 2), np.nan), marked, np.full(4, np.nan))
-    held = hold_club(fitted, marks, 1000.0)
-    np.testing.assert_allclose(held.club2d[at], marked[0], atol=1e-3)
+    return SwingMarks(np.array([at]), np.full((1, 14, 2), np.nan), marked, np.full(4, np.nan))
+
+
+def test_a_marked_shaft_is_where_it_was_marked_and_those_around_turn_along():
+    """The head moves by tens of px a frame there, so that the angle is carried on, not the px."""
+    fitted, at = swing_at(np.arange(FRAMES)), 280
+    marks, unseen = shaft_marked(fitted, at, 20), np.full_like(fitted.club2d, np.nan)
+    held = hold_club(fitted, marks, unseen, 1000.0)
+    np.testing.assert_allclose(held.club2d[at], marks.shafts[0], atol=1e-3)
     around = turned(held.club2d, fitted.club2d)
     assert around[at - 8 : at + 9].min() > 15 and around[[0, -1]].max() < 0.1
     camera = Camera(1000.0, np.array([639.5, 359.5]))
-    np.testing.assert_allclose(project(held.club[at], camera)[0], marked[0], atol=1e-3)
+    np.testing.assert_allclose(project(held.club[at], camera)[0], marks.shafts[0], atol=1e-3)
+
+
+def test_a_club_that_was_detected_as_it_was_fitted_is_not_turned_by_a_mark_beside_it():
+    fitted, at = swing_at(np.arange(FRAMES)), 280
+    marks, detected = shaft_marked(fitted, at, 20), fitted.club2d.copy()
+    detected[at - 4 : at + 5] = np.nan
+    held = hold_club(fitted, marks, detected, 1000.0)
+    np.testing.assert_allclose(held.club2d[at], marks.shafts[0], atol=1e-2)
+    around = turned(held.club2d, fitted.club2d)
+    assert around[at - 2 : at + 3].min() > 10
+    assert np.delete(around, slice(at - 12, at + 13)).max() < 3
+
+
+def test_what_an_earlier_fit_detected_stays_where_no_marked_shaft_near_by_refutes_it():
+    numbers = np.arange(FRAMES)
+    fitted, seen, at = swing_at(numbers), observed(numbers), 280
+    right = unrefuted_shafts(fitted, seen, shaft_marked(fitted, at, 5))
+    assert right.frames.tolist() == np.flatnonzero(np.isfinite(seen.club[:, 0, 0])).tolist()
+    np.testing.assert_array_equal(right.shafts, seen.club[right.frames])
+    wrong = unrefuted_shafts(fitted, seen, shaft_marked(fitted, at, 60))
+    lost = np.setdiff1d(right.frames, wrong.frames) / FPS
+    assert len(lost) and np.abs(lost - at / FPS).max() < 0.15
+
+
+def test_a_shaft_that_was_detected_earlier_may_be_the_club_like_any_other():
+    line = np.array([[[100.0, 100.0], [100.0, 200.0]]])
+    shafts = [ShaftHypotheses(line, np.array([0.4]), np.array([True]))] * 3
+    earlier = SwingMarks(
+        np.array([1]), np.full((1, 14, 2), np.nan), line + 30, np.full(4, np.nan)
+    )  # fmt: skip
+    added = add_shafts(shafts, earlier, height=400.0)
+    assert [len(a.ends) for a in added] == [1, 2, 1]
+    np.testing.assert_array_equal(added[1].ends[1], line[0] + 30)
+    assert added[1].weight.tolist() == [0.4, 0.25]
 
 
 def test_a_swing_without_marked_shafts_keeps_its_club():
     fitted = swing_at(np.arange(0, FRAMES, 8))
     joints = SwingMarks.of_joints(np.array([3]), np.full((1, 14, 2), 5.0))
-    assert hold_club(fitted, joints, 1000.0) is fitted
+    assert hold_club(fitted, joints, fitted.club2d, 1000.0) is fitted

@@ -4,7 +4,19 @@ import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.golf.fit.residuals import project
-from keyrecon.golf.records import InitialJoints, Matches, Observations
+from keyrecon.golf.fit.result import describe_fit
+from keyrecon.golf.observe.swing_timing import interpolate_times
+from keyrecon.golf.prior.kinematics import find_club, find_joints, fitted_pose
+from keyrecon.golf.prior.skeleton import size_body
+from keyrecon.golf.records import (
+    Camera,
+    InitialJoints,
+    Matches,
+    Observations,
+    SwingFit,
+    SwingState,
+)
+from keyrecon.io.formats.model_file import read_motion_model
 
 TRACKED = [LSP14.index(f"{s}_{n}") for s in ("right", "left") for n in ("ankle", "knee", "wrist")]
 TRACKED.append(LSP14.index("head_top"))
@@ -52,3 +64,27 @@ def observe(joints, club, camera, noise, seed=0):
         phase=np.zeros(frames),
         left_handed=False,
     )
+
+
+FRAMES, FPS = 480, 240.0
+KEYS = np.array([60.0, 250.0, 310.0, 430.0])
+
+
+def swing_at(frames):
+    """Some frames of a swing that takes 60 from the top to the hit."""
+    fit, seen = played(frames)
+    return describe_fit(fit, seen, frames / FPS)
+
+
+def observed(frames):
+    return played(frames)[1]
+
+
+def played(frames):
+    model, body = read_motion_model(), size_body(1.75)
+    phase = interpolate_times(KEYS, model.keys, FRAMES)[frames]
+    rotation, position = camera_before(180.0)
+    turns, places = np.tile(rotation, (len(frames), 1, 1)), np.tile(position, (len(frames), 1))
+    fit = SwingFit(model, body, SwingState(np.zeros(4), phase, turns, places))
+    pose, camera = fitted_pose(fit), Camera(1000.0, np.array([639.5, 359.5]))
+    return fit, observe(find_joints(body, pose), find_club(body, pose), camera, 0.0)

@@ -77,6 +77,8 @@ class SwingHypothesis:
     """How badly it explains the film; lower is better."""
     club: Float[np.ndarray, "T 2 2"]
     """Where it expects the club, px."""
+    earlier: SwingMarks = NO_MARKS
+    """Shafts that an earlier fit found, which may be the club too, px and frames of the file."""
 
 
 PLAYER_PIXELS = 48.0
