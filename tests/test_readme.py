@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from keyrecon.io.formats.motion_file import ARRAYS
-from keyrecon.io.workspace import OWN_NAMES
+from keyrecon.io.project_folder import OWN_NAMES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -24,8 +24,9 @@ from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     motion_on_court,
 )
+from keyrecon.io.project_folder import another_projects_file
 from keyrecon.io.video_writer import comment_of
-from keyrecon.io.workspace import Workspace, another_projects_file
+from keyrecon.io.workspace import Workspace
 from keyrecon.progress import Progress
 from keyrecon.records import Motion
 from keyrecon.report.overlay import (

@@ -45,6 +45,7 @@ from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.io.formats.swing_file import write_swing
 from keyrecon.io.held_video import hold_frames, mirror_video, with_exposure
 from keyrecon.io.option_tables import check_options
+from keyrecon.io.project_folder import GOLF_RESULTS
 from keyrecon.io.project_videos import relative_path
 from keyrecon.io.provenance import (
     forget_run,
@@ -55,7 +56,7 @@ from keyrecon.io.provenance import (
 )
 from keyrecon.io.video import Video, open_video
 from keyrecon.io.work_lock import lock_folder
-from keyrecon.io.workspace import GOLF, GOLF_RESULTS, Workspace
+from keyrecon.io.workspace import GOLF, Workspace
 from keyrecon.keeping import Keep, call_stage
 from keyrecon.progress import Progress, silent
 from keyrecon.report.golf_measures import measure_swing, record_swing

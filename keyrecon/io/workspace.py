@@ -1,21 +1,6 @@
-"""The project folder: the only place that knows file names.
+"""An open project: its video, what a person made in it, its options and the stages' results.
 
-    project.toml       the video (relative path, fingerprint, trim) and options that were set
-    picks.json         colours that a person clicked
-    keyframes.json     frames to annotate, with a picture of each in keyframes/
-    annotations.json   what a person marked
-    skeleton.json      joints and bones, where they are not the default ones
-    golf_clicks.json   of a golf swing: six joints of the address
-    golf_marks.json    of a golf swing: what a person put right in a fit
-    court_points.json  points of the court that a person clicked
-    shots.json         shots that a person said to use or to leave out, until the next run
-    ground_marks.json  upright things, lengths and the horizon that a person marked
-    camera.npz         the camera of every frame, where a court or the ground has told it
-    motion.npz, report.html
-    exports/           files for other programs that the page wrote
-    cache/             results of the stages; safe to delete
-
-What a person made is written durably and never replaced by something that does not parse.
+Where each lies in the folder tells `project_folder`.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -23,9 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from keyrecon.body import LSP14, Skeleton, read_skeleton
 from keyrecon.errors import KeyreconError, quoted
-from keyrecon.io.durable import clear_leftovers, hold_lock, make_folder, write_durably
+from keyrecon.io.durable import clear_leftovers, make_folder, write_durably
 from keyrecon.io.formats.court_points import (
     merge_clicks,
     read_court_points,
@@ -64,6 +48,7 @@ from keyrecon.io.project_file import (
     with_slow_motion,
     with_video_path,
 )
+from keyrecon.io.project_folder import GOLF_RESULTS, KEPT, OWN_NAMES, ProjectFolder
 from keyrecon.io.project_videos import (
     describe_video,
     open_project_video,
@@ -79,16 +64,6 @@ from keyrecon.reading import read_text
 from keyrecon.records import Pick
 from keyrecon.world.records import CourtClick, GroundMarks
 
-OWN_NAMES = (
-    *("project.toml", "picks.json", "keyframes.json", "annotations.json", "skeleton.json"),
-    *("annotate.sqlite", "motion.npz", "report.html", "golf_clicks.json", "golf_marks.json"),
-    *("camera.npz", "court_points.json", "ground_marks.json", "shots.json"),
-)
-"""Files that a project has or may come to have."""
-KEPT = ("*.toml", "*.json", "*.sqlite*", "motion.npz", "report.html")
-"""Files there are that hold a person's work, or from which the rest is made."""
-GOLF_RESULTS = ("golf.csv", "overlay.mp4")
-"""Files besides motion and report that a golf fit writes, and takes for its own."""
 GOLF = "golf"
 """The kind of project that a golf swing is, and the section of its options."""
 COURT = "court"
@@ -97,81 +72,21 @@ SECTIONS = (GOLF, COURT)
 """Tables of options beside those of the pipeline."""
 
 
-class Workspace:
-    """A project folder."""
+class Workspace(ProjectFolder):
+    """A project that is there."""
 
     def __init__(self, folder: Path, force: bool = False, workers: Workers | None = None) -> None:
         """Open the project in `folder`; `force` makes every stage again, `workers` make them.
 
         These need the whole path of the folder.
         """
-        self.folder = folder if workers is None else folder.absolute()
+        super().__init__(folder if workers is None else folder.absolute())
         self.stages = StageStore(self.folder / "cache", force, workers)
         if not self.project_file.is_file():
             raise no_project(folder)
         self.project = read_project(self.project_file)
         for place in (folder, self.stages.folder, self.pictures):
             clear_leftovers(place)
-
-    @property
-    def project_file(self) -> Path:
-        """project.toml"""
-        return self.folder / "project.toml"
-
-    @property
-    def picks_file(self) -> Path:
-        """picks.json"""
-        return self.folder / "picks.json"
-
-    @property
-    def keyframes_file(self) -> Path:
-        """keyframes.json"""
-        return self.folder / "keyframes.json"
-
-    @property
-    def annotations_file(self) -> Path:
-        """annotations.json"""
-        return self.folder / "annotations.json"
-
-    @property
-    def prepared_marks_file(self) -> Path:
-        """Marks that the automatic part was last made with; none where picks were enough."""
-        return self.folder / "cache" / "prepared_marks.json"
-
-    @property
-    def prepared_picks_file(self) -> Path:
-        """Picks that the automatic part was last made with: those left aside are not among them."""
-        return self.folder / "cache" / "prepared_picks.json"
-
-    @property
-    def motion_file(self) -> Path:
-        """motion.npz"""
-        return self.folder / "motion.npz"
-
-    @property
-    def camera_file(self) -> Path:
-        """camera.npz"""
-        return self.folder / "camera.npz"
-
-    @property
-    def court_points_file(self) -> Path:
-        """court_points.json"""
-        return self.folder / "court_points.json"
-
-    @property
-    def report_file(self) -> Path:
-        """report.html"""
-        return self.folder / "report.html"
-
-    @property
-    def golf_clicks_file(self) -> Path:
-        """golf_clicks.json"""
-        return self.folder / "golf_clicks.json"
-
-    @property
-    def golf_marks_file(self) -> Path:
-        """golf_marks.json"""
-        return self.folder / "golf_marks.json"
 
     @property
     def is_golf(self) -> bool:
@@ -190,27 +105,6 @@ class Workspace:
         """Files besides motion and report that a golf fit wrote."""
         files = (self.folder / name for name in GOLF_RESULTS)
         return [file for file in files if self.is_golf and file.is_file()]
-
-    @property
-    def exports(self) -> Path:
-        """Folder for files that the page writes for other programs."""
-        return self.folder / "exports"
-
-    def exported_files(self) -> list[Path]:
-        """What stands in that folder."""
-        files = self.exports.iterdir() if self.exports.is_dir() else ()
-        return sorted(f for f in files if f.is_file() and not f.name.startswith("."))
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The joints to mark: those of skeleton.json where the project has one."""
-        file = self.folder / "skeleton.json"
-        return read_skeleton(file) if file.is_file() else LSP14
-
-    @property
-    def pictures(self) -> Path:
-        """Folder with a picture of every keyframe to annotate."""
-        return self.folder / "keyframes"
 
     @classmethod
     def create(
@@ -292,11 +186,6 @@ class Workspace:
             write_picks(self.picks_file, together)
         return together
 
-    @property
-    def shots_file(self) -> Path:
-        """shots.json"""
-        return self.folder / "shots.json"
-
     def shot_choices(self) -> ShotChoices:
         """What a person said of shots since the last run."""
         file = self.shots_file
@@ -328,11 +217,6 @@ class Workspace:
             if new != old:
                 write_court_points(self.court_points_file, new)
 
-    @property
-    def ground_marks_file(self) -> Path:
-        """ground_marks.json"""
-        return self.folder / "ground_marks.json"
-
     def ground_marks(self) -> GroundMarks:
         """What a person told of the ground and the camera."""
         file = self.ground_marks_file
@@ -346,24 +230,6 @@ class Workspace:
             old = self.ground_marks()
             if (new := merge_marks(old, added, dropped)) != old:
                 write_ground_marks(self.ground_marks_file, new)
-
-    @contextmanager
-    def exclusive(self) -> Iterator[None]:
-        """Hold the project's files that a person made while they are read and replaced.
-
-        Commands and the annotator may change one project at the same time; each sees the
-        other's marks whole.
-        """
-        lock = hold_lock(self.folder / ".change.lock")
-        try:
-            yield
-        finally:
-            lock.release()
-
-    def check_writable(self) -> None:
-        """Raise KeyreconError where the project takes no files."""
-        with self.exclusive():
-            pass
 
     def kept_files(self) -> list[Path]:
         """Files of `KEPT`, and the videos."""
@@ -455,11 +321,3 @@ class Workspace:
 def _options_in(file: Path) -> dict[str, Any]:
     """Options that a project file has, by dotted names."""
     return flat_options(with_current_names(read_project(file).get("options", {})))
-
-
-def another_projects_file(file: Path) -> bool:
-    """Whether a file's place is one of those that the project in its folder needs."""
-    if not (file.parent / "project.toml").is_file():
-        return False
-    kept = file.exists() and any(file.match(name) for name in KEPT)
-    return kept or file.name.lower() in OWN_NAMES
