@@ -1,9 +1,12 @@
 """Where a video cuts from one shot to another.
 
 Pictures are compared as thumbnails without their coarse brightness, the middle of one wherever in
-the other it fits best: what lasts through a pan, a zoom or an exposure is the same scene. Over nine
-real clips neighbours in time correlate by 0.80 or more, thumbnails of different clips by 0.40 at
-most (4000 pairs). Cuts from one place to the same place are not found.
+the other it fits best: what lasts through a pan, a zoom or an exposure is the same scene. Over 18
+real clips neighbours in time correlate by 0.80 or more, thumbnails of different clips by 0.47 at
+most (6000 pairs). In a close-up somebody near moves one way and what is behind another, so that no
+one shift fits: where these clips are blown up, neighbours correlate by 0.17 and more. There every
+place of the picture may have moved by itself, by a smooth optical flow, and what it brings back is
+held against the picture in finer detail. Cuts from one place to the same place are not found.
 
 In a dissolve neighbours are alike throughout. But the picture in its middle is the weighted sum of
 those before and after it, which have nothing in common: no motion of a camera gives that.
@@ -19,6 +22,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from keyrecon.io.video import Video
+from keyrecon.numerics.picture_points import sample_picture
 
 Grey = UInt8[np.ndarray, "y x"]
 
@@ -34,6 +38,21 @@ quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips."
 SAME_SCENE = 0.6
 """Correlation above which two pictures show one scene: midway between neighbours and strangers. A
 quarter more or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
+FINE = 192
+"""Width of the pictures between which flow is sought, px."""
+SMOOTH_FLOW = 2
+"""Halvings of them at which it ends: finer, it makes any picture of any other. Ended at 0, 1 or at
+2, one pair of strangers in a thousand comes out as alike as the least alike 19, 2 or 1 % of
+neighbours do that no one shift brings together (249 pairs; fine pictures of 64, 192, 192 px)."""
+NEIGHBOURS_BY_FLOW = 0.4
+"""Correlation above which neighbours in time show one scene when one is brought back by the flow:
+above it are 92 % of those neighbours, and 0.03 % of 3000 pairs of strangers. Of five close-ups in
+each of 18 real clips 6 false cuts are left, of 130; of 120 cuts and as many dissolves between clips
+none is lost by it."""
+LEAST_SEEN = 1 / 3
+"""Share of a picture that has to come from within the one before to be held against it by flow."""
+FLOW_CONTRAST = 2.0
+"""By how much pictures are stretched before their flow is sought: they vary by 30 grey values."""
 PLAIN = 1.0
 """Contrast of a thumbnail below which it shows nothing, such as black, grey values. A quarter more
 or less, others with it: at most 1.9 points, 2.4 mm on four clips."""
@@ -72,6 +91,8 @@ class Thumbnail:
     """A small picture without its coarse brightness."""
 
     pixels: Float[np.ndarray, "h w"]
+    fine: UInt8[np.ndarray, "H W"]
+    """The picture itself, larger."""
 
     @cached_property
     def contrast(self) -> float:
@@ -82,6 +103,11 @@ class Thumbnail:
     def centred(self) -> Float[np.ndarray, "n"]:
         """All pixels in a row, with a mean of 0."""
         return self.pixels.ravel() - self.pixels.mean()
+
+    @cached_property
+    def detail(self) -> Float[np.ndarray, "H W"]:
+        """The larger one without its coarse brightness."""
+        return _without_coarse(self.fine)
 
 
 @dataclass(eq=False)
@@ -132,7 +158,7 @@ class CutDetector:
         if len(self._recent) > self.blends[-1] + 1:
             self._recent.popleft()
         self._look_for_blend()
-        if self._last is None or correlation(self._last, picture) >= SAME_SCENE:
+        if self._last is None or is_same_scene(self._last, picture, NEIGHBOURS_BY_FLOW):
             self._last, self._since = picture, []
         else:
             self._since.append(picture)
@@ -247,16 +273,30 @@ def find_blend(recent: Sequence[Thumbnail], lengths: Sequence[int]) -> tuple[int
             continue
         blend = weights[0] * a + weights[1] * b
         alike = float(blend @ m) / float(np.linalg.norm(blend) * np.linalg.norm(m))
-        if alike > BLENDED and correlation(before, after) < SAME_SCENE:
+        if alike > BLENDED and not is_same_scene(before, after, SAME_SCENE):
             return length, float(weights[0] / weights.sum())
     return None
 
 
 def thumbnail(grey: Grey) -> Thumbnail:
     """Of a picture."""
-    height = max(8, round(grey.shape[0] * WIDTH / grey.shape[1]))
-    small = cv2.resize(grey, (WIDTH, height), interpolation=cv2.INTER_AREA).astype(np.float32)
-    return Thumbnail(small - cv2.GaussianBlur(small, (0, 0), COARSE))
+    return Thumbnail(_without_coarse(_reduced(grey, WIDTH)), _reduced(grey, FINE))
+
+
+def _reduced(grey: Grey, width: int) -> UInt8[np.ndarray, "h w"]:
+    height = max(width // 8, round(grey.shape[0] * width / grey.shape[1]))
+    return cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def _without_coarse(grey: UInt8[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    values = grey.astype(np.float32)
+    return values - cv2.GaussianBlur(values, (0, 0), COARSE)
+
+
+def is_same_scene(first: Thumbnail, second: Thumbnail, by_flow: float) -> bool:
+    """Whether two pictures show one scene, moved as a whole or, as alike as `by_flow`, each place
+    by itself."""
+    return correlation(first, second) >= SAME_SCENE or flow_correlation(first, second) >= by_flow
 
 
 def correlation(first: Thumbnail, second: Thumbnail) -> float:
@@ -268,3 +308,25 @@ def correlation(first: Thumbnail, second: Thumbnail) -> float:
     if min(contrasts) < PLAIN:
         return float(max(contrasts) < PLAIN)
     return float(cv2.matchTemplate(first.pixels, middle, cv2.TM_CCOEFF_NORMED).max())
+
+
+def flow_correlation(first: Thumbnail, second: Thumbnail) -> float:
+    """How alike the second picture is to the first, -1 to 1, when every place of it is brought back
+    by dense optical flow (Kroeger, Timofte, Dai, Van Gool, ECCV 2016)."""
+    if min(first.contrast, second.contrast) < PLAIN:
+        return 0.0
+    estimator = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    estimator.setFinestScale(SMOOTH_FLOW)
+    before, after = (_grey_values(one.detail) for one in (first, second))
+    y, x = np.indices(after.shape)
+    unmoved = np.zeros((*after.shape, 2), np.float32)
+    origins = np.dstack([x, y]) + estimator.calc(after, before, unmoved)
+    inside = ((origins >= 0) & (origins <= (x.max(), y.max()))).all(axis=-1)
+    if inside.mean() < LEAST_SEEN:
+        return 0.0
+    back = sample_picture(first.detail, origins)[inside]
+    return float(np.corrcoef(back, second.detail[inside])[0, 1]) if back.std() > 0 else 0.0
+
+
+def _grey_values(detail: Float[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w"]:
+    return np.clip(FLOW_CONTRAST * detail + 128, 0, 255).astype(np.uint8)

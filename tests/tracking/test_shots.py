@@ -61,6 +61,22 @@ def test_what_lasts_is_one_shot(pictures):
     assert cuts_of(pictures) == []
 
 
+def close_up(t):
+    """Somebody who fills half of the picture moves to the left while what is behind moves right."""
+    picture = view(scene(0), -20 * t)
+    near = view(scene(1), 24 * t)
+    half = np.zeros(SIZE[::-1], bool)
+    half[30:, 60:220] = True
+    return np.where(half, near, picture)
+
+
+def test_a_close_up_of_somebody_who_moves_against_what_is_behind_is_one_shot():
+    pictures = [close_up(t) for t in range(12)]
+    assert cuts_of(pictures) == []
+    strange = [view(scene(2), 3 * t) for t in range(12)]
+    assert cuts_of(pictures + strange) == [12]
+
+
 def test_a_flash_is_no_cut():
     pictures = [view(scene(0))] * 30
     pictures[12 : 12 + FLASH_FRAMES] = [view(scene(1))] * FLASH_FRAMES
