@@ -14,6 +14,7 @@ from plotly.subplots import make_subplots
 from keyrecon.body import Skeleton
 from keyrecon.records import SOURCES, HalfKeyframes, Keyframes, Motion, PoseDistances
 from keyrecon.report.drawing import joint_sides
+from keyrecon.report.markup import thinning
 from keyrecon.report.summary import (
     hinge_angles,
     hinges,
@@ -62,7 +63,7 @@ def _add_occurrence(
     rank = np.empty(len(half.frames), dtype=np.int64)
     rank[order_by_pose(between)] = np.arange(1, len(half.frames) + 1)
     shown = np.isfinite(half.distance)
-    height = np.where(shown, rank[np.searchsorted(half.frames, half.nearest)], np.nan)
+    height = np.where(shown, rank[np.searchsorted(half.frames, half.nearest)], np.float32(np.nan))
     frames = np.arange(len(height))
     hover = "frame %{x}: keyframe at frame %{customdata}<extra></extra>"
     well = half.represented | ~shown
@@ -70,7 +71,7 @@ def _add_occurrence(
     figure.add_scatter(
         x=places,
         y=broken,
-        customdata=break_at_cuts(half.nearest, cuts)[1],
+        customdata=break_at_cuts(half.nearest.astype(np.float32), cuts)[1],
         hovertemplate=hover,
         row=row,
         col=1,
@@ -239,13 +240,16 @@ def _names_below(figure: go.Figure) -> go.Figure:
 
 def break_at_cuts(
     values: Num[np.ndarray, "T"], cuts: Int[np.ndarray, "C"] | None
-) -> tuple[Num[np.ndarray, "P"], Num[np.ndarray, "P"]]:
+) -> tuple[Float[np.ndarray, "P"], Num[np.ndarray, "P"]]:
     """Frames and their values as a line that ends with every shot: between two of them lies a
-    place without a value."""
-    frames = np.arange(len(values))
+    place without a value. Of hours every few frames (`markup.thinning`).
+    """
+    every = thinning(len(values))
+    frames, held = np.arange(0, len(values), every, dtype=np.float32), values[::every]
     if cuts is None or not len(cuts):
-        return frames, values
-    return np.insert(frames + 0.0, cuts, cuts - 0.5), np.insert(values + 0.0, cuts, np.nan)
+        return frames, held
+    behind = np.searchsorted(frames, cuts)
+    return np.insert(frames, behind, cuts - 0.5), np.insert(held + np.float32(0), behind, np.nan)
 
 
 def stack_charts(titles: tuple[str, ...], frames: int) -> go.Figure:

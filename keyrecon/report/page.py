@@ -251,7 +251,7 @@ def _every_few(frames: int) -> str:
     """What a report of hours leaves out."""
     every = thinning(frames)
     return (
-        f" So that this file stays small, pictures and figure are those of one frame in {every}, "
+        f" So that this file stays small, pictures, figure and curves are of one frame in {every}, "
         "and straight lines between."
         if every > 1
         else ""

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import gaussian_filter1d
 
 from keyrecon.io.frame_reader import read_small, reduce_picture, side_by_side
-from keyrecon.io.video import Video
+from keyrecon.io.video import Video, open_video
 from keyrecon.io.video_writer import write_video
 from keyrecon.progress import Progress, silent
 from keyrecon.records import Annotations, Motion, Shots, Track
@@ -37,6 +37,8 @@ NOTHING = 16
 JPEG_QUALITY = 80
 CLIP_QUALITY = 27
 """x264's crf; 27 keeps a minute of the small video under about 2 MB."""
+HALVED_BY, COARSEST = 6.0, 42
+"""By how much crf grows where a video is to take half of its bytes (x264's rule), and at most."""
 ROOM = 1.65
 """Side of the window in player heights: a raised arm with a racket fits."""
 CALM = 0.2
@@ -158,9 +160,21 @@ def cut_pictures(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         write_video(path, crops(), motion.fps / every, CLIP_QUALITY)
-        clip = video_uri(path.read_bytes())
+        clip = video_uri(_small_enough(path, motion.fps / every).read_bytes())
     shown = [{t: stills[t] for t in sorted(chosen)} for chosen in (even.tolist(), instants)]
     return Pictures(shown[0], shown[1], dict(sorted(marked.items())), clip)
+
+
+def _small_enough(clip: Path, fps: float) -> Path:
+    """The small video, encoded once more, coarser, where it came out larger than was expected: one
+    picture in several differs more from the one before, and so do shots cut to shots."""
+    excess = clip.stat().st_size / CLIP_BYTES
+    if excess <= 1:
+        return clip
+    coarser = CLIP_QUALITY + int(np.ceil(HALVED_BY * np.log2(excess)))
+    smaller = clip.with_name("smaller.mp4")
+    write_video(smaller, open_video(clip).frames(), fps, min(coarser, COARSEST))
+    return smaller
 
 
 def _with_gaps(

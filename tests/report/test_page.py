@@ -18,7 +18,7 @@ from keyrecon.body import LSP14
 from keyrecon.hyperextension import HyperextendedStretch
 from keyrecon.io.video import open_video
 from keyrecon.report import sections, summary
-from keyrecon.report.charts import joint_chart
+from keyrecon.report.charts import break_at_cuts, joint_chart
 from keyrecon.report.headline import in_words, marked_share
 from keyrecon.report.instants import KeyInstant
 from keyrecon.report.markup import MOST_FRAMES, pack, sentence, thinning
@@ -249,6 +249,29 @@ def test_of_hours_the_report_holds_every_few_frames():
     np.testing.assert_allclose(held * packed["step"], values[::3], atol=packed["step"])
     assert thinning(MOST_FRAMES) == 1 and thinning(MOST_FRAMES + 1) == 2
     assert thinning(50 * 3600) == 4
+
+
+def test_of_hours_a_curve_holds_every_few_frames_and_still_ends_with_every_shot(monkeypatch):
+    values, cuts = np.arange(12, dtype=np.float32), np.array([5])
+    places, broken = break_at_cuts(values, cuts)
+    assert places.tolist() == [0, 1, 2, 3, 4, 4.5, 5, 6, 7, 8, 9, 10, 11]
+    assert np.flatnonzero(np.isnan(broken)).tolist() == [5]
+    monkeypatch.setattr("keyrecon.report.markup.MOST_FRAMES", 4)
+    places, broken = break_at_cuts(values, cuts)
+    assert places.tolist() == [0, 3, 4.5, 6, 9]
+    np.testing.assert_array_equal(broken, [0, 3, np.nan, 6, 9])
+    assert places.dtype == broken.dtype == np.float32
+
+
+def test_a_small_video_that_came_out_too_large_is_made_coarser(material, monkeypatch):
+    def clip():
+        motion = material.motion
+        return cut_pictures(material.video, material.track, material.annotations, motion, 6).clip
+
+    fine = len(clip()) * 3 / 4
+    monkeypatch.setattr("keyrecon.report.pictures.CLIP_BYTES", 0.6 * fine)
+    monkeypatch.setattr("keyrecon.report.pictures.clip_side", lambda frames: SIDE)
+    assert len(clip()) * 3 / 4 < 0.7 * fine
 
 
 def test_its_small_video_lasts_as_long_with_fewer_pictures(material, tmp_path, monkeypatch):
