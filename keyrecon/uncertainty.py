@@ -213,7 +213,8 @@ def uncertain_stretches(
     if motion.expected_error is None:
         return []
     done = np.setdiff1d(np.array([] if marked is None else marked, int), motion.keyframes)
-    doubt = _doubt_by_part(motion)
+    height = player_height(motion)
+    doubt = _doubt_by_part(motion, height)
     least, gap = LEAST_SECONDS * motion.fps, round(MERGED_SECONDS * motion.fps)
     uncertain, stretches = _is_uncertain(doubt), []
     open_runs = [
@@ -225,7 +226,7 @@ def uncertain_stretches(
         shot, first, last = open_runs.pop()
         if last - first + 1 < least:
             continue
-        stretch, weight = _worst_stretch(motion, doubt, shot, first, last)
+        stretch, weight = _worst_stretch(motion, doubt, height, shot, slice(first, last + 1))
         open_runs += [(shot, first, stretch.first - 1), (shot, stretch.last + 1, last)]
         if stretch.frame not in done:
             stretches.append((weight, stretch))
@@ -243,7 +244,8 @@ def uncertain_share(motion: Motion) -> float:
     """Share of the frames in which arms, legs or head are uncertain."""
     if motion.expected_error is None:
         return 0.0
-    return float(_is_uncertain(_doubt_by_part(motion))[motion.known].mean())
+    doubt = _doubt_by_part(motion, player_height(motion))
+    return float(_is_uncertain(doubt)[motion.known].mean())
 
 
 def describe_uncertainty(motion: Motion) -> list[str]:
@@ -263,9 +265,11 @@ def describe_uncertainty(motion: Motion) -> list[str]:
     return lines
 
 
-def _doubt_by_part(motion: Motion) -> dict[str, Float[np.ndarray, "T"]]:
+def _doubt_by_part(
+    motion: Motion, height: Float[np.ndarray, "T"]
+) -> dict[str, Float[np.ndarray, "T"]]:
     """Expected error of the worst joint of each part, player heights; 0 without motion."""
-    height, errors = player_height(motion), motion.expected_error
+    errors = motion.expected_error
     assert errors is not None  # callers ask first
     known = motion.known
     errors, height = np.where(known[:, None], errors, 0.0), np.where(known, height, 1.0)
@@ -280,24 +284,27 @@ def _is_uncertain(doubt: Mapping[str, Float[np.ndarray, "T"]]) -> Bool[np.ndarra
 
 
 def _worst_stretch(
-    motion: Motion, doubt: Mapping[str, Float[np.ndarray, "T"]], shot: slice, first: int, last: int
+    motion: Motion,
+    doubt: Mapping[str, Float[np.ndarray, "T"]],
+    height: Float[np.ndarray, "T"],
+    shot: slice,
+    run: slice,
 ) -> tuple[UncertainStretch, float]:
     """The part of an uncertain run of a shot that marks of one frame would help most, and by how
-    much."""
+    much; of a player of a `height` in each frame, px."""
     reach = round(TAUGHT_SECONDS * motion.fps)
-    run = slice(first, last + 1)
     bad = _bad_parts(doubt, run)
-    taught = _taught(np.sum([doubt[name][shot] for name in bad], axis=0), reach)
-    frame = first + int(taught[first - shot.start : last + 1 - shot.start].argmax())
-    first, last = max(first, frame - reach), min(last, frame + reach)
+    around = slice(max(shot.start, run.start - reach), min(shot.stop, run.stop + reach))
+    taught = _taught(np.sum([doubt[name][around] for name in bad], axis=0), reach)
+    frame = run.start + int(taught[run.start - around.start :][: run.stop - run.start].argmax())
+    first, last = max(run.start, frame - reach), min(run.stop - 1, frame + reach)
     inside = slice(first, last + 1)
     bad = _bad_parts(doubt, inside)
     parts = body_parts(motion.skeleton)
     members = np.concatenate([parts[name] for name in bad])
     lower = motion.skeleton.is_lower[members]
     half = "both" if lower.any() and not lower.all() else "lower" if lower.all() else "upper"
-    height = player_height(motion)[inside]
-    error = float(np.mean([doubt[name][inside] * height for name in bad]))
+    error = float(np.mean([doubt[name][inside] * height[inside] for name in bad]))
     total = float(np.sum([doubt[name][inside] for name in bad]))
     return UncertainStretch(first, last, " and ".join(bad), error, frame, half), total
 

@@ -130,6 +130,16 @@ def test_no_line_covers_more_than_one_mark_can_help():
     assert len(told) >= 0.8 * 90
 
 
+def test_a_player_is_measured_once_for_however_many_stretches(monkeypatch):
+    """A motion of an hour has a thousand, and measuring takes all of its frames."""
+    motion, measured, measure = with_lost_arms(5, 94), [], uncertainty.player_height
+    monkeypatch.setattr(
+        uncertainty, "player_height", lambda motion: measured.append(1) or measure(motion)
+    )
+    assert len(uncertain_stretches(motion, count=9)) > 1
+    assert len(measured) == 1
+
+
 def test_no_stretch_reaches_over_frames_without_a_motion_or_into_another_shot():
     motion = with_lost_arms(30, 60)
     points, errors = motion.points3d.copy(), motion.expected_error.copy()
