@@ -46,13 +46,10 @@ def key_instants(motion: Motion) -> list[KeyInstant]:
 
     speeds = np.stack([hand_speed(motion, name) for name in hands])
     fastest = np.where(np.isfinite(speeds), speeds, 0).max(axis=0)
+    least, prominence = LEAST_SPEED * stature(motion), STANDS_OUT * float(fastest.max())
     peaks: list[int] = []
     for part in motion.stretches:
-        places, _ = find_peaks(
-            np.pad(fastest[part], 1),
-            height=LEAST_SPEED * stature(motion),
-            prominence=STANDS_OUT * float(fastest.max()),
-        )
+        places, _ = find_peaks(np.pad(fastest[part], 1), height=least, prominence=prominence)
         peaks += _apart(part.start + places - 1, fastest, motion.time)
     chosen = sorted(sorted(peaks, key=lambda t: -fastest[t])[:MOST])
     return [

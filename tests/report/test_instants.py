@@ -7,6 +7,7 @@ import pytest
 from small_motion import FPS, make_motion
 
 from keyrecon.body import LSP14
+from keyrecon.report import instants
 from keyrecon.report.instants import hand_speed, instant_angles, key_instants, separation
 
 WRIST = LSP14.index("right_wrist")
@@ -71,6 +72,14 @@ def test_strokes_on_both_sides_of_a_cut_are_two():
     assert len(key_instants(motion)) == 1
     found = key_instants(replace(motion, cuts=np.array([200])))
     assert [instant.frame for instant in found] == pytest.approx([185, 215], abs=1)
+
+
+def test_a_player_is_measured_once_for_however_many_shots(monkeypatch):
+    """A match of an hour has hundreds, and measuring takes all of its frames."""
+    measured, measure = [], instants.stature
+    monkeypatch.setattr(instants, "stature", lambda motion: measured.append(1) or measure(motion))
+    assert key_instants(replace(swinging([185, 215]), cuts=np.array([100, 200, 300])))
+    assert len(measured) == 1
 
 
 def test_a_runner_whose_hands_are_still_has_none():

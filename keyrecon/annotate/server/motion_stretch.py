@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from keyrecon.errors import KeyreconError
+from keyrecon.io.formats.conventions import stature
 from keyrecon.io.formats.motion_file import read_motion
 from keyrecon.records import SOURCES, Motion
 
@@ -15,7 +16,7 @@ def motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
     """Frames from..to-1 of the motion; {} before there is one."""
     if not file.is_file():
         return {}
-    motion = _read_motion(file, file.stat().st_mtime_ns)
+    motion, height = _read_motion(file, file.stat().st_mtime_ns)
     first, last = _range(query, len(motion.time))
     chosen = slice(first, last)
     return {
@@ -23,7 +24,7 @@ def motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
         "to": last,
         "cuts": [] if motion.cuts is None else motion.cuts.tolist(),
         "units": motion.units,
-        "stature": _stature(motion),
+        "stature": height,
         "points2d": np.round(motion.points2d[chosen], 1).tolist(),
         "points3d": np.round(motion.points3d[chosen], 4).tolist(),
         "confidence": np.round(motion.confidence[chosen], 2).tolist(),
@@ -35,17 +36,11 @@ def motion_stretch(file: Path, query: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def _stature(motion: Motion) -> float:
-    """The player's height in the motion's units, from all bones and their usual share of it."""
-    parents, children = motion.skeleton.bones.T
-    lengths = np.linalg.norm(motion.points3d[:, children] - motion.points3d[:, parents], axis=-1)
-    return round(float(np.nanmedian(lengths / motion.skeleton.lengths)), 4)
-
-
 @lru_cache(maxsize=1)
-def _read_motion(file: Path, changed: int) -> Motion:
-    """The motion; read again when the file has changed."""
-    return read_motion(file)
+def _read_motion(file: Path, changed: int) -> tuple[Motion, float]:
+    """The motion, and the player's height in its units; read again when the file has changed."""
+    motion = read_motion(file)
+    return motion, round(stature(motion), 4)
 
 
 def _range(query: dict[str, str], n_frames: int) -> tuple[int, int]:
