@@ -8,6 +8,7 @@ next suggestion better. Templates fitted to the annotated frames themselves are 
 """
 
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -75,13 +76,14 @@ class SuggestionScene:
 
 def scene_of(preparation: Preparation, sources: Annotations) -> SuggestionScene:
     """The scene of a preparation."""
-    return SuggestionScene(
-        preparation,
-        stabilise_shots(
-            preparation.track, preparation.camera, preparation.shots, preparation.video.fps
-        ),
-        sources,
-    )
+    return SuggestionScene(preparation, _body_frame(preparation), sources)
+
+
+@lru_cache(maxsize=1)
+def _body_frame(preparation: Preparation) -> BodyFrame:
+    """Kept from one suggestion to the next: of an hour of video it takes seconds."""
+    made = preparation
+    return stabilise_shots(made.track, made.camera, made.shots, made.video.fps)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from capsule_player import marks, scene, standing, turned
 
+from keyrecon.annotate.assist import pose_suggestion
 from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import choose_sources, suggest_joints, take_rows
 from keyrecon.body import LSP14
@@ -49,6 +50,19 @@ def test_a_pose_between_annotated_ones_is_foreseen(game):
     assert away(game, suggestion, 10).max() < 0.04
     assert np.median(away(game, suggestion, 10)) < 0.01
     assert np.isin(suggestion.source, (0, 3, 6, 9, 12, 15)).all()
+
+
+def test_player_coordinates_are_made_once_for_however_many_suggestions(game, monkeypatch):
+    """Of an hour of video they take seconds, and suggestions are made one after the other."""
+    made, make = [], pose_suggestion.stabilise_shots
+    monkeypatch.setattr(
+        pose_suggestion, "stabilise_shots", lambda *video: made.append(1) or make(*video)
+    )
+    preparation = replace(game[0])
+    for frame in (5, 11):
+        sources = choose_sources(preparation, marks(game[1], (0, 3, 9)), frame)
+        suggest_joints(preparation, sources, frame)
+    assert len(made) == 1
 
 
 def test_the_more_is_annotated_the_better_the_ghosts(game):
