@@ -58,7 +58,11 @@ class ElementIndex:
 
 
 def index_elements(edges: tuple[Edges, ...], body_frame: BodyFrame) -> ElementIndex:
-    """Put the elements of all frames into player coordinates, frame by frame."""
+    """Put the elements of all frames into player coordinates, frame by frame.
+
+    Where no frame has any there is one that belongs to none, so that a row of nothing stands for
+    something.
+    """
     count = np.array([len(e.points) for e in edges])
     frame = np.repeat(np.arange(len(edges)), count)
     points = body_frame.from_pixels(np.concatenate([e.points for e in edges]), frame)
@@ -69,6 +73,8 @@ def index_elements(edges: tuple[Edges, ...], body_frame: BodyFrame) -> ElementIn
     descriptors[:, 5] = PADDING_DISTANCE
     place = np.arange(len(frame)) - first[frame]
     descriptors[frame, :, place] = with_norms(describe_elements(points, tangent, color)).T
+    if not len(points):
+        points, tangent, color = np.zeros(1, complex), np.ones(1, complex), np.zeros(1, np.int64)
     return ElementIndex(points, tangent, color, first, descriptors)
 
 

@@ -176,7 +176,7 @@ class ProjectCache:
         return strip, estimate_shot_motion(strip)
 
     def suggestion(self, annotations: Annotations, frame: int) -> PoseSuggestion | None:
-        """Where the joints of a frame probably are; None while nothing else is annotated."""
+        """Where the joints of a frame probably are; None where nothing tells."""
         derived = self._from_preparation()
         return None if derived is None else _suggest(derived, annotations, frame)
 
@@ -284,10 +284,11 @@ class ProjectCache:
 
 
 def _suggest(derived: _Derived, annotations: Annotations, frame: int) -> PoseSuggestion | None:
-    """A suggestion, kept by the marks that it depends on."""
+    """A suggestion, kept by the marks that it depends on; None where nothing tells of the frame:
+    no other is annotated, or nobody was found there."""
     preparation = derived.preparation
     sources = choose_sources(preparation, annotations, frame)
-    if not len(sources.frames):
+    if not len(sources.frames) or not len(preparation.edges[frame].points):
         return None
     marks, video = _marks_of(annotations, frame), preparation.video
     near = nearest_marks(annotations, frame, video.fps, preparation.shots)

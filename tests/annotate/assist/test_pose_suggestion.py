@@ -10,6 +10,7 @@ from keyrecon.annotate.assist import pose_suggestion
 from keyrecon.annotate.assist.neighbours import find_neighbours
 from keyrecon.annotate.assist.pose_suggestion import choose_sources, suggest_joints, take_rows
 from keyrecon.body import LSP14
+from keyrecon.records import Edges
 
 ARMS = (("right_shoulder", ("right_elbow", "right_wrist")), ("right_elbow", ("right_wrist",)))
 LEGS = (("left_hip", ("left_knee", "left_ankle")), ("left_knee", ("left_ankle",)))
@@ -50,6 +51,17 @@ def test_a_pose_between_annotated_ones_is_foreseen(game):
     assert away(game, suggestion, 10).max() < 0.04
     assert np.median(away(game, suggestion, 10)) < 0.01
     assert np.isin(suggestion.source, (0, 3, 6, 9, 12, 15)).all()
+
+
+def test_a_frame_without_any_edge_is_suggested_what_others_show(game):
+    """As one of a shot that is left out, until it is marked."""
+    preparation, truth = game
+    found = vars(preparation.edges[10])
+    none = Edges(**{name: values[:0] for name, values in found.items()})
+    edges = tuple(none if t == 10 else e for t, e in enumerate(preparation.edges))
+    bare = replace(preparation, edges=edges)
+    sources = choose_sources(bare, marks(truth, (0, 3, 9)), 10)
+    assert np.isfinite(suggest_joints(bare, sources, 10).joints).all()
 
 
 def test_player_coordinates_are_made_once_for_however_many_suggestions(game, monkeypatch):

@@ -98,6 +98,7 @@ def test_nothing_that_followed_from_a_preparation_outlives_it(cache, monkeypatch
     """The track, the shots and the sizes that it was made with may all be others."""
     one, other = object.__new__(Preparation), object.__new__(Preparation)
     known = dict.fromkeys(("video", "shots", "track"), SimpleNamespace(fps=50.0, height=None))
+    known["edges"] = {9: SimpleNamespace(points=[(5.0, 6.0)])}
     for preparation in (one, other):
         vars(preparation).update(known)
     of = {
@@ -121,3 +122,12 @@ def test_nothing_that_followed_from_a_preparation_outlives_it(cache, monkeypatch
         assert cache.any_suggestion(MARKS, 9) is of[made][PoseSuggestion]
         assert cache.suggestion(MARKS, 9) is of[made][PoseSuggestion]
         assert cache.body(MARKS) is of[made][BodyEstimate]
+
+
+def test_where_nobody_was_found_nothing_is_suggested(monkeypatch, cache):
+    preparation = object.__new__(Preparation)
+    edges = {9: SimpleNamespace(points=[])}
+    vars(preparation).update(edges=edges, video=None, shots=None, track=None)
+    monkeypatch.setattr(project_cache, "choose_sources", lambda *_: MARKS)
+    monkeypatch.setattr(cache, "preparation", lambda: preparation)
+    assert cache.suggestion(MARKS, 9) is None
