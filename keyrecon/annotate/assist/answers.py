@@ -112,7 +112,12 @@ def describe_reasons(cache: ProjectCache, added: dict[int, str]) -> Json:
     return {
         "frames": frames,
         "height_px": float(np.median(preparation.track.height)),
-        "boxes": [_rounded(box, 0) if np.isfinite(box).all() else None for box in boxes],
+        "boxes": [
+            box if known else None
+            for box, known in zip(
+                np.round(boxes).tolist(), np.isfinite(boxes).all(axis=1).tolist(), strict=True
+            )
+        ],
     }
 
 

@@ -15,6 +15,7 @@ gain from frames like it, which spreads suggestions out by itself.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -49,6 +50,25 @@ class _HalfCoverage:
     shown: Bool[np.ndarray, "T"]
     """Frames with the player."""
 
+    @cached_property
+    def nearest(self) -> Int[np.ndarray, "T"]:
+        """Column of the keyframe that shows each frame best."""
+        return self.distance.argmin(axis=1)
+
+    @cached_property
+    def covering(self) -> Int[np.ndarray, "T"]:
+        """How many keyframes cover each frame."""
+        return (self.distance < self.beta).sum(axis=1)
+
+    def serves(self, column: int) -> Bool[np.ndarray, "T"]:
+        """Frames that a keyframe shows best."""
+        return (self.nearest == column) & self.shown
+
+    def alone(self, column: int) -> Bool[np.ndarray, "T"]:
+        """Frames that no other keyframe covers."""
+        covered = self.distance[:, column] < self.beta
+        return covered & (self.covering == 1) & self.shown
+
 
 def explain_keyframes(
     distances: PoseDistances, keyframes: Keyframes, added: dict[int, str]
@@ -63,11 +83,10 @@ def explain_keyframes(
             if frame not in coverage.frames:
                 continue
             column = int(np.searchsorted(coverage.frames, frame))
-            nearest = (coverage.distance.argmin(axis=1) == column) & coverage.shown
-            covered = coverage.distance < coverage.beta
-            alone = covered[:, column] & (covered.sum(axis=1) == 1) & coverage.shown
+            nearest = coverage.serves(column)
             served |= nearest
-            sentences.append(_describe(coverage.half, nearest, int(alone.sum())))
+            alone = int(coverage.alone(column).sum())
+            sentences.append(_describe(coverage.half, nearest, alone))
         reasons[frame] = Reason(int(served.sum()), " ".join(sentences))
     return reasons
 
