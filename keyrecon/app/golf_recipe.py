@@ -56,7 +56,9 @@ def find_swing(
     if not marks.any:
         hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
         check_hand(hands, clicked, "The clicks")
-    candidates = keep("search", find_candidates, scene, pose, marks, model)
+    # by other names, so that no number of corrections pushes the fit without them out of the cache
+    kind = "_marked" if marks.any else ""
+    candidates = keep(f"search{kind}", find_candidates, scene, pose, marks, model)
     if np.isfinite(marks.shafts).any():
         earlier = _earlier_shafts(
             lambda: find_swing(video, camera, clicked, model, options, keep, progress), marks
@@ -72,19 +74,19 @@ def find_swing(
 
     tried: list[_Tried] = []
     for number, candidate in enumerate(candidates[: options.candidates], 1):
-        first = attempt(candidate, f"_{number}")
+        first = attempt(candidate, f"{kind}_{number}")
         tried.append(first)
         slowed, searched = None, options.observation.find_slow_motion
         if searched and first.observed.slow_motion == 1 and options.method == "swing":
             slowed = find_slowed_keys(first.fitted.keys, first.observed.film, scene.film)
         if slowed is not None:
-            tried.append(attempt(replace(candidate, keys=slowed), f"_{number}s"))
+            tried.append(attempt(replace(candidate, keys=slowed), f"{kind}_{number}s"))
         if not tried[-1].doubts or options.method == "windows":
             break
     best = min(tried, key=lambda t: len(t.doubts))
     return keep(
-        "found", swing_found, best.fitted, best.observations, best.doubts, best.observed, marks,
-        video, model,
+        f"found{kind}", swing_found, best.fitted, best.observations, best.doubts, best.observed,
+        marks, video, model,
     )  # fmt: skip
 
 

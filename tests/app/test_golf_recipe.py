@@ -32,17 +32,21 @@ class SearchBegan(Exception):
 
 def keep(name, stage, *inputs, **named):
     """A film whose swing goes round the other way."""
-    if name == "search":
+    if name.startswith("search"):
         raise SearchBegan
     return HandCosts(given=0.6, other=0.1) if name == "hands" else None
 
 
-def test_who_marks_is_believed_whichever_way_the_swing_seems_to_go(tmp_path, monkeypatch):
+def film_of_a_swing(tmp_path, monkeypatch):
     write_video(tmp_path / "v.mp4", (np.zeros((270, 320, 3), np.uint8) for _ in range(4)), 30.0)
     video = open_video(tmp_path / "v.mp4")
     camera = CameraPath(np.tile(np.eye(3), (4, 1, 1)), np.ones(4))
     monkeypatch.setattr(golf_recipe, "place_in_film", lambda pose, film: pose)
-    swing = video, camera, clicked_pose(GolfClicks(0, (320, 270), JOINTS)), read_motion_model()
+    return video, camera, clicked_pose(GolfClicks(0, (320, 270), JOINTS)), read_motion_model()
+
+
+def test_who_marks_is_believed_whichever_way_the_swing_seems_to_go(tmp_path, monkeypatch):
+    swing = film_of_a_swing(tmp_path, monkeypatch)
     with pytest.raises(KeyreconError, match="mark the top of the swing"):
         find_swing(*swing, keep=keep)
     top = replace(NO_MARKS, keys=np.array([np.nan, 12.0, np.nan, np.nan]))
@@ -69,3 +73,23 @@ def test_marks_are_held_to_where_the_clicks_alone_show_no_swing():
         raise KeyreconError("No swing was found.")
 
     assert golf_recipe._earlier_shafts(find, NO_MARKS) is NO_MARKS
+
+
+def test_marks_push_no_stage_of_the_fit_without_them_out_of_the_cache(tmp_path, monkeypatch):
+    """A store keeps a few results of each name; the fit without marks is wanted with every mark."""
+    names = {}
+    for marked in (False, True):
+        swing = film_of_a_swing(tmp_path, monkeypatch)
+        top = np.array([np.nan, 12.0, np.nan, np.nan])
+        marks = replace(NO_MARKS, keys=top) if marked else NO_MARKS
+        names[marked] = set()
+
+        def note(name, stage, *inputs, names=names[marked], **named):
+            names.add(name)
+            if name.startswith("search"):
+                raise SearchBegan
+            return HandCosts(given=0.1, other=0.6) if name == "hands" else None
+
+        with pytest.raises(SearchBegan):
+            find_swing(*swing, keep=note, marks=marks)
+    assert names[False] & names[True] == {"film", "scene"}
