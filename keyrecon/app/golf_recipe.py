@@ -1,6 +1,5 @@
 """The recipe of a golf fit: which stages make a swing from a video and clicks, in what order."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from keyrecon.golf.observe.film import choose_frames
 from keyrecon.golf.observe.motion_timing import TimeShift, measure_time_shift
 from keyrecon.golf.plausibility import SwingDoubt, find_doubts, is_shifted
 from keyrecon.golf.records import NO_MARKS, FittedSwing, MotionModel, Observations, SwingMarks
-from keyrecon.golf.scene import observe_scene
+from keyrecon.golf.scene import SwingScene, observe_scene
 from keyrecon.golf.swing_fit import (
     FoundSwing,
     GolfOptions,
@@ -53,53 +52,12 @@ def find_swing(
         "scene", observe_scene, video, film, place_in_film(pose, film),
         options=options.observation.scene, progress=progress,
     )  # fmt: skip
+    search = _Search(video, scene, pose, model, options, keep, progress)
     if not marks.any:
-        hands = keep("hands", measure_hands, scene, place_in_film(pose, film), model)
-        check_hand(hands, clicked, "The clicks")
-    # by other names, so that no number of corrections pushes the fit without them out of the cache
-    kind = "_marked" if marks.any else ""
-    candidates = keep(f"search{kind}", find_candidates, scene, pose, marks, model)
-    if np.isfinite(marks.shafts).any():
-        earlier = _earlier_shafts(
-            lambda: find_swing(video, camera, clicked, model, options, keep, progress), marks
-        )
-        candidates = tuple(replace(candidate, earlier=earlier) for candidate in candidates)
-
-    def attempt(candidate: SwingHypothesis, suffix: str) -> _Tried:
-        observed = keep(
-            f"observe{suffix}", observe_swing, video, scene, candidate, pose, marks, model,
-            options=options.observation, progress=progress,
-        )  # fmt: skip
-        return _try(observed, video, model, options, keep, progress, suffix)
-
-    tried: list[_Tried] = []
-    for number, candidate in enumerate(candidates[: options.candidates], 1):
-        first = attempt(candidate, f"{kind}_{number}")
-        tried.append(first)
-        slowed, searched = None, options.observation.find_slow_motion
-        if searched and first.observed.slow_motion == 1 and options.method == "swing":
-            slowed = find_slowed_keys(first.fitted.keys, first.observed.film, scene.film)
-        if slowed is not None:
-            tried.append(attempt(replace(candidate, keys=slowed), f"{kind}_{number}s"))
-        if not tried[-1].doubts or options.method == "windows":
-            break
-    best = min(tried, key=lambda t: len(t.doubts))
-    return keep(
-        f"found{kind}", swing_found, best.fitted, best.observations, best.doubts, best.observed,
-        marks, video, model,
-    )  # fmt: skip
-
-
-def _earlier_shafts(find: Callable[[], FoundSwing], marks: SwingMarks) -> SwingMarks:
-    """The club of a fit without the marks, which a person saw and corrected.
-
-    None where there is no such fit, or something speaks against it.
-    """
-    try:
-        found = find()
-    except KeyreconError:  # the clicks alone show no swing: what the marks are for
-        return NO_MARKS
-    return NO_MARKS if found.doubts else unrefuted_shafts(found.fitted, found.observations, marks)
+        search.check_hand(clicked)
+        return search.find(marks)
+    has_shafts = bool(np.isfinite(marks.shafts).any())
+    return search.find(marks, _earlier_shafts(search, clicked, marks) if has_shafts else NO_MARKS)
 
 
 RETIMINGS = 2
@@ -121,35 +79,92 @@ class _Tried:
     doubts: tuple[SwingDoubt, ...]
 
 
-def _try(
-    observed: ObservedSwing,
-    video: Video,
-    model: MotionModel,
-    options: GolfOptions,
-    keep: Keep,
-    progress: Progress,
-    suffix: str,
-) -> _Tried:
-    """One candidate fitted, and anew at their time where the pictures show it clearly off."""
-    shown = observed.film.open(video)
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """A film in which a swing is looked for, and how; with what marks it is told each time."""
 
-    def fit(first: Observations, suffix: str) -> _Tried:
-        fitted, guided = fit_candidate(first, shown, model, options, keep, progress, suffix)
+    video: Video
+    scene: SwingScene
+    pose: ClickedPose
+    model: MotionModel
+    options: GolfOptions
+    keep: Keep
+    progress: Progress
+
+    def check_hand(self, clicked: ClickedPose) -> None:
+        """Raises KeyreconError where the swing goes round the other way than was clicked."""
+        placed = place_in_film(self.pose, self.scene.film)
+        hands = self.keep("hands", measure_hands, self.scene, placed, self.model)
+        check_hand(hands, clicked, "The clicks")
+
+    def find(self, marks: SwingMarks, earlier: SwingMarks = NO_MARKS) -> FoundSwing:
+        """The swing that explains the film best; its club may be where one was found `earlier`.
+
+        Stages have names of their own where there are marks, so that no number of corrections
+        pushes the fit without them out of the cache.
+        """
+        keep, options, kind = self.keep, self.options, "_marked" if marks.any else ""
+        found = keep(f"search{kind}", find_candidates, self.scene, self.pose, marks, self.model)
+        candidates = [replace(one, earlier=earlier) for one in found[: options.candidates]]
+        tried: list[_Tried] = []
+        for number, candidate in enumerate(candidates, 1):
+            first = self._try(candidate, marks, f"{kind}_{number}")
+            tried.append(first)
+            slowed, searched = None, options.observation.find_slow_motion
+            if searched and first.observed.slow_motion == 1 and options.method == "swing":
+                slowed = find_slowed_keys(first.fitted.keys, first.observed.film, self.scene.film)
+            if slowed is not None:
+                slower = replace(candidate, keys=slowed)
+                tried.append(self._try(slower, marks, f"{kind}_{number}s"))
+            if not tried[-1].doubts or options.method == "windows":
+                break
+        best = min(tried, key=lambda t: len(t.doubts))
+        return keep(
+            f"found{kind}", swing_found, best.fitted, best.observations, best.doubts,
+            best.observed, marks, self.video, self.model,
+        )  # fmt: skip
+
+    def _try(self, candidate: SwingHypothesis, marks: SwingMarks, suffix: str) -> _Tried:
+        """One candidate fitted, and anew at their time where the pictures show it clearly off."""
+        keep, options, model = self.keep, self.options, self.model
+        observed = keep(
+            f"observe{suffix}", observe_swing, self.video, self.scene, candidate, self.pose, marks,
+            model, options=options.observation, progress=self.progress,
+        )  # fmt: skip
+        tried = self._fit(observed, observed.observations, suffix)
+        for number in range(RETIMINGS if options.method == "swing" else 0):
+            if not is_shifted(tried.shift):
+                break
+            again = f"{suffix}_timed_{number + 1}"
+            first = keep(f"observe{again}", retime, tried.first, tried.fitted, tried.shift, model)
+            retried = self._fit(observed, first, again)
+            if _is_worse(retried, tried):
+                break
+            tried = retried
+        return tried
+
+    def _fit(self, observed: ObservedSwing, first: Observations, suffix: str) -> _Tried:
+        """A fit to the first observations of a candidate, and what speaks against it."""
+        shown, keep = observed.film.open(self.video), self.keep
+        fitted, guided = fit_candidate(
+            first, shown, self.model, self.options, keep, self.progress, suffix
+        )
         shift = keep(f"timing{suffix}", measure_time_shift, shown, fitted, first.height)
         doubts = tuple(find_doubts(fitted, first, shift))
         return _Tried(first, fitted, guided, observed, shift, doubts)
 
-    tried = fit(observed.observations, suffix)
-    for number in range(RETIMINGS if options.method == "swing" else 0):
-        if not is_shifted(tried.shift):
-            break
-        again = f"{suffix}_timed_{number + 1}"
-        first = keep(f"observe{again}", retime, tried.first, tried.fitted, tried.shift, model)
-        retried = fit(first, again)
-        if _is_worse(retried, tried):
-            break
-        tried = retried
-    return tried
+
+def _earlier_shafts(search: _Search, clicked: ClickedPose, marks: SwingMarks) -> SwingMarks:
+    """The club of the fit without the marks, which a person saw and corrected.
+
+    None where there is no such fit, or something speaks against it.
+    """
+    try:
+        search.check_hand(clicked)
+        found = search.find(NO_MARKS)
+    except KeyreconError:  # the clicks alone show no swing: what the marks are for
+        return NO_MARKS
+    return NO_MARKS if found.doubts else unrefuted_shafts(found.fitted, found.observations, marks)
 
 
 def _is_worse(one: _Tried, other: _Tried) -> bool:
