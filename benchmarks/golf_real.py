@@ -38,6 +38,7 @@ from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_mod
 from keyrecon.io.held_video import hold_frames
 from keyrecon.io.stages import StageStore
 from keyrecon.io.video import open_video
+from keyrecon.numerics.geometry import signed_angles
 from keyrecon.report.golf_pictures import draw_golfer
 
 KEY_NAMES = ("start", "top", "hit", "finish")
@@ -151,8 +152,7 @@ def club_angles(swing: Swing, club: np.ndarray) -> np.ndarray:
     frames = sorted(swing.clubs)
     one = club[frames, 1] - club[frames, 0]
     other = np.array([swing.clubs[t][1] - swing.clubs[t][0] for t in frames])
-    cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    return np.abs(np.degrees(np.arctan2(cross, (one * other).sum(axis=1))))
+    return np.abs(np.degrees(signed_angles(one, other)))
 
 
 COLUMNS = (

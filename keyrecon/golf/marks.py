@@ -16,7 +16,7 @@ from scipy.linalg import solve
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.shaft_hypotheses import ShaftHypotheses
 from keyrecon.golf.records import FittedSwing, Observations, SwingMarks
-from keyrecon.numerics.geometry import warp_points
+from keyrecon.numerics.geometry import signed_angles, warp_points
 from keyrecon.records import SOURCES
 
 SHAFT_SPREAD = 3.0
@@ -25,8 +25,8 @@ SURE_WEIGHT = 2.0
 """Weight of a marked shaft among those detected, player heights: more than any club is long."""
 FADING = 0.15
 """Seconds over which a mark's correction fades: half a downswing."""
-MISSED_ANGLE = np.radians(15)
-"""A fitted club this far from a marked one was another one."""
+ANOTHER_CLUB = np.radians(15)
+"""A fitted club turned so far from a marked or detected one is another one."""
 CONFIRMED, CONFIRMED_DOUBT = np.radians(5), 0.1
 """A fitted club within so much of the detected one is right there, whatever a mark turns it by a
 few frames away; the variance of that, as a share of what marks turn clubs by."""
@@ -122,7 +122,7 @@ def unrefuted_shafts(
     club, time = observations.club, earlier.motion.time
     rows = np.flatnonzero(np.isfinite(marks.shafts).all(axis=(1, 2)))
     turns = _turns(earlier.club2d[marks.frames[rows]], marks.shafts[rows])
-    missed = time[marks.frames[rows[np.abs(turns) > MISSED_ANGLE]]]
+    missed = time[marks.frames[rows[np.abs(turns) > ANOTHER_CLUB]]]
     near = (np.abs(time[:, None] - missed) < FADING).any(axis=1)
     frames = np.flatnonzero(np.isfinite(club).all(axis=(1, 2)) & ~near)
     unknown = SwingMarks.of_joints(frames, np.full((len(frames), 14, 2), np.nan))
@@ -244,10 +244,8 @@ def hold_club(
 def _turns(
     first: Float[np.ndarray, "n 2 2"], second: Float[np.ndarray, "n 2 2"]
 ) -> Float[np.ndarray, "n"]:
-    """By how much shafts are turned from one to the other, radians, -pi to pi."""
-    angles = [np.arctan2(*np.moveaxis(s[:, 1] - s[:, 0], 1, 0)[::-1]) for s in (first, second)]
-    turned: Float[np.ndarray, "n"] = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
-    return turned
+    """By how much shafts are turned from one to the other, rad."""
+    return signed_angles(first[:, 1] - first[:, 0], second[:, 1] - second[:, 0])
 
 
 def _spread_in_time(

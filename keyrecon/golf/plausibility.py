@@ -19,11 +19,12 @@ from keyrecon.golf.fit.residuals import (
     sample_distance,
     sight_directions,
 )
-from keyrecon.golf.marks import carry_marks
+from keyrecon.golf.marks import ANOTHER_CLUB, carry_marks
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import UNKNOWN_SHIFT, TimeShift
 from keyrecon.golf.observe.swing_timing import LEAST_DETECTED
 from keyrecon.golf.records import FittedSwing, Observations
+from keyrecon.numerics.geometry import signed_angles
 
 DOWNSWING_SECONDS = (0.15, 0.5)
 """From the top to the hit. Tour players take .23-.28 s, amateurs .25-.4 (Cochran & Stobbs, The
@@ -50,8 +51,6 @@ TRACK_SPREAD, FARTHEST_TRACKED = 0.05, 0.06
 """A joint that was tracked to so many body heights is known there; of ten such joints no more than
 one is farther from the fit than this: .012 to .037 in those right fits, .06 to .22 in all those
 made wrong but where time alone was shifted."""
-CLUB_ANGLE = np.radians(15)
-"""A fitted club this far from the detected one is another one."""
 LEAST_CLUB_AGREED = 0.8
 """Share of the first detections between start and hit that the fitted club agrees with, at least:
 .95 to 1 in right fits of five real swings."""
@@ -251,8 +250,8 @@ def _doubt_club(fitted: FittedSwing, observations: Observations) -> list[SwingDo
     if seen.mean() < LEAST_DETECTED:
         text = f"the club was detected in {seen.mean():.0%} of the frames of the swing"
         return [SwingDoubt(text, during.start)]
-    angle = _angles(detected, expected)
-    agreed = angle[seen] < CLUB_ANGLE
+    angle = np.abs(signed_angles(detected, expected))
+    agreed = angle[seen] < ANOTHER_CLUB
     if agreed.mean() >= LEAST_CLUB_AGREED:
         return []
     worst = during.start + int(np.where(seen, np.nan_to_num(angle), 0).argmax())
@@ -297,17 +296,8 @@ def _doubt_shafts(fitted: FittedSwing, observations: Observations) -> list[Swing
     )
     length = np.fmin(np.linalg.norm(marked, axis=1), np.linalg.norm(expected, axis=1))
     seen = np.isfinite(marked).all(axis=1) & (length > LEAST_SHAFT * observations.height)
-    angle = np.where(seen, np.nan_to_num(_angles(marked, expected)), 0)
-    if not angle.size or angle.max() < CLUB_ANGLE:
+    angle = np.where(seen, np.nan_to_num(np.abs(signed_angles(marked, expected))), 0)
+    if not angle.size or angle.max() < ANOTHER_CLUB:
         return []
     text = f"the club was marked {np.degrees(angle.max()):.0f} degrees from where the fit has it"
     return [SwingDoubt(text, int(marks.frames[angle.argmax()]))]
-
-
-def _angles(
-    one: Float[np.ndarray, "n 2"], other: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "n"]:
-    """Between vectors, rad."""
-    cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    angles: Float[np.ndarray, "n"] = np.abs(np.arctan2(cross, (one * other).sum(axis=1)))
-    return angles

@@ -39,6 +39,14 @@ def unit_vectors(
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), min_length)
 
 
+def signed_angles(
+    first: Float[np.ndarray, "*n 2"], second: Float[np.ndarray, "*n 2"]
+) -> Float[np.ndarray, "*n"]:
+    """Radians by which vectors are turned into others, from x to y, -pi to pi."""
+    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return np.arctan2(cross, (first * second).sum(axis=-1))
+
+
 def look_at(
     center: Float[np.ndarray, "3"], target: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3 3"]:

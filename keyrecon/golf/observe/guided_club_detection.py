@@ -27,6 +27,7 @@ from keyrecon.golf.observe.club_lines import (
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.io.frame_reader import side_by_side
 from keyrecon.io.video import Video
+from keyrecon.numerics.geometry import signed_angles
 from keyrecon.numerics.viterbi import find_cheapest_path, longest_gap
 from keyrecon.ranges import within
 
@@ -135,9 +136,7 @@ def _usual_departures(
     """How far clubs are usually turned from where they are expected, degrees, and how far beside
     they pass, heights: by more where they move fast, since the fit is early or late."""
     way = expected[:, 1] - expected[:, 0]
-    before, after = way[:-1], way[1:]
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    turn = np.abs(np.degrees(np.arctan2(cross, (before * after).sum(axis=1))))
+    turn = np.abs(np.degrees(signed_angles(way[:-1], way[1:])))
     turned = np.nan_to_num(np.fmax(np.append(turn[:1], turn), np.append(turn, turn[-1:])))
     moved = EARLY * fps * np.stack([turned, swept[:, 0]], axis=1)
     return np.hypot([options.usual_turn, options.usual_offset], moved)
