@@ -78,6 +78,8 @@ MERGED_SECONDS = 0.2
 """Uncertain frames that are nearer to each other than this make one stretch."""
 LEAST_SECONDS = 0.1
 """Shorter stretches are not worth a line."""
+MOST_TOLD = 3
+"""Of the worst stretches, each with a line of its own."""
 MAX_LISTED = 12
 """Stretches that are named in one line after the worst. Of 53 frames of nine real clips that have a
 joint off by more than a fifth of the trunk 35 lie in the three worst stretches of their clips, 43
@@ -201,9 +203,20 @@ def find_bins(values: Float[np.ndarray, "*n"], edges: tuple[float, ...]) -> Int[
 
 
 def uncertain_stretches(
-    motion: Motion, marked: Int[np.ndarray, "n"] | None = None, count: int = 3
+    motion: Motion, marked: Int[np.ndarray, "n"] | None = None, count: int = MOST_TOLD
 ) -> list[UncertainStretch]:
-    """The worst stretches of a motion, in the order of time.
+    """The worst stretches of a motion, in the order of time (`rank_stretches`)."""
+    return _in_time(rank_stretches(motion, marked)[:count])
+
+
+def _in_time(stretches: Sequence[UncertainStretch]) -> list[UncertainStretch]:
+    return sorted(stretches, key=lambda s: s.first)
+
+
+def rank_stretches(
+    motion: Motion, marked: Int[np.ndarray, "n"] | None = None
+) -> list[UncertainStretch]:
+    """All uncertain stretches of a motion, the worst first.
 
     None is longer than what the marks of one frame help (`TAUGHT_SECONDS` to either side), and
     none goes on over frames without a motion or into another shot. Those whose best frame is among
@@ -230,13 +243,12 @@ def uncertain_stretches(
         open_runs += [(shot, first, stretch.first - 1), (shot, stretch.last + 1, last)]
         if stretch.frame not in done:
             stretches.append((weight, stretch))
-    worst = sorted(stretches, key=lambda row: -row[0])[:count]
-    return sorted((stretch for _, stretch in worst), key=lambda s: s.first)
+    return [stretch for _, stretch in sorted(stretches, key=lambda row: -row[0])]
 
 
 def uncertain_parts(motion: Motion, frames: Sequence[int]) -> list[str]:
     """What is uncertain in each of some frames, such as 'arms and legs'; '' where nothing is."""
-    stretches = uncertain_stretches(motion, count=len(motion.time))
+    stretches = rank_stretches(motion)
     return [next((s.what for s in stretches if s.first <= f <= s.last), "") for f in frames]
 
 
@@ -251,17 +263,17 @@ def uncertain_share(motion: Motion) -> float:
 def describe_uncertainty(motion: Motion) -> list[str]:
     """How much of a motion is uncertain, the worst stretches, a line each, and where the others
     are; nothing where all is certain."""
-    worst = uncertain_stretches(motion)
-    if not worst:
+    ranked = rank_stretches(motion)
+    if not ranked:
         return []
+    worst, others = _in_time(ranked[:MOST_TOLD]), _in_time(ranked[MOST_TOLD:])
     share = uncertain_share(motion)
     lines = [f"Arms, legs or head are uncertain in {share:.0%} of the frames. Worst:"]
     lines += [stretch.text for stretch in worst]
-    every = uncertain_stretches(motion, count=len(motion.time))
-    others = [f"{s.first}-{s.last} ({s.what})" for s in every if s not in worst]
     if others:
         more = f" and {len(others) - MAX_LISTED} more" if len(others) > MAX_LISTED else ""
-        lines.append(f"Also uncertain: frames {', '.join(others[:MAX_LISTED])}{more}.")
+        listed = ", ".join(f"{s.first}-{s.last} ({s.what})" for s in others[:MAX_LISTED])
+        lines.append(f"Also uncertain: frames {listed}{more}.")
     return lines
 
 

@@ -68,7 +68,9 @@ BLENDED = 0.88
 """Correlation of the middle picture with the best sum of both from which it is that sum, and the
 least weight that each has. Of 60 dissolves of 8 to 45 frames between moving clips all were found;
 in 3056 frames of nine real and four rendered clips none was, nor where these were blown up two and
-four times, which with .8 gave four."""
+four times, which with .8 gave four. By flow the pictures before and after show one scene from
+`SAME_SCENE` on, not from `NEIGHBOURS_BY_FLOW`: both may be blended in part themselves. Two false
+dissolves in close-ups of real clips had .68 and .83."""
 LEAST_WEIGHT = 0.25
 UNEVEN_SUM = 0.2
 """How far from 1 the weights may add up to. Of blurred pictures the sum of two is the one half-way
