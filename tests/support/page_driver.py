@@ -285,11 +285,11 @@ class Held:
     """Requests that wait until they are let go, the oldest first."""
 
     def __init__(self, person, pattern, method="GET"):
-        self.person, self.routes, self.method = person, [], method
+        self.person, self.routes, self.method, self.ended = person, [], method, False
         person.page.route(pattern, self._take)
 
     def _take(self, route):
-        if route.request.method == self.method:
+        if route.request.method == self.method and not self.ended:
             self.routes.append(route)
         else:
             route.continue_()
@@ -302,6 +302,12 @@ class Held:
         """Let one go, when it has come."""
         self.wait_for(1)
         self.routes.pop(0).continue_()
+
+    def end(self):
+        """Let all go that have come, and hold none that comes later."""
+        self.ended = True
+        while self.routes:
+            self.let_go()
 
 
 def clearest_place(limb, place_of):

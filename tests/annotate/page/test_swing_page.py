@@ -5,7 +5,7 @@ import json
 import pytest
 from golfer import Golfer
 from overlaps import OVERLAPS, PARTS
-from page_driver import BROWSER, serving
+from page_driver import BROWSER, Held, serving
 from page_project import CLUB, FRAMES, make_golf_project, truth, write_numbered_video
 
 from keyrecon.annotate.assist.answers import make_assistant
@@ -85,12 +85,10 @@ def test_no_golfer_stands_in_frames_to_which_nothing_was_fitted(visit):
 
 def test_a_swing_that_is_on_its_way_says_so(visit):
     person, _ = visit()
-    held = []
-    person.page.route("**/api/motion?*", lambda route: held.append(route))
+    held = Held(person, "**/api/motion?*")
     person.page.reload()
     person.await_text("#swing-empty", "on its way")
-    for route in held:
-        route.continue_()
+    held.end()
     person.page.wait_for_selector("#swing-empty", state="hidden")
 
 
