@@ -23,6 +23,9 @@ Signs = dict[str, int]
 class Assistant:
     """What can be computed while a person marks."""
 
+    ready: Callable[[float, Callable[[], None]], bool] | None = None
+    """Whether the stored results are loaded, after so many seconds at most; where they are not, the
+    function is called when they are. Of hours of video they take longer than a page may wait."""
     keyframes: Callable[[dict[int, str]], Json] | None = None
     """Added keyframes -> {"frames": {frame: {"stands_for", "why"}}, "height_px", "boxes"}; the
     boxes tell where the player is in every frame."""

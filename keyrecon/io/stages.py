@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
+from functools import cache
 from pathlib import Path, PosixPath
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
@@ -269,7 +270,7 @@ class StageStore:
             if value.exposure is not None:
                 digest.update(value.exposure.tobytes())
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
-            digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+            digest.update(f"{_type_text(value.dtype)}{value.shape}".encode() + value.tobytes())
         elif is_dataclass(value):
             digest.update(type(value).__name__.encode())
             for field in fields(value):
@@ -288,6 +289,12 @@ class StageStore:
 
 _NOTHING: Any = object()
 """In place of a result; None can be one."""
+
+
+@cache
+def _type_text(dtype: np.dtype) -> str:
+    """NumPy makes it anew every time, which is half of the digest of small arrays."""
+    return str(dtype)
 
 
 def _inputs_of(named: Mapping[str, object]) -> dict[str, object]:

@@ -63,6 +63,7 @@ def make_assistant(workspace: Workspace) -> Assistant:
     """What needs the automatic part answers with nothing before that was run."""
     cache = ProjectCache(workspace)
     return Assistant(
+        ready=cache.is_ready,
         keyframes=partial(describe_reasons, cache),
         bodies=partial(describe_bodies, cache),
         motion_digest=partial(project_motion_digest, workspace.folder),

@@ -122,8 +122,23 @@ class ProjectCache:
         self._strip: LatestResult[tuple[int, ...], tuple[Strip, CameraPath]] = LatestResult(
             self._cut_strip
         )
-        # ready when the page asks, and in nobody's way when the server is stopped
-        Thread(target=self.preparation, daemon=True).start()
+
+    def is_ready(self, patience: float, then: Callable[[], None]) -> bool:
+        """Whether the automatic part is loaded as its files are now, after `patience` seconds at
+        most; where it is not, `then` is called when it is. Nobody waits for it when the server is
+        stopped."""
+        loading = Thread(target=self.preparation, daemon=True)
+        loading.start()
+        loading.join(patience)
+        if not loading.is_alive():
+            return True
+
+        def tell() -> None:
+            loading.join()
+            then()
+
+        Thread(target=tell, daemon=True).start()
+        return False
 
     def preparation(self) -> Preparation | None:
         """The automatic part; None before it was run, or when its results are gone."""

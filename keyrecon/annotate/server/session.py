@@ -31,6 +31,8 @@ from keyrecon.io.workspace import Workspace
 
 logger = logging.getLogger(__name__)
 Json = dict[str, Any]
+PATIENCE_SECONDS = 0.5
+"""That a page waits for what the stored results tell; later that comes as news."""
 WATCH_SECONDS = 1.0
 """How often the files are checked: the times of a few files, which costs nothing."""
 
@@ -52,6 +54,12 @@ class Session:
         """A digest of what a motion would be made from now; None where nothing can tell it."""
         find = self.assistant.motion_digest
         return None if find is None else find(self.frames.video)
+
+    def await_results(self) -> bool:
+        """Whether the stored results are loaded; where that takes longer than a page may wait, what
+        they tell of the project is news when they are."""
+        ready = self.assistant.ready
+        return not ready or ready(PATIENCE_SECONDS, lambda: self.events.publish({"project": True}))
 
     def close(self) -> None:
         """End its threads and let go of its files."""
@@ -88,9 +96,11 @@ def describe_project(session: Session) -> Json:
     revision = session.store.state.revision
     keyframes, cells = session.keyframes.current(), session.store.state.cells
     added = {int(frame): half for frame, half in by_frame(cells, "own").items()}
-    explain, skeleton = session.assistant.keyframes, session.limits.skeleton
-    explained = explain(added) if explain and keyframes else {}
-    bodies = session.assistant.bodies() if session.assistant.bodies and not keyframes else None
+    assistant, skeleton = session.assistant, session.limits.skeleton
+    loaded = bool(keyframes) and session.await_results()
+    explained = assistant.keyframes(added) if assistant.keyframes and loaded else {}
+    bodies = assistant.bodies() if assistant.bodies and not keyframes else None
+    shots = assistant.shots() if assistant.shots and loaded else []
     name = session.workspace.folder.resolve().name
     return {
         **describe_video(session.frames.video, name),
@@ -104,7 +114,7 @@ def describe_project(session: Session) -> Json:
         "bodies": None if bodies is None else [body["frame"] for body in bodies],
         "height_px": explained.get("height_px"),
         "boxes": explained.get("boxes"),
-        "shots": session.assistant.shots() if session.assistant.shots and keyframes else [],
+        "shots": shots,
         "golf": session.workspace.is_golf,
         "settings": describe_settings(Workspace(session.workspace.folder), session.frames.video),
         "run": describe_run(session.workspace, revision, session.motion_digest),
@@ -114,6 +124,7 @@ def describe_project(session: Session) -> Json:
             "motion": session.workspace.motion_file.is_file(),
             "report": session.workspace.report_file.is_file(),
             "assistant": bool(explained),
+            "loaded": loaded,
         },
     }
 

@@ -2,7 +2,7 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor, wait
-from threading import Barrier
+from threading import Barrier, Event
 from types import SimpleNamespace
 
 import numpy as np
@@ -131,3 +131,15 @@ def test_where_nobody_was_found_nothing_is_suggested(monkeypatch, cache):
     monkeypatch.setattr(project_cache, "choose_sources", lambda *_: MARKS)
     monkeypatch.setattr(cache, "preparation", lambda: preparation)
     assert cache.suggestion(MARKS, 9) is None
+
+
+def test_whoever_does_not_wait_for_the_stored_results_is_told_when_they_are_read(
+    cache, monkeypatch
+):
+    may_end, told = Event(), Event()
+    monkeypatch.setattr(cache, "preparation", may_end.wait)
+    assert not cache.is_ready(0.01, told.set)
+    assert not told.is_set()
+    may_end.set()
+    assert told.wait(60)
+    assert cache.is_ready(60.0, lambda: pytest.fail("told though it was waited for"))

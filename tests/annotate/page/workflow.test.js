@@ -106,8 +106,9 @@ test("a video of few frames has each in the strip once", () => {
 });
 
 test("without stored results the page says why it knows nothing of the body", () => {
-  const has = { keyframes: true, assistant: false };
+  const has = { keyframes: true, assistant: false, loaded: true };
   assert.match(workflow.whyNoAssistant({ has }), /stored results are missing/);
+  assert.match(workflow.whyNoAssistant({ has: { ...has, loaded: false } }), /are being read/);
   assert.equal(workflow.whyNoAssistant(PROJECT), null);
 });
 

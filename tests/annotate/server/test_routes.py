@@ -261,6 +261,26 @@ def test_what_stands_in_the_way_is_reported_once_and_when_it_is_gone(opened, fol
     assert [bool(news["trouble"]) for news in heard] == [True, False]
 
 
+def test_a_page_opens_before_the_stored_results_are_read_and_hears_of_them(opened, folder):
+    write_keyframes(folder, [10, 30], [30, 40])
+    when_read = []
+    assistant = Assistant(
+        ready=lambda _, then: bool(when_read or when_read.append(then)),
+        keyframes=lambda _: {"frames": {10: {"why": "Unlike the others."}}, "boxes": [None] * 50},
+    )
+    session = opened(assistant)
+    early = ask(session, "GET", "/api/project").json()
+    assert [row["frame"] for row in early["keyframes"]] == [10, 30, 40]
+    assert (early["boxes"], early["has"]["loaded"]) == (None, False)
+    news = []
+    session.events.publish = news.append
+    when_read[0]()
+    assert news == [{"project": True}]
+    late = ask(session, "GET", "/api/project").json()
+    assert late["keyframes"][0]["why"] == "Unlike the others."
+    assert late["has"]["loaded"]
+
+
 def test_whatever_another_program_makes_of_the_project_is_news(opened, folder):
     session = opened()
     watch = ProjectWatch(session)

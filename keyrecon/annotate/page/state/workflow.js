@@ -128,6 +128,7 @@ export function sidesOf(project) {
 // Where the server can say nothing of the body: why, and what helps; else null.
 export function whyNoAssistant({ has }) {
   if (!has.keyframes || has.assistant) return null;
+  if (!has.loaded) return "The stored results are being read.";
   return "The stored results are missing or of another version. Make the motion, and this works again.";
 }
 
