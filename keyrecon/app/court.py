@@ -50,7 +50,7 @@ def calibrate(
     `typed` options, by dotted names, count also where their value is the default.
     The project keeps the clicks, with those of former calls; `forget` names points (or "all") whose
     clicks are taken out first. New clicks that contradict the rest are not kept. Where no court is
-    found without clicks that were taken out, the camera that they told is set aside.
+    found without clicks that were taken out, the camera of before is set aside.
     """
     check_options(options.court, "--")
     options = workspace.options(options, CalibrationOptions(), COURT, typed)
@@ -114,8 +114,8 @@ def _set_aside_camera(workspace: Workspace) -> str:
     lines = outdated_report_lines(workspace, place_stored_motion(workspace))
     return " ".join(
         [
-            f" The camera found with clicks that were taken out was set aside as {copy.name}; "
-            "nothing is placed on the court by it any more.",
+            f" The camera that was found before was set aside as {copy.name}; nothing is placed on "
+            "the court by it any more.",
             *lines,
         ]
     )
