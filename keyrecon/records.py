@@ -49,6 +49,8 @@ class CameraPath:
 
 PLAYER = "the player"
 """What a usable shot shows."""
+PERHAPS = "perhaps the player"
+"""What a shot shows of which a person must tell whether it is usable."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,8 +49,9 @@ class Assistant:
     preview: Callable[[tuple[Pick, ...], tuple[int, ...]], Json] | None = None
     """Head and feet found on a few frames with these picks."""
     shots: Callable[[], list[Json]] | None = None
-    """Shots as {"number", "first", "last", "shows", "used", "wanted"}: what each shows, whether it
-    is used now, and in the next run; none where there is but one."""
+    """Shots as {"number", "first", "last", "shows", "unsure", "used", "wanted"}: what each shows,
+    whether a person must tell, whether it is used now, and in the next run; none where there is but
+    one."""
     choose_shot: Callable[[int, bool], list[Json]] | None = None
     """Keeps by its number whether a shot is used in the next run; the shots anew."""
     court: Callable[[], Json] | None = None

@@ -24,6 +24,7 @@ from keyrecon.numerics.runs import list_runs
 from keyrecon.pipeline import Options, frames_off_marks, prepare
 from keyrecon.progress import Progress
 from keyrecon.records import (
+    PERHAPS,
     Annotations,
     CameraPath,
     Pick,
@@ -265,7 +266,25 @@ def describe_shots(shots: Shots) -> list[str]:
     return [
         f"{len(listed)} shots, {sum(shots.usable)} usable (frames): {listing}. "
         "Nothing is made of the others; where this is wrong, say so with --shots.use or "
-        "--shots.skip and their numbers, or mark the player there."
+        "--shots.skip and their numbers, or mark the player there.",
+        *_describe_unsure(shots),
+    ]
+
+
+def _describe_unsure(shots: Shots) -> list[str]:
+    """Which shots a person must tell of."""
+    unsure = [
+        f"{number} ({part.start}-{part.stop - 1})"
+        for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
+        if shown == PERHAPS
+    ]
+    if not unsure:
+        return []
+    more = f" and {len(unsure) - MOST_LISTED} more" if len(unsure) > MOST_LISTED else ""
+    which = f"shot{'s' if len(unsure) > 1 else ''} {', '.join(unsure[:MOST_LISTED])}{more}"
+    return [
+        f"Perhaps the player, or somebody dressed alike: {which}. Look, and if it is the player, "
+        "say so with --shots.use or by a click in the strip of shots on the page."
     ]
 
 

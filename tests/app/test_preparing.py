@@ -21,6 +21,7 @@ from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
 from keyrecon.progress import silent
 from keyrecon.records import (
+    PERHAPS,
     PLAYER,
     Annotations,
     CameraPath,
@@ -43,6 +44,14 @@ def test_every_shot_is_told_with_its_frames_and_what_it_shows():
 
 def test_a_video_of_one_shot_tells_nothing():
     assert describe_shots(Shots.between((), 100)) == []
+
+
+def test_shots_that_a_person_must_tell_of_are_named():
+    shows = (PLAYER, PERHAPS, "black", *(PERHAPS,) * 12)
+    shots = Shots(tuple(range(0, 150, 10)), 150, shows)
+    _, asked = describe_shots(shots)
+    assert asked.startswith("Perhaps the player, or somebody dressed alike: shots 2 (10-19), 4 (")
+    assert "14 (130-139) and 1 more. Look" in asked
 
 
 FRAMES = np.arange(0, 200, 4)

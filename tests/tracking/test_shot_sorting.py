@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from keyrecon.errors import KeyreconError
-from keyrecon.records import PLAYER, Shots, Track
+from keyrecon.records import PERHAPS, PLAYER, Shots, Track
 from keyrecon.tracking.shot_sorting import CELLS, PlayerDetection, ShotOptions, sort_shots
 
 FPS = 50.0
@@ -39,6 +39,13 @@ def sort(detections, length=100, told=(0,), **options):
 
 def test_a_shot_like_the_marked_one_shows_the_player_and_another_somebody_else(player, somebody):
     assert sort([seen(player), seen(somebody), seen(player)]) == (PLAYER, "somebody else", PLAYER)
+
+
+def test_of_a_shot_that_is_a_little_like_the_marked_one_a_person_must_tell(player, somebody):
+    mixed = seen(0.5 * player + 0.5 * somebody)
+    assert sort([seen(player), mixed]) == (PLAYER, PERHAPS)
+    assert sort([seen(player), mixed], use="2") == (PLAYER, PLAYER)
+    assert sort([seen(player), mixed], alike=0.4) == (PLAYER, PLAYER)
 
 
 def test_black_slow_motion_and_an_empty_scene_are_told_apart(player):

@@ -8,7 +8,7 @@ from keyrecon.annotate.assist.project_cache import ProjectCache
 from keyrecon.annotate.assistant import Json
 from keyrecon.errors import KeyreconError
 from keyrecon.io.workspace import Workspace
-from keyrecon.records import Shots
+from keyrecon.records import PERHAPS, Shots
 
 
 def project_shots(cache: ProjectCache, workspace: Workspace) -> list[Json]:
@@ -29,6 +29,7 @@ def list_shots(shots: Shots, workspace: Workspace) -> list[Json]:
             "first": part.start,
             "last": part.stop - 1,
             "shows": shown,
+            "unsure": shown == PERHAPS,
             "used": used,
             "wanted": number in choices.use or (used and number not in choices.skip),
         }

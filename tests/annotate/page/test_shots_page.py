@@ -12,7 +12,7 @@ from keyrecon.app.preparing import with_chosen_shots
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.workspace import Workspace
 from keyrecon.pipeline import Options
-from keyrecon.records import PLAYER, Shots
+from keyrecon.records import PERHAPS, PLAYER, Shots
 
 pytestmark = pytest.mark.skipif(
     not BROWSER.exists(), reason=f"THE PAGE IS NOT TESTED: there is no browser at {BROWSER}"
@@ -98,6 +98,27 @@ def test_a_second_click_takes_the_first_back_though_that_is_not_kept_yet(chromiu
         person.await_saved()
         assert pressed(person) == ["true", "false", "false"]
     assert Workspace(folder).shot_choices() == ShotChoices(skip=(3,))
+
+
+def test_the_strip_asks_of_a_shot_whether_it_is_the_player_until_a_click_tells(chromium, folder):
+    workspace = Workspace(folder)
+    shots = Shots((0, 40, 60), FRAMES, (PLAYER, PERHAPS, "somebody else"))
+
+    def say(number, used):
+        workspace.choose_shot(number, used)
+        return list_shots(shots, workspace)
+
+    with serving(
+        folder, Assistant(shots=partial(list_shots, shots, workspace), choose_shot=say)
+    ) as server:
+        person = open_page(chromium, server)
+        assert [row[-1] for row in words(person)] == ["used", PERHAPS, "somebody else"]
+        person.await_text("#shots-note", "Is this the player\\? Click it if so: shot 2")
+        assert person.page.locator(".shot.unsure").count() == 1
+        person.page.click(".shot.unsure")
+        person.await_text("#shots-note", "Choose the keyframes again")
+        person.await_saved()
+    assert workspace.shot_choices() == ShotChoices(use=(2,))
 
 
 def test_a_video_of_one_shot_has_no_strip(chromium, folder):

@@ -1,9 +1,10 @@
 // The shots of a video as a strip of pictures: a click says whether one shows the player. It is kept, and
 // known when the keyframes are chosen next.
 import * as api from "../state/api.js";
-import { byId, make, setText } from "./dom.js";
+import { byId, make, setText, toggle } from "./dom.js";
 
 const WIDTH = 160; // of a picture, px
+const MOST_NAMED = 8;
 
 export function createShots(model, { address, show, isBusy }) {
   const strip = byId("shots");
@@ -33,6 +34,7 @@ export function createShots(model, { address, show, isBusy }) {
     const words = `${shot.number} · ${shot.first}-${shot.last}`;
     const button = make("button", { className: "shot" }, picture, make("b", {}, words), make("small", {}, saying(shot)));
     button.setAttribute("aria-pressed", shot.wanted);
+    toggle(button, "unsure", shot.unsure);
     button.title = shot.wanted ? "Leave this shot out" : "Use this shot";
     button.addEventListener("click", () => {
       show(middle);
@@ -53,13 +55,15 @@ export function createShots(model, { address, show, isBusy }) {
     if (strip.dataset.content === content) return;
     strip.dataset.content = content;
     strip.replaceChildren(...shots.map(tile));
-    const changed = shots.some(({ used, wanted }) => used !== wanted);
-    setText(
-      byId("shots-note"),
-      changed
-        ? "Choose the keyframes again, and they know this."
-        : "Click a shot that shows the player and is not used, or one that is used and does not.",
-    );
+    setText(byId("shots-note"), note(shots));
+  }
+
+  function note(shots) {
+    if (shots.some(({ used, wanted }) => used !== wanted)) return "Choose the keyframes again, and they know this.";
+    const unsure = shots.filter((shot) => shot.unsure).map(({ number }) => number);
+    if (unsure.length)
+      return `Is this the player? Click it if so: shot ${unsure.slice(0, MOST_NAMED).join(", ")}${unsure.length > MOST_NAMED ? " ..." : ""}.`;
+    return "Click a shot that shows the player and is not used, or one that is used and does not.";
   }
 
   return { draw };
