@@ -129,12 +129,13 @@ ROBUST_FOREGROUND, ROBUST_SILHOUETTE, ROBUST_MATCH = 0.06, 0.039, 0.0096
 """Residuals beyond which a line of sight (m: the radius of a thigh), a limb off the mask (player
 heights) and a match (player heights: the accuracy of Lucas-Kanade on cloth) count less. Chosen on
 rendered swings (12 and 3 px of 310); see benchmarks/golf.py."""
-UNFOLLOWED = 0.1
+UNFOLLOWED = 0.05
 """Metres by which a swing of the model misses marked joints, before the body may depart from it: of
-the joints that fits of five real swings have worst, .05 to .17. Were they due within `MODEL_ERROR`,
-elbows and wrists that no capture has would be met by another time, and by other proportions
-(`proportions`): with four corrected frames joints of the five within a fifth of the trunk were .95,
-.93, .98, .95 and .97 so, and are .96, .94, .99, .96 and .99."""
+the joints that fits of real swings have worst, .05 to .17. Were they due within `MODEL_ERROR`,
+elbows and wrists that no capture has would be met by another time, and by other proportions.
+Chosen on four corrected frames: eight real swings have joints off by .0642 trunk lengths with .05
+and .0648 with .1 (with .03 one loses 3 % of its joints), seven rendered ones 35.9 and 36.6 mm, and
+tops .6 and 1.1 frames off (35.4 and .7 with .03)."""
 HELD = 100.0
 """Standard deviations beyond which a mark counts less where the fit follows the picture: no mark is
 an outlier, however far the model was from it."""
