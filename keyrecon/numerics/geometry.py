@@ -40,10 +40,10 @@ def unit_vectors(
 
 
 def signed_angles(
-    first: Float[np.ndarray, "*n 2"], second: Float[np.ndarray, "*n 2"]
-) -> Float[np.ndarray, "*n"]:
+    first: Float[np.ndarray, "n 2"], second: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n"]:
     """Radians by which vectors are turned into others, from x to y, -pi to pi."""
-    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     return np.arctan2(cross, (first * second).sum(axis=-1))
 
 

@@ -27,4 +27,4 @@ def test_a_vector_is_turned_from_x_to_y_by_a_positive_angle_and_never_by_more_th
     x_axis = np.tile([2.0, 0.0], (len(degrees), 1))
     turned = 5 * np.column_stack([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
     np.testing.assert_allclose(np.degrees(signed_angles(x_axis, turned)), degrees, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(signed_angles(turned[4], turned[5])), 2.0)
+    np.testing.assert_allclose(np.degrees(signed_angles(turned[4:5], turned[5:])), 2.0)
