@@ -255,10 +255,8 @@ def describe_shots(shots: Shots) -> list[str]:
     """How many shots there are, which of them show the player, and what the others show."""
     if len(shots.parts) == 1:
         return []
-    listed = [
-        f"{number} ({part.start}-{part.stop - 1}) {shown}"
-        for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
-    ]
+    named = _named_shots(shots)
+    listed = [f"{name} {shown}" for name, shown in zip(named, shots.shows, strict=True)]
     more = f"; and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
     listing = f"{'; '.join(listed[:MOST_LISTED])}{more}"
     if all(shots.usable):
@@ -271,13 +269,16 @@ def describe_shots(shots: Shots) -> list[str]:
     ]
 
 
+def _named_shots(shots: Shots) -> list[str]:
+    """Number and frames of each."""
+    parts = enumerate(shots.parts, 1)
+    return [f"{number} ({part.start}-{part.stop - 1})" for number, part in parts]
+
+
 def _describe_unsure(shots: Shots) -> list[str]:
     """Which shots a person must tell of."""
-    unsure = [
-        f"{number} ({part.start}-{part.stop - 1})"
-        for number, (part, shown) in enumerate(zip(shots.parts, shots.shows, strict=True), 1)
-        if shown == PERHAPS
-    ]
+    named = zip(_named_shots(shots), shots.shows, strict=True)
+    unsure = [name for name, shown in named if shown == PERHAPS]
     if not unsure:
         return []
     more = f" and {len(unsure) - MOST_LISTED} more" if len(unsure) > MOST_LISTED else ""
