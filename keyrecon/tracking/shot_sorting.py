@@ -201,10 +201,13 @@ def _who(likeness: float, options: ShotOptions) -> str:
 def likeness_to_told(
     detections: Sequence[PlayerDetection], picked: Bool[np.ndarray, "S"]
 ) -> Float[np.ndarray, "S"]:
-    """Of each shot with those that a person told of, relative to what these have themselves."""
+    """Of each shot with those that a person told of, relative to what these have themselves.
+
+    `UNLIKE` where nobody was found in those: whether it is the player, a person must tell.
+    """
     known = [s.layout for s, tell in zip(detections, picked, strict=True) if tell and len(s.layout)]
     if not known:
-        return np.ones(len(detections))
+        return np.full(len(detections), UNLIKE if picked.any() else 1.0)
     usual = np.concatenate(known)
     expected = _centred(np.median(usual, axis=0)[None])[0]
     reference = float(np.median(_centred(usual) @ expected))

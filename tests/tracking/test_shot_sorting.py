@@ -83,6 +83,13 @@ def test_a_video_without_the_player_is_refused(player):
         sort([seen(player, found=False), seen(player, found=False)])
 
 
+def test_whoever_is_found_is_not_the_player_where_the_marked_shot_does_not_tell(player, somebody):
+    lost = seen(player, found=False)
+    with pytest.raises(KeyreconError, match="No shot"):
+        sort([lost, seen(somebody)])
+    assert sort([lost, seen(somebody), seen(player)], use="3") == ("nobody found", PERHAPS, PLAYER)
+
+
 def test_a_dissolve_is_no_shot_of_the_player(player):
     shots = Shots.between((100, 140), 300)
     detections = [seen(player), seen(player), seen(player)]
