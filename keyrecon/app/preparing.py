@@ -318,7 +318,7 @@ def prepare_project(
     if track_marks is None and marks is not None and not workspace.picks_file.is_file():
         track_marks = marks
     prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
-    if marks is not None and len(frames_off_marks(prepared.preparation, marks)):
+    if marks is not None and _teach_more(marks, track_marks, prepared.preparation):
         track_marks = marks
         prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
     if track_marks is not None:
@@ -326,6 +326,17 @@ def prepare_project(
         write_durably(file, coco_text(track_marks, size).encode())
     write_picks(workspace.prepared_picks_file, prepared.prepared_picks)
     return _with_marks_and_picks(workspace, prepared, marks)
+
+
+def _teach_more(marks: Annotations, known: Annotations | None, made: Preparation) -> bool:
+    """Whether marks disagree with the track, or are in a shot that is left out without the track
+    having been made with them: they tell that it shows the player."""
+    if len(frames_off_marks(made, marks)):
+        return True
+    new = anchors_from_bodies(marks).frames
+    if known is not None:
+        new = np.setdiff1d(new, anchors_from_bodies(known).frames)
+    return bool(np.setdiff1d(new, made.shots.usable_frames).size)
 
 
 def _marks_of_last_preparation(

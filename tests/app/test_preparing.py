@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from page_project import write_numbered_video
 
 from keyrecon.annotate.assist import project_cache
@@ -151,7 +152,10 @@ def standing_bodies(places):
     return Annotations(LSP14, np.array([*places]), joints, seen, sides_of_bones)
 
 
-def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypatch):
+@pytest.fixture
+def following(tmp_path, monkeypatch):
+    """(prepare, used): prepares a project with bodies, `used` lists those that the track is made
+    with; `shots` are what the automatic part tells of the video."""
     project.start(write_numbered_video(tmp_path / "v.mp4"), tmp_path / "p")
     workspace, used = Workspace(tmp_path / "p"), []
     workspace.prepared_marks_file.parent.mkdir()
@@ -166,8 +170,9 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypa
         anchors = anchors_from_bodies(bodies)
         even = np.ones(len(video))
         track = Track(anchors.head, anchors.feet, 120 * even, np.zeros((len(video), 4)), even)
-        made = object.__new__(Preparation)  # nothing but its track is looked at
+        made = object.__new__(Preparation)  # nothing but its track and its shots is looked at
         object.__setattr__(made, "track", track)
+        object.__setattr__(made, "shots", prepare_with.shots)
         return preparing.ProjectPreparation(made)
 
     monkeypatch.setattr(preparing, "_without_outlier_picks", follow)
@@ -177,10 +182,26 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(tmp_path, monkeypa
         made = preparing.prepare_project(workspace, video, marks, Options(), silent)
         return made.preparation.track.head[6, 0]
 
+    prepare_with.shots = Shots.between((), len(video))
+    return prepare_with, used
+
+
+def test_a_mark_that_was_taken_back_teaches_the_track_no_more(following):
+    prepare_with, used = following
     assert prepare_with({2: 50, 6: 120, 9: 60}) == 120  # somebody else was marked in frame 6
     assert abs(prepare_with({2: 50, 9: 60}) - 55) < 5
     prepare_with({2: 50, 5: 54, 9: 60})
     assert used == [[2, 6, 9], [2, 9], [2, 9]]  # what is added in place changes nothing
+
+
+def test_a_mark_in_a_shot_that_is_left_out_is_told_to_the_track_once(following):
+    prepare_with, used = following
+    prepare_with({2: 50, 9: 50})
+    n_frames = prepare_with.shots.n_frames
+    prepare_with.shots = Shots((0, 5), n_frames, (PLAYER, "somebody else"))
+    prepare_with({2: 50, 7: 50, 9: 50})  # where the track would go on to anyway
+    prepare_with({2: 50, 3: 50, 7: 50, 9: 50})
+    assert used == [[2, 9], [2, 9], [2, 7, 9], [2, 7, 9]]
 
 
 def test_the_page_recalls_the_track_that_was_made_without_the_outlying_clicks(
