@@ -396,7 +396,7 @@ def as_printed(options: Options = Options()) -> Options:
     """The forms that the paper prints, for every stage that has another default."""
     return replace(
         options,
-        find=replace(options.find, pace=EVERY_FRAME, other_trunk=1.0),
+        find=replace(options.find, pace=EVERY_FRAME, other_trunk=1.0, doubtful=0.0),
         compare=replace(options.compare, largest="observed"),
         track=replace(options.track, method="paper"),
         keyframes=replace(options.keyframes, method="paper"),

@@ -53,16 +53,17 @@ class Evidence:
     """The same of the trunk alone, where somebody told what it looks like."""
 
 
-def model_scene_by_colour(
+def suppose_scenes(
     pictures: Reader,
     numbers: Int[np.ndarray, "n"],
     camera: CameraPath,
     shrink: float,
     player: Float[np.ndarray, "bins"],
-) -> ForegroundModel:
-    """A background before the player is tracked: the median of what does not have their colours.
+) -> tuple[ForegroundModel, ...]:
+    """Backgrounds before the player is tracked: the median of what does not have their colours.
 
-    Where everything has, the background does, and the median of all it is. `pictures` gives the
+    Where everything has, the background does, and the median of all it is; or a player stands still
+    there, and it is unknown. That is the second, where there is such a place. `pictures` gives the
     frames with some of the `numbers`, reduced by `shrink`.
     """
     sampled = numbers[sample_frames(len(numbers), BackgroundOptions.samples)]
@@ -77,7 +78,9 @@ def model_scene_by_colour(
     clear = median_background(lab, free, paths, shrink, min_share=MIN_CLEAR_SHARE, overlay=overlay)
     anywhere = [np.ones_like(f) for f in free]
     plain = median_background(lab, anywhere, paths, shrink, overlay=overlay)
-    return ForegroundModel(complete_background(clear, plain), camera)
+    supposed = complete_background(clear, plain)
+    scenes = (supposed,) if (clear.known == supposed.known).all() else (supposed, clear)
+    return tuple(ForegroundModel(scene, camera) for scene in scenes)
 
 
 def evaluate_evidence(

@@ -53,6 +53,7 @@ def test_printed_key_poses_are_slerped_whatever_prior_a_project_has():
 
 def test_the_printed_tracker_does_not_ask_what_is_beneath_a_head():
     assert PRINTED.find.other_trunk == 1
+    assert PRINTED.find.doubtful == 0
 
 
 @pytest.mark.parametrize("verb", ["keyframes", "run"])
