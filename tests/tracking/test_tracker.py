@@ -23,7 +23,7 @@ from keyrecon.segmentation.color_model import learn_colors, to_lab
 from keyrecon.segmentation.contours import find_edges
 from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.tracking.camera_motion import estimate_camera_motion
-from keyrecon.tracking.detection import find_player
+from keyrecon.tracking.detection import FindOptions, find_player
 from keyrecon.tracking.scale import standing_height, zoom
 from keyrecon.tracking.tracker import TrackOptions, track_player
 
@@ -76,6 +76,21 @@ def test_neither_a_racket_like_a_shoe_nor_a_lifted_foot_misleads(tmp_path):
     for foot in (left, right):
         off = np.linalg.norm(track.feet - foot[:, None], axis=2).min(axis=1)
         assert (off < 0.1 * HEIGHT).mean() > 0.97
+
+
+def test_a_player_who_never_leaves_his_place_is_not_taken_for_the_scene(tmp_path):
+    x, y = heads(1)[0] - corners(1, False)[0]
+    picture = scene()[30 : 30 + SIZE[0], 80 : 80 + SIZE[1]]
+    draw_player(picture, x, y)
+    write_video(tmp_path / "still.mp4", (picture for _ in range(COUNT)), 30.0, crf=18)
+    video = open_video(tmp_path / "still.mp4")
+    camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
+    colors = learn_colors(video, picks(1))
+    with pytest.raises(KeyreconError, match="found in only 0 of"):
+        find_player(video, colors, camera, NO_MARKS, FindOptions(doubtful=0.0))
+    track = find_player(video, colors, camera, NO_MARKS)
+    assert np.linalg.norm(track.head - (x, y), axis=1).max() < 0.05 * HEIGHT
+    assert np.linalg.norm(track.mid_feet - (x, y + HEIGHT), axis=1).max() < 0.06 * HEIGHT
 
 
 def test_the_printed_form_keeps_the_path_through_colour_and_symmetry(found):
