@@ -66,7 +66,7 @@ class ShotOptions:
 
     No stroke is that short.
     """
-    alike: Annotated[float, within(0, 1)] = 0.75
+    alike: Annotated[float, within(0, 1)] = 0.8
     """How alike the colours must be for a shot to show the player, from 0 to 1; lower it where
     shots are left out that show the player.
 
