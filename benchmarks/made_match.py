@@ -88,7 +88,7 @@ def made_match(folder: Path, other: Path, length: int, starts: tuple[int, int]) 
     point = [Piece(PLAYER, length, folder / "video.mp4", first) for first in starts]
     return [
         point[0],
-        Piece("close-up", 60, folder / "video.mp4", starts[0] + 40, (0.5, 0.35)),
+        Piece("close-up", 60, folder / "video.mp4", starts[0] + 40, focus=(0.5, 0.35)),
         Piece("black", 25),
         Piece("replay", 90, folder / "video.mp4", starts[0] + length // 2),
         Piece("other", 60, other / "video.mp4", 100),
