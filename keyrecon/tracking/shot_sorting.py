@@ -50,8 +50,8 @@ CELLS = 12, 8
 above."""
 UNLIKE = 0.4
 """Likeness below which a shot shows somebody or something else. Evidence: of 306 shots of other
-people 280 have at most .39 or nobody is found, 26 .40 to .75; of 36 of the player one has .13, behind
-a caption."""
+people 280 have at most .39 or nobody is found, 26 .40 to .75; of 36 of the player one has .13,
+behind a caption."""
 MORE_REPEATED = 0.25
 """Share of repeated frames beyond that of the shots with clicks or marks from which a shot is slow
 motion: half speed repeats every second picture. Half of that; evidence: above."""
