@@ -53,7 +53,7 @@ class Evidence:
     """The same of the trunk alone, where somebody told what it looks like."""
 
 
-def suppose_scenes(
+def background_hypotheses(
     pictures: Reader,
     numbers: Int[np.ndarray, "n"],
     camera: CameraPath,

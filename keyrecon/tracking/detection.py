@@ -36,7 +36,7 @@ from keyrecon.records import CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.background_model import BackgroundOptions, reduced_width
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
 from keyrecon.segmentation.foreground_model import ForegroundModel
-from keyrecon.segmentation.part_evidence import Reader, evaluate_evidence, suppose_scenes
+from keyrecon.segmentation.part_evidence import Reader, background_hypotheses, evaluate_evidence
 from keyrecon.tracking.anchors import anchored_states, marked_places, with_bridge_costs
 from keyrecon.tracking.candidates import PartCandidates, search_frame
 from keyrecon.tracking.foot_pairs import (
@@ -140,7 +140,7 @@ def find_player(
     paced = np.append(np.arange(0, len(video), every), len(video) - 1)
     numbers = np.unique(np.concatenate([paced, anchors.frames[anchors.marked]]))
     pictures = _read_pictures(video, width, numbers, progress)
-    scenes = suppose_scenes(pictures, numbers, camera, shrink, parts.max(axis=0))
+    backgrounds = background_hypotheses(pictures, numbers, camera, shrink, parts.max(axis=0))
     named = [parts[colors.names.index(name)] for name in ("head", "trunk") if name in colors.names]
     rows = [named[0], foot_table(colors), parts.max(axis=0), *named[1:]]
     tables = np.stack(rows).astype(np.float32)
@@ -150,25 +150,25 @@ def find_player(
         candidates = _search(shown, numbers, scene, tables, colors.height * shrink, shrink)
         return _link(candidates, numbers, video, camera, colors.height, anchors, options)
 
-    return _surest(scenes, detect, options.doubtful)
+    return surest_track(backgrounds, detect, options.doubtful)
 
 
-def _surest(
-    scenes: Sequence[ForegroundModel],
+def surest_track(
+    backgrounds: Sequence[ForegroundModel],
     detect: Callable[[ForegroundModel], tuple[Track, float]],
     doubtful: float,
 ) -> Track:
-    """The track before one of the scenes whose places, where some were found, are the surest.
+    """The track before one of the backgrounds whose places, where some were found, are the surest.
 
-    No further one is made after one whose feet are not `doubtful`. Raises KeyreconError, that of
-    the first scene, where no track is found.
+    `detect` gives a track and the confidence of its feet; no further one is made after one whose
+    feet are not `doubtful`. Raises KeyreconError, that of the first, where no track is found.
     """
     made: list[Track] = []
     missed: list[KeyreconError] = []
-    for scene in scenes:
+    for background in backgrounds:
         feet = 0.0
         try:
-            track, feet = detect(scene)
+            track, feet = detect(background)
             made.append(track)
         except KeyreconError as error:
             missed.append(error)
