@@ -161,6 +161,13 @@ class TrackAnchors:
     bones, px; NaN where too little is marked."""
     footless: Bool[np.ndarray, "A"]
     """Where hips or knees are marked and no foot is."""
+    followed_head: Float[np.ndarray, "A 2"]
+    """Where flow from the marks leads to, px, however sure it is; NaN where it says nothing or
+    the head is fixed."""
+    drift: Float[np.ndarray, "A"]
+    """Of the followed head, player heights (see `FlowTracks`)."""
+    likeness: Float[np.ndarray, "A"]
+    """Of the followed head with the mark."""
 
     @classmethod
     def none(cls) -> "TrackAnchors":
@@ -172,6 +179,9 @@ class TrackAnchors:
             np.zeros(0, dtype=bool),
             np.zeros(0),
             np.zeros(0, dtype=bool),
+            np.zeros((0, 2)),
+            np.zeros(0),
+            np.zeros(0),
         )
 
 
@@ -386,6 +396,12 @@ class FlowTracks:
     """0-1: how well the ways from both marks agree, and the place with what was marked."""
     joined: Bool[np.ndarray, "T J"]
     """Whether there is a way from a mark before and one from a mark after."""
+    drift: Float[np.ndarray, "T J"]
+    """How far apart both ways end, or, where there is one, how far its steps did not lead back in
+    sum, player heights; NaN where nothing was followed."""
+    likeness: Float[np.ndarray, "T J"]
+    """Correlation of the picture there with that around the mark, the better one of two; NaN where
+    nothing was followed."""
 
 
 SOURCES = ("annotated", "propagated", "interpolated", "refined")

@@ -82,6 +82,9 @@ def part_of_anchors(anchors: TrackAnchors, part: slice) -> TrackAnchors:
         anchors.marked[inside],
         anchors.height[inside],
         anchors.footless[inside],
+        anchors.followed_head[inside],
+        anchors.drift[inside],
+        anchors.likeness[inside],
     )
 
 

@@ -24,6 +24,11 @@ LEG_JOINTS = ("right_knee", "left_knee", "right_ankle", "left_ankle")
 SURE_FLOW = 0.7
 """Confidence from which joints followed by flow count as fixed points of the track. A quarter more
 or less, others with it: at most 0.6 points on two clips."""
+SURE_DRIFT, SURE_LIKENESS = 0.02, 0.4
+"""Drift below which, player heights, and likeness from which they do too: one step that a turned
+head has changed its looks by does not make all that follow doubtful. Evidence: one way from one or
+four marked bodies of 18 real clips: necks and tops of heads are .12 off in 1 of 1706, ankles in 1
+of 1543; with less likeness heads in 14 of 100."""
 ALONG_TRUNK = 0.2, 0.45, 0.7
 """From neck to hips: the shirt, and not its collar or the belt. A quarter more or less, others with
 it: at most 0.6 points on two clips."""
@@ -61,8 +66,7 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
     marked = _anchors(names, annotations.frames, annotations.joints, marked=True)
     if flow is None:
         return marked
-    sure = np.where(flow.confidence[..., None] > SURE_FLOW, flow.joints, np.nan)
-    between = _anchors(names, np.arange(len(sure)), sure, marked=False)
+    between = _followed(names, flow)
     new = ~np.isin(between.frames, marked.frames)
     order = np.argsort(np.concatenate([marked.frames, between.frames[new]]), kind="stable")
     return TrackAnchors(
@@ -70,6 +74,30 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
             np.concatenate([getattr(marked, f.name), getattr(between, f.name)[new]])[order]
             for f in fields(TrackAnchors)
         )
+    )
+
+
+def _followed(names: tuple[str, ...], flow: FlowTracks) -> TrackAnchors:
+    """Anchors where flow is sure, and where it leads the head elsewhere."""
+    frames = np.arange(len(flow.joints))
+    # comparisons with NaN are false: where nothing is followed nothing is sure
+    alike = (flow.drift < SURE_DRIFT) & (flow.likeness >= SURE_LIKENESS)
+    sure = (flow.confidence > SURE_FLOW) | alike
+    fixed = _anchors(names, frames, np.where(sure[..., None], flow.joints, np.nan), marked=False)
+    every = _anchors(names, frames, flow.joints, marked=False)
+    ends = [names.index("neck"), names.index("head_top")]
+    drift, likeness = flow.drift[:, ends].max(axis=1), flow.likeness[:, ends].min(axis=1)
+    row = np.searchsorted(every.frames, fixed.frames)
+    head, feet = np.full_like(every.head, np.nan), np.full_like(every.feet, np.nan)
+    head[row], feet[row] = fixed.head, fixed.feet
+    led = np.where(np.isfinite(head), np.nan, every.head)
+    return replace(
+        every,
+        head=head,
+        feet=feet,
+        followed_head=led,
+        drift=drift[every.frames],
+        likeness=likeness[every.frames],
     )
 
 
@@ -110,6 +138,9 @@ def _anchors(
         np.full(int(useful.sum()), marked),
         np.full(int(useful.sum()), np.nan),
         (marked & of_legs & ~of_feet)[useful],
+        np.full((int(useful.sum()), 2), np.nan),
+        np.full(int(useful.sum()), np.nan),
+        np.full(int(useful.sum()), np.nan),
     )
 
 

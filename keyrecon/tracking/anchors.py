@@ -25,6 +25,19 @@ clips."""
 MAX_BRIDGE_COST = 8.0
 """Largest cost of a place far from the way between two marks: that of a jump; a frame without any
 place costs half as much."""
+FOLLOWED_COST = 1.5
+"""Cost of a head that is not detected, but where flow leads from a mark: that of a propagated
+foot."""
+EVEN_DRIFT = 0.3
+"""Drift at which flow has a head as often as not, player heights. Evidence: necks and tops of heads
+of 18 real clips with one or four marked bodies that have a likeness of .4 or more: .12 off in none
+of 141 with a drift of .02 to .05, in 6 of 107 up to .15, in half of those beyond."""
+LIKE_THE_MARK = 0.2, 0.5
+"""Likeness up to which flow has anything and from which it counts in full. Evidence: of the same
+with a drift up to .05 17 of 100 are off with a likeness of .2 to .4, 27 with less."""
+FOLLOWED_SPREAD = 0.05
+"""Standard deviation of a head that flow has, player heights: half a head is .065. The same heads
+are .035 off in the median with a drift of .03 to .15."""
 DOUBT_SECONDS = 0.3
 """Doubt is averaged over this time: one frame of blur needs no mark. It decides only which body is
 asked for next."""
@@ -86,6 +99,50 @@ def with_bridge_costs(
         )
         for state, cost, place, deviation in pairs
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedHeads:
+    """Where flow from marks leads a head that is not fixed, and how sure that is."""
+
+    places: Float[np.ndarray, "n 2"]
+    """In the reference frame; NaN where it leads nowhere."""
+    doubt: Float[np.ndarray, "n"]
+    """Probability that the head is elsewhere."""
+    spread: float
+    """Standard deviation of the others, px."""
+
+    @classmethod
+    def of(
+        cls, anchors: TrackAnchors, numbers: Int[np.ndarray, "n"], camera: CameraPath, height: float
+    ) -> "FollowedHeads":
+        """Those of some frames, of a player of some px."""
+        places, doubt = np.full((len(numbers), 2), np.nan), np.ones(len(numbers))
+        _, row, entry = np.intersect1d(numbers, anchors.frames, return_indices=True)
+        led = anchors.followed_head[entry]
+        places[row] = warp_points(camera.to_reference[numbers[row]], led)
+        alike = np.interp(anchors.likeness[entry], LIKE_THE_MARK, (0.0, 1.0))
+        doubt[row] = 1 - alike * EVEN_DRIFT / (anchors.drift[entry] + EVEN_DRIFT)
+        places[~(doubt < 1)] = np.nan
+        return cls(places, doubt, FOLLOWED_SPREAD * height)
+
+    def every(self, step: int) -> "FollowedHeads":
+        """Each `step`-th of the frames."""
+        return FollowedHeads(self.places[::step], self.doubt[::step], self.spread)
+
+    def with_costs(
+        self, states: Sequence[Float[np.ndarray, "_ 1 2"]], costs: Sequence[Float[np.ndarray, "_"]]
+    ) -> tuple[list[Float[np.ndarray, "_ 1 2"]], list[Float[np.ndarray, "_"]]]:
+        """States with where flow leads among them, and costs, more for those that lie elsewhere:
+        -log of the odds that flow is wrong, at most."""
+        more, dearer = list(states), list(costs)
+        for t in np.flatnonzero(np.isfinite(self.places).all(axis=1)).tolist():
+            away = np.square(states[t][:, 0] - self.places[t]).sum(axis=1) / (2 * self.spread**2)
+            doubt = max(float(self.doubt[t]), 1e-6)
+            elsewhere = -np.log(doubt + (1 - doubt) * np.exp(-away))
+            more[t] = np.concatenate([states[t], self.places[t][None, None]])
+            dearer[t] = np.append(costs[t] + elsewhere, FOLLOWED_COST)
+        return more, dearer
 
 
 def _bridges(

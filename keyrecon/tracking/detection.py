@@ -37,7 +37,12 @@ from keyrecon.segmentation.background_model import BackgroundOptions, reduced_wi
 from keyrecon.segmentation.color_model import foot_table, posterior_tables, to_lab
 from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.part_evidence import Reader, background_hypotheses, evaluate_evidence
-from keyrecon.tracking.anchors import anchored_states, marked_places, with_bridge_costs
+from keyrecon.tracking.anchors import (
+    FollowedHeads,
+    anchored_states,
+    marked_places,
+    with_bridge_costs,
+)
 from keyrecon.tracking.candidates import PartCandidates, search_frame
 from keyrecon.tracking.foot_pairs import (
     COLOR_PRIOR,
@@ -247,6 +252,9 @@ def _link(
     head_cost = head_costs(candidates, options.other_trunk)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
+    stable, head_cost = FollowedHeads.of(anchors, numbers, camera, height).with_costs(
+        stable, head_cost
+    )
     stable, head_cost = anchored_states(stable, head_cost, marked_head)
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)

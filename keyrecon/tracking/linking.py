@@ -16,7 +16,12 @@ from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath
 from keyrecon.segmentation.player_crops import Cropping
-from keyrecon.tracking.anchors import ANCHOR_FOOT_COST, anchored_states, with_bridge_costs
+from keyrecon.tracking.anchors import (
+    ANCHOR_FOOT_COST,
+    FollowedHeads,
+    anchored_states,
+    with_bridge_costs,
+)
 from keyrecon.tracking.candidates import MIN_FOOT_SEPARATION
 from keyrecon.tracking.foot_pairs import (
     FILTER_PRIOR,
@@ -105,16 +110,19 @@ def link_head(
     camera: CameraPath,
     cropping: Cropping,
     marked: Float[np.ndarray, "T 1 2"],
+    followed: FollowedHeads,
     model: TransitionModel,
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T"]]:
     """The head in the picture of every frame, and its confidence; `model`: how it moves, px.
 
-    `marked` heads, in the reference frame, are passed through; NaN where there is none.
+    `marked` heads, in the reference frame, are passed through; NaN where there is none. Those that
+    flow leads to are candidates.
     """
     places = [cropping.to_picture(detected.heads, t) for t, detected in enumerate(detections)]
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(detected.head_strength) for detected in detections]
     costs = with_bridge_costs(stable, costs, marked, model.sigma)
+    stable, costs = followed.with_costs(stable, costs)
     stable, costs = anchored_states(stable, costs, marked)
     chosen = find_cheapest_track(costs, stable, model)
     from_reference = np.linalg.inv(camera.to_reference)

@@ -97,7 +97,8 @@ def track_marked_joints(
     if _marked_height(marks) < LEAST_HEIGHT:
         shape = (len(video), len(marks.skeleton.names))
         unknown = np.full((*shape, 2), np.nan)
-        return FlowTracks(unknown, np.zeros(shape), np.zeros(shape, dtype=bool))
+        none, nothing = np.zeros(shape, dtype=bool), np.full(shape, np.nan)
+        return FlowTracks(unknown, np.zeros(shape), none, nothing, nothing)
     follower = _Follower.start(video, marks, options)
     pictures = progress(read_grey(video, follower.width), "Following marks", len(video))
     for t, picture in enumerate(pictures):
@@ -159,6 +160,8 @@ class _Follower:
     """Places followed forwards, and the marks."""
     joints: Float[np.ndarray, "T J 2"]
     confidence: Float[np.ndarray, "T J"]
+    drift: Float[np.ndarray, "T J"]
+    likeness: Float[np.ndarray, "T J"]
     doubt: Float[np.ndarray, "J"]
     """Forwards: by how much the steps since the mark have not led back, player heights."""
     alike: Float[np.ndarray, "J"]
@@ -186,6 +189,8 @@ class _Follower:
             ahead=places.copy(),
             joints=np.full((*shape, 2), np.nan),
             confidence=np.zeros(shape),
+            drift=np.full(shape, np.nan),
+            likeness=np.full(shape, np.nan),
             doubt=np.zeros(shape[1]),
             alike=np.ones(shape[1]),
             patches=np.zeros((shape[1], side, side)),
@@ -195,7 +200,8 @@ class _Follower:
     def tracks(self) -> FlowTracks:
         """What was followed, in pixels of the video."""
         joints = (self.joints + 0.5) / self.shrink - 0.5
-        return FlowTracks(joints, self.confidence, self.schedule.joined(np.s_[:]))
+        joined = self.schedule.joined(np.s_[:])
+        return FlowTracks(joints, self.confidence, joined, self.drift, self.likeness)
 
     def advance(self, t: int, picture: UInt8[np.ndarray, "h w"]) -> None:
         """Take the next picture: follow joints into it, and back from those marked in it."""
@@ -222,6 +228,7 @@ class _Follower:
             self.alike[lone] = np.minimum(
                 self.alike[lone], _ramp(alike, self.options.lone_likeness)
             )
+            self.drift[t, lone], self.likeness[t, lone] = self.doubt[lone], alike
             self._note(t, lone, places[alone], self._agreement(self.doubt[lone]) * self.alike[lone])
 
     def _follow_back(
@@ -249,6 +256,7 @@ class _Follower:
             either = np.maximum(alike, _correlations(here, self.patches[group]))
             least = np.minimum(least, _ramp(alike, self.options.lone_likeness))
             believed = np.where(joined, _ramp(either, self.options.likeness), least)
+            self.drift[t, group], self.likeness[t, group] = apart, np.where(joined, either, alike)
             self._note(t, group, middle, self._agreement(apart) * believed)
 
     def _step(

@@ -27,7 +27,7 @@ from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
 from keyrecon.timeline import part_of_path
-from keyrecon.tracking.anchors import marked_places
+from keyrecon.tracking.anchors import FollowedHeads, marked_places
 from keyrecon.tracking.correlation_filters import (
     Examples,
     Filters,
@@ -147,9 +147,11 @@ def track_player(
     cropping = Cropping.below_heads(rough, options.player)
     crops = cut_crops(video, cropping, ForegroundModel(background, camera), progress)
     evidence = SizeEvidence.of(camera, video, anchors)
-    head, feet = marked_places(anchors, np.arange(len(video)), camera)
+    numbers = np.arange(len(video))
+    head, feet = marked_places(anchors, numbers, camera)
+    followed = FollowedHeads.of(anchors, numbers, camera, float(np.median(rough.height)))
     frames = _CroppedFrames(
-        crops, cropping, options.player, rough, camera, evidence, head, feet, video.fps
+        crops, cropping, options.player, rough, camera, evidence, head, feet, followed, video.fps
     )
     channels = Channels.of(colors, cropping.size)
     marked = _marked_examples(frames, channels, anchors)
@@ -179,6 +181,8 @@ class _CroppedFrames:
     """Heads that a person marked, in the reference frame; else NaN."""
     marked_feet: Float[np.ndarray, "T 2 2"]
     """The same of both feet."""
+    followed: FollowedHeads
+    """Heads that flow leads to."""
     fps: float
 
     def every(self, step: int) -> "_CroppedFrames":
@@ -192,6 +196,7 @@ class _CroppedFrames:
             self.evidence.every(step),
             self.marked_head[::step],
             self.marked_feet[::step],
+            self.followed.every(step),
             self.fps / step,
         )
 
@@ -272,7 +277,9 @@ def _link(
     step = float(np.median(frames.rough.height)) / fps
     max_gap = round(MAX_GAP_SECONDS * fps)
     motion = TransitionModel(options.head_speed * step, max_gap)
-    head, head_confidence = link_head(detections, camera, cropping, frames.marked_head, motion)
+    head, head_confidence = link_head(
+        detections, camera, cropping, frames.marked_head, frames.followed, motion
+    )
     stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
     memory = round(MEMORY_SECONDS * fps)
     gait = FootMotionModel(options.foot_speed * step, max_gap, memory, occlusion_cost, stiffness)
