@@ -162,12 +162,10 @@ class TrackAnchors:
     footless: Bool[np.ndarray, "A"]
     """Where hips or knees are marked and no foot is."""
     followed_head: Float[np.ndarray, "A 2"]
-    """Where flow from the marks leads to, px, however sure it is; NaN where it says nothing or
+    """Where flow leads the head from marks, px, however sure it is; NaN where it says nothing or
     the head is fixed."""
-    drift: Float[np.ndarray, "A"]
-    """Of the followed head, player heights (see `FlowTracks`)."""
-    likeness: Float[np.ndarray, "A"]
-    """Of the followed head with the mark."""
+    head_doubt: Float[np.ndarray, "A"]
+    """Probability that the head is elsewhere than flow leads it; NaN where it leads nowhere."""
 
     @classmethod
     def none(cls) -> "TrackAnchors":
@@ -180,7 +178,6 @@ class TrackAnchors:
             np.zeros(0),
             np.zeros(0, dtype=bool),
             np.zeros((0, 2)),
-            np.zeros(0),
             np.zeros(0),
         )
 

@@ -75,17 +75,8 @@ def part_of_marks(marks: Annotations, frames: Int[np.ndarray, "n"]) -> Annotatio
 def part_of_anchors(anchors: TrackAnchors, part: slice) -> TrackAnchors:
     """Fixed points within a shot, whose frames count from 0."""
     inside = (anchors.frames >= part.start) & (anchors.frames < part.stop)
-    return TrackAnchors(
-        anchors.frames[inside] - part.start,
-        anchors.head[inside],
-        anchors.feet[inside],
-        anchors.marked[inside],
-        anchors.height[inside],
-        anchors.footless[inside],
-        anchors.followed_head[inside],
-        anchors.drift[inside],
-        anchors.likeness[inside],
-    )
+    own = TrackAnchors(*(getattr(anchors, field.name)[inside] for field in fields(anchors)))
+    return replace(own, frames=own.frames - part.start)
 
 
 def part_of_picks(picks: Sequence[Pick], part: slice) -> tuple[Pick, ...]:

@@ -28,13 +28,6 @@ place costs half as much."""
 FOLLOWED_COST = 1.5
 """Cost of a head that is not detected, but where flow leads from a mark: that of a propagated
 foot."""
-EVEN_DRIFT = 0.3
-"""Drift at which flow has a head as often as not, player heights. Evidence: necks and tops of heads
-of 18 real clips with one or four marked bodies that have a likeness of .4 or more: .12 off in none
-of 141 with a drift of .02 to .05, in 6 of 107 up to .15, in half of those beyond."""
-LIKE_THE_MARK = 0.2, 0.5
-"""Likeness up to which flow has anything and from which it counts in full. Evidence: of the same
-with a drift up to .05 17 of 100 are off with a likeness of .2 to .4, 27 with less."""
 FOLLOWED_SPREAD = 0.05
 """Standard deviation of a head that flow has, player heights: half a head is .065. The same heads
 are .035 off in the median with a drift of .03 to .15."""
@@ -108,7 +101,7 @@ class FollowedHeads:
     places: Float[np.ndarray, "n 2"]
     """In the reference frame; NaN where it leads nowhere."""
     doubt: Float[np.ndarray, "n"]
-    """Probability that the head is elsewhere."""
+    """Probability that the head is elsewhere; NaN where it leads nowhere."""
     spread: float
     """Standard deviation of the others, px."""
 
@@ -117,13 +110,10 @@ class FollowedHeads:
         cls, anchors: TrackAnchors, numbers: Int[np.ndarray, "n"], camera: CameraPath, height: float
     ) -> "FollowedHeads":
         """Those of some frames, of a player of some px."""
-        places, doubt = np.full((len(numbers), 2), np.nan), np.ones(len(numbers))
+        places, doubt = np.full((len(numbers), 2), np.nan), np.full(len(numbers), np.nan)
         _, row, entry = np.intersect1d(numbers, anchors.frames, return_indices=True)
-        led = anchors.followed_head[entry]
+        led, doubt[row] = anchors.followed_head[entry], anchors.head_doubt[entry]
         places[row] = warp_points(camera.to_reference[numbers[row]], led)
-        alike = np.interp(anchors.likeness[entry], LIKE_THE_MARK, (0.0, 1.0))
-        doubt[row] = 1 - alike * EVEN_DRIFT / (anchors.drift[entry] + EVEN_DRIFT)
-        places[~(doubt < 1)] = np.nan
         return cls(places, doubt, FOLLOWED_SPREAD * height)
 
     def every(self, step: int) -> "FollowedHeads":

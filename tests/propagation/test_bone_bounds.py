@@ -99,6 +99,7 @@ def test_flow_has_no_joint_where_a_bone_would_be_too_long():
     bounds = np.array([[np.inf, 0.25], [0.25, np.inf]])
     for away, expected in ((24.0, 24.0), (30.0, 20.0)):
         places = np.array([[[0.0, 0.0], [away, 0.0]]])
-        flow = FlowTracks(places, np.full((1, 2), 0.95), np.ones((1, 2), bool))
+        exact, both = np.zeros((1, 2)), np.ones((1, 2), bool)
+        flow = FlowTracks(places, 0.95 + exact, both, drift=exact, likeness=1 - exact)
         found = with_flow(tracks, flow, np.full(1, 100.0), bounds)
         assert np.linalg.norm(found.joints[0, 1]) == expected

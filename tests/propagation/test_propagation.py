@@ -164,7 +164,8 @@ def fused(edges, followed, joined=True, shift=40.0):
     """One joint at 0 by edges and elsewhere by flow, each with a confidence."""
     joints = np.zeros((1, 1, 2))
     tracks = JointTracks(joints, np.full((1, 1), edges), np.zeros((1, 1), dtype=np.int64))
-    flow = FlowTracks(joints + shift, np.full((1, 1), followed), np.full((1, 1), joined))
+    sure, ways, exact = np.full((1, 1), followed), np.full((1, 1), joined), np.zeros((1, 1))
+    flow = FlowTracks(joints + shift, sure, ways, drift=exact, likeness=1 - exact)
     result = with_flow(tracks, flow, np.full(1, 100.0), np.full((1, 1), np.inf))
     return float(result.joints[0, 0, 0]), float(result.confidence[0, 0])
 

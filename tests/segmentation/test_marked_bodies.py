@@ -54,9 +54,47 @@ def test_sure_flow_gives_further_anchors_that_nobody_marked():
     joints = np.tile(body().joints, (12, 1, 1))
     confidence = np.zeros(joints.shape[:2])
     confidence[8] = 0.9
-    anchors = anchors_from_bodies(body(), FlowTracks(joints, confidence, confidence > 0))
+    unlike = np.zeros(joints.shape[:2])
+    flow = FlowTracks(joints, confidence, confidence > 0, drift=unlike + 1, likeness=unlike)
+    anchors = anchors_from_bodies(body(), flow)
+    fixed = np.isfinite(anchors.head).all(axis=1)
+    assert anchors.frames[fixed].tolist() == [7, 8]
+    assert anchors.marked[fixed].tolist() == [True, False]
+    assert not np.isfinite(anchors.followed_head).any()
+
+
+def followed_body(drift, likeness):
+    """The anchor of frame 8, where flow leads every joint from the mark in frame 7."""
+    joints = np.tile(body().joints, (9, 1, 1))
+    joints[:8] = np.nan
+    values = [np.full(joints.shape[:2], v) for v in (0.0, drift, likeness)]
+    flow = FlowTracks(joints, values[0], values[0] > 0, drift=values[1], likeness=values[2])
+    anchors = anchors_from_bodies(body(), flow)
     assert anchors.frames.tolist() == [7, 8]
-    assert anchors.marked.tolist() == [True, False]
+    return tuple(value[1] for value in (anchors.head, anchors.followed_head, anchors.head_doubt))
+
+
+def test_steps_that_led_back_fix_a_head_though_it_has_turned_and_looks_are_only_alike():
+    head, led, _ = followed_body(drift=0.01, likeness=0.45)
+    assert np.isfinite(head).all()
+    assert np.isnan(led).all()
+
+
+def test_a_head_that_flow_is_less_sure_of_is_likelier_the_less_it_drifted_and_the_more_alike():
+    doubts = []
+    for drift, likeness in ((0.03, 0.6), (0.1, 0.6), (0.1, 0.35)):
+        head, led, doubt = followed_body(drift, likeness)
+        assert np.isnan(head).all()
+        assert np.isfinite(led).all()
+        doubts.append(float(doubt))
+    assert 0 < doubts[0] < doubts[1] < doubts[2] < 1
+
+
+def test_where_nothing_is_like_the_mark_flow_leads_nowhere():
+    head, led, doubt = followed_body(drift=0.001, likeness=0.1)
+    assert np.isnan(head).all()
+    assert np.isnan(led).all()
+    assert np.isnan(doubt)
 
 
 def test_a_body_is_footless_where_legs_are_marked_and_no_foot():

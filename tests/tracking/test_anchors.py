@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
-from keyrecon.records import Pick, Track, TrackAnchors
+from keyrecon.records import CameraPath, Pick, Track, TrackAnchors
 from keyrecon.tracking.anchors import (
     DOUBT_SECONDS,
+    FollowedHeads,
     anchored_states,
     distance_to_track,
     frames_off_anchors,
@@ -43,7 +44,8 @@ def marks(track, frames, shift=(0.0, 0.0)):
     frames = np.array(frames)
     head, feet = track.head[frames] + shift, track.feet[frames] + shift
     every, unknown = np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
-    return TrackAnchors(frames, head, feet, every, unknown, ~every)
+    nowhere = np.full((len(frames), 2), np.nan)
+    return TrackAnchors(frames, head, feet, every, unknown, ~every, nowhere, unknown)
 
 
 def test_a_path_passes_through_a_mark_however_cheap_the_way_around_it_is():
@@ -89,6 +91,48 @@ def test_a_bridge_forgives_more_the_farther_a_mark_is_and_most_between_marks():
     assert (np.diff(cost[21:40]) > 0).all()
     assert (np.diff(cost[41:]) < 0).all()
     assert with_bridge_costs([np.ones((1, 1, 2))], [np.ones(1)], marked[1:2], 2.0) == [np.ones(1)]
+
+
+def followed(places, doubt, count=40):
+    """A head at x = 0 that flow leads along `places`, with some doubt, in a camera that pans."""
+    frames = np.arange(count)
+    paths = np.tile(np.eye(3), (count, 1, 1))
+    paths[:, 0, 2] = -3.0 * frames
+    nothing = np.full((count, 2), np.nan)
+    anchors = replace(
+        marks(standing(count), frames),
+        head=nothing,
+        followed_head=places + 3.0 * frames[:, None] * [1, 0],
+        head_doubt=np.full(count, doubt),
+    )
+    return FollowedHeads.of(anchors, frames, CameraPath(paths, np.ones(count)), 100.0)
+
+
+def test_where_flow_leads_is_a_candidate_and_what_lies_elsewhere_pays_as_much_as_flow_is_sure():
+    way = np.tile([50.0, 20.0], (40, 1))
+    elsewhere = [np.array([[[50.0, 20.0]], [[90.0, 20.0]]])] * 40
+    for doubt in (0.01, 0.3):
+        states, costs = followed(way, doubt).with_costs(elsewhere, [np.zeros(2)] * 40)
+        for state, cost in zip(states, costs, strict=True):
+            np.testing.assert_allclose(state[2, 0], [50, 20])
+            np.testing.assert_allclose(cost[:2], [0, -np.log(doubt)], atol=1e-6)
+
+
+def test_a_shoulder_that_looks_like_a_head_is_left_where_flow_leads_the_head():
+    shoulder = [np.array([[[70.0, 40.0]]])] * 40
+    way = np.tile([50.0, 20.0], (40, 1))
+    for doubt, expected in ((0.02, 1), (0.9, 0)):
+        states, costs = followed(way, doubt).with_costs(shoulder, [np.zeros(1)] * 40)
+        taken = find_cheapest_track(costs, states, TransitionModel(3.0, 25))
+        assert (taken == expected).all()
+
+
+def test_where_flow_leads_nowhere_nothing_is_added():
+    states, costs = followed(np.full((40, 2), np.nan), 0.1).with_costs(
+        [np.zeros((1, 1, 2))] * 40, [np.zeros(1)] * 40
+    )
+    assert all(len(state) == 1 for state in states)
+    assert not np.any(costs)
 
 
 def test_marks_where_the_track_is_contradict_nothing_and_others_are_named():

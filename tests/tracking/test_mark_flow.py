@@ -62,6 +62,14 @@ def test_a_single_mark_is_followed_both_ways_while_the_place_looks_like_it(video
     assert flow.confidence[20:].max() < 0.3
 
 
+def test_drift_and_likeness_tell_a_place_that_was_followed_from_one_that_was_lost(video):
+    flow = track_marked_joints(video, marked(9), OPTIONS)
+    assert flow.drift[16].max() < 0.02
+    assert flow.likeness[16].min() > 0.8
+    assert np.median(flow.likeness[21]) < 0.3  # the body is gone
+    assert np.isnan(flow.drift[9]).all()  # marked, not followed
+
+
 def test_marks_too_far_apart_say_nothing_of_the_middle(video):
     flow = track_marked_joints(video, marked(0, 17), FlowOptions(player=143.0, longest=0.2))
     assert np.isnan(flow.joints[8]).all()

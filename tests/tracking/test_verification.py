@@ -75,9 +75,8 @@ def verified(tmp_path):
 def marks(track, frames):
     """Head and feet marked where the track has them."""
     every, unknown = np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
-    return TrackAnchors(
-        np.array(frames), track.head[frames], track.feet[frames], every, unknown, ~every
-    )
+    places, nowhere = (track.head[frames], track.feet[frames]), np.full((len(frames), 2), np.nan)
+    return TrackAnchors(np.array(frames), *places, every, unknown, ~every, nowhere, unknown)
 
 
 def _shins(rows):
