@@ -252,10 +252,8 @@ def _link(
     head_cost = head_costs(candidates, options.other_trunk)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
-    stable, head_cost = FollowedHeads.of(anchors, numbers, camera, height).with_costs(
-        stable, head_cost
-    )
-    stable, head_cost = anchored_states(stable, head_cost, marked_head)
+    more = FollowedHeads.of(anchors, numbers, camera, height).with_costs(stable, head_cost)
+    stable, head_cost = anchored_states(*more, marked_head)
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
@@ -274,8 +272,9 @@ def _link(
     of_feet = state_confidence([c / 2 for c in costs], taken)
     of_both = np.sqrt(of_head * np.where(evidence.cut(head)[numbers], of_head, of_feet))
     confidence = np.interp(np.arange(len(head)), numbers, of_both)
-    size, box = np.full(len(head), np.nan), np.full((len(head), 4), np.nan)
-    track = Track(head, feet, size, box, confidence)
+    track = Track(
+        head, feet, np.full(len(head), np.nan), np.full((len(head), 4), np.nan), confidence
+    )
     # Places that were missed are on the way between those that were not, of head and feet each by
     # itself: a head that jumps to somebody else and feet that stay are no body.
     found = np.interp(np.arange(len(head)), numbers, (chosen >= 0) & (taken >= 0)) == 1

@@ -122,8 +122,7 @@ def link_head(
     stable = [h[:, None] for h in to_reference_frame(places, camera.to_reference)]
     costs = [part_costs(detected.head_strength) for detected in detections]
     costs = with_bridge_costs(stable, costs, marked, model.sigma)
-    stable, costs = followed.with_costs(stable, costs)
-    stable, costs = anchored_states(stable, costs, marked)
+    stable, costs = anchored_states(*followed.with_costs(stable, costs), marked)
     chosen = find_cheapest_track(costs, stable, model)
     from_reference = np.linalg.inv(camera.to_reference)
     head = fill_gaps(taken_states(stable, chosen), np.arange(len(detections)), from_reference)
