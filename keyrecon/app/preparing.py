@@ -97,7 +97,9 @@ class ProjectPreparation:
         if self.marks is not None:
             lines += [
                 f"The {mark.part} marked in frame {mark.frame}: {mark.distance:.1f} body heights "
-                "off the way through the frames before and after; look at that mark."
+                "off the way on which the player was followed: one of the two is wrong. Look at "
+                f"that mark; if it is right, mark a body in frame {mark.around[0]} or "
+                f"{mark.around[1]} too."
                 for mark in outlier_marks(
                     track,
                     anchors_from_bodies(self.marks),

@@ -218,12 +218,17 @@ class OutlierMark:
     """'head' or 'feet'."""
     distance: float
     """Player heights."""
+    around: tuple[int, int]
+    """The frames before and after."""
 
 
 def outlier_marks(
     track: Track, anchors: TrackAnchors, fps: float, shots: Shots | None = None
 ) -> list[OutlierMark]:
-    """Marked heads and feet far off the straight path through the frames before and after."""
+    """Marked heads and feet far off the straight path through the frames before and after.
+
+    The mark is wrong, or the track in one of these frames.
+    """
     shot = (shots or Shots.between((), len(track.height))).number
     step = max(1, round(WAY_SECONDS * fps))
     outliers: list[OutlierMark] = []
@@ -231,11 +236,11 @@ def outlier_marks(
         frame = int(anchors.frames[row])
         if not step <= frame < len(track.height) - step:
             continue
-        around = [frame - step, frame + step]
+        around = (frame - step, frame + step)
         if shot[around[0]] != shot[around[1]]:
             continue
-        head = np.linalg.norm(anchors.head[row] - track.head[around].mean(axis=0))
-        way = track.feet[around].mean(axis=0)
+        head = np.linalg.norm(anchors.head[row] - track.head[list(around)].mean(axis=0))
+        way = track.feet[list(around)].mean(axis=0)
         feet = min(
             np.linalg.norm(anchors.feet[row] - one, axis=1).max() for one in (way, way[::-1])
         )
@@ -243,7 +248,7 @@ def outlier_marks(
         for part, far, most in zip(("head", "feet"), (head, feet), MAX_WAY_DISTANCE, strict=True):
             distance = float(far / track.height[frame])
             if distance > most + turning:  # not where nothing is marked, which is NaN
-                outliers.append(OutlierMark(frame, part, distance))
+                outliers.append(OutlierMark(frame, part, distance, around))
     return outliers
 
 
