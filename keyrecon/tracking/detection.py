@@ -246,16 +246,15 @@ def _link(
 ) -> tuple[Track, float]:
     """The path of the head, then that of the feet, and the lesser of the mean confidences of the
     feet and of all, in frames in which they are not fixed."""
-    from_reference = np.linalg.inv(camera.to_reference)
-    searched = camera.to_reference[numbers]
+    from_reference, searched = np.linalg.inv(camera.to_reference), camera.to_reference[numbers]
     apart = float(np.median(np.diff(numbers))) if len(numbers) > 1 else video.fps
     step, max_gap = height / video.fps * apart, round(MAX_GAP_SECONDS * video.fps / apart)
     marked_head, marked_feet = marked_places(anchors, numbers, camera)
     head_cost = head_costs(candidates, options.other_trunk)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
     head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
-    more = FollowedHeads.of(anchors, numbers, camera, height).with_costs(stable, head_cost)
-    stable, head_cost = anchored_states(*more, marked_head)
+    followed = FollowedHeads.of(anchors, numbers, camera, height)
+    stable, head_cost = anchored_states(*followed.with_costs(stable, head_cost), marked_head)
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
@@ -281,9 +280,8 @@ def _link(
     # itself: a head that jumps to somebody else and feet that stay are no body.
     found = np.interp(np.arange(len(head)), numbers, (chosen >= 0) & (taken >= 0)) == 1
     track = with_standing_height(track, evidence, round(options.envelope * video.fps), found)
-    free = np.isnan(marked_feet).any(axis=(1, 2))
-    either = free | np.isnan(marked_head).any(axis=(1, 2))
-    return track, min(_mean(of_feet[free], 1.0), _mean(of_both[either], 1.0))
+    free_head, free_feet = (np.isnan(m).any(axis=(1, 2)) for m in (marked_head, marked_feet))
+    return track, min(_mean(of_feet[free_feet], 1.0), _mean(of_both[free_head | free_feet], 1.0))
 
 
 def _pair(

@@ -10,7 +10,7 @@ forgotten. Weak candidates give way to strong ones before and after them (see `s
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 
 from keyrecon.numerics.geometry import warp_points
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
@@ -71,6 +71,9 @@ class Detections:
     foot_strength: Float[np.ndarray, "n"]
     covered: Bool[np.ndarray, "y x"]
     """Where the player covers the scene, at half the resolution of the crop."""
+    looks: UInt8[np.ndarray, "2 y x"] | None = None
+    """How much places look like a marked head or foot, at half the resolution (`mark_filters`);
+    None where no head and feet are."""
 
 
 @dataclass(frozen=True)

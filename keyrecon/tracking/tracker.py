@@ -45,6 +45,7 @@ from keyrecon.tracking.linking import (
     link_feet,
     link_head,
 )
+from keyrecon.tracking.mark_filters import MarkFilters, doubted
 from keyrecon.tracking.radial_symmetry import find_peaks
 from keyrecon.tracking.scale import SizeEvidence, with_standing_height
 from keyrecon.tracking.visibility import is_visible
@@ -154,14 +155,15 @@ def track_player(
         crops, cropping, options.player, rough, camera, evidence, head, feet, followed, video.fps
     )
     channels = Channels.of(colors, cropping.size)
-    marked = _marked_examples(frames, channels, anchors)
+    taught = _Taught.by(anchors, frames, channels, options.examples)
     sparse = frames.every(max(1, round(video.fps / TRAINING_RATE)))
-    filters = _train(sparse, channels, sparse.rough, clear_frames(sparse.rough), marked, options)
-    detections = _detect(sparse, channels, filters, progress)
+    filters = _train(sparse, channels, sparse.rough, clear_frames(sparse.rough), taught, options)
+    detections = _detect(sparse, channels, filters, None, progress)
     first = _link(detections, sparse, FIRST_OCCLUSION_COST, options)
-    filters = _train(sparse, channels, first, sound_frames(first), marked, options)
-    track = _link(_detect(frames, channels, filters, progress), frames, OCCLUSION_COST, options)
-    return _through_marks(track, anchors)
+    filters = _train(sparse, channels, first, sound_frames(first), taught, options)
+    detections = _detect(frames, channels, filters, taught.filters, progress)
+    track = _link(detections, frames, OCCLUSION_COST, options)
+    return _through_marks(doubted(track, [d.looks for d in detections], cropping), anchors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +213,7 @@ def _train(
     channels: Channels,
     track: Track,
     usable: Int[np.ndarray, "n"],
-    marked: Examples | None,
+    taught: "_Taught",
     options: TrackOptions,
 ) -> Filters:
     """Filters from marked frames and from some of the usable ones, spread evenly."""
@@ -219,22 +221,38 @@ def _train(
     chosen = usable[np.unique(rows.astype(int))]
     parts = np.concatenate([track.head[:, None], track.feet], axis=1)[chosen]
     examples = make_examples(frames.crops, channels, frames.cropping, chosen, parts)
-    examples = examples if marked is None else examples.joined(marked)
+    examples = examples if taught.marked is None else examples.joined(taught.marked)
     return train_filters(examples, frames.cropping.size, frames.player)
 
 
-def _marked_examples(
-    frames: _CroppedFrames, channels: Channels, anchors: TrackAnchors
-) -> Examples | None:
-    """Examples of the frames on which head and feet are marked, each several times over."""
-    whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
-    whole &= anchors.marked
-    if not whole.any():
-        return None
-    parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[whole]
-    numbers = np.repeat(anchors.frames[whole], MARK_WEIGHT)
-    parts = np.repeat(parts, MARK_WEIGHT, axis=0)
-    return make_examples(frames.crops, channels, frames.cropping, numbers, parts)
+@dataclass(frozen=True, eq=False)
+class _Taught:
+    """What fixed points teach of the player's looks; nothing where head and feet never are."""
+
+    marked: Examples | None = None
+    """Frames on which head and feet are marked, each several times over."""
+    filters: MarkFilters | None = None
+    """Of these and of those in which flow has both."""
+
+    @classmethod
+    def by(
+        cls, anchors: TrackAnchors, frames: _CroppedFrames, channels: Channels, most: int
+    ) -> "_Taught":
+        """By at most so many fixed points."""
+        whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
+
+        def examples(rows: Int[np.ndarray, "n"]) -> Examples:
+            parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[rows]
+            return make_examples(
+                frames.crops, channels, frames.cropping, anchors.frames[rows], parts
+            )
+
+        rows, marked = np.flatnonzero(whole), np.flatnonzero(whole & anchors.marked)
+        if not len(marked):
+            return cls()
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
+        filters = MarkFilters.learn(examples(rows), frames.cropping.size, frames.player)
+        return cls(examples(np.repeat(marked, MARK_WEIGHT)), filters)
 
 
 def _through_marks(track: Track, anchors: TrackAnchors) -> Track:
@@ -251,16 +269,23 @@ def _through_marks(track: Track, anchors: TrackAnchors) -> Track:
 
 
 def _detect(
-    frames: _CroppedFrames, channels: Channels, filters: Filters, progress: Progress
+    frames: _CroppedFrames,
+    channels: Channels,
+    filters: Filters,
+    told: MarkFilters | None,
+    progress: Progress,
 ) -> list[Detections]:
-    """Candidates of all frames."""
+    """Candidates of all frames, and how much every place looks like what was marked."""
     crops = frames.crops
 
     def detect(t: int) -> Detections:
         foreground = crops.foreground[t]
         features = channels.compute(crops.lab[t], foreground)
-        response = respond(filters, spectrum(features))
-        return detect_in_crop(response, foreground, channels.player(features), frames.player)
+        shown = spectrum(features)
+        found = detect_in_crop(
+            respond(filters, shown), foreground, channels.player(features), frames.player
+        )
+        return found if told is None else replace(found, looks=told.responses(shown))
 
     numbers = progress(range(len(crops.lab)), "Detecting head and feet", len(crops.lab))
     return list(side_by_side(detect, numbers))

@@ -85,8 +85,9 @@ def test_a_marked_head_does_not_make_the_track_sure_of_feet_that_were_not_seen()
     unsure.confidence[:] = 0
     head = np.array([HEAD, HEAD + 1, (np.nan, np.nan)])
     feet = np.array([(LEFT, RIGHT), np.full((2, 2), np.nan), (LEFT, RIGHT)])
+    every, unknown, nowhere = np.ones(3, bool), np.full(3, np.nan), np.full((3, 2), np.nan)
     anchors = TrackAnchors(
-        np.array([5, 10, 15]), head, feet, np.ones(3, bool), np.full(3, np.nan), np.zeros(3, bool)
+        np.array([5, 10, 15]), head, feet, every, unknown, ~every, nowhere, unknown
     )
     marked = _through_marks(unsure, anchors)
     assert np.flatnonzero(marked.confidence).tolist() == [5]

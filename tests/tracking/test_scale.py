@@ -58,7 +58,8 @@ def test_a_marked_body_without_feet_speaks_for_the_frames_up_to_those_that_have_
     feet[1] = np.nan
     without = np.array([False, True, False])
     given = marked, track.head[marked], feet, np.ones(3, bool), height[marked], without
-    bodies = TrackAnchors(*given)
+    nowhere, unknown = np.full((len(given[0]), 2), np.nan), np.full(len(given[0]), np.nan)
+    bodies = TrackAnchors(*given, nowhere, unknown)
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
     write_video(tmp_path / "dark.mp4", np.zeros((COUNT, ROWS, 400, 3), np.uint8), 25.0)
     told = SizeEvidence.of(camera, open_video(tmp_path / "dark.mp4"), bodies)
