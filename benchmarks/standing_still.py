@@ -1,20 +1,24 @@
-"""Heads and feet as they are first detected, where players stand still, against marks by eye.
+"""Heads and feet as they are detected and tracked, and how sure that is, against marks by eye.
 
     python benchmarks/standing_still.py [--only NAME ...]
 
 Every real clip, whole and in thirds (a golfer does not leave his place, and a shot of a match may
 be as short), with one body marked, the whole clip with four and ten too. What always has the
 player's colours is either taken for the scene, as printed; or for unknown as well where the first
-track is doubtful (`FindOptions.doubtful`), and the surer track kept; or always both:
+track is doubtful (`FindOptions.doubtful`), and the surer track kept. From that the track is made:
 
     off       frames marked by eye whose head or feet lie .15 player heights or more from the marks
     nobody    no head was found in most frames
-    ms        per frame of the video, reading included
+    ms        to detect, per frame of the video, reading included
+    sure      mean confidence of the track in frames that are right, and in those that are off
+
+At the end, of all frames: how often the track is right by how sure it is.
 """
 
 import argparse
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -28,15 +32,25 @@ from keyrecon.pipeline import Options, prepare
 from keyrecon.records import Annotations, Track
 from keyrecon.tracking.detection import FindOptions
 
-FORMS = {"printed": 0.0, "doubted": FindOptions().doubtful, "both": 1.0}
-"""What is measured, and from which confidence on a track is believed in it."""
+PRINTED = replace(Options(), find=FindOptions(doubtful=0.0))
+SURENESS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.01)
 THIRDS = 3
 OFF = 0.15
 """Player heights: a head is .13 high, a shoe .15 long."""
 
 
-class Detected(Exception):
-    """The player was detected; what follows is not needed."""
+class Enough(Exception):
+    """What follows is not needed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What was made of a task."""
+
+    detected: Track | None = None
+    tracked: Track | None = None
+    seconds: float = 0.0
+    """To detect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,41 +80,42 @@ def list_tasks(clip: real.Clip) -> Iterator[Task]:
             yield Task(f"third {number}", slice(first, end), middle)
 
 
-def detect(clip: real.Clip, task: Task, doubtful: float) -> tuple[Track | None, float]:
-    """What is first found of the player, and the seconds that it took."""
+def follow(clip: real.Clip, task: Task, options: Options, last: str) -> Followed:
+    """What is found of the player up to the stage `last`: `find`, or `track`."""
     marks = real.take(clip, task.told, task.told)
     marks = replace(marks, frames=marks.frames - task.part.start)
-    options = replace(Options(), find=FindOptions(doubtful=doubtful))
-    found: list[tuple[Track, float]] = []
+    made: dict[str, tuple[Track, float]] = {}
 
     def keep(name: str, stage: Callable[..., Any], /, *inputs: Any, **named: Any) -> Any:
         began = time.perf_counter()
         result = stage(*inputs, **named)
-        if name == "find":
-            found.append((result, time.perf_counter() - began))
-            raise Detected
+        if name in ("find", "track"):
+            made[name] = result, time.perf_counter() - began
+        if name == last:
+            raise Enough
         return result
 
-    try:
+    with suppress(Enough, KeyreconError):
         prepare(clip.video.part(task.part), (), options, keep, marks=marks)
-    except Detected:
-        return found[0]
-    except KeyreconError:
-        pass
-    return None, 0.0
+    detected, seconds = made.get("find", (None, 0.0))
+    return Followed(detected, made.get("track", (None, 0.0))[0], seconds)
 
 
-def share_off(track: Track, truth: Annotations, task: Task) -> float:
-    """Share of the frames marked by eye, and not told, whose head or feet are off."""
+def measure_off(
+    track: Track | None, truth: Annotations, task: Task
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whether head or feet are off in frames marked by eye and not told, and how sure they are."""
     inside = (truth.frames >= task.part.start) & (truth.frames < task.part.stop)
     inside[task.told] = False
+    if track is None:
+        return np.ones(int(inside.sum()), dtype=bool), np.zeros(int(inside.sum()))
     at = truth.frames[inside] - task.part.start
     joints = truth.joints[inside]
     head = np.linalg.norm(track.head[at] - joints[:, LSP14.index("head_top")], axis=1)
     ankles = joints[:, [LSP14.index("right_ankle"), LSP14.index("left_ankle")]]
     ways = [np.linalg.norm(track.feet[at] - a, axis=2) for a in (ankles, ankles[:, ::-1])]
     feet = np.minimum(*(way.mean(axis=1) for way in ways))
-    return float((np.maximum(head, feet) > OFF * track.height[at]).mean())
+    return np.maximum(head, feet) > OFF * track.height[at], track.confidence[at]
 
 
 def main() -> None:
@@ -108,21 +123,41 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", default=[])
     words = parser.parse_args()
-    print(f"{'clip':<26}{'told':<12}" + "".join(f"{form + ', off':>14}{'ms':>6}" for form in FORMS))
+    names = ("printed, off", "detected, off", "tracked, off")
+    print(
+        f"{'clip':<26}{'told':<12}{'ms':>6}" + "".join(f"{n:>15}" for n in names) + f"{'sure':>14}"
+    )
     shares: list[list[float]] = []
+    off_frames, sure_frames = [], []
     for name in words.only or sorted(path.stem for path in real.TRUTH.glob("*.json")):
         clip = real.load_clip(name)
         for task in list_tasks(clip):
-            row, line = [], f"{name:<26}{task.name:<12}"
-            for doubtful in FORMS.values():
-                track, seconds = detect(clip, task, doubtful)
-                row.append(1.0 if track is None else share_off(track, clip.truth, task))
-                frames = task.part.stop - task.part.start
-                line += f"{'nobody' if track is None else f'{row[-1]:.0%}':>14}"
-                line += f"{1000 * seconds / frames:6.1f}"
-            print(line, flush=True)
-            shares.append(row)
-    print(f"{'mean':<38}" + "".join(f"{mean:>14.1%}{'':6}" for mean in np.mean(shares, axis=0)))
+            made = follow(clip, task, Options(), "track")
+            tracks = follow(clip, task, PRINTED, "find").detected, made.detected, made.tracked
+            off, sure = measure_off(made.tracked, clip.truth, task)
+            shares.append([float(measure_off(t, clip.truth, task)[0].mean()) for t in tracks])
+            shown = [
+                "nobody" if track is None else f"{share:.0%}"
+                for track, share in zip(tracks, shares[-1], strict=True)
+            ]
+            ms = 1000 * made.seconds / (task.part.stop - task.part.start)
+            surety = "".join(
+                f"{sure[k].mean():7.2f}" if k.any() else f"{'':7}" for k in (~off, off)
+            )
+            print(
+                f"{name:<26}{task.name:<12}{ms:6.1f}" + "".join(f"{s:>15}" for s in shown) + surety
+            )
+            off_frames.append(off)
+            sure_frames.append(sure)
+    print(f"{'mean':<44}" + "".join(f"{mean:>15.1%}" for mean in np.mean(shares, axis=0)))
+    off, sure = np.concatenate(off_frames), np.concatenate(sure_frames)
+    for low, high in pairwise(SURENESS):
+        inside = (sure >= low) & (sure < high)
+        if inside.any():
+            print(
+                f"sure {low:.2f} to {min(high, 1):.2f}: {inside.sum()} frames, "
+                f"{1 - off[inside].mean():.0%} right"
+            )
 
 
 if __name__ == "__main__":
