@@ -27,15 +27,15 @@ or less, others with it: at most 0.6 points on two clips."""
 SURE_DRIFT, SURE_LIKENESS = 0.02, 0.4
 """Drift below which, player heights, and likeness from which they do too: one step that a turned
 head has changed its looks by does not make all that follow doubtful. Evidence: one way from one or
-four marked bodies of 18 real clips: necks and tops of heads are .12 off in 1 of 1706, ankles in 1
-of 1543; with less likeness heads in 14 of 100."""
+four marked bodies of 18 real clips: necks and tops of heads are .12 off in 2 of 1706, ankles in 1
+of 1516; with less likeness heads in 19 of 100."""
 EVEN_DRIFT = 0.3
 """Drift at which flow has a head as often as not, player heights. Evidence: necks and tops of heads
 of 18 real clips with one or four marked bodies that have a likeness of .4 or more: .12 off in none
 of 141 with a drift of .02 to .05, in 6 of 107 up to .15, in half of those beyond."""
 LIKE_THE_MARK = 0.2, 0.5
 """Likeness up to which flow says nothing of a head and from which it counts in full. Evidence: of
-the same with a drift up to .05, 17 of 100 are off with a likeness of .2 to .4, 27 with less."""
+the same with a drift up to .05, 14 of 100 are off with a likeness of .2 to .4, 33 with less."""
 ALONG_TRUNK = 0.2, 0.45, 0.7
 """From neck to hips: the shirt, and not its collar or the belt. A quarter more or less, others with
 it: at most 0.6 points on two clips."""
