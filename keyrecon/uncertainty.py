@@ -87,9 +87,8 @@ in any (benchmarks/expected_error.py)."""
 TAUGHT_SECONDS = 0.5
 """A mark teaches the frames within this time most."""
 MIN_CONFIDENCE = 0.4
-"""Confidence under which a track is a guess: of such frames marked by eye in 18 real clips (108 of
-2212) head and feet were right in 38 of 100; from there to .6 in 77 (`benchmarks/standing_still.py`).
-"""
+"""Confidence under which a track is a guess: head and feet were right in 38 of 100 such frames
+(108 of 2212, marked by eye in 18 real clips, `benchmarks/standing_still.py`), up to .6 in 77."""
 
 
 @dataclass(frozen=True)
