@@ -70,7 +70,7 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
     names = annotations.skeleton.names
     if not {"neck", "head_top", *LEG_JOINTS} <= set(names):
         return TrackAnchors.none()
-    marked = _anchors(names, annotations.frames, annotations.joints, marked=True)
+    marked = _marked(names, annotations.frames, annotations.joints)
     if flow is None:
         return marked
     between = _followed(names, flow)
@@ -86,22 +86,21 @@ def anchors_from_bodies(annotations: Annotations, flow: FlowTracks | None = None
 
 def _followed(names: tuple[str, ...], flow: FlowTracks) -> TrackAnchors:
     """Anchors where flow is sure, and where it leads the head elsewhere."""
-    frames = np.arange(len(flow.joints))
     # comparisons with NaN are false: where nothing is followed nothing is sure
     alike = (flow.drift < SURE_DRIFT) & (flow.likeness >= SURE_LIKENESS)
     sure = (flow.confidence > SURE_FLOW) | alike
-    fixed = _anchors(names, frames, np.where(sure[..., None], flow.joints, np.nan), marked=False)
-    every = _anchors(names, frames, flow.joints, marked=False)
+    head, feet = _head_and_feet(names, np.where(sure[..., None], flow.joints, np.nan))
+    led, _ = _head_and_feet(names, flow.joints)
     ends = [names.index("neck"), names.index("head_top")]
     drift, likeness = flow.drift[:, ends].max(axis=1), flow.likeness[:, ends].min(axis=1)
     doubt = 1 - np.interp(likeness, LIKE_THE_MARK, (0, 1)) * EVEN_DRIFT / (drift + EVEN_DRIFT)
-    row = np.searchsorted(every.frames, fixed.frames)
-    head, feet = np.full_like(every.head, np.nan), np.full_like(every.feet, np.nan)
-    head[row], feet[row] = fixed.head, fixed.feet
-    doubt = doubt[every.frames]
-    led = np.where(np.isnan(head) & (doubt < 1)[:, None], every.head, np.nan)
-    doubt = np.where(np.isfinite(led).all(axis=1), doubt, np.nan)
-    return replace(every, head=head, feet=feet, followed_head=led, head_doubt=doubt)
+    leads = np.isnan(head).any(axis=1) & np.isfinite(led).all(axis=1) & (doubt < 1)
+    frames, nobody = np.arange(len(leads)), np.zeros(len(leads), dtype=bool)
+    led, doubt = np.where(leads[:, None], led, np.nan), np.where(leads, doubt, np.nan)
+    every = TrackAnchors(
+        frames, head, feet, nobody, np.full(len(leads), np.nan), nobody, led, doubt
+    )
+    return _some(every, leads | _any_place(head, feet))
 
 
 def with_heights(
@@ -113,12 +112,27 @@ def with_heights(
     return replace(anchors, height=np.where(matched, heights[row], anchors.height))
 
 
-def _anchors(
-    names: tuple[str, ...],
-    frames: Int[np.ndarray, "n"],
-    joints: Float[np.ndarray, "n J 2"],
-    marked: bool,
+def _marked(
+    names: tuple[str, ...], frames: Int[np.ndarray, "n"], joints: Float[np.ndarray, "n J 2"]
 ) -> TrackAnchors:
+    """Anchors where head or feet are marked."""
+    head, feet = _head_and_feet(names, joints)
+    known = {name: np.isfinite(joints[:, n]).all(axis=1) for n, name in enumerate(names)}
+    of_legs, of_feet = (
+        np.any([known[name] for name in names if name.endswith(ends)], axis=0)
+        for ends in (("_hip", "_knee"), "_ankle")
+    )
+    marked, unknown = np.ones(len(frames), dtype=bool), np.full(len(frames), np.nan)
+    nowhere = np.full((len(frames), 2), np.nan)
+    footless = of_legs & ~of_feet
+    every = TrackAnchors(frames, head, feet, marked, unknown, footless, nowhere, unknown)
+    return _some(every, _any_place(head, feet))
+
+
+def _head_and_feet(
+    names: tuple[str, ...], joints: Float[np.ndarray, "n J 2"]
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 2"]]:
+    """Centre of the head and both shoes; NaN where an end of the head is unknown, or of a shank."""
     place = {name: joints[:, names.index(name)] for name in ("neck", "head_top", *LEG_JOINTS)}
     head = place["neck"] * (1 - HEAD_CENTRE) + place["head_top"] * HEAD_CENTRE
     shoes = [
@@ -128,22 +142,17 @@ def _anchors(
     ]
     feet = np.stack(shoes, axis=1)
     feet[~np.isfinite(feet).all(axis=(1, 2))] = np.nan
-    useful = np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
-    known = {name: np.isfinite(joints[:, n]).all(axis=1) for n, name in enumerate(names)}
-    of_legs, of_feet = (
-        np.any([known[name] for name in names if name.endswith(ends)], axis=0)
-        for ends in (("_hip", "_knee"), "_ankle")
-    )
-    return TrackAnchors(
-        frames[useful],
-        head[useful],
-        feet[useful],
-        np.full(int(useful.sum()), marked),
-        np.full(int(useful.sum()), np.nan),
-        (marked & of_legs & ~of_feet)[useful],
-        np.full((int(useful.sum()), 2), np.nan),
-        np.full(int(useful.sum()), np.nan),
-    )
+    return head, feet
+
+
+def _any_place(
+    head: Float[np.ndarray, "n 2"], feet: Float[np.ndarray, "n 2 2"]
+) -> Bool[np.ndarray, "n"]:
+    return np.isfinite(head).all(axis=1) | np.isfinite(feet).all(axis=(1, 2))
+
+
+def _some(anchors: TrackAnchors, rows: Bool[np.ndarray, "A"]) -> TrackAnchors:
+    return TrackAnchors(*(getattr(anchors, f.name)[rows] for f in fields(TrackAnchors)))
 
 
 class _Body:

@@ -111,7 +111,7 @@ class FollowedHeads:
     ) -> "FollowedHeads":
         """Those of some frames, of a player of some px."""
         places, doubt = np.full((len(numbers), 2), np.nan), np.full(len(numbers), np.nan)
-        _, row, entry = np.intersect1d(numbers, anchors.frames, return_indices=True)
+        row, entry = _shared_rows(numbers, anchors)
         led, doubt[row] = anchors.followed_head[entry], anchors.head_doubt[entry]
         places[row] = warp_points(camera.to_reference[numbers[row]], led)
         return cls(places, doubt, FOLLOWED_SPREAD * height)
@@ -153,13 +153,19 @@ def marked_places(
 ) -> tuple[Float[np.ndarray, "n 1 2"], Float[np.ndarray, "n 2 2"]]:
     """Marked heads and feet of some frames in the reference frame; NaN where not marked."""
     head, feet = np.full((len(numbers), 1, 2), np.nan), np.full((len(numbers), 2, 2), np.nan)
-    at = np.searchsorted(anchors.frames, numbers)
-    for row, place in enumerate(at.tolist()):
-        if place < len(anchors.frames) and anchors.frames[place] == numbers[row]:
-            path = camera.to_reference[numbers[row]]
-            head[row, 0] = warp_points(path, anchors.head[place])
-            feet[row] = warp_points(path, anchors.feet[place])
+    row, entry = _shared_rows(numbers, anchors)
+    path = camera.to_reference[numbers[row]]
+    head[row, 0] = warp_points(path, anchors.head[entry])
+    feet[row] = warp_points(path[:, None], anchors.feet[entry])
     return head, feet
+
+
+def _shared_rows(
+    numbers: Int[np.ndarray, "n"], anchors: TrackAnchors
+) -> tuple[Int[np.ndarray, "m"], Int[np.ndarray, "m"]]:
+    """Rows of the frames, and of the anchors, that both have."""
+    _, row, entry = np.intersect1d(numbers, anchors.frames, return_indices=True)
+    return row, entry
 
 
 def frames_off_anchors(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:

@@ -104,6 +104,10 @@ class Examples:
     places: Float[np.ndarray, "N 3 2"]
     """Head and both feet, px of the crop."""
 
+    def some(self, rows: Int[np.ndarray, "n"]) -> "Examples":
+        """Those of some rows."""
+        return Examples(self.spectra[rows], self.places[rows])
+
     def joined(self, other: "Examples") -> "Examples":
         """These and others."""
         return Examples(

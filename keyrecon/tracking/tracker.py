@@ -6,7 +6,8 @@ head and feet (see `correlation_filters`): leg above the shoe, shoe, court benea
 cut out around the rough head, the peaks of the filters' responses are detections, and the cheapest
 path through them is the track (see `linking`). It is right more often than the rough one, in
 frames that are not clear too, so the filters are trained once more on it. The second training
-needs no more than some frames of every second.
+needs no more than some frames of every second. Filters that only marks have taught say in the end
+how sure all this is (see `mark_filters`).
 
 `method="paper"` keeps the path through colour and radial symmetry, the rough track.
 """
@@ -240,19 +241,17 @@ class _Taught:
     ) -> "_Taught":
         """By at most so many fixed points."""
         whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
-
-        def examples(rows: Int[np.ndarray, "n"]) -> Examples:
-            parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[rows]
-            return make_examples(
-                frames.crops, channels, frames.cropping, anchors.frames[rows], parts
-            )
-
         rows, marked = np.flatnonzero(whole), np.flatnonzero(whole & anchors.marked)
         if not len(marked):
             return cls()
-        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
-        filters = MarkFilters.learn(examples(rows), frames.cropping.size, frames.player)
-        return cls(examples(np.repeat(marked, MARK_WEIGHT)), filters)
+        spread = np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)
+        rows = np.union1d(rows[spread], marked)
+        parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[rows]
+        numbers = anchors.frames[rows]
+        examples = make_examples(frames.crops, channels, frames.cropping, numbers, parts)
+        filters = MarkFilters.learn(examples, frames.cropping.size, frames.player)
+        again = np.repeat(np.flatnonzero(anchors.marked[rows]), MARK_WEIGHT)
+        return cls(examples.some(again), filters)
 
 
 def _through_marks(track: Track, anchors: TrackAnchors) -> Track:

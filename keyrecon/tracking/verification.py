@@ -1,8 +1,9 @@
 """Check the track against the video: truncation, occlusion by overlays, and distractors.
 
-The tracker's path passes through any candidates that there are: its confidence is as high for a
-knee at the lower edge as for a shoe, and for another player in the same clothes as for the right
-one. What is found here is reported; neither the track nor the motion changes.
+The tracker's path passes through any candidates that there are: its confidence may be as high for
+another player in the same clothes as for the right one and, where nothing is marked, for a knee at
+the lower edge as for a shoe. What is found here is reported; neither the track nor the motion
+changes.
 
 Truncation: feet that are in the picture have ground beneath them; where they are cut off, the
 player's colours reach the last row. So does a shadow: where feet were marked, the size of the
