@@ -93,6 +93,18 @@ def test_a_head_that_flow_is_less_sure_of_is_likelier_the_less_it_drifted_and_th
     assert 0 < doubts[0] < doubts[1] < doubts[2] < 1
 
 
+def test_two_feet_that_flow_has_in_one_place_are_not_fixed_for_their_looks():
+    for together, fixed in ((False, True), (True, False)):
+        joints = np.tile(body().joints, (9, 1, 1))
+        if together:
+            joints[:, LSP14.index("left_ankle")] = joints[:, LSP14.index("right_ankle")] + 3.0
+        exact = np.full(joints.shape[:2], 0.01)
+        flow = FlowTracks(joints, 0 * exact, exact > 1, drift=exact, likeness=50 * exact)
+        anchors = anchors_from_bodies(body(), flow)
+        assert np.isfinite(anchors.head[anchors.frames == 8]).all()
+        assert np.isfinite(anchors.feet[anchors.frames == 8]).all() == fixed
+
+
 def test_where_nothing_is_like_the_mark_flow_leads_nowhere():
     assert followed_body(drift=0.001, likeness=0.1) is None
 

@@ -62,6 +62,25 @@ def test_head_and_feet_are_found_in_every_frame(found):
     assert np.linalg.norm(track.mid_feet - truth - (0, HEIGHT), axis=1).max() < 0.06 * HEIGHT
 
 
+def test_a_track_is_as_sure_as_it_looks_like_what_was_marked(found):
+    panning, video, camera, colors, track = found
+    background = build_background(video, camera, track)
+    height, unknown, nowhere = track.height[[0]], np.full(1, np.nan), np.full((1, 2), np.nan)
+    medians = {}
+    for name, aside in (("player", 0.0), ("wall", -2.0 * HEIGHT / 3)):
+        shift = np.array([aside, 0.0])
+        anchors = TrackAnchors(
+            np.array([0]), track.head[[0]] + shift, track.feet[[0]] + shift,
+            np.ones(1, bool), height, np.zeros(1, bool), nowhere, unknown,
+        )  # fmt: skip
+        again = track_player(video, track, camera, background, colors, anchors)
+        truth = heads(COUNT) - corners(COUNT, panning)
+        assert np.linalg.norm(again.head - truth, axis=1)[5:].max() < 0.05 * HEIGHT
+        medians[name] = float(np.median(again.confidence[5:]))
+    assert medians["player"] > 0.9
+    assert medians["wall"] < 0.6
+
+
 def test_neither_a_racket_like_a_shoe_nor_a_lifted_foot_misleads(tmp_path):
     video = film(tmp_path / "playing.mp4", COUNT, playing=True)
     camera = CameraPath(np.tile(np.eye(3), (COUNT, 1, 1)), np.ones(COUNT))
