@@ -30,8 +30,8 @@ head has changed its looks by does not make all that follow doubtful. Evidence: 
 four marked bodies of 18 real clips: necks and tops of heads are .12 off in 2 of 1706, ankles in 1
 of 1516; with less likeness heads in 19 of 100."""
 ONE_PLACE = 1 / 3
-"""Ankles nearer than this share of a shank are followed to one place, where flow may have handed one
-leg over to the other, which looks like it: they are not fixed for their looks. In a rendered
+"""Ankles nearer than this share of a shank are followed to one place, where flow may have handed
+one leg over to the other, which looks like it: they are not fixed for their looks. In a rendered
 sequence both feet were on one shoe for 62 of 600 frames."""
 EVEN_DRIFT = 0.3
 """Drift at which flow has a head as often as not, player heights. Evidence: necks and tops of heads
