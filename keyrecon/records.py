@@ -395,7 +395,8 @@ class FlowTracks:
     """Whether there is a way from a mark before and one from a mark after."""
     drift: Float[np.ndarray, "T J"]
     """How far apart both ways end, or, where there is one, how far its steps did not lead back in
-    sum, player heights; NaN where nothing was followed."""
+    sum; at the ends of a head that has grown at least by how much too long it is, or was on that
+    way. Player heights; NaN where nothing was followed."""
     likeness: Float[np.ndarray, "T J"]
     """Correlation of the picture there with that around the mark, the better one of two; NaN where
     nothing was followed."""

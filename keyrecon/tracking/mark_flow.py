@@ -37,6 +37,14 @@ it: at most 1.9 points, 2.4 mm on four clips."""
 LEAST_HEIGHT = 12.0
 """px that marks must span from top to bottom: half of a body 24 px high, the smallest taken."""
 
+HEAD_ENDS = ("neck", "head_top")
+GROWN = 1.15
+"""A head longer than the longest marked one by more than this factor has lost an end on the way:
+as its drift counts what is too much. Two eyes mark an end .016 to .042 player heights apart, a
+tenth to a fifth of a head. Evidence: of heads so followed in 18 real clips and eight rendered
+sequences 276 had grown by 1.3 or more with a drift below .1, the true ones by .9 to 1.1 in the
+median. Shorter ones are as often right as others: heads bend to the camera."""
+
 
 @dataclass(frozen=True)
 class FlowOptions:
@@ -155,6 +163,10 @@ class _Follower:
     """Their pixels per pixel of the video."""
     height: float
     """Of the player in them, px."""
+    head: tuple[int, ...]
+    """Both ends of it among the joints; none where the skeleton has none."""
+    longest: float
+    """Length that a head may have, px; infinite where none is marked."""
     marks: Float[np.ndarray, "T J 2"]
     ahead: Float[np.ndarray, "T J 2"]
     """Places followed forwards, and the marks."""
@@ -179,12 +191,16 @@ class _Follower:
         places = np.full((*shape, 2), np.nan)
         places[marks.frames] = shrink * (marks.joints + 0.5) - 0.5
         side = options.side(height)
+        names = marks.skeleton.names
+        head = tuple(names.index(end) for end in HEAD_ENDS if end in names)
         return cls(
             schedule=_Schedule.of(marks, len(video), round(options.longest * video.fps)),
             options=options,
             width=width,
             shrink=shrink,
             height=height,
+            head=head,
+            longest=GROWN * _longest(places[:, head]),
             marks=places,
             ahead=places.copy(),
             joints=np.full((*shape, 2), np.nan),
@@ -222,6 +238,7 @@ class _Follower:
         places, returned = self._step(t - 1, t, self.ahead[t - 1, going], alone)
         self.ahead[t, going] = places
         self.doubt[going] += returned
+        self.doubt[going] = np.maximum(self.doubt[going], self._slid(going, places))
         lone = going[alone]
         if len(lone):
             alike = _correlations(self._patches(t, places[alone]), self.patches[lone])
@@ -245,12 +262,13 @@ class _Follower:
             group, ends, doubt, least = group[kept], ends[kept], doubt[kept], least[kept]
             joined = self.schedule.joined(t)[group]
             places, returned = self._step(t + 1, t, places[kept], ~joined)
-            doubt = doubt + returned
+            doubt = np.maximum(doubt + returned, self._slid(group, places))
             last = self.schedule.last[t, group]
             share = np.where(joined, (t - last) / (marked_at - last), 1.0)[:, None]
             ahead = np.where(joined[:, None], self.ahead[t, group], places)
             middle = (1 - share) * ahead + share * places
-            apart = np.where(joined, np.linalg.norm(ahead - places, axis=1) / self.height, doubt)
+            parted = np.linalg.norm(ahead - places, axis=1) / self.height
+            apart = np.where(joined, np.maximum(parted, self._slid(group, middle)), doubt)
             here = self._patches(t, middle)
             alike = _correlations(here, ends)
             either = np.maximum(alike, _correlations(here, self.patches[group]))
@@ -274,6 +292,17 @@ class _Follower:
         if not alone.all():
             there[~alone] = track_points(before, after, here[~alone], side)[0][:, 0]
         return there, returned
+
+    def _slid(
+        self, group: Int[np.ndarray, "g"], places: Float[np.ndarray, "g 2"]
+    ) -> Float[np.ndarray, "g"]:
+        """By how much a head is longer than it may be, player heights, at its ends; others 0."""
+        slid = np.zeros(len(group))
+        ends = np.flatnonzero(np.isin(group, self.head))
+        if len(ends) == len(HEAD_ENDS):
+            length = float(np.linalg.norm(places[ends[1]] - places[ends[0]]))
+            slid[ends] = max(0.0, length - self.longest) / self.height
+        return slid
 
     def _agreement(self, apart: Float[np.ndarray, "g"]) -> Float[np.ndarray, "g"]:
         """0-1, for two ways that end so many player heights apart."""
@@ -309,6 +338,14 @@ def _marked_height(marks: Annotations) -> float:
         return _extent(marks.joints[whole, :, 1])
     lower = marks.skeleton.is_lower
     return sum(_extent(marks.joints[:, half, 1]) for half in (lower, ~lower))
+
+
+def _longest(ends: Float[np.ndarray, "n e 2"]) -> float:
+    """Length of the longest part of which both ends are known, px; infinite where there is none."""
+    if ends.shape[1] < len(HEAD_ENDS):
+        return np.inf
+    longest = np.fmax.reduce(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), initial=0.0)
+    return float(longest) or np.inf
 
 
 def _extent(y: Float[np.ndarray, "n j"]) -> float:

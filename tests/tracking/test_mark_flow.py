@@ -1,5 +1,7 @@
 """Marked joints followed by optical flow between marks."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -82,3 +84,31 @@ def test_one_joint_marked_says_nothing_of_the_player_and_is_not_followed(video):
     flow = track_marked_joints(video, marks)
     assert np.isnan(flow.joints).all()
     assert (flow.confidence == 0).all()
+
+
+def test_a_head_that_grows_has_lost_an_end_and_stays_doubtful_when_it_is_short_again(tmp_path):
+    noise = np.random.default_rng(1).integers(0, 255, (2, 180, 80, 3)).astype(np.uint8)
+    body, top = (cv2.GaussianBlur(each, (5, 5), 0) for each in noise)
+    away = [*range(0, 40, 4), *range(40, -1, -4)]  # the top of the head goes off, and comes back
+
+    def frames():
+        for x in away:
+            picture = np.full((240, 320, 3), 90, np.uint8)
+            picture[15:175, 40:120] = body[:160]
+            picture[180:230, 40 + x : 120 + x] = top[:50]
+            yield picture
+
+    path = tmp_path / "head.mp4"
+    write_video(path, frames(), 25.0)
+    joints = BODY[None].copy()
+    ends = [LSP14.index("neck"), LSP14.index("head_top")]
+    joints[0, ends] = (80.0, 160.0), (80.0, 200.0)
+    marks = replace(marked(0), joints=joints)
+    flow = track_marked_joints(open_video(path), marks, FlowOptions(player=170.0))
+    back = len(away) - 1
+    assert np.linalg.norm(flow.joints[back, ends] - joints[0, ends], axis=1).max() < 3
+    assert flow.drift[1, ends].max() < 0.01
+    assert flow.drift[10, ends].min() > 0.04  # 57 px long instead of 40, of a player of 170
+    assert flow.drift[back, ends].min() > 0.04
+    assert np.delete(flow.drift[back], ends).max() < 0.02
+    assert flow.confidence[back, ends].max() < 0.5
