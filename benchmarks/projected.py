@@ -85,8 +85,7 @@ def lift(
     options = MarkOptions(CLICK_NOISE * tall, signs, sequence.seed)
     marks: Annotations = mark_from_truth(keyframes, truth.points2d, truth.points3d, options=options)
     joints = truth.points2d + tall * errors(frames, fps, rng)
-    source = np.repeat(nearest[:, None], len(LSP14.names), axis=1)
-    tracks = JointTracks(joints, np.full(source.shape, 0.8), source)
+    tracks = JointTracks(joints, np.full(joints.shape[:2], 0.8))
     seen = truth.height_px * (1 + SCALE_ERROR * rng.standard_normal())
     typed = truth.height * (1 + rng.uniform(-HEIGHT_ERROR, HEIGHT_ERROR))
     given = tracks, marks, keyframes, seen, fps

@@ -159,13 +159,12 @@ def mark_keyframes(clip: Clip, asked: Keyframes, first: np.ndarray) -> Annotatio
 
     At most every second frame with marks by eye is used, so that enough are left to measure on.
     """
-    halves = []
+    halves, most = [], len(clip.truth.frames) // 2 - len(first)
     for half in (asked.upper, asked.lower):
-        most = len(clip.truth.frames) // 2 - len(first)
-        frames = half.frames
-        if len(frames) > most:
-            frames = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
-        halves.append(np.union1d(nearest_rows(clip, frames), first))
+        rows = np.setdiff1d(nearest_rows(clip, half.frames), first)
+        if len(rows) > most:
+            rows = rows[np.linspace(0, len(rows) - 1, most).round().astype(int)]
+        halves.append(np.union1d(rows, first))
     return take(clip, *halves)
 
 

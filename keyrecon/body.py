@@ -202,6 +202,11 @@ _LSP = (  # name, parent, bone length in statures
 )
 
 
+def plain_name(name: str) -> str:
+    """A joint's name in a sentence."""
+    return name.replace("_", " ")
+
+
 def standing_length(lengths: Float[np.ndarray, "B"], skeleton: Skeleton) -> float:
     """How tall bones of these lengths stand: the longest leg and the longest midline chain."""
     reach = skeleton.ancestry @ lengths

@@ -33,7 +33,7 @@ def known_focal(video: Video, degrees: float | None) -> FieldOfView | None:
     if degrees is not None:
         focal = video.width / 2 / np.tan(np.radians(degrees) / 2)
         return FieldOfView(float(focal), TYPED_ERROR, f"the field of view of {degrees:g} degrees")
-    if video.joints:  # several files, perhaps of several lenses
+    if video.file_starts:  # several files, perhaps of several lenses
         return None
     lens = lens_focal(video.path, (video.width, video.height))
     return None if lens is None else FieldOfView(lens, LENS_ERROR, "the lens that the file names")

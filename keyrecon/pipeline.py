@@ -88,13 +88,13 @@ class Options:
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     propagate: PropagateOptions = field(default_factory=PropagateOptions)
     depths: str = "built-in"
-    """What helps where nobody said which end of a limb is nearer: 'built-in', 'none', or a file of
-    `keyrecon depths`."""
+    """What helps `keyrecon run` where nobody said which end of a limb is nearer: 'built-in',
+    'none', or a file of `keyrecon depths`."""
     sides: str = "built-in"
-    """What tells left arms from right ones by the pose of the whole body: 'built-in', 'none', or a
-    file of `keyrecon sides`."""
+    """What tells `keyrecon run` left arms from right ones by the pose of the whole body:
+    'built-in', 'none', or a file of `keyrecon sides`."""
     prior: Literal["none", "golf"] = "none"
-    """'golf': a model of golf swings helps with depth and between the keyframes.
+    """'golf': a model of golf swings helps `keyrecon run` with depth and between the keyframes.
 
     It tells depth signs and what nobody saw between keyframes.
     """
@@ -182,11 +182,11 @@ def with_marked_keyframes(
     options: Options = Options(),
     progress: Progress = silent,
 ) -> Preparation:
-    """The same with the frames that are marked already among the keyframes."""
+    """The same with the frames of usable shots that are marked already among the keyframes."""
     keyframes = keep_marked(
         preparation.pose_distances,
         preparation.keyframes,
-        marked_frames(marks),
+        marked_frames(marks_in_shots(marks, preparation.shots)),
         options.keyframes,
         progress,
     )
@@ -273,8 +273,7 @@ def _lift(
             models.swing,
             height,
             video,
-            options=options.swing,
-            progress=progress,
+            options=swing_prior_options(options, video),
         )
     return keep(
         "lift",
@@ -288,6 +287,13 @@ def _lift(
         options=options.lift,
         progress=progress,
     )
+
+
+def swing_prior_options(options: Options, video: Video) -> SwingPriorOptions:
+    """Options of the swing prior with the player's height and the focal length, where known."""
+    focal, height = focal_length(options.lift, video), options.lift.height
+    swing = options.swing if focal is None else replace(options.swing, focal=focal / video.width)
+    return swing if height is None else replace(swing, stature=height)
 
 
 def focal_length(options: LiftOptions, video: Video) -> float | None:

@@ -146,14 +146,15 @@ class TrackVerification:
 
 @dataclass(frozen=True, eq=False)
 class TrackAnchors:
-    """Where a person marked the player's head and feet: fixed points of the track."""
+    """Fixed points of the track: heads and feet that a person marked, or that flow between marks is
+    sure of."""
 
     frames: Int[np.ndarray, "A"]
     """Ascending."""
     head: Float[np.ndarray, "A 2"]
-    """Centre of the head, px; NaN where not marked."""
+    """Centre of the head, px; NaN where not fixed."""
     feet: Float[np.ndarray, "A 2 2"]
-    """Both shoes, px; NaN where not both are marked."""
+    """Both shoes, px; NaN where not both are fixed."""
     marked: Bool[np.ndarray, "A"]
     """False where flow between marks has found them, not a person."""
     height: Float[np.ndarray, "A"]
@@ -373,8 +374,6 @@ class JointTracks:
     """px; NaN where missing."""
     confidence: Float[np.ndarray, "T J"]
     """0-1; 0 where missing."""
-    keyframe: Int[np.ndarray, "T J"]
-    """Frame number of the keyframe that each joint comes from."""
     exchange_evidence: Float[np.ndarray, "T 2"] | None = None
     """Log odds by the motion that left and right are exchanged in the marks of the lower body, and
     of the upper, nats; 0 in frames without marks, None where not computed."""
@@ -438,8 +437,9 @@ class Motion:
     elsewhere: Float[np.ndarray, "T J"] | None = None
     """As in `JointTracks`; of `points2d_propagated`."""
     cuts: Int[np.ndarray, "C"] | None = None
-    """Frames with which another shot begins; None where there is one shot. In shots that do not
-    show the player everything but the time is unknown, and confidence is 0."""
+    """Frames with which another shot begins, or a stretch of one in which nobody is seen, or is
+    again; None where there is one stretch. Where nobody is everything but the time is unknown, and
+    confidence is 0."""
 
     @property
     def known(self) -> Bool[np.ndarray, "T"]:

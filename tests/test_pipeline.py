@@ -1,6 +1,7 @@
 """What a result says of itself: where each joint comes from."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from keyrecon.body import LSP14
 from keyrecon.io.formats.coco import write_coco_motion
 from keyrecon.io.video import Video
 from keyrecon.lifting.lifting import LiftResult
-from keyrecon.pipeline import assemble_motion
+from keyrecon.pipeline import Options, assemble_motion, swing_prior_options
 from keyrecon.records import SOURCES, Annotations, JointTracks
 from keyrecon.report.summary import missing_shares
 
@@ -47,7 +48,7 @@ def motion():
     )
     frames = np.arange(T)
     video = Video(Path("v.mp4"), 640, 480, frames, frames / 25, 25.0, 0, False, None)
-    carried = JointTracks(joints, confidence, np.zeros((T, J), dtype=np.int64))
+    carried = JointTracks(joints, confidence)
     return assemble_motion(video, marks, carried, lifted, None)
 
 
@@ -73,3 +74,13 @@ def test_coco_has_a_joint_that_nothing_told_of_as_not_seen(motion, tmp_path):
     for where in (UNSEEN, NOWHERE, SLIPPED, UNSEEN_SLIP):
         expected[where] = 1
     assert (seen == expected).all()
+
+
+def test_the_swing_prior_knows_the_lens_and_the_height_that_are_told():
+    video = Video(Path("v.mp4"), 640, 480, np.arange(2), np.arange(2) / 25, 25.0, 0, False, None)
+    usual = Options()
+    assert swing_prior_options(usual, video) == usual.swing
+    told = replace(usual, lift=replace(usual.lift, height=1.6, field_of_view=90.0))
+    known = swing_prior_options(told, video)
+    assert known.stature == 1.6
+    assert known.focal == pytest.approx(0.5)

@@ -40,7 +40,6 @@ def make_tracks(count, seed=0):
     return JointTracks(
         rng.random((count, 4, 2)),
         rng.random((count, 4)),
-        rng.integers(0, 9, (count, 4)),
         rng.random((count, 2)),
     )
 

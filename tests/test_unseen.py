@@ -61,7 +61,7 @@ def test_one_joint_that_was_carried_is_enough():
 
 
 def test_of_legs_below_the_picture_nothing_is_known_and_of_the_rest_what_was():
-    tracks = JointTracks(np.zeros((4, 14, 2)), np.full((4, 14), 0.5), np.zeros((4, 14), int))
+    tracks = JointTracks(np.zeros((4, 14, 2)), np.full((4, 14), 0.5))
     outside = np.array([False, True, True, False])
     legs = np.array([name.endswith(("knee", "ankle")) for name in LSP14.names])
     joints = np.where(LSP14.is_lower[:, None], np.nan, np.zeros((1, 14, 2)))

@@ -28,6 +28,7 @@ from keyrecon.golf.marks import join_marks
 from keyrecon.golf.mirroring import mirror_clicks, mirror_found
 from keyrecon.golf.plausibility import SwingDoubt
 from keyrecon.golf.records import (
+    KEY_POSTURES,
     NO_MARKS,
     FittedSwing,
     MotionModel,
@@ -67,7 +68,6 @@ from keyrecon.tracking.camera_motion import estimate_camera_motion
 
 CLICKS_FILE = "golf_clicks.json"
 TABLE_FILE, OVERLAY_FILE = GOLF_RESULTS
-KEYS = ("start", "top", "hit", "finish")
 SHORTEST_SWING = 0.7
 """Seconds from the beginning of the upswing to the hit, at least: the fastest tour players take
 0.93 (21 + 7 frames at 30 a second: 0.7 + 0.23; Novosel & Garrity, Tour Tempo, 2004)."""
@@ -305,8 +305,8 @@ def _require_same_video(workspace: Workspace, video: Video, slow_motion: float |
             f"{folder} is a project with a skeleton of its own, which a swing does not have; name "
             "another folder with --out."
         )
-    earlier = kept.get("slow_motion", 1.0)
-    if slow_motion not in (None, earlier):
+    earlier = kept.get("slow_motion")
+    if earlier is not None and slow_motion not in (None, earlier):
         raise KeyreconError(
             f"{folder} was made with --slowmo {earlier:g}; name another folder with --out for "
             f"--slowmo {slow_motion:g}."
@@ -366,7 +366,7 @@ def describe_tempo(swing: RecordedSwing) -> str:
         text if np.isfinite(m.value) else f"no {m.name}"
         for m, text in zip((up, down, tempo), pace, strict=True)
     ]
-    missing = [name for name, shown in zip(KEYS, swing.shown, strict=True) if not shown]
+    missing = [name for name, shown in zip(KEY_POSTURES, swing.shown, strict=True) if not shown]
     not_shown = f" ({' and '.join(missing)} not shown)" if missing else ""
     times = "" if swing.doubts else f"; {', '.join(known)}"
     return (

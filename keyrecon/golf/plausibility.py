@@ -19,6 +19,7 @@ from keyrecon.golf.fit.residuals import (
     sample_distance,
     sight_directions,
 )
+from keyrecon.golf.fit.swing_path import DOWNSWING_SECONDS, TEMPO
 from keyrecon.golf.marks import ANOTHER_CLUB, carry_marks
 from keyrecon.golf.observe.film import Film
 from keyrecon.golf.observe.motion_timing import UNKNOWN_SHIFT, TimeShift
@@ -26,11 +27,6 @@ from keyrecon.golf.observe.swing_timing import LEAST_DETECTED
 from keyrecon.golf.records import FittedSwing, Observations
 from keyrecon.numerics.geometry import signed_angles
 
-DOWNSWING_SECONDS = (0.15, 0.5)
-"""From the top to the hit. Tour players take .23-.28 s, amateurs .25-.4 (Cochran & Stobbs, The
-Search for the Perfect Swing, 1968; Novosel & Garrity, Tour Tempo, 2004)."""
-TEMPO = (1.5, 6.0)
-"""Upswing to downswing: 3 to 1 for tour players, 2 to 4 for most others (Novosel & Garrity)."""
 ON_FIGURE = 0.03
 """A joint this near to the player's mask lies on it, body heights: half a wrist's width."""
 LEAST_ON_FIGURE = 0.88
@@ -178,20 +174,27 @@ def _doubt_shift(fitted: FittedSwing, shift: TimeShift) -> list[SwingDoubt]:
     return [SwingDoubt(f"the pictures show arms and club come down {seconds:.2f} s {way}", middle)]
 
 
-def _off_figure(fitted: FittedSwing, observations: Observations) -> Bool[np.ndarray, "n J"]:
-    """Which joints lie off the player's mask, from the start to the finish."""
+def _off_figure(
+    fitted: FittedSwing, observations: Observations
+) -> tuple[Bool[np.ndarray, "n J"], Bool[np.ndarray, "n"]]:
+    """Which joints lie off the player's mask, from the start to the finish, and in which of these
+    frames there is a mask; where there is none, none lies off."""
     during = _swing(fitted, 3)
     points = fitted.motion.points2d[during]
     away = sample_distance(observations.silhouette_distance[during], points)[0]
-    return away.reshape(points.shape[:2]) >= ON_FIGURE * observations.height
+    masked = np.array([len(samples) > 0 for samples in observations.foreground[during]])
+    off = away.reshape(points.shape[:2]) >= ON_FIGURE * observations.height
+    return off & masked[:, None], masked
 
 
 def _doubt_figure(fitted: FittedSwing, observations: Observations) -> list[SwingDoubt]:
     """Joints lie on the player's mask, hands at every time."""
     if not len(observations.silhouette_distance):
         return []
-    off, start = _off_figure(fitted, observations), _swing(fitted, 3).start
-    on = 1 - off.mean()
+    (off, masked), start = _off_figure(fitted, observations), _swing(fitted, 3).start
+    if not masked.any():
+        return []
+    on = 1 - off[masked].mean()
     if on < LEAST_ON_FIGURE:
         worst = start + int(off.mean(axis=1).argmax())
         return [SwingDoubt(f"only {on:.0%} of the joints lie on the player", worst)]

@@ -163,6 +163,10 @@ class Matches:
     end: Float[np.ndarray, "n 2"]
 
 
+KEY_POSTURES = ("start", "top", "hit", "finish")
+"""Of a golf swing, in the order of time."""
+
+
 @dataclass(frozen=True, eq=False)
 class SwingMarks:
     """What a person marked: joints and shaft in some frames, and when key postures are."""

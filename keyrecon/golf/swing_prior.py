@@ -31,7 +31,6 @@ from keyrecon.golf.records import (
 )
 from keyrecon.io.video import Video
 from keyrecon.numerics.geometry import unit_vectors
-from keyrecon.progress import Progress, silent
 from keyrecon.ranges import BODY_HEIGHTS, within
 from keyrecon.records import Annotations, JointTracks
 
@@ -68,7 +67,6 @@ def fit_swing_prior(
     heights: Float[np.ndarray, "T"],
     video: Video,
     options: SwingPriorOptions = SwingPriorOptions(),
-    progress: Progress = silent,
 ) -> Float[np.ndarray, "T 14 3"]:
     """Joints of the fitted swing in camera axes, metres.
 

@@ -45,9 +45,9 @@ class HeldVideo(Video):
         return self.source.name
 
     @property
-    def joints(self) -> tuple[int, ...]:
+    def file_starts(self) -> tuple[int, ...]:
         """Those of the source."""
-        return self.source.joints
+        return self.source.file_starts
 
     @cached_property
     def fingerprint(self) -> str:

@@ -1,7 +1,7 @@
 """Several files of one player as one video: the frames of one after those of the other.
 
 Frames are numbered on through all files, and time goes on from file to file by a frame, since when
-the next was filmed is not known. Where a file begins the picture cuts (`Video.joints`).
+the next was filmed is not known. Where a file begins the picture cuts (`Video.file_starts`).
 """
 
 import hashlib
@@ -44,7 +44,7 @@ class JoinedVideo(Video):
         return hashlib.sha256(fingerprints.encode()).hexdigest()[:32]
 
     @property
-    def joints(self) -> tuple[int, ...]:
+    def file_starts(self) -> tuple[int, ...]:
         """Frames with which another file begins."""
         starts = set(np.searchsorted(self.stamps, self.begins[1:]).tolist())
         return tuple(sorted(starts - {0, len(self)}))
@@ -55,7 +55,7 @@ class JoinedVideo(Video):
 
     def _decoded(self, start: int, stop: int | None) -> "Iterator[av.VideoFrame]":
         stop = len(self) if stop is None else min(stop, len(self))
-        inner = [joint for joint in self.joints if start < joint < stop]
+        inner = [frame for frame in self.file_starts if start < frame < stop]
         for first, last in pairwise([start, *inner, stop]) if start < stop else ():
             number = int(np.searchsorted(self.begins, self.stamps[first], side="right")) - 1
             file = self.files[number]

@@ -84,7 +84,7 @@ class Video:
         return self.path.name
 
     @property
-    def joints(self) -> tuple[int, ...]:
+    def file_starts(self) -> tuple[int, ...]:
         """Frames with which another file begins; of one file none."""
         return ()
 

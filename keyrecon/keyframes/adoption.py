@@ -56,14 +56,15 @@ def keep_marked(
     87.3 instead of 86.5 within a tenth.
     """
     halves = []
-    for half, name, frames in zip(
-        (asked.upper, asked.lower), ("upper", "lower"), marked, strict=True
+    tables = comparison.upper, comparison.lower
+    for half, table, apart, frames in zip(
+        (asked.upper, asked.lower), tables, comparison.exemplar_distance, marked, strict=True
     ):
-        distances = getattr(comparison, name)
         chosen = half.frames.tolist()
         for frame in frames.tolist():
             if chosen:
-                row = distances[comparison.row[frame], comparison.row[chosen]]
+                row = table[comparison.row[frame], comparison.row[chosen]]
+                row = np.maximum(row, np.maximum(apart[frame], apart[chosen]))
                 nearest = int(row.argmin())
                 if chosen[nearest] not in frames and row[nearest] < half.beta:
                     chosen.pop(nearest)

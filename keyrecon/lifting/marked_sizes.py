@@ -48,7 +48,7 @@ def marked_heights(
     count = int(retimed.frames[-1]) + 1
     nothing = np.full((count, len(skeleton.names), 2), np.nan)
     nowhere = np.zeros(nothing.shape[:2])
-    tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))
+    tracks = JointTracks(nothing, nowhere)
     free = LengthOptions(scale_spread=SIZE_SPREAD)
     size = estimate_lengths(tracks, retimed, np.full(count, usual), fps, free)
     return np.where(known, HEAD_TO_FEET * size.scale[retimed.frames], np.nan)

@@ -23,7 +23,7 @@ from keyrecon.numerics.banded_least_squares import (
     solve_banded,
 )
 from keyrecon.numerics.bone_directions import pose_from_directions
-from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.geometry import tangents, unit_vectors
 from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 
 
@@ -107,13 +107,6 @@ def solve(
         return (before - after) / max(before, 1e-12) < tolerance
 
     return minimise(start, evaluate, step, accepts, converged, DAMPING, rounds)
-
-
-def tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3 2"]:
-    """Two unit vectors at right angles to every direction."""
-    helper = np.eye(3)[np.abs(directions).argmin(axis=-1)]
-    first = unit_vectors(np.cross(directions, helper))
-    return np.stack([first, np.cross(directions, first)], axis=-1)
 
 
 def _move(state: MotionState, step: Float[np.ndarray, "T D"]) -> MotionState:

@@ -39,6 +39,13 @@ def unit_vectors(
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), min_length)
 
 
+def tangents(directions: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3 2"]:
+    """Two unit vectors at right angles to every direction."""
+    helper = np.eye(3)[np.abs(directions).argmin(axis=-1)]
+    first = unit_vectors(np.cross(directions, helper))
+    return np.stack([first, np.cross(directions, first)], axis=-1)
+
+
 def signed_angles(
     first: Float[np.ndarray, "n 2"], second: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, "n"]:

@@ -213,14 +213,12 @@ def transfer_joints(
     models = _gather_models(preparation, annotations)
     shape = (len(preparation.track.height), len(annotations.skeleton.names))
     joints, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
-    source = np.zeros(shape, dtype=np.int64)
     bones, is_lower = annotations.skeleton.bones, annotations.skeleton.is_lower
     frames = progress(_grey_pictures(preparation), "Propagating joints", shape[0])
     halves: tuple[tuple[HalfName, np.ndarray], ...] = (("upper", ~is_lower), ("lower", is_lower))
     for t, picture in enumerate(frames):
         for name, members in halves:
             keyframes = getattr(preparation.keyframes, name)
-            source[t, members] = keyframes.nearest[t]
             model = models.get((name, int(keyframes.nearest[t])))
             if model is None:
                 continue
@@ -232,7 +230,7 @@ def transfer_joints(
             joints[t, members] = refined[members]
             likeness = np.exp(-keyframes.distance[t] / keyframes.beta)
             confidence[t, members] = np.where(np.isnan(refined[:, 0]), 0, share * likeness)[members]
-    return JointTracks(joints, confidence, source)
+    return JointTracks(joints, confidence)
 
 
 def _anchor(preparation: Preparation, frame: int, name: HalfName) -> Float[np.ndarray, "2"]:

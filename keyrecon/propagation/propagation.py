@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float
 
 from keyrecon.body_models.side_model import SideModel
 from keyrecon.errors import KeyreconError
@@ -157,8 +157,6 @@ class PropagatedHalf:
 
     joints: Complex[np.ndarray, "T J"]
     confidence: Float[np.ndarray, "T J"]
-    template: Int[np.ndarray, "T J"]
-    """Row of the annotated frame that each joint comes from."""
     elsewhere: Float[np.ndarray, "T J"]
     """As in `JointTracks`."""
     exchange_evidence: Float[np.ndarray, "T"]
@@ -173,7 +171,7 @@ def propagate_joints(
     options: PropagateOptions = PropagateOptions(),
     progress: Progress = silent,
 ) -> JointTracks:
-    """Joints in px, confidence and source keyframe of every joint in every frame.
+    """Joints in px and confidence of every joint in every frame.
 
     Where `flow` between two marks is surer of a joint than edges are, flow has it. `sides` helps to
     tell the arms apart.
@@ -211,7 +209,6 @@ def _propagate_fused(
     frames = np.arange(len(preparation.edges))
     joints = np.full((len(frames), annotations.joints.shape[1]), np.nan + 0j)
     confidence, elsewhere = np.zeros((2, *joints.shape))
-    source = np.zeros(joints.shape, dtype=np.int64)
     exchanged: list[Float[np.ndarray, "T"]] = []
     halves = split_body(annotations.skeleton)
     for half in progress(halves, "Propagating joints", len(halves)):
@@ -226,11 +223,10 @@ def _propagate_fused(
         joints[:, free] = result.joints[:, half.free]
         confidence[:, free] = result.confidence[:, half.free]
         elsewhere[:, free] = result.elsewhere[:, half.free]
-        source[:, free] = poses.frames[result.template[:, half.free]]
         exchanged.append(result.exchange_evidence)
     places = player.body_frame.to_pixels(joints, frames[:, None])
     evidence = np.stack(exchanged, axis=1)
-    tracks = JointTracks(places, confidence, source, evidence, elsewhere)
+    tracks = JointTracks(places, confidence, evidence, elsewhere)
     return with_flow(tracks, flow, preparation.track.height, player.bounds)
 
 
@@ -321,14 +317,10 @@ def propagate_half(
     chosen = ChosenHypotheses(identity.apply(half, limbs_chosen.joints), nearest)
     joints = smooth_trajectories(templates, index, chosen, shots, fps, rounds)
     confidence = joint_confidence(templates, index, chosen.joints, joints, identity.probability)
-    template, elsewhere = (
-        identity.apply(half, values)
-        for values in (
-            limbs_chosen.template,
-            limbs_chosen.elsewhere(identity.apply(half, joints)),
-        )
+    elsewhere = limbs_chosen.elsewhere(identity.apply(half, joints))
+    return PropagatedHalf(
+        joints, confidence, identity.apply(half, elsewhere), identity.exchange_evidence
     )
-    return PropagatedHalf(joints, confidence, template, elsewhere, identity.exchange_evidence)
 
 
 def _with_appearance(
@@ -352,16 +344,13 @@ def _with_marks(
     """Annotated joints exactly as they were marked, absent ones nowhere."""
     row, joint = np.nonzero(kept)
     frame = annotations.frames[row]
-    joints, confidence, source = (
-        values.copy() for values in (tracks.joints, tracks.confidence, tracks.keyframe)
-    )
+    joints, confidence = tracks.joints.copy(), tracks.confidence.copy()
     for at, name in annotations.absent:
         joints[at, annotations.skeleton.index(name)] = np.nan
         confidence[at, annotations.skeleton.index(name)] = 0
     joints[frame, joint] = annotations.joints[row, joint]
     confidence[frame, joint] = 1
-    source[frame, joint] = frame
-    tracks = replace(tracks, joints=joints, confidence=confidence, keyframe=source)
+    tracks = replace(tracks, joints=joints, confidence=confidence)
     if tracks.elsewhere is None:
         return tracks
     elsewhere = tracks.elsewhere.copy()

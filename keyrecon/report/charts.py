@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from jaxtyping import Float, Int, Num
 from plotly.subplots import make_subplots
 
-from keyrecon.body import Skeleton
+from keyrecon.body import Skeleton, plain_name
 from keyrecon.records import SOURCES, HalfKeyframes, Keyframes, Motion, PoseDistances
 from keyrecon.report.drawing import joint_sides
 from keyrecon.report.markup import thinning
@@ -25,11 +25,6 @@ from keyrecon.report.summary import (
 
 SIDE_COLORS = ("var(--left)", "var(--right)", "var(--trunk)")
 SOURCE_COLORS = ("var(--annotated)", "var(--propagated)", "var(--interpolated)", "var(--refined)")
-
-
-def plain_name(name: str) -> str:
-    """A joint's name for a reader."""
-    return name.replace("_", " ")
 
 
 def keyframe_chart(

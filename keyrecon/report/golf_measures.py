@@ -150,7 +150,7 @@ def measure_swing(swing: RecordedSwing) -> SwingMeasures:
     keys = _measure_tempo(swing)
     for curve in curves:
         keys += [_measure_key(swing, curve, posture) for posture in AT[curve.name]]
-    return SwingMeasures(curves, tuple(keys), float(swing.club_seen.mean()))
+    return SwingMeasures(curves, tuple(keys), float(swing.club_seen[swing.fitted].mean()))
 
 
 def measure_curves(swing: RecordedSwing) -> tuple[Curve, ...]:

@@ -15,6 +15,7 @@ from plotly.offline import get_plotlyjs
 
 from keyrecon import __version__
 from keyrecon.annotation_budget import annotation_cost
+from keyrecon.body import plain_name
 from keyrecon.io.durable import write_durably
 from keyrecon.io.formats.conventions import stature
 from keyrecon.progress import Progress, silent
@@ -190,7 +191,7 @@ def _coverage(material: ReportMaterial) -> str:
 def _joint_curves(material: ReportMaterial) -> str:
     names = material.motion.skeleton.names
     options = "".join(
-        f'<option value="{joint}">{text(charts.plain_name(name))}</option>'
+        f'<option value="{joint}">{text(plain_name(name))}</option>'
         for joint, name in enumerate(names)
     )
     return section(

@@ -5,9 +5,9 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
+from keyrecon.body import plain_name
 from keyrecon.io.formats.conventions import stature
 from keyrecon.records import Motion
-from keyrecon.report.charts import plain_name
 from keyrecon.report.markup import ReportMaterial, note, number, section, table
 from keyrecon.report.summary import (
     bone_lengths,

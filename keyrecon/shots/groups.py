@@ -12,7 +12,7 @@ than two at a time unless somebody asks for more workers.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -124,8 +124,7 @@ def propagate_in_groups(
             options=options,
         )
         span = np.searchsorted(group.frames, (group.own.start, group.own.stop)).tolist()
-        tracks = take_frames(tracks, slice(*span))
-        return replace(tracks, keyframe=group.frames[tracks.keyframe])
+        return take_frames(tracks, slice(*span))
 
     carried = work_on_each(keep, carry, groups, large=True)
     return join_frames([*progress(carried, "Propagating joints", len(groups))])

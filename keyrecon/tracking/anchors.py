@@ -148,10 +148,10 @@ def _bridges(
     return place, step / np.sqrt(np.minimum(precision, 1))
 
 
-def marked_places(
+def fixed_places(
     anchors: TrackAnchors, numbers: Int[np.ndarray, "n"], camera: CameraPath
 ) -> tuple[Float[np.ndarray, "n 1 2"], Float[np.ndarray, "n 2 2"]]:
-    """Marked heads and feet of some frames in the reference frame; NaN where not marked."""
+    """Fixed heads and feet of some frames in the reference frame; NaN where there is none."""
     head, feet = np.full((len(numbers), 1, 2), np.nan), np.full((len(numbers), 2, 2), np.nan)
     row, entry = _shared_rows(numbers, anchors)
     path = camera.to_reference[numbers[row]]
@@ -169,7 +169,8 @@ def _shared_rows(
 
 
 def frames_off_anchors(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "n"]:
-    """Frames in which the head or a foot of a track is not where a person marked it."""
+    """Frames in which the head or a foot of a track is not where a person marked it; none of shots
+    that are left out."""
     if not anchors.marked.all():
         raise ValueError("only a person's marks contradict a track")
     limit = CONTRADICTION * track.height[anchors.frames]
@@ -180,7 +181,8 @@ def frames_off_anchors(track: Track, anchors: TrackAnchors) -> Int[np.ndarray, "
         for feet in (tracked, tracked[:, ::-1])
     )
     # comparisons with NaN are false: what is not marked contradicts nothing
-    return anchors.frames[(head > limit) | (np.minimum(straight, crossed) > limit)]
+    off = (head > limit) | (np.minimum(straight, crossed) > limit)
+    return anchors.frames[off & track.known[anchors.frames]]
 
 
 def least_sure_frames(
@@ -243,7 +245,7 @@ def outlier_marks(
         if not step <= frame < len(track.height) - step:
             continue
         around = (frame - step, frame + step)
-        if shot[around[0]] != shot[around[1]]:
+        if shot[around[0]] != shot[around[1]] or not track.known[frame]:
             continue
         head = np.linalg.norm(anchors.head[row] - track.head[list(around)].mean(axis=0))
         way = track.feet[list(around)].mean(axis=0)

@@ -180,7 +180,7 @@ def estimate_camera_motion(
     recent = RecentPictures(MOST_HELD if parallel_map is in_threads else 0)
     watched = recent.watch(detector.watch(_read_reduced(video, options, progress)))
     path = _estimate_motion(video, options, progress, _first_shot(watched, detector), detector)
-    if not detector.cuts and not video.joints:
+    if not detector.cuts and not video.file_starts:
         return path
     return _estimate_shots(video, options, watched, recent, detector, parallel_map)
 
@@ -299,7 +299,7 @@ def _estimate_shots(
 
     moved = [*parallel_map(estimate_shot_motion, begun())]
     known = {part.start: (part.stop, path) for part, path in zip(parts, moved, strict=True)}
-    cuts = tuple(sorted({*detector.cuts, *video.joints}))
+    cuts = tuple(sorted({*detector.cuts, *video.file_starts}))
     paths = []
     for part in Shots.between(cuts, len(video)).parts:
         stop, path = known.get(part.start, (None, None))

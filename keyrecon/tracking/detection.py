@@ -40,7 +40,7 @@ from keyrecon.segmentation.part_evidence import Reader, background_hypotheses, e
 from keyrecon.tracking.anchors import (
     FollowedHeads,
     anchored_states,
-    marked_places,
+    fixed_places,
     with_bridge_costs,
 )
 from keyrecon.tracking.candidates import PartCandidates, search_frame
@@ -249,12 +249,12 @@ def _link(
     from_reference, searched = np.linalg.inv(camera.to_reference), camera.to_reference[numbers]
     apart = float(np.median(np.diff(numbers))) if len(numbers) > 1 else video.fps
     step, max_gap = height / video.fps * apart, round(MAX_GAP_SECONDS * video.fps / apart)
-    marked_head, marked_feet = marked_places(anchors, numbers, camera)
+    fixed_head, fixed_feet = fixed_places(anchors, numbers, camera)
     head_cost = head_costs(candidates, options.other_trunk)
     stable = [h[:, None] for h in to_reference_frame([c.heads for c in candidates], searched)]
-    head_cost = with_bridge_costs(stable, head_cost, marked_head, options.head_speed * step)
+    head_cost = with_bridge_costs(stable, head_cost, fixed_head, options.head_speed * step)
     followed = FollowedHeads.of(anchors, numbers, camera, height)
-    stable, head_cost = anchored_states(*followed.with_costs(stable, head_cost), marked_head)
+    stable, head_cost = anchored_states(*followed.with_costs(stable, head_cost), fixed_head)
     chosen = find_cheapest_track(
         head_cost, stable, TransitionModel(options.head_speed * step, max_gap)
     )
@@ -264,7 +264,7 @@ def _link(
     pairs, costs = _pair(candidates, head[numbers], height)
     stable = to_reference_frame([c.feet for c in candidates], searched)
     stable = [f[p] for f, p in zip(stable, pairs, strict=True)]
-    stable, costs = anchored_states(stable, costs, marked_feet)
+    stable, costs = anchored_states(stable, costs, fixed_feet)
     model = TransitionModel(options.foot_speed * step, max_gap, skip_cost=FOOT_SKIP_COST)
     taken = find_cheapest_track(costs, stable, model)
     feet = fill_gaps(taken_states(stable, taken), numbers, from_reference)
@@ -280,7 +280,7 @@ def _link(
     # itself: a head that jumps to somebody else and feet that stay are no body.
     found = np.interp(np.arange(len(head)), numbers, (chosen >= 0) & (taken >= 0)) == 1
     track = with_standing_height(track, evidence, round(options.envelope * video.fps), found)
-    free_head, free_feet = (np.isnan(m).any(axis=(1, 2)) for m in (marked_head, marked_feet))
+    free_head, free_feet = (np.isnan(m).any(axis=(1, 2)) for m in (fixed_head, fixed_feet))
     return track, min(_mean(of_feet[free_feet], 1.0), _mean(of_both[free_head | free_feet], 1.0))
 
 

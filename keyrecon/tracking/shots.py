@@ -235,12 +235,12 @@ def find_shots(watched: Iterator[Grey], detector: CutDetector, video: Video) -> 
         if len(detector.cuts) == cuts or detector.cuts[-1] >= detector.count:
             continue
         cuts, last = len(detector.cuts), detector.cuts[-1]
-        joints = [joint for joint in video.joints if joint < last]
-        for end in sorted({*detector.cuts, *joints}):
+        starts = [frame for frame in video.file_starts if frame < last]
+        for end in sorted({*detector.cuts, *starts}):
             if end > start:
                 yield slice(start, end)
                 start = end
-    for end in sorted({*detector.cuts, *video.joints, len(video)}):
+    for end in sorted({*detector.cuts, *video.file_starts, len(video)}):
         if end > start:
             yield slice(start, end)
             start = end

@@ -28,7 +28,7 @@ from keyrecon.records import Background, CameraPath, Colors, Track, TrackAnchors
 from keyrecon.segmentation.foreground_model import ForegroundModel
 from keyrecon.segmentation.player_crops import ABOVE_HEAD, Channels, Cropping, Crops, cut_crops
 from keyrecon.timeline import part_of_path
-from keyrecon.tracking.anchors import FollowedHeads, marked_places
+from keyrecon.tracking.anchors import FollowedHeads, fixed_places
 from keyrecon.tracking.correlation_filters import (
     Examples,
     Filters,
@@ -142,7 +142,8 @@ def track_player(
 ) -> Track:
     """Head, feet, standing height, box and confidence in every frame.
 
-    Heads and feet that a person marked are passed through, and examples for the filters.
+    Heads and feet of the anchors are passed through, those that a person marked are examples for
+    the filters.
     """
     if options.method == "paper":
         return rough
@@ -150,7 +151,7 @@ def track_player(
     crops = cut_crops(video, cropping, ForegroundModel(background, camera), progress)
     evidence = SizeEvidence.of(camera, video, anchors)
     numbers = np.arange(len(video))
-    head, feet = marked_places(anchors, numbers, camera)
+    head, feet = fixed_places(anchors, numbers, camera)
     followed = FollowedHeads.of(anchors, numbers, camera, float(np.median(rough.height)))
     frames = _CroppedFrames(
         crops, cropping, options.player, rough, camera, evidence, head, feet, followed, video.fps
@@ -164,7 +165,7 @@ def track_player(
     filters = _train(sparse, channels, first, sound_frames(first), taught, options)
     detections = _detect(frames, channels, filters, taught.filters, progress)
     track = _link(detections, frames, OCCLUSION_COST, options)
-    return _through_marks(doubted(track, [d.looks for d in detections], cropping), anchors)
+    return _through_anchors(doubted(track, [d.looks for d in detections], cropping), anchors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +181,9 @@ class _CroppedFrames:
     camera: CameraPath
     evidence: SizeEvidence
     """Of the player's size."""
-    marked_head: Float[np.ndarray, "T 1 2"]
-    """Heads that a person marked, in the reference frame; else NaN."""
-    marked_feet: Float[np.ndarray, "T 2 2"]
+    fixed_head: Float[np.ndarray, "T 1 2"]
+    """Heads of the anchors, in the reference frame; else NaN."""
+    fixed_feet: Float[np.ndarray, "T 2 2"]
     """The same of both feet."""
     followed: FollowedHeads
     """Heads that flow leads to."""
@@ -197,8 +198,8 @@ class _CroppedFrames:
             _thinned(self.rough, step),
             part_of_path(self.camera, slice(None, None, step)),
             self.evidence.every(step),
-            self.marked_head[::step],
-            self.marked_feet[::step],
+            self.fixed_head[::step],
+            self.fixed_feet[::step],
             self.followed.every(step),
             self.fps / step,
         )
@@ -254,8 +255,8 @@ class _Taught:
         return cls(examples.some(again), filters)
 
 
-def _through_marks(track: Track, anchors: TrackAnchors) -> Track:
-    """The track with head and feet where they were marked, and sure where both were."""
+def _through_anchors(track: Track, anchors: TrackAnchors) -> Track:
+    """The track with head and feet where they are fixed, and sure where both are."""
     head, feet, confidence = track.head.copy(), track.feet.copy(), track.confidence.copy()
     with_head, with_feet = (
         np.isfinite(part).all(axis=tuple(range(1, part.ndim)))
@@ -302,13 +303,13 @@ def _link(
     max_gap = round(MAX_GAP_SECONDS * fps)
     motion = TransitionModel(options.head_speed * step, max_gap)
     head, head_confidence = link_head(
-        detections, camera, cropping, frames.marked_head, frames.followed, motion
+        detections, camera, cropping, frames.fixed_head, frames.followed, motion
     )
     stiffness = (fps / (2 * np.pi * options.foot_rate)) ** 4
     memory = round(MEMORY_SECONDS * fps)
     gait = FootMotionModel(options.foot_speed * step, max_gap, memory, occlusion_cost, stiffness)
     feet, feet_confidence = link_feet(
-        detections, camera, cropping, head, frames.rough.height, frames.marked_feet, gait
+        detections, camera, cropping, head, frames.rough.height, frames.fixed_feet, gait
     )
     cut = frames.evidence.cut(head)
     confidence = np.sqrt(head_confidence * np.where(cut, head_confidence, feet_confidence))

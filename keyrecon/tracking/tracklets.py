@@ -63,8 +63,8 @@ def linked_to_player(
 
 
 def find_jumps(track: Track, camera: CameraPath, shots: Shots, fps: float) -> list[int]:
-    """Frames of a shot to which the head moves farther than anybody does, the camera's motion
-    apart; of several close together the first."""
+    """Frames to which the head moves farther than anybody does, the camera's motion apart and in
+    one shot; of several close together the first."""
     jumps: list[int] = []
     for shot in shots.parts:
         frames = shot.start + np.flatnonzero(track.confidence[shot] > 0)

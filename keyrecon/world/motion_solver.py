@@ -22,7 +22,7 @@ from keyrecon.numerics.banded_least_squares import (
     band_from_blocks,
     solve_banded,
 )
-from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.geometry import tangents, unit_vectors
 from keyrecon.numerics.levenberg_marquardt import Damping, minimise
 
 DAMPING = Damping(start=1e-3, increase=10.0, decrease=5.0, largest=1e3)
@@ -153,18 +153,11 @@ def _prior_cost(state: WorldState, prior: DirectionPrior) -> float:
     return 0.5 * float((prior.weight * off**2).sum() + stiff * (prior.weight * bend**2).sum())
 
 
-def _tangents(directions: Float[np.ndarray, "T B 3"]) -> Float[np.ndarray, "T B 3 2"]:
-    """Two unit vectors at right angles to every direction."""
-    helper = np.eye(3)[np.abs(directions).argmin(axis=-1)]
-    first = unit_vectors(np.cross(directions, helper))
-    return np.stack([first, np.cross(directions, first)], axis=-1)
-
-
 def _moved(
     state: WorldState, step: Float[np.ndarray, "T D"], growth: Float[np.ndarray, "P"]
 ) -> WorldState:
     turn = step[:, 3:].reshape(len(step), -1, 2)
-    moved = state.directions + np.einsum("tbik,tbk->tbi", _tangents(state.directions), turn)
+    moved = state.directions + np.einsum("tbik,tbk->tbi", tangents(state.directions), turn)
     return replace(
         state,
         root=state.root + step[:, :3],
@@ -202,7 +195,7 @@ def _step(
     size_spread: Float[np.ndarray, "P"],
     damping: float,
 ) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "P"]]:
-    basis, grown = _tangents(state.directions), _size_slopes(state, figure)
+    basis, grown = tangents(state.directions), _size_slopes(state, figure)
     by_unknowns = _joint_slopes(state, figure, basis)
     frames, _, size = by_unknowns.shape
     blocks = [np.zeros((frames, size, size)) for _ in range(3)]

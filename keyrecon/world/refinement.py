@@ -30,6 +30,7 @@ from jaxtyping import Bool, Float, Int
 from keyrecon.body import Skeleton
 from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.records import Motion
+from keyrecon.timeline import PER_FRAME
 from keyrecon.world import world_terms as terms
 from keyrecon.world.lean import facing, remove_lean, sight_on_ground
 from keyrecon.world.motion_solver import DirectionPrior, Figure, Term, WorldState, solve
@@ -96,12 +97,6 @@ WINDOW_FRAMES, OVERLAP_FRAMES = 1500, 100
 """Frames solved together, and shared by neighbours, whose joints are blended there."""
 
 
-OF_FRAMES = (
-    "points3d", "points2d", "points2d_propagated", "confidence", "source", "scale", "time"
-)  # fmt: skip
-"""What a `Motion` has of every frame."""
-
-
 Shots = tuple[slice, ...]
 
 
@@ -138,7 +133,7 @@ class Placed:
         """Some of its frames, as one shot."""
         motion = replace(
             self.motion,
-            **{name: getattr(self.motion, name)[frames] for name in OF_FRAMES},
+            **{name: getattr(self.motion, name)[frames] for name in PER_FRAME},
             expected_error=None,
             cuts=None,
         )

@@ -274,9 +274,12 @@ def test_marks_of_another_video_are_refused(swing, tmp_path):
         fit(swing, project)
 
 
-def test_another_slow_motion_needs_another_folder(swing):
-    with pytest.raises(KeyreconError, match="was made with --slowmo 1"):
-        fit(swing, swing / "project", slow_motion=1.5)
+def test_a_slow_motion_may_be_told_later_and_another_needs_another_folder(swing, tmp_path):
+    project, video = shutil.copytree(swing / "project", tmp_path / "p"), swing / "video.mp4"
+    opened = app.open_golf_project(project, open_video(video), None, slow_motion=1.5)
+    assert opened.project["video"]["slow_motion"] == 1.5
+    with pytest.raises(KeyreconError, match=r"made with --slowmo 1\.5"):
+        app.open_golf_project(project, open_video(video), None, slow_motion=2.0)
 
 
 def test_other_clicks_stay_beside_the_new_ones(swing, tmp_path):

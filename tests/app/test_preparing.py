@@ -163,6 +163,7 @@ def following(tmp_path, monkeypatch):
 
     def follow(_workspace, video, _options, marks, _progress):
         """A track through the marks that it is given, and straight on between them."""
+        marks = standing_bodies({2: 50, 9: 50}) if marks is None else marks
         used.append(marks.frames.tolist())
         times = np.arange(len(video))
         across = np.interp(times, marks.frames, marks.joints[:, LSP14.index("neck"), 0])
@@ -192,6 +193,25 @@ def test_a_mark_that_was_taken_back_teaches_the_track_no_more(following):
     assert abs(prepare_with({2: 50, 9: 60}) - 55) < 5
     prepare_with({2: 50, 5: 54, 9: 60})
     assert used == [[2, 6, 9], [2, 9], [2, 9]]  # what is added in place changes nothing
+
+
+def test_a_mark_that_was_moved_is_told_to_the_track_and_one_that_was_nudged_is_not(following):
+    prepare_with, used = following
+    prepare_with({2: 50, 9: 50})
+    assert prepare_with({2: 50, 6: 50, 9: 52}) == 50  # of a player of 120
+    assert abs(prepare_with({2: 50, 6: 50, 9: 60}) - 50) < 0.1
+    assert used == [[2, 9], [2, 9], [2, 6, 9]]
+
+
+def test_marks_of_a_track_that_is_made_without_any_are_not_recalled(following, tmp_path):
+    prepare_with, _ = following
+    prepare_with({2: 50, 9: 50})
+    file = Workspace(tmp_path / "p").prepared_marks_file
+    assert file.is_file()
+    clicked = Workspace(tmp_path / "p", force=True)
+    clicked.add_picks([Pick(0, "head", 50.0, 40.0), Pick(0, "foot", 50.0, 160.0)])
+    preparing.prepare_project(clicked, clicked.video(), None, Options(), silent)
+    assert not file.is_file()
 
 
 def test_a_mark_in_a_shot_that_is_left_out_is_told_to_the_track_once(following):
@@ -224,6 +244,11 @@ def test_the_page_recalls_the_track_that_was_made_without_the_outlying_clicks(
     monkeypatch.setattr(preparing, "outlier_picks", lambda *_: [wrong])
     made = preparing.prepare_project(workspace, workspace.video(), None, Options(), silent)
     assert made.rejected_picks == (wrong,)
+    monkeypatch.setattr(
+        preparing, "outlier_picks", lambda made, _: [wrong] * (wrong in made.track.clicks)
+    )
+    alone = preparing.prepare_project(workspace, workspace.video(), None, Options(), silent)
+    assert alone.rejected_picks == (wrong,)  # though the track without it passes there
     page = project_cache.ProjectCache(workspace)
     assert page._prepared().track.clicks == made.preparation.track.clicks
     workspace.add_picks([Pick(5, "foot", 12.0, 40.0)])  # whoever clicks on still has that help

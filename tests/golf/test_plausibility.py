@@ -88,8 +88,19 @@ def test_a_club_elsewhere_or_nowhere_is_told(played):
     assert "detected in 0%" in texts(fitted, none)
 
 
+def on_trunk_and_beside(fitted, observations, beside):
+    """Samples of a mask: on the spine, and a share of them at the player's side."""
+    spine = fitted.motion.points2d[:, [LSP14.index("neck")]]
+    hips = fitted.motion.points2d[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]]
+    way = hips.mean(axis=1, keepdims=True) - spine
+    on = spine + np.linspace(0.3, 0.9, 100)[None, :, None] * way
+    on[:, : round(100 * beside), 0] += 1.2 * observations.height
+    return replace(observations, foreground=tuple(on))
+
+
 def test_a_body_beside_the_figure_is_told_with_a_frame(played):
     fitted, observations = played
+    observations = on_trunk_and_beside(fitted, observations, 0.0)
     shape = (FRAMES, 720 // SILHOUETTE_STEP, 1280 // SILHOUETTE_STEP)
     on = replace(observations, silhouette_distance=np.zeros(shape))
     assert find_doubts(fitted, on) == []
@@ -99,14 +110,15 @@ def test_a_body_beside_the_figure_is_told_with_a_frame(played):
     assert 0 <= doubt.frame < FRAMES
 
 
-def on_trunk_and_beside(fitted, observations, beside):
-    """Samples of a mask: on the spine, and a share of them at the player's side."""
-    spine = fitted.motion.points2d[:, [LSP14.index("neck")]]
-    hips = fitted.motion.points2d[:, [LSP14.index("right_hip"), LSP14.index("left_hip")]]
-    way = hips.mean(axis=1, keepdims=True) - spine
-    on = spine + np.linspace(0.3, 0.9, 100)[None, :, None] * way
-    on[:, : round(100 * beside), 0] += 1.2 * observations.height
-    return replace(observations, foreground=tuple(on))
+def test_frames_without_a_mask_do_not_speak_for_a_swing(played):
+    fitted, observations = played
+    observations = on_trunk_and_beside(fitted, observations, 0.0)
+    masked = np.arange(FRAMES) % 4 == 0
+    samples = [s if m else s[:0] for s, m in zip(observations.foreground, masked, strict=True)]
+    shape = (720 // SILHOUETTE_STEP, 1280 // SILHOUETTE_STEP)
+    away = np.where(masked[:, None, None], np.full(shape, 50.0), 0.0)
+    seen = replace(observations, foreground=tuple(samples), silhouette_distance=away)
+    assert "only 0% of the joints lie on the player" in texts(fitted, seen)
 
 
 @pytest.mark.parametrize(("beside", "told"), [(0.0, False), (0.15, True)])
@@ -129,6 +141,7 @@ def test_joints_tracked_elsewhere_are_told_unless_the_track_is_unsure(played):
 @pytest.mark.parametrize(("frames", "told"), [(2, False), (6, True)])
 def test_hands_that_leave_the_figure_are_told_unless_for_a_moment_only(played, frames, told):
     fitted, observations = played
+    observations = on_trunk_and_beside(fitted, observations, 0.0)
     distance = np.zeros((FRAMES, 720 // SILHOUETTE_STEP, 1280 // SILHOUETTE_STEP))
     first = round(float(fitted.keys[1]))
     wrists = [LSP14.index("right_wrist"), LSP14.index("left_wrist")]

@@ -42,11 +42,11 @@ def test_time_goes_on_by_a_frame_from_file_to_file(joined):
 
 
 def test_a_part_knows_where_files_begin_in_it(joined):
-    assert joined.joints == (16, 36)
+    assert joined.file_starts == (16, 36)
     part = joined.part(np.r_[10:18, 36, 40:44])
-    assert part.joints == (6, 8)
+    assert part.file_starts == (6, 8)
     assert [read_number(p) for p in part.frames()] == [*range(14, 20), 0, 1, 0, 4, 5, 6, 7]
-    assert joined.part(slice(16, 30)).joints == ()
+    assert joined.part(slice(16, 30)).file_starts == ()
 
 
 def test_the_camera_is_cut_where_a_file_begins_however_alike_the_pictures(joined):

@@ -81,7 +81,7 @@ def test_a_video_is_added_behind_the_first_and_what_a_person_wrote_stays(project
     project.project_file.write_text(project.project_file.read_text() + "# my note\n")
     assert len(project.add_video(second, {"start": 2})) == 15 + 8
     again = Workspace(project.folder)
-    assert again.video().joints == (15,)
+    assert again.video().file_starts == (15,)
     assert "# my note" in project.project_file.read_text()
     assert again.reserves(second)
 

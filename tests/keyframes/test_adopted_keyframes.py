@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from capsule_player import marks, scene, standing
 from sporting_poses import comparison_of, sporting_poses
 
-from keyrecon.keyframes.adoption import adopt_keyframes
+from keyrecon.keyframes.adoption import adopt_keyframes, keep_marked
 from keyrecon.keyframes.selection import KeyframeOptions, choose_keyframes
+from keyrecon.pipeline import with_marked_keyframes
 from keyrecon.propagation.marked_poses import distances_to
+from keyrecon.records import PLAYER, Shots
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +119,25 @@ def test_a_keyframe_is_no_distance_from_itself_even_where_an_exemplar_stands_for
     apart = distances_to(comparison, "upper", np.array([31, 60]))
     assert apart[31, 0] == apart[60, 1] == 0
     assert (np.delete(apart[:, 0], 31) >= comparison.exemplar_distance[0, 31]).all()
+
+
+def test_a_mark_takes_no_place_of_a_keyframe_that_it_does_not_represent():
+    """One exemplar stands for both, and neither shows the pose of the other."""
+    comparison = every_second_frame_is_an_exemplar(sporting_poses(400, seed=6))
+    asked = choose_keyframes(comparison, 50.0, KeyframeOptions(budget=0.015))
+    keyframe = next(int(f) for f in asked.upper.frames if f % 2 == 0)
+    apart = comparison.exemplar_distance.copy()
+    for far, kept in ((2 * asked.upper.beta, True), (asked.upper.beta / 2, False)):
+        apart[:, keyframe + 1] = far
+        own = np.array([keyframe + 1]), np.array([], int)
+        with_mark = keep_marked(replace(comparison, exemplar_distance=apart), asked, own)
+        assert keyframe + 1 in with_mark.upper.frames
+        assert (keyframe in with_mark.upper.frames) == kept
+
+
+def test_a_mark_in_a_shot_that_is_left_out_takes_no_keyframe_of_a_used_one():
+    made, truth = scene([standing()] * 12, [4])
+    for shows, kept in (("somebody else", [4]), (PLAYER, [10])):
+        shown = replace(made, shots=Shots((0, 8), 12, (PLAYER, shows)))
+        with_mark = with_marked_keyframes(shown, marks(truth, [10]))
+        assert with_mark.keyframes.upper.frames.tolist() == kept

@@ -51,8 +51,7 @@ def scene(frames=240, every=12, noise=0.0, signs=True, seed=0):
         beta=every / 3,
         printed_count=len(at),
     )
-    source = np.repeat(nearest[:, None], 14, axis=1)
-    tracks = JointTracks(joints, np.ones((frames, 14)), source)
+    tracks = JointTracks(joints, np.ones((frames, 14)))
     for array in (joints, marks.joints, nearer, tracks.confidence):
         array.setflags(write=False)
     return truth, tracks, marks, Keyframes(half, half, 10, 0.95)
@@ -317,9 +316,7 @@ def test_gross_outliers_change_little():
     joints[outlier] += rng.normal(0, 0.15 * SCALE, (outlier.sum(), 2))
     height = np.full(150, 0.88 * SCALE)
     clean = lift_motion(tracks, marks, keys, height, 50.0)
-    disturbed = lift_motion(
-        JointTracks(joints, tracks.confidence, tracks.keyframe), marks, keys, height, 50.0
-    )
+    disturbed = lift_motion(JointTracks(joints, tracks.confidence), marks, keys, height, 50.0)
     assert aligned_error(disturbed.points3d, truth) < aligned_error(clean.points3d, truth) + 0.008
     assert disturbed.rejected[outlier].mean() > 0.6
 

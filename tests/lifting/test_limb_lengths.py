@@ -30,7 +30,7 @@ def test_a_short_bone_that_points_at_the_camera_is_not_taken_for_a_long_one(seed
     marked = np.arange(0, frames, 60)
     nobody = np.zeros((len(marked), len(LSP14.bones)), dtype=np.int64)
     marks = Annotations(LSP14, marked, joints[marked], np.ones((len(marked), 14), bool), nobody)
-    tracks = JointTracks(joints, np.ones((frames, 14)), np.zeros((frames, 14), dtype=np.int64))
+    tracks = JointTracks(joints, np.ones((frames, 14)))
     found = estimate_lengths(tracks, marks, np.full(frames, SCALE), 25.0).lengths
     ratio = found[ARMS[0]] / found[LEG] / (true[ARMS[0]] / true[LEG])
     assert 0.75 < ratio < 1.1  # nobody can tell that eight tenths were not all
@@ -48,6 +48,6 @@ def test_elbows_of_no_confidence_that_lie_beyond_the_arm_make_no_arm_longer():
     confidence = np.ones((frames, 14))
     confidence[lost, elbows] = 0.0
     joints[lost, elbows] += [0.0, 1.6 * LSP14.lengths[ARMS[0]] * SCALE]
-    tracks = JointTracks(joints, confidence, np.zeros((frames, 14), dtype=np.int64))
+    tracks = JointTracks(joints, confidence)
     found = estimate_lengths(tracks, marks, np.full(frames, SCALE), 25.0).lengths
     assert found[ARMS[0]] / found[LEG] < 1.05 * LSP14.lengths[ARMS[0]] / LSP14.lengths[LEG]

@@ -36,8 +36,7 @@ def filmed(truth: np.ndarray) -> tuple[JointTracks, Annotations, Keyframes]:
     nearest = at[np.abs(np.arange(frames)[:, None] - at).argmin(axis=1)]
     apart = np.abs(np.arange(frames) - nearest).astype(float)
     half = HalfKeyframes(at, nearest, apart < 4, 1.0, 4.0, apart, len(at))
-    source = np.repeat(nearest[:, None], 14, axis=1)
-    tracks = JointTracks(picture, np.ones((frames, 14)), source)
+    tracks = JointTracks(picture, np.ones((frames, 14)))
     return tracks, marks, Keyframes(half, half, 10, 0.95)
 
 

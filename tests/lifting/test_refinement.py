@@ -12,10 +12,10 @@ from keyrecon.lifting.limb_lengths import BodySize
 from keyrecon.lifting.preprocessing import HUBER_DELTA, PreparedTracks, bridge_gaps, reject_spikes
 from keyrecon.lifting.priors.anatomy import sideways_spread
 from keyrecon.lifting.refinement import refine_motion, tilted_as
-from keyrecon.lifting.solver import MotionState, Smoothness, solve, tangents
+from keyrecon.lifting.solver import MotionState, Smoothness, solve
 from keyrecon.lifting.terms import unseen_bend
 from keyrecon.numerics.bone_directions import bone_vectors, pose_from_directions
-from keyrecon.numerics.geometry import unit_vectors
+from keyrecon.numerics.geometry import tangents, unit_vectors
 from keyrecon.paper.gradient_descent import descend, keep_lengths, low_pass
 from keyrecon.records import HalfKeyframes
 

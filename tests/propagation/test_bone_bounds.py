@@ -95,7 +95,7 @@ def test_a_limb_that_cannot_be_that_long_is_refused_whatever_speaks_for_it():
 
 def test_flow_has_no_joint_where_a_bone_would_be_too_long():
     joints = np.array([[[0.0, 0.0], [0.0, 20.0]]])
-    tracks = JointTracks(joints, np.full((1, 2), 0.3), np.zeros((1, 2), dtype=np.int64))
+    tracks = JointTracks(joints, np.full((1, 2), 0.3))
     bounds = np.array([[np.inf, 0.25], [0.25, np.inf]])
     for away, expected in ((24.0, 24.0), (30.0, 20.0)):
         places = np.array([[[0.0, 0.0], [away, 0.0]]])

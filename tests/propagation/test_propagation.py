@@ -31,7 +31,6 @@ def test_annotated_frames_keep_their_marks_exactly():
     found = carry(preparation, marks(truth, (2, 9)))
     np.testing.assert_array_equal(found.joints[[2, 9]], truth[[2, 9]])
     assert (found.confidence[[2, 9]] == 1).all()
-    assert (found.keyframe[[2, 9]] == [[2], [9]]).all()
 
 
 @pytest.mark.parametrize("options", [PropagateOptions(), PAPER], ids=["fused", "paper"])
@@ -163,7 +162,7 @@ def test_a_frame_on_which_half_of_the_joints_are_marked_serves_as_a_figure():
 def fused(edges, followed, joined=True, shift=40.0):
     """One joint at 0 by edges and elsewhere by flow, each with a confidence."""
     joints = np.zeros((1, 1, 2))
-    tracks = JointTracks(joints, np.full((1, 1), edges), np.zeros((1, 1), dtype=np.int64))
+    tracks = JointTracks(joints, np.full((1, 1), edges))
     sure, ways, exact = np.full((1, 1), followed), np.full((1, 1), joined), np.zeros((1, 1))
     flow = FlowTracks(joints + shift, sure, ways, drift=exact, likeness=1 - exact)
     result = with_flow(tracks, flow, np.full(1, 100.0), np.full((1, 1), np.inf))

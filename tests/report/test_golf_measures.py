@@ -304,6 +304,7 @@ def test_frames_to_which_nothing_was_fitted_have_no_numbers_and_no_doubts(tmp_pa
     swing = record_swing(shown_within(turning(ramp, ramp), 4, 27), seen())
     outside = np.r_[0:4, 28:FRAMES]
     measures = measure_swing(swing)
+    assert measures.club_found == swing.club_seen[4:28].mean() != swing.club_seen.mean()
     for curve in measures.curves:
         for numbers in (curve.values, curve.error):
             assert np.isnan(numbers[outside]).all()

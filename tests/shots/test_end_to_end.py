@@ -162,7 +162,7 @@ def test_groups_carried_by_processes_of_this_machine_are_the_same_to_the_digit(
         assert len({*multiprocessing.active_children()} - {*others}) == 2
     alone = carry(call_stage)
     assert len([*tmp_path.glob("propagate@*.npz")]) == 2
-    for name in ("joints", "confidence", "keyframe", "elsewhere"):
+    for name in ("joints", "confidence", "elsewhere"):
         np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
     off = np.linalg.norm(alone.joints - truth["points2d"], axis=2)
     assert np.median(off) < 0.02 * np.median(preparation.track.height)

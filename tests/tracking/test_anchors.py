@@ -7,6 +7,7 @@ import pytest
 
 from keyrecon.numerics.viterbi import TransitionModel, find_cheapest_track
 from keyrecon.records import CameraPath, Pick, Track, TrackAnchors
+from keyrecon.timeline import scatter_track, take_frames
 from keyrecon.tracking.anchors import (
     DOUBT_SECONDS,
     FollowedHeads,
@@ -163,6 +164,14 @@ def test_a_mark_that_the_player_would_have_to_jump_to_is_named_and_others_are_no
     assert (found.frame, found.part) == (30, "head")
     assert found.distance == pytest.approx(0.4, abs=0.01)
     assert outlier_marks(track, marks(track, [0, 10, 30, 59]), 25.0) == []
+
+
+def test_in_a_shot_that_is_left_out_no_mark_is_off_and_nothing_is_contradicted():
+    track = standing(60)
+    left_out = scatter_track(take_frames(track, slice(30)), np.arange(30), 60)
+    far = marks(track, [10, 45], (60.0, 0.0))
+    assert frames_off_anchors(left_out, far).tolist() == [10]
+    assert {mark.frame for mark in outlier_marks(left_out, far, 25.0)} == {10}
 
 
 def test_feet_in_either_order_lie_on_their_way():

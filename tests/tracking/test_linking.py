@@ -8,7 +8,7 @@ from keyrecon.segmentation.player_crops import Cropping
 from keyrecon.tracking.correlation_filters import clear_frames, sound_frames
 from keyrecon.tracking.linking import Detections, FootMotionModel, link_feet
 from keyrecon.tracking.smoothing import fill_gaps
-from keyrecon.tracking.tracker import _through_marks, detect_in_crop
+from keyrecon.tracking.tracker import _through_anchors, detect_in_crop
 
 COUNT, TALL = 60, 56.0
 HEAD, LEFT, RIGHT = (np.array(spot) for spot in ((200.0, 100.0), (195.0, 150.0), (205.0, 158.0)))
@@ -89,7 +89,7 @@ def test_a_marked_head_does_not_make_the_track_sure_of_feet_that_were_not_seen()
     anchors = TrackAnchors(
         np.array([5, 10, 15]), head, feet, every, unknown, ~every, nowhere, unknown
     )
-    marked = _through_marks(unsure, anchors)
+    marked = _through_anchors(unsure, anchors)
     assert np.flatnonzero(marked.confidence).tolist() == [5]
     assert marked.head[10].tolist() == (HEAD + 1).tolist()
 

@@ -98,5 +98,5 @@ def _measure(annotations: Annotations, height_px: Float[np.ndarray, "T"], fps: f
         return BodySize(skeleton, skeleton.lengths, across, height_px / HEAD_TO_FEET)
     nothing = np.full((len(height_px), len(skeleton.names), 2), np.nan)
     nowhere = np.zeros(nothing.shape[:2])
-    tracks = JointTracks(nothing, nowhere, nowhere.astype(np.int64))
+    tracks = JointTracks(nothing, nowhere)
     return estimate_lengths(tracks, annotations, height_px, fps)

@@ -30,10 +30,9 @@ from keyrecon.annotate.assist.suspicion import (
     LEAST_EVIDENCE,
     MIN_SUSPICION,
     Check,
-    label,
     suspicion,
 )
-from keyrecon.body import Skeleton
+from keyrecon.body import Skeleton, plain_name
 from keyrecon.lifting.limb_lengths import BodySize, LengthOptions
 from keyrecon.propagation.marked_poses import LEAST_MARKED
 from keyrecon.records import Annotations, Track
@@ -290,16 +289,16 @@ def _describe(
     if longest > max(far, unlike):
         parent, child = (skeleton.names[j] for j in skeleton.bones[bone])
         text = (
-            f"From {label(parent)} to {label(child)} is {residuals.stretch[row, bone]:.1f} times "
-            "as long as it can be; check both ends."
+            f"From {plain_name(parent)} to {plain_name(child)} is "
+            f"{residuals.stretch[row, bone]:.1f} times as long as it can be; check both ends."
         )
         return Check(frame, name, "long", doubt, text, (child, parent))
     if unlike > far:
-        text = f"A place beside it looks more like the {label(name)} of other frames."
+        text = f"A place beside it looks more like the {plain_name(name)} of other frames."
         return Check(frame, name, "unlike", doubt, text, (name,))
     text = (
-        f"The {label(name)} is {residuals.distance[row, joint]:.0%} of the player's height from "
-        "where similar frames have it."
+        f"The {plain_name(name)} is {residuals.distance[row, joint]:.0%} of the player's height "
+        "from where similar frames have it."
     )
     return Check(frame, name, "far", doubt, text, (name,))
 
@@ -366,7 +365,7 @@ def _left_out(annotations: Annotations) -> Iterator[Check]:
             names = tuple(name for name in open_ if (frame, name) not in absent)
             done = marked[row, half].mean() >= LEAST_MARKED
             if names:
-                listed = ", ".join(label(name) for name in names)
+                listed = ", ".join(plain_name(name) for name in names)
                 text = f"Not marked: {listed}; place them, or say that they are not seen."
                 yield Check(
                     frame,

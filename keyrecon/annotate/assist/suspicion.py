@@ -33,8 +33,3 @@ class Check:
 def suspicion(residual: float) -> float:
     """0 at 0, one half at 1, 1 far beyond."""
     return max(residual, 0.0) ** 4 / (max(residual, 0.0) ** 4 + 1)
-
-
-def label(name: str) -> str:
-    """A joint's name in a sentence."""
-    return name.replace("_", " ")

@@ -16,7 +16,7 @@ from keyrecon.annotate.assistant import Json
 from keyrecon.errors import KeyreconError
 from keyrecon.golf.click_checks import check_pose
 from keyrecon.golf.clicks import NEEDED, check_joints, check_numbers, clicked_pose
-from keyrecon.golf.records import MotionModel, RecordedSwing
+from keyrecon.golf.records import KEY_POSTURES, MotionModel, RecordedSwing
 from keyrecon.io.formats.clicks import clicks_from_parts
 from keyrecon.io.formats.model_file import BUILT_IN_SWING_PRIOR, read_motion_model
 from keyrecon.io.formats.swing_file import read_swing
@@ -24,7 +24,6 @@ from keyrecon.io.provenance import is_fitted
 from keyrecon.io.workspace import Workspace
 from keyrecon.report.golf_measures import measure_swing
 
-KEYS = ("start", "top", "hit", "finish")
 ORIGIN = "The clicks"
 """What messages call them."""
 _FRAME = re.compile(r" \(frame (\d+)\)$")
@@ -68,7 +67,7 @@ def _built_in_prior() -> MotionModel:
 
 def _keys_complaint(keys: Mapping[str, int | float]) -> str | None:
     """Why the marked key postures cannot be followed."""
-    marked = [(keys[name], name) for name in KEYS if name in keys]
+    marked = [(keys[name], name) for name in KEY_POSTURES if name in keys]
     for (before, first), (after, second) in pairwise(marked):
         if before >= after:
             return (
@@ -96,7 +95,7 @@ def _read_fit(file: Path, changed: int) -> Json:
         return {}
     club = np.where(swing.fitted[:, None, None], swing.club2d, np.nan)
     return {
-        "keys": {n: _number(key) for n, key in zip(KEYS, swing.keys.tolist(), strict=True)},
+        "keys": {n: _number(key) for n, key in zip(KEY_POSTURES, swing.keys.tolist(), strict=True)},
         "fitted": swing.fitted.tolist(),
         "club": [_rounded(ends) for ends in club.reshape(-1, 4)],
         "seen": swing.club_seen.tolist(),

@@ -177,8 +177,6 @@ def check_fit(cells: Mapping[Key, Value], skeleton: Skeleton, n_frames: int) -> 
         )
 
 
-KEY_POSTURES = ("start", "top", "hit", "finish")
-"""Key postures of a golf swing, in the order of time."""
 ABSENT = (0, 0, 0)
 """The mark of a joint that is absent, as a file has it."""
 

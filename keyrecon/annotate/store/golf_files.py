@@ -7,7 +7,7 @@ joints stand in annotations.json too, with whether they are hidden, which only t
 
 import numpy as np
 
-from keyrecon.annotate.store.cells import KEY_POSTURES, Cells, is_absent, of_body, of_kind
+from keyrecon.annotate.store.cells import Cells, is_absent, of_body, of_kind
 from keyrecon.annotate.store.edits import Limits
 from keyrecon.annotate.store.file_sync import FileForm
 from keyrecon.body import LSP14
@@ -18,7 +18,12 @@ from keyrecon.io.formats.clicks import (
     parts_of_clicks,
     read_some_clicks,
 )
-from keyrecon.io.formats.golf_marks import SwingMarks, golf_marks_text, read_golf_marks
+from keyrecon.io.formats.golf_marks import (
+    KEY_POSTURES,
+    SwingMarks,
+    golf_marks_text,
+    read_golf_marks,
+)
 from keyrecon.io.workspace import Workspace
 
 CLICK_CELLS, MARK_CELLS = ("golf", "click"), ("mark", "shaft", "key")

@@ -22,6 +22,11 @@ UNMARKED = np.full(4, np.nan)
 SLOWEST_CAMERA = 24.0
 """No camera takes fewer pictures per second, however slowly they are shown: a downswing has at
 least 3 of them."""
+DOWNSWING_SECONDS = (0.15, 0.5)
+"""From the top to the hit. Tour players take .23-.28 s, amateurs .25-.4 (Cochran & Stobbs, The
+Search for the Perfect Swing, 1968; Novosel & Garrity, Tour Tempo, 2004)."""
+TEMPO = (1.5, 6.0)
+"""Upswing to downswing: 3 to 1 for tour players, 2 to 4 for most others (Novosel & Garrity)."""
 RATIOS = 1.12
 """Step between durations that are tried."""
 SAME = 0.5
@@ -32,10 +37,9 @@ SAME = 0.5
 class SearchLimits:
     """Which swings are tried; times in seconds of the world."""
 
-    downswing: tuple[float, float] = (0.15, 0.5)
-    """Shortest and longest from the top to the hit (Cochran and Stobbs, 1968; Novosel and Garrity,
-    2004: .23 to .28 for tour players)."""
-    tempo: tuple[float, float] = (1.5, 6.0)
+    downswing: tuple[float, float] = DOWNSWING_SECONDS
+    """Shortest and longest from the top to the hit."""
+    tempo: tuple[float, float] = TEMPO
     """Upswing to downswing."""
     follow: tuple[float, float] = (1.0, 5.0)
     """From the hit to the finish, in downswings."""

@@ -22,14 +22,13 @@ import numpy as np
 
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
-from keyrecon.golf.records import NO_MARKS, SwingMarks
+from keyrecon.golf.records import KEY_POSTURES, NO_MARKS, SwingMarks
 from keyrecon.io.durable import write_durably
 from keyrecon.reading import parse_json, read_text, reading, real, whole
 
-__all__ = ["SwingMarks", "golf_marks_text", "read_golf_marks", "write_golf_marks"]
+__all__ = ["KEY_POSTURES", "SwingMarks", "golf_marks_text", "read_golf_marks", "write_golf_marks"]
 FORMAT = 1
 """Version of the file."""
-KEY_NAMES = ("start", "top", "hit", "finish")
 
 
 def read_golf_marks(path: Path, n_frames: int, size: tuple[int, int]) -> SwingMarks:
@@ -85,7 +84,7 @@ def golf_marks_text(marks: SwingMarks, size: tuple[int, int]) -> str:
         if np.isfinite(ends).all():
             row["shaft"] = ends.tolist()
         rows.append(json.dumps(row))
-    named_keys = zip(KEY_NAMES, marks.keys.tolist(), strict=True)
+    named_keys = zip(KEY_POSTURES, marks.keys.tolist(), strict=True)
     keys = {name: key for name, key in named_keys if np.isfinite(key)}
     body = ",\n    ".join(rows)
     return (
@@ -118,12 +117,12 @@ def _point(place: list, size: tuple[int, int], path: Path) -> tuple[float, float
 
 
 def _keys(named: dict, path: Path) -> np.ndarray:
-    if strange := sorted(set(named) - set(KEY_NAMES)):
+    if strange := sorted(set(named) - set(KEY_POSTURES)):
         raise KeyreconError(
             f"{path} marks '{strange[0][:40]}', which is no key posture; use "
-            f"{', '.join(KEY_NAMES)}."
+            f"{', '.join(KEY_POSTURES)}."
         )
-    keys = np.array([real(named[name]) if name in named else np.nan for name in KEY_NAMES])
+    keys = np.array([real(named[name]) if name in named else np.nan for name in KEY_POSTURES])
     if (np.diff(keys[np.isfinite(keys)]) <= 0).any():
         raise KeyreconError(f"{path}: start, top, hit and finish must be marked in this order.")
     return keys

@@ -46,7 +46,7 @@ def filmed():
 
 def propagated(pixels):
     confidence = np.full(pixels.shape[:2], 0.8)
-    return JointTracks(pixels, confidence, np.zeros(pixels.shape[:2], np.int64))
+    return JointTracks(pixels, confidence)
 
 
 def marked(pixels, frames):
