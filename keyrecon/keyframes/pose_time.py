@@ -46,8 +46,9 @@ def elapsed_time(
     change = pose_change(comparison, half, max(1, reach // 4))
     mean = change.mean() if len(change) else 0.0
     weight = 1 - share + share * change / mean if mean > 0 else np.ones(len(change))
-    if share > 0 and comparison.seen[half].any():
-        weight *= (1 + np.minimum(comparison.seen[half] / WELL_SEEN, 1.0)) / 2
+    seen = np.nan_to_num(comparison.seen[half])
+    if share > 0 and seen.any():
+        weight *= (1 + np.minimum(seen / WELL_SEEN, 1.0)) / 2
         weight *= len(weight) / weight.sum()
     return np.rint(TIME_UNIT * np.concatenate([[0.0], np.cumsum(weight)])).astype(np.int64)
 

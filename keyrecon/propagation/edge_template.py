@@ -26,7 +26,7 @@ from jaxtyping import Bool, Complex, Float, Int
 from keyrecon.numerics.geometry import to_complex
 from keyrecon.propagation.body_frame import BodyFrame
 from keyrecon.propagation.half_body import BodyHalf
-from keyrecon.records import Edges
+from keyrecon.records import Edges, Preparation
 
 MAX_OUTLINE_OFFSET = 0.16
 """Farthest an outline lies from its bone, player heights: the side of a loose shirt. Halved or
@@ -218,17 +218,24 @@ class FootEvidence:
         return replace(self, points=self.points[frames], seen=self.seen[frames])
 
 
+def feet_in_sight(preparation: Preparation) -> Bool[np.ndarray, "T"]:
+    """Frames in which the feet were seen, not interpolated or put beneath the picture."""
+    track = preparation.track
+    inside = (track.feet[..., 1] < preparation.video.height).all(axis=1)
+    return (track.confidence > 0) & inside
+
+
 def learn_foot_offsets(
-    half: BodyHalf,
-    frames: Int[np.ndarray, "K"],
-    joints: Complex[np.ndarray, "K J"],
+    poses: AnnotatedPoses,
     tracked: Complex[np.ndarray, "T 2"],
     seen: Bool[np.ndarray, "T"],
 ) -> FootEvidence:
-    """Tracked feet, moved to where the ankles are on annotated frames in which they were seen."""
+    """Tracked feet, moved to where the ankles are on frames in which both were marked and seen."""
+    half, frames = poses.half, poses.frames
     ends = np.array([max(side, key=lambda j: half.depth[j]) for side in half.sides])
-    gap = joints[:, ends] - order_feet(tracked[frames], joints[:, ends])
-    gap = gap[seen[frames]] if seen[frames].any() else gap
+    gap = poses.joints[:, ends] - order_feet(tracked[frames], poses.joints[:, ends])
+    used = seen[frames] & poses.known[:, ends].all(axis=1)
+    gap = gap[used] if used.any() else gap
     shift = np.median(gap.real) + 1j * np.median(gap.imag)
     spread = float(np.median(np.abs(gap - shift)))
     return FootEvidence(ends, tracked + shift, seen, max(spread, MIN_FOOT_SPREAD))

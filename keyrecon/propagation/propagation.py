@@ -43,6 +43,7 @@ from keyrecon.propagation.correspondence import ElementIndex, index_elements, jo
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
     EdgeTemplates,
+    feet_in_sight,
     learn_foot_offsets,
     make_edge_templates,
 )
@@ -257,8 +258,7 @@ def _half_templates(player: PlayerEvidence, poses: AnnotatedPoses, most: int) ->
         return templates
     track = player.preparation.track
     tracked = body_frame.from_pixels(track.feet, np.arange(len(track.feet))[:, None])
-    seen = track.confidence > 0
-    feet = learn_foot_offsets(poses.half, poses.frames, poses.joints, tracked, seen)
+    feet = learn_foot_offsets(poses, tracked, feet_in_sight(player.preparation))
     return replace(templates, feet=feet)
 
 

@@ -198,7 +198,12 @@ def least_sure_frames(
     counts as itself once it is chosen: marks teach what lies near them in time. `time` of each
     frame, seconds, may be another than the video's (`pose_seconds`).
     """
-    doubt = 1 - uniform_filter1d(track.confidence, max(1, round(DOUBT_SECONDS * fps)))
+    window = max(1, round(DOUBT_SECONDS * fps))
+    doubt, known = (  # what is left out is no doubt of the frames beside it
+        uniform_filter1d(values, window)
+        for values in ((1 - track.confidence) * track.known, track.known.astype(float))
+    )
+    doubt = doubt / np.maximum(known, 1 / (2 * window))
     chosen = list(marked.tolist())
     time = np.arange(len(doubt)) / fps if time is None else time
     for _ in range(count):

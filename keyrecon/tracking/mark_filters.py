@@ -68,9 +68,15 @@ def responses_at(
 
 
 def doubted(
-    track: Track, looks: Sequence[UInt8[np.ndarray, "2 y x"] | None], cropping: Cropping
+    track: Track,
+    looks: Sequence[UInt8[np.ndarray, "2 y x"] | None],
+    cropping: Cropping,
+    rows: int,
 ) -> Track:
-    """A track that is no surer than it looks like the marks; where nobody told looks, the same."""
+    """A track that is no surer than it looks like the marks; where nobody told looks, the same.
+
+    Feet beneath the picture, which has so many `rows`, look like nothing, and are not asked.
+    """
     parts = np.concatenate([track.head[:, None], track.feet], axis=1)
     found = np.array(
         [
@@ -79,5 +85,7 @@ def doubted(
         ]
     )
     right = np.interp(found[:, 0], HEAD_RESPONSES, HEAD_RIGHT)
-    right = np.minimum(right, np.interp(found[:, 1], FOOT_RESPONSES, FOOT_RIGHT))
+    shown = (track.feet[..., 1] < rows).all(axis=1)
+    feet_right = np.interp(found[:, 1], FOOT_RESPONSES, FOOT_RIGHT)
+    right = np.minimum(right, np.where(shown, feet_right, 1.0))
     return replace(track, confidence=track.confidence * right)

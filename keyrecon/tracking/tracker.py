@@ -157,7 +157,8 @@ def track_player(
         crops, cropping, options.player, rough, camera, evidence, head, feet, followed, video.fps
     )
     channels = Channels.of(colors, cropping.size)
-    taught = _Taught.by(anchors, frames, channels, options.examples)
+    size = video.width, video.height
+    taught = _Taught.by(anchors, frames, channels, size, options.examples)
     sparse = frames.every(max(1, round(video.fps / TRAINING_RATE)))
     filters = _train(sparse, channels, sparse.rough, clear_frames(sparse.rough), taught, options)
     detections = _detect(sparse, channels, filters, None, progress)
@@ -165,7 +166,8 @@ def track_player(
     filters = _train(sparse, channels, first, sound_frames(first), taught, options)
     detections = _detect(frames, channels, filters, taught.filters, progress)
     track = _link(detections, frames, OCCLUSION_COST, options)
-    return _through_anchors(doubted(track, [d.looks for d in detections], cropping), anchors)
+    looks = [found.looks for found in detections]
+    return _through_anchors(doubted(track, looks, cropping, video.height), anchors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,18 +240,24 @@ class _Taught:
 
     @classmethod
     def by(
-        cls, anchors: TrackAnchors, frames: _CroppedFrames, channels: Channels, most: int
+        cls,
+        anchors: TrackAnchors,
+        frames: _CroppedFrames,
+        channels: Channels,
+        size: tuple[int, int],
+        most: int,
     ) -> "_Taught":
-        """By at most so many fixed points."""
-        whole = np.isfinite(anchors.head).all(axis=1) & np.isfinite(anchors.feet).all(axis=(1, 2))
+        """By at most so many fixed points in pictures of a size."""
+        parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)
+        # comparisons with NaN are false; beneath the picture a foot looks like nothing
+        whole = ((parts >= 0) & (parts < size)).all(axis=(1, 2))
         rows, marked = np.flatnonzero(whole), np.flatnonzero(whole & anchors.marked)
         if not len(marked):
             return cls()
         spread = np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)
         rows = np.union1d(rows[spread], marked)
-        parts = np.concatenate([anchors.head[:, None], anchors.feet], axis=1)[rows]
         numbers = anchors.frames[rows]
-        examples = make_examples(frames.crops, channels, frames.cropping, numbers, parts)
+        examples = make_examples(frames.crops, channels, frames.cropping, numbers, parts[rows])
         filters = MarkFilters.learn(examples, frames.cropping.size, frames.player)
         again = np.repeat(np.flatnonzero(anchors.marked[rows]), MARK_WEIGHT)
         return cls(examples.some(again), filters)

@@ -266,7 +266,7 @@ def _mean_player(
     """Mean of the part maps about the player, less the mean of each: a blob is no player."""
     above, below, aside = _margins(height)
     total, count = np.zeros((len(views[0].tables), above + below + 1, 2 * aside + 1)), 0
-    sure = confidence >= min(0.5, float(np.median(confidence)))
+    sure = (confidence > 0) & (confidence >= min(0.5, float(np.median(confidence))))
     for view, is_sure in zip(views, sure, strict=True):
         if is_sure:
             scale = height / view.height

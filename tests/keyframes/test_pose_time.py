@@ -35,6 +35,16 @@ def test_all_frames_together_take_as_long_as_they_are_many():
     assert np.array_equal(elapsed_time(comparison, 0, 10, 0.0), TIME_UNIT * np.arange(401))
 
 
+def test_frames_whose_legs_lie_beneath_the_picture_leave_time_as_it_is_elsewhere():
+    comparison = comparison_of(sporting_poses(seed=1))
+    seen = comparison.seen.copy()
+    seen[1, 200:203] = np.nan
+    elapsed = elapsed_time(replace(comparison, seen=seen), 1, 10, 0.35)
+    assert elapsed[-1] == pytest.approx(400 * TIME_UNIT, abs=1)
+    usual = elapsed_time(comparison, 1, 10, 0.35)
+    assert np.abs(elapsed - usual).max() < 3 * TIME_UNIT
+
+
 def test_no_frame_takes_less_than_its_share_and_a_stroke_takes_longer(rare_strokes):
     time = np.diff(elapsed_time(rare_strokes, 0, 10, 0.35)) / TIME_UNIT
     assert time.min() >= 0.64

@@ -1,5 +1,7 @@
 """Edge templates, their correspondence, and least squares over joints."""
 
+from dataclasses import replace
+
 import numpy as np
 from capsule_player import scene, standing, turned
 
@@ -16,6 +18,7 @@ from keyrecon.propagation.correspondence import (
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
     assign_to_bones,
+    feet_in_sight,
     learn_foot_offsets,
     make_edge_templates,
 )
@@ -183,8 +186,28 @@ def test_each_foot_counts_for_the_leg_it_fits():
     ends = np.array([max(side, key=lambda j: LOWER.depth[j]) for side in LOWER.sides])
     joints[:, ends] = ankles
     tracked = np.array([[0.23 + 1.02j, -0.17 + 1.02j], [0.13 + 1.02j, -0.07 + 1.02j]])
-    feet = learn_foot_offsets(LOWER, np.arange(2), joints, tracked, np.ones(2, bool))
+    poses = AnnotatedPoses(LOWER, np.arange(2), joints, np.ones((2, 6), bool), np.ones(5))
+    feet = learn_foot_offsets(poses, tracked, np.ones(2, bool))
     seen = foot_equations(feet, np.arange(2), joints + 0.02).solve()[:, ends]
     np.testing.assert_allclose(seen, ankles, atol=1e-6)
     far = foot_equations(feet, np.arange(2), joints + 0.5j).matrix
     assert far.max() < 0.01 * foot_equations(feet, np.arange(2), joints).matrix.max()
+
+
+def test_a_foot_that_nobody_marked_tells_nothing_of_where_ankles_are():
+    ends = np.array([max(side, key=lambda j: LOWER.depth[j]) for side in LOWER.sides])
+    joints, known = np.zeros((3, 6), complex), np.ones((3, 6), bool)
+    joints[:, ends] = [-0.2 + 1j, 0.2 + 1j]
+    tracked = joints[:, ends] + 0.03j
+    joints[1:, ends[0]] -= 0.3j  # where it stands on the median
+    known[1:, ends[0]] = False
+    poses = AnnotatedPoses(LOWER, np.arange(3), joints, known, np.ones(5))
+    feet = learn_foot_offsets(poses, tracked, np.ones(3, bool))
+    np.testing.assert_allclose(feet.points, tracked - 0.03j)
+
+
+def test_feet_beneath_the_picture_are_not_in_sight():
+    preparation, _ = scene([standing()] * 4, (0,), origin=[(600, y) for y in (200, 700, 200, 200)])
+    away = replace(preparation.track, confidence=np.array([1.0, 1.0, 0.0, 1.0]))
+    seen = feet_in_sight(replace(preparation, track=away))
+    assert seen.tolist() == [True, False, False, True]

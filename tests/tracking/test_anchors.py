@@ -157,6 +157,14 @@ def test_the_next_mark_is_asked_for_where_the_track_is_least_sure_and_no_mark_is
     assert abs(first - second) > DOUBT_SECONDS * 50
 
 
+def test_what_is_left_out_is_no_doubt_of_the_frames_beside_it():
+    track = standing(200, np.full(200, 0.9))
+    inside = np.r_[0:100, 150:200]
+    left_out = scatter_track(take_frames(track, inside), inside, 200)
+    (asked,) = least_sure_frames(left_out, np.array([60]), 25.0, 1)
+    assert asked not in range(95, 155)  # as unsure as all others, and as far away as some
+
+
 def test_a_mark_that_the_player_would_have_to_jump_to_is_named_and_others_are_not():
     track = walking(60)
     wrong = replace_head(marks(track, [10, 30, 50]), 1, (40.0, 0.0))

@@ -9,6 +9,7 @@ from keyrecon.tracking.correlation_filters import Examples, spectrum
 from keyrecon.tracking.mark_filters import MarkFilters, doubted, responses_at
 
 SIZE, TALL = (96, 80), 56.0
+ROWS = 80
 HEAD, FEET = (40.0, 16.0), ((34.0, 72.0), (48.0, 72.0))
 """Of the body that is marked, in the crop."""
 SLEEVE, KNEE = (52.0, 24.0), (34.0, 58.0)
@@ -53,7 +54,16 @@ def test_a_track_that_looks_unlike_the_marks_is_unsure_and_no_track_becomes_sure
     sure = np.array([0.9, 0.9, 0.9, 0.2])
     track = Track(places[:, 0], places[:, 1:], np.full(4, TALL), np.zeros((4, 4)), sure)
     cropping = Cropping(np.zeros((4, 2)), np.ones(4), SIZE)
-    found = doubted(track, [looks] * 4, cropping).confidence
+    found = doubted(track, [looks] * 4, cropping, ROWS).confidence
     np.testing.assert_allclose(found[[0, 3]], [0.9, 0.2])
     assert (found[[1, 2]] < 0.6).all()
-    np.testing.assert_array_equal(doubted(track, [None] * 4, cropping).confidence, sure)
+    np.testing.assert_array_equal(doubted(track, [None] * 4, cropping, ROWS).confidence, sure)
+
+
+def test_feet_beneath_the_picture_are_not_asked_what_they_look_like(looks):
+    places = np.array([[HEAD, KNEE, FEET[1]]] * 2)
+    track = Track(places[:, 0], places[:, 1:], np.full(2, TALL), np.zeros((2, 4)), np.full(2, 0.9))
+    cropping = Cropping(np.zeros((2, 2)), np.ones(2), SIZE)
+    shown, cut = (doubted(track, [looks] * 2, cropping, rows).confidence for rows in (ROWS, 40))
+    assert (shown < 0.6).all()
+    np.testing.assert_allclose(cut, 0.9)

@@ -25,6 +25,7 @@ from keyrecon.propagation.correspondence import (
 from keyrecon.propagation.edge_template import (
     AnnotatedPoses,
     EdgeTemplates,
+    feet_in_sight,
     learn_foot_offsets,
     list_half_elements,
     make_edge_templates,
@@ -147,7 +148,7 @@ def _make_templates(
         return templates
     track = scene.preparation.track
     tracked = body_frame.from_pixels(track.feet, np.arange(len(edges))[:, None])
-    feet = learn_foot_offsets(half, poses.frames, poses.joints, tracked, track.confidence > 0)
+    feet = learn_foot_offsets(poses, tracked, feet_in_sight(scene.preparation))
     return replace(templates, feet=feet.part(frames))
 
 
