@@ -68,7 +68,9 @@ def test_of_legs_below_the_picture_nothing_is_known_and_of_the_rest_what_was():
     joints[0, LSP14.index("left_knee")] = 0.0
     seen, signs = np.isfinite(joints[..., 0]), np.zeros((1, len(LSP14.bones)), int)
     marks = Annotations(LSP14, np.array([2]), joints, seen, signs)
-    confidence = without_hidden_legs(tracks, marks, outside).confidence
+    known = without_hidden_legs(tracks, marks, outside)
+    confidence = known.confidence
+    np.testing.assert_array_equal(np.isfinite(known.joints).all(axis=2), confidence > 0)
     assert (confidence[1, legs] == 0).all()
     assert (confidence[2, legs] > 0).sum() == 1
     assert (confidence[:, ~legs] == 0.5).all() and (confidence[[0, 3]] == 0.5).all()

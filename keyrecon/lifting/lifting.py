@@ -162,8 +162,7 @@ def _lift_orthographic(
     shots = priors.shots or Shots.between((), len(height_px))
     size = estimate_lengths(tracks, annotations, height_px, fps, options.lengths, shots)
     marks = keyframe_marks(annotations)
-    seen = np.where(tracks.confidence[..., None] > 0, tracks.joints, np.nan)
-    tracks = replace(tracks, joints=marked_joints(replace(tracks, joints=seen), annotations))
+    tracks = replace(tracks, joints=marked_joints(tracks, annotations))
     if priors.depth_model is not None:
         rounds = options.lengths.corrections
         size = correct_lengths(size, tracks.joints, priors.depth_model, fps, rounds, shots)

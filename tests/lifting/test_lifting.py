@@ -321,24 +321,6 @@ def test_gross_outliers_change_little():
     assert disturbed.rejected[outlier].mean() > 0.6
 
 
-def test_where_nothing_was_seen_of_a_joint_what_was_carried_there_does_not_count():
-    truth, tracks, marks, keys = scene(frames=100, noise=0.005)
-    legs = [LSP14.index(f"{side}_{end}") for side in ("right", "left") for end in ("knee", "ankle")]
-    unseen = np.zeros(tracks.joints.shape[:2], dtype=bool)
-    unseen[40:70, legs] = True
-    unseen[marks.frames] = False
-    joints, confidence = tracks.joints.copy(), np.where(unseen, 0.0, tracks.confidence)
-    joints[unseen] += (0.25 * SCALE, 0)
-    nothing = np.where(unseen[..., None], np.nan, tracks.joints)
-    height = np.full(100, 0.88 * SCALE)
-    carried, missing = (
-        lift_motion(JointTracks(places, confidence), marks, keys, height, 50.0).points3d
-        for places in (joints, nothing)
-    )
-    np.testing.assert_array_equal(carried, missing)
-    assert aligned_error(carried, truth) < 0.05
-
-
 def test_the_inputs_are_left_as_they_were():
     _, tracks, marks, keys = scene(frames=60)
     before = tracks.joints.copy()
