@@ -192,6 +192,21 @@ test("a file's trouble that is gone takes no other notice away", async () => {
   model.notify(null);
 });
 
+test("why an edit was not taken, and what is wrong with a file, stays until it is closed", async (context) => {
+  hurry(context);
+  const { model, answer, hear } = await createTrial();
+  model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));
+  await answer("edits", { revision: 1, results: [{ ok: false, status: 400, error: "Frame 3 is outside." }] });
+  await rest();
+  assert.match(model.notice.text, /Frame 3 is outside/);
+  model.listen(async () => {});
+  await hear("message", { trouble: "half a file" });
+  await rest();
+  assert.equal(model.notice.text, "half a file");
+  await hear("message", { trouble: null });
+  assert.equal(model.notice.text, null);
+});
+
 test("a pose that did not come is asked for again when the server is back", async (context) => {
   hurry(context);
   const { model, answer, fail, hear, waits } = await createTrial();
@@ -280,6 +295,19 @@ test("work that has ended before it is known what is at work is news", async () 
   await answer("jobs", [job("done", "Player found in 99 % of 100 frames.")]);
   noteEnds();
   assert.match(model.notice.text, /99 %/);
+});
+
+test("why work failed stays until it is closed", async (context) => {
+  hurry(context);
+  const { model, hear, refreshJobs, noteEnds, answer } = await createWork();
+  const listed = refreshJobs();
+  await answer("jobs", [job("running")]);
+  await listed;
+  noteEnds();
+  await hear("message", { job: job("failed", "No player was found.") });
+  noteEnds();
+  await rest();
+  assert.equal(model.notice.text, "No player was found.");
 });
 
 test("news of work that comes after its end does not begin it again, and the end is told once", async () => {
