@@ -221,6 +221,18 @@ test("a pose that did not come is asked for again when the server is back", asyn
   assert.equal(waits("pose"), 1);
 });
 
+test("a pose and a suggestion are asked for again once there is more to make them from", async () => {
+  const { model, answer, waits } = await createTrial();
+  model.ui.frame = 3;
+  model.poses.refresh();
+  await answer("pose", {});
+  assert.equal(model.poses.refresh(), null);
+  model.readProject();
+  await answer("project", PROJECT);
+  assert.notEqual(model.poses.refresh(), null);
+  assert.deepEqual([waits("pose"), waits("suggestion/3")], [1, 1]);
+});
+
 test("a stretch of the motion that does not come is not asked for without a pause", async () => {
   let asked = 0,
     ended = false;
