@@ -132,6 +132,18 @@ test("news that is older than an answer leaves what the answer said", async () =
   assert.deepEqual([model.marks(3), model.state.undo], [{ neck: [4, 4, 2] }, 1]);
 });
 
+test("marks that come from outside for a frame in no list have the project read again", async () => {
+  const { model, answer, hear, waits } = await createTrial();
+  model.listen(async () => {});
+  const news = (revision, to) => ({ revision, edits: [{ id: `x${revision}`, revision, changes: change(to) }] });
+  await hear("message", news(1, [1, 1, 2]));
+  assert.equal(waits("project"), 1);
+  await answer("project", { ...PROJECT, keyframes: [{ frame: 3, half: "upper" }] });
+  await hear("message", news(2, [2, 2, 2]));
+  assert.equal(waits("project"), 0);
+  assert.deepEqual(model.keyframes().map(({ frame }) => frame), [3]);
+});
+
 test("a joint that is moved before an undo of it is answered is moved from where the undo left it", async () => {
   const { model, answer, asked } = await createTrial();
   model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));

@@ -236,9 +236,13 @@ export async function createModel() {
       model.state = free.reduce(apply, model.state);
     }
     model.state = { ...model.state, ...counted(counts) };
+    if (entries.flatMap(({ changes }) => changes).some(isUnlisted)) model.readProject().catch(model.disconnected);
     model.redraw();
     edited();
   }
+  // Whether it is a mark of a frame that the project does not list yet.
+  const isUnlisted = ({ kind, frame, to }) =>
+    kind === "mark" && to && !model.keyframes().some((keyframe) => keyframe.frame === frame);
 
   function takeBack(edit) {
     const back = inverse(edit);
