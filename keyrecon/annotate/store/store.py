@@ -47,6 +47,8 @@ OTHER_PAGE = "use the page that is open, or stop that keyrecon annotate first"
 """What helps whose project is open already."""
 Result = dict[str, Any]
 """The answer to an edit: "ok", else "status" with "current" (409) or "error" (400)."""
+KNOWN: Result = {"ok": True, "known": True}
+"""The answer to an edit that was accepted before; others may have changed its cells since."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def accept_edits(
     results: list[Result] = []
     for edit in edits:
         known = knows(edit.id) or edit.id in {draft.id for draft in drafts}
-        result, draft = ({"ok": True}, None) if known else _accept_one(edit, now, limits)
+        result, draft = (KNOWN, None) if known else _accept_one(edit, now, limits)
         results.append({"id": edit.id, **result})
         if draft is not None:
             drafts.append(draft)

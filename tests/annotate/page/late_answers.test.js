@@ -164,6 +164,20 @@ test("a joint that is moved before an undo of it is answered is moved from where
   assert.deepEqual(model.marks(3), { neck: [8, 8, 2] });
 });
 
+test("after a lost answer the page shows what another page has made of its mark since", async (context) => {
+  hurry(context);
+  const { model, answer, fail, hear, waits } = await createTrial();
+  model.listen(async () => {});
+  model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));
+  await fail("edits"); // it was accepted all the same, as revision 1
+  await hear("message", { revision: 2, edits: [{ id: "y", revision: 2, changes: change([9, 9, 2]) }] });
+  while (!waits("edits")) await rest();
+  await answer("edits", { revision: 2, results: [{ ok: true, known: true }] });
+  assert.equal(waits("state"), 1);
+  await answer("state", { revision: 2, marks: { 3: { neck: [9, 9, 2] } }, nearer: {} });
+  assert.deepEqual(model.marks(3), { neck: [9, 9, 2] });
+});
+
 test("an own version that is wanted before that of another page is here is made on that of the other", async () => {
   const { model, answer, asked } = await createTrial();
   model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));

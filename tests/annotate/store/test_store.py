@@ -37,9 +37,10 @@ def test_what_another_page_changed_meanwhile_is_not_overwritten(open_store):
 def test_an_edit_sent_twice_counts_once(open_store):
     store = open_store()
     first = mark(3, "neck", [10, 20, 2])
-    submit(store, first)
+    assert "known" not in submit(store, first)[0]
     store.undo("u")
-    assert submit(open_store(), first)[0]["ok"]
+    again = submit(open_store(), first)[0]
+    assert (again["ok"], again["known"]) == (True, True)
     assert open_store().state.cells == {}
 
 

@@ -188,6 +188,7 @@ export async function createModel() {
       .map((result, n) => ({ ...result, edit: batch[n] }))
       .filter(({ ok }) => !ok);
     if (failed.length) yieldTo(failed);
+    else if (results.some(({ known }) => known)) model.readState().catch(model.disconnected);
     edited();
   }
 
