@@ -39,8 +39,8 @@ class Assistant:
     """Where the joints of a frame probably are, from the frames annotated so far."""
     pose: Callable[[Annotations, int, Marks, Signs], Json] | None = None
     """A frame's body in space from its marks and signs, and the most plausible alternatives."""
-    checks: Callable[[Annotations], list[Json]] | None = None
-    """Marks that look wrong, most suspicious first."""
+    checks: Callable[[Annotations], list[Json] | None] | None = None
+    """Marks that look wrong, most suspicious first; None where nothing can be checked yet."""
     next_frames: Callable[[Annotations, frozenset[int]], list[Json]] | None = None
     """Frames where one more annotation would help most, none of those taken already."""
     stretches: Callable[[Annotations], list[Json]] | None = None

@@ -268,11 +268,11 @@ def _rounded(values: Iterable[float], digits: int) -> list[float]:
     return [round(float(value), digits) for value in values]
 
 
-def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json]:
-    """Marks that look wrong, the most suspicious first."""
+def describe_checks(cache: ProjectCache, annotations: Annotations) -> list[Json] | None:
+    """Marks that look wrong, the most suspicious first; None where nothing can be checked yet."""
     preparation, body = cache.preparation(), cache.body(annotations, wait=True)
     if preparation is None or body is None:
-        return []
+        return None
     completed = completed_halves(annotations)
     neighbours, appearance = cache.neighbours(completed), cache.appearance(completed)
     evidence = evidence_of_motion(annotations, cache.motion())

@@ -190,10 +190,10 @@ def pose(session: Session, request: ApiRequest) -> Json:
     return estimate(session.store.annotations(), body.frame, marks, signs) if estimate else {}
 
 
-def checks(session: Session, request: ApiRequest) -> list[Json]:
-    """Marks that look wrong."""
+def checks(session: Session, request: ApiRequest) -> list[Json] | None:
+    """Marks that look wrong; null where nothing can be checked."""
     check = session.assistant.checks
-    return check(session.store.annotations()) if check else []
+    return check(session.store.annotations()) if check else None
 
 
 def next_frames(session: Session, request: ApiRequest) -> list[Json]:

@@ -7,8 +7,8 @@ and its id makes sure that it counts once. Listeners are called with every accep
 """
 
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from threading import RLock
 from typing import Any
@@ -27,7 +27,15 @@ from keyrecon.annotate.store.cells import (
 from keyrecon.annotate.store.edits import AnyEdit, Limits, changes_of
 from keyrecon.annotate.store.file_sync import FileForm, FileSync, annotations_form, picks_form
 from keyrecon.annotate.store.golf_files import clicks_form, marks_form
-from keyrecon.annotate.store.journal import REMEDY, Entry, Journal, JournalState, Role, advance
+from keyrecon.annotate.store.journal import (
+    REMEDY,
+    Entry,
+    Journal,
+    JournalState,
+    NotSaved,
+    Role,
+    advance,
+)
 from keyrecon.errors import KeyreconError
 from keyrecon.io.durable import put_aside
 from keyrecon.io.work_lock import lock_annotation
@@ -39,6 +47,8 @@ OTHER_PAGE = "use the page that is open, or stop that keyrecon annotate first"
 """What helps whose project is open already."""
 Result = dict[str, Any]
 """The answer to an edit: "ok", else "status" with "current" (409) or "error" (400)."""
+KNOWN: Result = {"ok": True, "known": True}
+"""The answer to an edit that was accepted before; others may have changed its cells since."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,7 @@ def accept_edits(
     results: list[Result] = []
     for edit in edits:
         known = knows(edit.id) or edit.id in {draft.id for draft in drafts}
-        result, draft = ({"ok": True}, None) if known else _accept_one(edit, now, limits)
+        result, draft = (KNOWN, None) if known else _accept_one(edit, now, limits)
         results.append({"id": edit.id, **result})
         if draft is not None:
             drafts.append(draft)
@@ -210,7 +220,7 @@ class Store:
     ) -> list[Entry]:
         """Everything that changes the state goes through here, one at a time."""
         entries: list[Entry] = []
-        with self._lock, self._workspace.exclusive():
+        with self._lock, self._alone():
             before = self.state.revision
             try:
                 self._show_swing()
@@ -222,6 +232,16 @@ class Store:
             finally:
                 self._notify(before)
         return entries
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold the project's files; NotSaved where its lock cannot be taken."""
+        with ExitStack() as held:
+            try:
+                held.enter_context(self._workspace.exclusive())
+            except KeyreconError as fault:
+                raise NotSaved(str(fault)) from fault
+            yield
 
     def _take_in(self, file: FileSync) -> None:
         """Accept what another program changed in a file as one more edit."""

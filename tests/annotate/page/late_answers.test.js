@@ -132,6 +132,18 @@ test("news that is older than an answer leaves what the answer said", async () =
   assert.deepEqual([model.marks(3), model.state.undo], [{ neck: [4, 4, 2] }, 1]);
 });
 
+test("marks that come from outside for a frame in no list have the project read again", async () => {
+  const { model, answer, hear, waits } = await createTrial();
+  model.listen(async () => {});
+  const news = (revision, to) => ({ revision, edits: [{ id: `x${revision}`, revision, changes: change(to) }] });
+  await hear("message", news(1, [1, 1, 2]));
+  assert.equal(waits("project"), 1);
+  await answer("project", { ...PROJECT, keyframes: [{ frame: 3, half: "upper" }] });
+  await hear("message", news(2, [2, 2, 2]));
+  assert.equal(waits("project"), 0);
+  assert.deepEqual(model.keyframes().map(({ frame }) => frame), [3]);
+});
+
 test("a joint that is moved before an undo of it is answered is moved from where the undo left it", async () => {
   const { model, answer, asked } = await createTrial();
   model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));
@@ -150,6 +162,20 @@ test("a joint that is moved before an undo of it is answered is moved from where
     ],
   );
   assert.deepEqual(model.marks(3), { neck: [8, 8, 2] });
+});
+
+test("after a lost answer the page shows what another page has made of its mark since", async (context) => {
+  hurry(context);
+  const { model, answer, fail, hear, waits } = await createTrial();
+  model.listen(async () => {});
+  model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));
+  await fail("edits"); // it was accepted all the same, as revision 1
+  await hear("message", { revision: 2, edits: [{ id: "y", revision: 2, changes: change([9, 9, 2]) }] });
+  while (!waits("edits")) await rest();
+  await answer("edits", { revision: 2, results: [{ ok: true, known: true }] });
+  assert.equal(waits("state"), 1);
+  await answer("state", { revision: 2, marks: { 3: { neck: [9, 9, 2] } }, nearer: {} });
+  assert.deepEqual(model.marks(3), { neck: [9, 9, 2] });
 });
 
 test("an own version that is wanted before that of another page is here is made on that of the other", async () => {
@@ -192,6 +218,21 @@ test("a file's trouble that is gone takes no other notice away", async () => {
   model.notify(null);
 });
 
+test("why an edit was not taken, and what is wrong with a file, stays until it is closed", async (context) => {
+  hurry(context);
+  const { model, answer, hear } = await createTrial();
+  model.edit(placeJoint(model.state, 3, "neck", [1, 1, 2]));
+  await answer("edits", { revision: 1, results: [{ ok: false, status: 400, error: "Frame 3 is outside." }] });
+  await rest();
+  assert.match(model.notice.text, /Frame 3 is outside/);
+  model.listen(async () => {});
+  await hear("message", { trouble: "half a file" });
+  await rest();
+  assert.equal(model.notice.text, "half a file");
+  await hear("message", { trouble: null });
+  assert.equal(model.notice.text, null);
+});
+
 test("a pose that did not come is asked for again when the server is back", async (context) => {
   hurry(context);
   const { model, answer, fail, hear, waits } = await createTrial();
@@ -204,6 +245,18 @@ test("a pose that did not come is asked for again when the server is back", asyn
   await answer("state", { revision: 0, marks: {}, nearer: {} });
   assert.notEqual(model.poses.refresh(), null);
   assert.equal(waits("pose"), 1);
+});
+
+test("a pose and a suggestion are asked for again once there is more to make them from", async () => {
+  const { model, answer, waits } = await createTrial();
+  model.ui.frame = 3;
+  model.poses.refresh();
+  await answer("pose", {});
+  assert.equal(model.poses.refresh(), null);
+  model.readProject();
+  await answer("project", PROJECT);
+  assert.notEqual(model.poses.refresh(), null);
+  assert.deepEqual([waits("pose"), waits("suggestion/3")], [1, 1]);
 });
 
 test("a stretch of the motion that does not come is not asked for without a pause", async () => {
@@ -280,6 +333,19 @@ test("work that has ended before it is known what is at work is news", async () 
   await answer("jobs", [job("done", "Player found in 99 % of 100 frames.")]);
   noteEnds();
   assert.match(model.notice.text, /99 %/);
+});
+
+test("why work failed stays until it is closed", async (context) => {
+  hurry(context);
+  const { model, hear, refreshJobs, noteEnds, answer } = await createWork();
+  const listed = refreshJobs();
+  await answer("jobs", [job("running")]);
+  await listed;
+  noteEnds();
+  await hear("message", { job: job("failed", "No player was found.") });
+  noteEnds();
+  await rest();
+  assert.equal(model.notice.text, "No player was found.");
 });
 
 test("news of work that comes after its end does not begin it again, and the end is told once", async () => {

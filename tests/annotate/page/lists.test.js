@@ -42,11 +42,12 @@ const { followProject } = await import("../../../keyrecon/annotate/page/views/do
 
 const CHECK = { frame: 3, joint: "left_knee", kind: "crossed", suspicion: 0.95, text: "Legs look swapped." };
 
-// What the tab of checks says when the server answers so.
-async function said(answers) {
+// What the tab of checks says when the server answers so, one time after the other.
+async function said(...turns) {
+  let answers = null;
   globalThis.fetch = async (path) => {
     const answer = answers[path.split("/").at(-1)];
-    return answer ? { ok: true, status: 200, json: async () => answer } : { ok: false, status: 500, json: async () => ({ error: "x" }) };
+    return answer !== undefined ? { ok: true, status: 200, json: async () => answer } : { ok: false, status: 500, json: async () => ({ error: "x" }) };
   };
   const model = {
     project: { has: { keyframes: true, assistant: true }, halves: {}, order: [] },
@@ -61,7 +62,7 @@ async function said(answers) {
     notify: nothing,
   };
   const lists = createLists(model, {});
-  await lists.refresh();
+  for (answers of turns) await lists.refresh();
   tabs[1].handlers.click();
   lists.draw();
   return element("explanation").textContent;
@@ -72,8 +73,14 @@ test("checks are shown though another list has no answer", async () => {
 });
 
 test("nothing is said to look right before the marks were looked through", async () => {
-  assert.equal(await said({ stretches: [], next_frames: [] }), "The marks were not looked through yet.");
+  assert.equal(await said({ stretches: [], next_frames: [], checks: null }), "The marks were not looked through yet.");
   assert.equal(await said({ stretches: [], next_frames: [], checks: [] }), "Nothing looks wrong.");
+});
+
+test("what the marks looked like before is not told where they could not be looked through", async () => {
+  const answers = { stretches: [], next_frames: [] };
+  for (const before of [[], [CHECK]])
+    assert.equal(await said({ ...answers, checks: before }, answers), "The marks could not be looked through.");
 });
 
 test("the tick of a keyframe follows whether it counts as marked, with as many marks as before", () => {

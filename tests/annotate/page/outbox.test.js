@@ -143,6 +143,22 @@ test("one edit that the server never takes holds up no other", async () => {
   assert.ok(trial.sent.flat().includes("c"));
 });
 
+test("edits that the server takes only one by one are sent after a failed try, too", async () => {
+  let gone = true;
+  const trial = createTrial((edits) => {
+    if (gone) throw new Gone("away");
+    if (edits.length > 1) throw new Error("no such joint");
+    return {};
+  });
+  for (const id of ["a", "b", "c"]) trial.outbox.add(edit(id));
+  await rest();
+  gone = false;
+  await trial.retry();
+  await rest();
+  assert.deepEqual(trial.outbox.waiting(), []);
+  assert.deepEqual(trial.statuses.at(-1).slice(0, 2), ["saved", 0]);
+});
+
 test("another project's edits are left alone", () => {
   const storage = createStorage();
   pendingEdits(storage, "other").keep(edit("x"));

@@ -97,7 +97,7 @@ def test_what_is_not_saved_is_answered_so_and_accepted_when_it_is_sent_again(ope
 def test_without_an_assistant_its_questions_have_empty_answers(opened):
     session = opened()
     assert ask(session, "GET", "/api/suggestion/3").json() == {}
-    assert ask(session, "GET", "/api/checks").json() == []
+    assert ask(session, "GET", "/api/checks").json() is None
     assert ask(session, "GET", "/api/next_frames").json() == []
     assert ask(session, "POST", "/api/picks/preview", {"frames": [1]}).json() == {}
     assert ask(session, "GET", "/api/backprojection/3").status == 204

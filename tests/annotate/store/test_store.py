@@ -11,6 +11,7 @@ from annotator_files import LIMITS, NECK, on_file
 
 from keyrecon.annotate.store.cells import written_cells
 from keyrecon.annotate.store.edits import Limits
+from keyrecon.annotate.store.journal import NotSaved
 from keyrecon.annotate.store.store import Store
 from keyrecon.body import LSP14
 from keyrecon.errors import KeyreconError
@@ -36,9 +37,10 @@ def test_what_another_page_changed_meanwhile_is_not_overwritten(open_store):
 def test_an_edit_sent_twice_counts_once(open_store):
     store = open_store()
     first = mark(3, "neck", [10, 20, 2])
-    submit(store, first)
+    assert "known" not in submit(store, first)[0]
     store.undo("u")
-    assert submit(open_store(), first)[0]["ok"]
+    again = submit(open_store(), first)[0]
+    assert (again["ok"], again["known"]) == (True, True)
     assert open_store().state.cells == {}
 
 
@@ -127,6 +129,18 @@ def test_a_project_is_annotated_by_one_server_at_a_time(open_store, bare):
     open_store()
     with pytest.raises(KeyreconError, match="being annotated already"):
         Store(Workspace(bare), LIMITS)
+
+
+def test_an_edit_is_not_saved_where_the_projects_lock_cannot_be_taken(open_store, bare):
+    store = open_store()
+    lock = bare / ".change.lock"
+    lock.unlink(missing_ok=True)
+    lock.mkdir()  # as on a disk that takes no files
+    late = mark(3, "neck", [10, 20, 2])
+    with pytest.raises(NotSaved, match="cannot be written"):
+        submit(store, late)
+    lock.rmdir()
+    assert submit(store, late)[0]["ok"]
 
 
 def test_a_change_of_several_cells_stands_whole_or_not_at_all(open_store):

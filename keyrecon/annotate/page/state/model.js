@@ -25,6 +25,10 @@ const NOTICE_MS = 10000; // that a notice is shown
 const AGAIN_MS = 2000; // after which what did not come is asked for again
 const IDLE_MS = 800; // without an edit, after which what is computed from edits is asked for anew
 
+// An offer of nothing: the notice stays until it is closed, as somebody has to look at a frame, a mark, a
+// shot or a file.
+export const KEPT = {};
+
 // An end is an end, whichever of news and answers comes first.
 export function noteJob(jobs, job) {
   if ((jobs.get(job.id)?.state ?? "running") === "running") jobs.set(job.id, job);
@@ -184,6 +188,7 @@ export async function createModel() {
       .map((result, n) => ({ ...result, edit: batch[n] }))
       .filter(({ ok }) => !ok);
     if (failed.length) yieldTo(failed);
+    else if (results.some(({ known }) => known)) model.readState().catch(model.disconnected);
     edited();
   }
 
@@ -195,7 +200,7 @@ export async function createModel() {
       await read; // they are made on what stands there
       overruled.forEach((edit) => model.edit(rebased(model.state, edit)));
     }
-    model.notify(text, overruled.length ? { text: "Use mine", overruled, act } : null);
+    model.notify(text, overruled.length ? { text: "Use mine", overruled, act } : KEPT);
   }
 
   // Work begins with what is on the disk; Gone where that may take long.
@@ -232,9 +237,13 @@ export async function createModel() {
       model.state = free.reduce(apply, model.state);
     }
     model.state = { ...model.state, ...counted(counts) };
+    if (entries.flatMap(({ changes }) => changes).some(isUnlisted)) model.readProject().catch(model.disconnected);
     model.redraw();
     edited();
   }
+  // Whether it is a mark of a frame that the project does not list yet.
+  const isUnlisted = ({ kind, frame, to }) =>
+    kind === "mark" && to && !model.keyframes().some((keyframe) => keyframe.frame === frame);
 
   function takeBack(edit) {
     const back = inverse(edit);
@@ -301,7 +310,7 @@ export async function createModel() {
 
   let trouble = null; // with the files of the project, as it was told last
   function tellTrouble(text) {
-    if (text || model.notice?.text === trouble) model.notify(text);
+    if (text || model.notice?.text === trouble) model.notify(text, text && KEPT);
     trouble = text;
   }
 

@@ -108,6 +108,7 @@ export function createOutbox({ send, pending, status, delivered, rejected, stumb
 
   // One bad edit must not hold up the good ones: they go one by one until it is found.
   function reject(batch, fault) {
+    failures = 0;
     batchSize = 1;
     if (batch.length > 1) return;
     forget(batch);

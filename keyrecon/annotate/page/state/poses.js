@@ -49,15 +49,20 @@ export function createPoses(model) {
     return pending;
   }
 
+  // The pose is then asked for when the page is drawn.
+  function askAnew() {
+    lost = false;
+    asked = "";
+    if (model.ui.frame !== null) requestSuggestion(model.ui.frame);
+  }
+  model.onProject(askAnew); // once the player was followed there is more to make them from
+
   return {
     refresh,
     requestSuggestion,
     // Asks again for what did not come while the server was gone.
     askAgain() {
-      if (!lost) return;
-      lost = false;
-      asked = "";
-      if (model.ui.frame !== null) requestSuggestion(model.ui.frame);
+      if (lost) askAnew();
     },
     // Whether no later request has been made than the one of this promise.
     isLatest: (promise) => promise === pending,

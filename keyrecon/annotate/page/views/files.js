@@ -52,6 +52,7 @@ export function createFiles(model) {
   async function accept(content, mode) {
     await api.send("import", { ...content, accept: true, mode });
     await model.readState();
+    await model.readProject(); // it lists frames that bear marks
     comparison.replaceChildren();
     chosen.value = "";
     model.notifyOfEdit("The marks were taken in; Undo takes them out again.");

@@ -5,6 +5,7 @@ import { label, requiredJoints, whyNoAssistant } from "../state/workflow.js";
 
 const HALF = { upper: "upper body", lower: "lower body", both: "whole body" };
 const TABS = { frames: "frame-list", checks: "check-list", next: "next-list" };
+const NOT_YET = "The marks were not looked through yet.";
 
 // A small body whose asked half is filled.
 function halfIcon(half) {
@@ -109,7 +110,7 @@ function suspicionMeter(share) {
 export function createLists(model, actions) {
   let tab = "frames",
     suggestions = [],
-    checked = false; // whether the marks were ever looked through
+    looked = NOT_YET; // what there is to say where no check is listed
   const frames = createVirtualList(byId("frame-list"), {
     height: 54,
     fill: (element, item) => keyframeRow(model, element, item),
@@ -135,9 +136,17 @@ export function createLists(model, actions) {
   const answers = {
     stretches: (found) => (model.stretches = found),
     next_frames: (found) => (suggestions = found),
+    // Null where nothing could be checked yet.
     checks(found) {
-      model.checks = found;
-      checked = true;
+      model.checks = found ?? [];
+      looked = found ? "Nothing looks wrong." : NOT_YET;
+    },
+  };
+  // What was said of older marks no longer stands.
+  const lost = {
+    checks() {
+      model.checks = [];
+      looked = "The marks could not be looked through.";
     },
   };
   // The server takes a while over these: one request at a time, or edits would wait for it. Where it has no
@@ -146,7 +155,10 @@ export function createLists(model, actions) {
     async () => {
       let failed = null;
       for (const [name, take] of Object.entries(answers)) {
-        await api.read(name).then(take, (fault) => (failed ??= fault));
+        await api.read(name).then(take, (fault) => {
+          lost[name]?.();
+          failed ??= fault;
+        });
         model.redraw();
       }
       if (failed) throw failed;
@@ -170,9 +182,7 @@ export function createLists(model, actions) {
     if (tab === "checks")
       return model.checks.length
         ? model.checks[openCheck()]?.text ?? "Most suspicious first. G goes from one to the next."
-        : checked
-        ? "Nothing looks wrong."
-        : "The marks were not looked through yet.";
+        : looked;
     if (tab === "next") {
       if (model.stretches.length && !suggestions.length)
         return "Where the program is least sure. Choose a line to mark its frame.";

@@ -3,6 +3,7 @@
 import * as api from "../state/api.js";
 import { byId, counted, make, numberIn, setText, toggle } from "./dom.js";
 import { KEYS, keyText } from "./keyboard.js";
+import { KEPT } from "../state/model.js";
 import { CLICKS } from "../state/swing.js";
 import { budgetIn, stepsOf } from "../state/workflow.js";
 
@@ -12,7 +13,6 @@ const SAVING = {
   unsaved: (count) => (count ? `Not saved: ${count} kept in this browser` : "Not connected"),
 };
 const LASTING = { isRead: true }; // an offer of nothing: the notice stays until it is read
-const KEPT = {}; // until it is closed: somebody has to look at a frame, a mark or a shot
 const GOOD_NEWS = /^(Player found in|Note: |Wrote |On the (court|ground): |For a report )/;
 const READ_MS = 3000; // after which whoever goes on working has read it
 const RESULTS = { follow: "bodies", keyframes: "keyframes", golf: "swing", run: "motion" }; // where they are seen
@@ -232,7 +232,7 @@ export function createJobs(model, go = () => {}) {
   const toMotion = { text: "Go to 3 Motion", act: () => model.update({ view: "motion" }), isRead: true };
 
   function ended(job) {
-    if (job.state === "failed") model.notify(job.text || "The work failed.");
+    if (job.state === "failed") model.notify(job.text || "The work failed.", KEPT);
     if (job.state === "cancelled")
       model.notify("Cancelled. What was finished is kept; starting again goes on from there.");
     if (job.state !== "done") return;
