@@ -23,6 +23,7 @@ from keyrecon.io.formats.export import check_packages, check_suffix, export_moti
 from keyrecon.io.formats.motion_file import (
     cut_further_arrays,
     motion_on_court,
+    read_motion,
 )
 from keyrecon.io.project_folder import another_projects_file
 from keyrecon.io.video_writer import comment_of
@@ -36,6 +37,7 @@ from keyrecon.report.overlay import (
     write_overlay,
 )
 from keyrecon.timeline import cut_motion
+from keyrecon.world.placement import stature_change
 
 OVERLAY, CALIBRATION = ".mp4", ".toml"
 WITH_VIDEO = (OVERLAY, ".json")
@@ -70,7 +72,8 @@ def export(
     cameras = [file for file in files if file.suffix.lower() == CALIBRATION]
     motions = [file for file in files if file not in cameras]
     chosen = _read_motion(workspace, frames) if motions else None
-    lines = [_write_calibration(file, workspace, frames) for file in cameras]
+    motion = _motion_of_camera(workspace, chosen) if cameras else None
+    lines = [_write_calibration(file, workspace, motion, frames) for file in cameras]
     if chosen is None:
         return lines
     for file in motions:
@@ -187,9 +190,23 @@ def _write_overlay(
     return f"Wrote {file}."
 
 
-def _write_calibration(file: Path, workspace: Workspace, frames: str | None) -> str:
-    """The camera as Pose2Sim reads it."""
+def _motion_of_camera(workspace: Workspace, chosen: _ChosenMotion | None) -> Motion | None:
+    """The motion whose metres a camera is to have: the one that is written beside it, else the
+    project's; None where there is none."""
+    if chosen is not None:
+        return chosen.motion
+    return read_motion(workspace.motion_file) if workspace.motion_file.is_file() else None
+
+
+def _write_calibration(
+    file: Path, workspace: Workspace, motion: Motion | None, frames: str | None
+) -> str:
+    """The camera as Pose2Sim reads it, in the metres of the motion."""
     camera, video = load_camera(workspace), workspace.video()
     chosen = None if frames is None else chosen_frames(frames, len(camera.found), "camera.npz")
+    change = 1.0 if motion is None else stature_change(motion, camera)
+    camera = camera.scaled(change)
     done = write_calibration(file, camera, (video.width, video.height), file.stem, chosen)
+    if change != 1:
+        done += f"; scaled with the player, who is {camera.stature:.2f} m tall now"
     return f"Wrote {file}{done}."

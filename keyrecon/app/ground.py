@@ -1,6 +1,7 @@
 """`keyrecon ground`: the camera over level ground, where there is no court."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -79,10 +80,10 @@ def find_ground(
     together = merge_marks(kept, new)
     _check_no_court(workspace)
     motion = _motion_of(workspace, video)
-    known = known_focal(video, together.field_of_view)
-    options = workspace.options(Options(), Options()).camera
+    options = workspace.options(Options(), Options())
+    known = _known_lens(video, together.field_of_view, options.lift.field_of_view)
     path = workspace.stages.keep(
-        "camera", estimate_camera_motion, video, options=options, progress=progress
+        "camera", estimate_camera_motion, video, options=options.camera, progress=progress
     )
     try:
         found = calibrate_ground(motion, path, (video.width, video.height), together.marks, known)
@@ -144,6 +145,15 @@ def _check_no_court(workspace: Workspace) -> None:
             f"{file} has the camera from a court, which tells it more surely than the ground can; "
             "to use the ground all the same, move that file away."
         )
+
+
+def _known_lens(video: Video, here: float | None, by_run: float | None) -> FieldOfView | None:
+    """The lens by the degrees that were given here, else by those of `keyrecon run`, else by the
+    file."""
+    known = known_focal(video, by_run if here is None else here)
+    if known is None or here is not None or by_run is None:
+        return known
+    return replace(known, source=f"{known.source} that keyrecon run was told")
 
 
 def _former_input_note(kept: GroundMarks, new: GroundMarks) -> str:

@@ -16,7 +16,7 @@ from jaxtyping import Float, UInt8
 from keyrecon.records import CameraPath
 from keyrecon.world.court import CourtModel
 from keyrecon.world.line_fit import FIXED_CENTRE, LOOSE, LineFit, evaluate, fit_lines
-from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.pinhole import Pinhole, carried_focal
 
 SEARCHES = (6.0, 3.0)
 """px to both sides in which lines are looked for, first and second step."""
@@ -54,7 +54,7 @@ def carry_camera(camera: Pinhole, homography: Float[np.ndarray, "3 3"]) -> Pinho
     moved = moved @ np.diag([camera.focal, camera.focal, 1.0]) @ camera.rotation
     moved = moved / np.cbrt(np.linalg.det(moved))
     moved = moved / np.linalg.norm(moved[2])
-    focal = float(np.sqrt(np.linalg.norm(moved[0]) * np.linalg.norm(moved[1])))
+    focal = float(carried_focal(camera, homography[None])[0])
     left, _, right = np.linalg.svd(np.diag([1 / focal, 1 / focal, 1.0]) @ moved)
     return replace(camera, focal=focal, rotation=left @ right)
 

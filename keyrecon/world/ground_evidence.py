@@ -13,8 +13,8 @@ standard deviations:
   of a camera from video of a walking human", ICPR 2002, use the vanishing points of head and feet).
 - While a foot stands, his centre of mass is over his feet on average.
 
-All pixels are those of one reference picture; a camera that turns and zooms has its frames there by
-the homographies of its path.
+Pixels are those of one reference picture; a camera that turns and zooms has its frames there by the
+homographies of its path. Only the player's size is read in the pictures of the frames themselves.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from keyrecon.world.pinhole import Pinhole
+from keyrecon.world.pinhole import Pinhole, carried_focal
 from keyrecon.world.placement import ANKLE_SHARE
 from keyrecon.world.records import Kind
 
@@ -59,15 +59,20 @@ class MarkedEnds:
 
 @dataclass(frozen=True, eq=False)
 class Stances:
-    """Moments in which a foot of the player stands, in the reference picture."""
+    """Moments in which a foot of the player stands, in the reference picture; his size in that of
+    the frame."""
 
     frame: Int[np.ndarray, "N"]
     foot: Float[np.ndarray, "N 2"]
     """The standing ankle, px."""
+    own_foot: Float[np.ndarray, "N 2"]
+    """The same in the picture of its own frame."""
+    from_reference: Float[np.ndarray, "N 3 3"]
+    """Homographies from the reference picture into those of the frames."""
     behind: Float[np.ndarray, "N"]
     """Depth of the middle of the hips beyond that ankle, units of the motion."""
     scale: Float[np.ndarray, "N"]
-    """px per unit of the motion at the middle of the hips."""
+    """px of its own frame per unit of the motion at the middle of the hips."""
     feet: Float[np.ndarray, "N 2"]
     """Between the ankles, px."""
     up: Float[np.ndarray, "N 2"]
@@ -194,14 +199,16 @@ def size_residuals(camera: Pinhole, stances: Stances, log_size: float) -> Float[
     """Distance of the player by his foot on the ground over that by his size, logarithm.
 
     Off the camera's axis a picture is larger: lengths across the way from its middle by 1 / cosine
-    of the angle, and most of a player's are, or nearly so.
+    of the angle, and most of a player's are, or nearly so. His size was measured in the picture of
+    its own frame, so that focal length and axis are those of that frame.
     """
     size = np.exp(log_size)
     place = on_plane(camera, stances.foot, ANKLE_SHARE * size * stances.stature)
     far = np.linalg.norm(place - camera.centre, axis=1) + size * stances.behind
-    aside = (stances.foot - camera.principal) / camera.focal
+    focal = carried_focal(camera, stances.from_reference)
+    aside = (stances.own_foot - camera.principal) / focal[:, None]
     larger = np.sqrt(1 + (aside**2).sum(axis=1))
-    by_size = camera.focal * size * larger / stances.scale
+    by_size = focal * size * larger / stances.scale
     return np.log(np.maximum(far, NEAREST) / by_size)
 
 

@@ -91,3 +91,15 @@ def pinhole_from_homography(
         if centre[2] > 0:
             break
     return Pinhole(focal, principal, rotation, centre)
+
+
+def carried_focal(
+    camera: Pinhole, homographies: Float[np.ndarray, "n 3 3"]
+) -> Float[np.ndarray, "n"]:
+    """Focal lengths, px, after a camera has turned and zoomed, from the homographies of its picture
+    into the later ones."""
+    x, y = camera.principal
+    shift = np.array([[1, 0, -x], [0, 1, -y], [0, 0, 1.0]])
+    moved = shift @ homographies @ np.linalg.inv(shift) * [camera.focal, camera.focal, 1.0]
+    across, down, axis = np.linalg.norm(moved, axis=2).T
+    return np.sqrt(across * down) / axis

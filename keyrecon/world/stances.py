@@ -62,8 +62,10 @@ def find_stances(
     return Stances(
         frames,
         feet[frames, foot],
+        motion.points2d[:, ankles][frames, foot],
+        np.linalg.inv(to_reference[frames]),
         middle[frames] - motion.points3d[:, ankles, 2][frames, foot],
-        scale[frames],
+        motion.scale[frames],
         between,
         np.einsum("j,tjk->tk", masses, pixels[frames]) - between,
         stature,

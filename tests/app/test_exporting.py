@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import tomllib
 from dataclasses import replace
 
 import av
@@ -27,7 +28,8 @@ from keyrecon.progress import silent
 from keyrecon.records import Annotations
 from keyrecon.report.overlay import OverlayOptions
 from keyrecon.timeline import cut_motion
-from keyrecon.world.records import WorldMotion
+from keyrecon.world.placement import given_height
+from keyrecon.world.records import GROUND, WorldMotion
 
 
 @pytest.fixture
@@ -290,6 +292,27 @@ def test_a_calibration_is_of_the_frames_asked_for(project):
     with pytest.raises(KeyreconError, match=r"such as 120-180; got '9000-nonsense'"):
         export(project, [file], silent, "9000-nonsense")
     assert file.read_bytes() == kept
+
+
+def test_a_calibration_is_in_the_metres_of_the_motion(project):
+    """Whose player was taller when the camera was found."""
+    file, motion = project.folder.parent / "a.toml", read_motion(project.motion_file)
+    camera = court_camera(camera_at((2, -20, 3), (0, -9, 0.8), 1.6), 20)
+    stature = 1.25 * given_height(motion)
+    camera = replace(camera, origin=GROUND, stature=stature, sd_tilt=np.full(20, 0.01))
+    write_camera(project.camera_file, camera)
+
+    def shift():
+        return np.array(tomllib.loads(file.read_text())["cam_01"]["translation"])
+
+    line = export(project, [file], silent)[0]
+    assert np.allclose(shift(), camera.t[0] / 1.25)
+    assert f"scaled with the player, who is {given_height(motion):.2f} m tall now" in line
+    export(project, [project.folder.parent / "b.csv", file], silent)
+    assert np.allclose(shift(), camera.t[0] / 1.25)
+    project.motion_file.unlink()
+    assert "scaled" not in export(project, [file], silent)[0]
+    assert np.allclose(shift(), camera.t[0])
 
 
 @pytest.mark.parametrize("slowmo", [0.0, -1.0, float("nan"), float("inf"), 1e6])

@@ -36,16 +36,42 @@ def standing(x=0.0, y=7.0, steps=40):
 def seen(points, camera=CAMERA, units="m", noise=0.0, seed=0):
     """The motion as a lifting has it, with an error of its size that lasts for a second or so."""
     motion = lifted(points, camera, units)
-    hips = motion.points2d[:, [2, 3]].mean(axis=1)
-    larger = np.sqrt(1 + (((hips - camera.principal) / camera.focal) ** 2).sum(axis=1))
     rng = np.random.default_rng(seed)
     slow = np.repeat(rng.normal(0, noise, len(points) // 50 + 1), 50)[: len(points)]
-    return replace(motion, scale=motion.scale * larger * np.exp(slow))
+    return replace(motion, scale=motion.scale * np.exp(slow))
 
 
 def still(points):
     """The path of a camera that does not move."""
     return CameraPath(np.tile(np.eye(3), (len(points), 1, 1)), np.ones(len(points)))
+
+
+def turned(azimuths, zoom=None, camera=CAMERA):
+    """A camera that turns to the right by angles about the vertical, and zooms; and its path."""
+    zoom = np.ones(len(azimuths)) if zoom is None else zoom
+    views = []
+    for azimuth, larger in zip(azimuths, zoom, strict=True):
+        c, s = np.cos(azimuth), np.sin(azimuth)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+        views.append(replace(camera, focal=larger * camera.focal, rotation=camera.rotation @ turn))
+    to_world = np.array([view.rotation.T @ np.linalg.inv(_inner(view)) for view in views])
+    path = np.linalg.inv(to_world[0]) @ to_world
+    return views, CameraPath(path / path[:, 2:, 2:], np.ones(len(path)))
+
+
+def _inner(view):
+    (x, y), focal = view.principal, view.focal
+    return np.array([[focal, 0, x], [0, focal, y], [0, 0, 1.0]])
+
+
+def seen_by(views, points):
+    """The motion as a lifting has it whose every frame has its own view."""
+    parts = [seen(frame[None], view) for frame, view in zip(points, views, strict=True)]
+    arrays = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("points2d", "points2d_propagated", "points3d", "scale")
+    }
+    return replace(seen(points), **arrays)
 
 
 def mark(kind, ends, metres=None, camera=CAMERA, frame=0):

@@ -14,20 +14,20 @@ from ground_walker import (
     mark,
     posts,
     seen,
+    seen_by,
     standing,
     still,
+    turned,
     walks,
 )
 
 from keyrecon.errors import KeyreconError
-from keyrecon.numerics.geometry import warp_points
-from keyrecon.records import CameraPath
 from keyrecon.world.ground_calibration import (
     ContradictoryMarks,
     FieldOfView,
     calibrate_ground,
 )
-from keyrecon.world.ground_evidence import GroundState, on_plane, upward
+from keyrecon.world.ground_evidence import GroundState, on_plane, size_residuals, upward
 from keyrecon.world.records import GROUND
 
 FOV = FieldOfView(1100.0, 0.03, "told")
@@ -142,24 +142,43 @@ def test_the_origin_is_under_the_first_stance_and_the_camera_looks_along_y(about
 
 
 def test_a_camera_that_pans_is_followed(about):
-    turns = np.radians(6) * np.sin(np.arange(len(about)) / 60)
-    views = []
-    for turn in turns:
-        c, s = np.cos(turn), np.sin(turn)
-        turned = CAMERA.rotation @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-        views.append(replace(CAMERA, rotation=turned))
-    inner = np.array([[1100, 0, PRINCIPAL[0]], [0, 1100, PRINCIPAL[1]], [0, 0, 1.0]])
-    path = np.array(
-        [inner @ views[0].rotation @ v.rotation.T @ np.linalg.inv(inner) for v in views]
-    )
-    motion = seen(about)
-    pixels = warp_points(np.linalg.inv(path)[:, None], motion.points2d)
-    panned = replace(motion, points2d=pixels)
-    found = calibrate_ground(panned, CameraPath(path, np.ones(len(path))), SIZE, posts(), FOV)
+    views, path = turned(np.radians(6) * np.sin(np.arange(len(about)) / 60))
+    found = calibrate_ground(seen_by(views, about), path, SIZE, posts(), FOV)
     assert_true(found, 0.05, 0.7, 0.05)
     t = len(about) // 2
     between = found.camera.R[t] @ found.camera.R[0].T
     assert np.allclose(between, views[t].rotation @ views[0].rotation.T, atol=0.01)
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """From 20 degrees left of the first picture's axis to 20 right of it, and the azimuths."""
+    points = walks([(0.0, 9, 90), (3.0, 9, -45), (-4.0, 10, 0), (-3.0, 8, 30), (0.5, 14, 0)])
+    x, y = points[..., 0].mean(axis=1), points[..., 1].mean(axis=1)
+    azimuths = np.arctan2(x, y)
+    assert np.degrees(azimuths.min()) < -20 and np.degrees(azimuths.max()) > 20
+    return points, azimuths
+
+
+@pytest.mark.parametrize("longest", [1.0, 2.5])
+def test_a_size_is_that_of_the_picture_it_was_measured_in(followed, longest):
+    """Also where the camera zooms as it turns, and is no usual one."""
+    points, azimuths = followed
+    for camera in (CAMERA, replace(CAMERA, focal=2600.0)):
+        zoom = np.linspace(1, longest, len(points))
+        views, path = turned(azimuths - azimuths[0], zoom, camera)
+        known = FieldOfView(camera.focal, 0.001, "told")
+        found = calibrate_ground(seen_by(views, points), path, SIZE, (), known)
+        true = replace(TRUE, log_focal=np.log(views[found.reference].focal))
+        off = size_residuals(true.pinhole(PRINCIPAL), found.stances, 0.0)
+        assert np.abs(off).max() < 0.03
+
+
+def test_a_camera_that_follows_the_player_far_round_is_found(followed):
+    points, azimuths = followed
+    views, path = turned(azimuths - azimuths[0])
+    found = calibrate_ground(seen_by(views, points), path, SIZE, (), FOV)
+    assert_true(found, 0.05, 1.0, 0.05)
 
 
 def test_after_a_cut_only_the_shot_with_most_of_the_motion_has_a_camera(about):
