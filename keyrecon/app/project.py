@@ -62,7 +62,10 @@ def start(
         f"{opened.fps:.4g} frames per second."
     )
     if opened.variable_rate:
-        text += "\nThe frames are unevenly spaced in time; keyrecon uses their true times."
+        text += (
+            "\nThe frames are unevenly spaced in time; keyrecon uses their true times, but on a "
+            "court or the ground, where flight and feet count as if they were even."
+        )
     if golf:
         return (
             f"{text}\nNext: keyrecon annotate {quoted(folder)} to click six joints on a page, and "
