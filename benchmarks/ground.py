@@ -51,11 +51,11 @@ from keyrecon.app.placing import most_tilt_error
 from keyrecon.records import CameraPath, Motion
 from keyrecon.synthetic.motion import MotionOptions, place_joints
 from keyrecon.synthetic.rally import PointPlan, Pose
+from keyrecon.timeline import PER_FRAME
 from keyrecon.world.ground_calibration import FieldOfView, GroundCalibration, calibrate_ground
 from keyrecon.world.ground_evidence import GroundState
 from keyrecon.world.placement import place_motion
 from keyrecon.world.records import GroundMark, WorldCamera
-from keyrecon.world.refinement import OF_FRAMES
 from keyrecon.world.sight import sight_axes
 
 POSED = 600
@@ -90,7 +90,7 @@ def rendered(folder: Path, frames: int) -> Scene:
     truth, stored = Truth.read(folder / "truth.npz"), np.load(folder / "truth.npz")
     own = slice(0, frames)
     motion = lifted(folder, float(stored["fps"]))
-    motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
+    motion = replace(motion, **{name: getattr(motion, name)[own] for name in PER_FRAME})
     width, height = (2 * stored["principal"] + 1).astype(int).tolist()
     camera = true_camera(truth).part(own)
     return Scene(folder.name, motion, truth.points[own], camera, path_of(camera), (width, height))
@@ -227,7 +227,7 @@ def _camera(found: GroundCalibration, scene: Scene) -> str:
 def _pose(found: GroundCalibration, scene: Scene) -> str:
     own = slice(0, POSED)
     motion = scene.motion
-    motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
+    motion = replace(motion, **{name: getattr(motion, name)[own] for name in PER_FRAME})
     true, found_camera, camera = scene.points[own], found.camera.part(own), scene.camera.part(own)
     axes = sight_axes(camera, motion.points2d[:, HIPS].mean(axis=1))
     before = np.einsum("tij,tnj->tni", axes, motion.points3d)

@@ -55,6 +55,7 @@ from keyrecon.synthetic.cameras import UP, CameraMove
 from keyrecon.synthetic.motion import MotionOptions, play_tennis
 from keyrecon.synthetic.sequence import SceneOptions, film_stage, set_stage
 from keyrecon.synthetic.sequence import draw_court as paint_court
+from keyrecon.timeline import PER_FRAME
 from keyrecon.tracking.camera_motion import estimate_camera_motion
 from keyrecon.world.calibration import CalibrationOptions, calibrate_court
 from keyrecon.world.court import CourtOptions, tennis_court
@@ -62,7 +63,6 @@ from keyrecon.world.court_tracking import SPACING, check_still
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import place_motion
 from keyrecon.world.records import WorldCamera, WorldMotion
-from keyrecon.world.refinement import OF_FRAMES
 from keyrecon.world.sight import sight_axes
 from keyrecon.world.world_terms import joint_masses
 
@@ -229,7 +229,7 @@ def measure_lift(folder: Path, frames: int) -> str:
     truth, fps = Truth.read(folder / "truth.npz"), float(np.load(folder / "truth.npz")["fps"])
     own = slice(0, frames)
     motion, camera = lifted(folder, fps), true_camera(truth)
-    motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
+    motion = replace(motion, **{name: getattr(motion, name)[own] for name in PER_FRAME})
     camera = camera.part(own)
     return f"{folder.name:<24}{_place(truth.points[own], truth.contact[own], camera, motion)}"
 

@@ -25,10 +25,10 @@ from keyrecon.synthetic.contacts import find_contacts
 from keyrecon.synthetic.court import NET_Z
 from keyrecon.synthetic.figure import estimate_stature
 from keyrecon.synthetic.sequence import SynthOptions
+from keyrecon.timeline import PER_FRAME
 from keyrecon.world.pinhole import Pinhole
 from keyrecon.world.placement import place_motion
 from keyrecon.world.records import WorldMotion
-from keyrecon.world.refinement import OF_FRAMES
 from keyrecon.world.run_measures import run_velocity
 
 
@@ -93,7 +93,7 @@ def main() -> None:
             continue
         truth = capture(sequence, told.mocap)
         motion = lift_truth(truth, true_camera(truth), 1)
-        motion = replace(motion, **{name: getattr(motion, name)[own] for name in OF_FRAMES})
+        motion = replace(motion, **{name: getattr(motion, name)[own] for name in PER_FRAME})
         camera, true = true_camera(truth).part(own), truth.points[own]
         placed = _place(true, truth.contact[own], camera, motion)
         world = place_motion(motion, camera)

@@ -1,6 +1,7 @@
 """How the house is built: which way imports point, and that one name means one thing."""
 
 import ast
+import importlib.util
 import subprocess
 import sys
 from collections import defaultdict
@@ -116,3 +117,24 @@ def test_importing_the_package_loads_no_heavy_library():
     code = "import sys, keyrecon; print(*{'cv2','av','plotly','scipy','tyro'} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == ""
+
+
+def _is_module(name):
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def test_benchmarks_take_from_the_package_what_it_has():
+    for file in sorted(PACKAGE.with_name("benchmarks").glob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("keyrecon"):
+                module = importlib.import_module(node.module)
+                missing = [
+                    name.name
+                    for name in node.names
+                    if not hasattr(module, name.name)
+                    and not _is_module(f"{node.module}.{name.name}")
+                ]
+                assert not missing, f"{file.name}: {node.module} has no {missing}"
