@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from keyrecon.numerics.geometry import unit_vectors
 from keyrecon.world.pinhole import Pinhole, carried_focal
 from keyrecon.world.placement import ANKLE_SHARE
 from keyrecon.world.records import Kind
@@ -65,8 +66,8 @@ class Stances:
     frame: Int[np.ndarray, "N"]
     foot: Float[np.ndarray, "N 2"]
     """The standing ankle, px."""
-    own_foot: Float[np.ndarray, "N 2"]
-    """The same in the picture of its own frame."""
+    sights: Float[np.ndarray, "N 2 2"]
+    """The same foot, and the middle of the hips, in the picture of their own frame."""
     from_reference: Float[np.ndarray, "N 3 3"]
     """Homographies from the reference picture into those of the frames."""
     behind: Float[np.ndarray, "N"]
@@ -198,17 +199,19 @@ def _off_horizon(
 def size_residuals(camera: Pinhole, stances: Stances, log_size: float) -> Float[np.ndarray, "N"]:
     """Distance of the player by his foot on the ground over that by his size, logarithm.
 
-    Off the camera's axis a picture is larger: lengths across the way from its middle by 1 / cosine
-    of the angle, and most of a player's are, or nearly so. His size was measured in the picture of
-    its own frame, so that focal length and axis are those of that frame.
+    His size is that of a body as deep in the picture as his hips, which were lifted about the line
+    of sight to them: along it the foot lies nearer by the angle between both, and deeper by
+    `behind`; depth is that distance times the cosine of its angle to the camera's axis. Focal
+    length and axis are those of his own frame.
     """
     size = np.exp(log_size)
     place = on_plane(camera, stances.foot, ANKLE_SHARE * size * stances.stature)
-    far = np.linalg.norm(place - camera.centre, axis=1) + size * stances.behind
     focal = carried_focal(camera, stances.from_reference)
-    aside = (stances.own_foot - camera.principal) / focal[:, None]
-    larger = np.sqrt(1 + (aside**2).sum(axis=1))
-    by_size = focal * size * larger / stances.scale
+    aside = (stances.sights - camera.principal) / focal[:, None, None]
+    to_foot, to_hips = unit_vectors(np.insert(aside, 2, 1.0, axis=2)).swapaxes(0, 1)
+    along = np.linalg.norm(place - camera.centre, axis=1) * (to_foot * to_hips).sum(axis=1)
+    far = (along + size * stances.behind) * to_hips[:, 2]
+    by_size = focal * size / stances.scale
     return np.log(np.maximum(far, NEAREST) / by_size)
 
 

@@ -57,12 +57,12 @@ def find_stances(
     frames = _stillest(speed.min(axis=1), motion)
     foot = speed[frames].argmin(axis=1)
     middle = motion.points3d[:, hips, 2].mean(axis=1)
-    masses = joint_masses(skeleton.names)
+    masses, own = joint_masses(skeleton.names), motion.points2d
     between = feet[frames].mean(axis=1)
     return Stances(
         frames,
         feet[frames, foot],
-        motion.points2d[:, ankles][frames, foot],
+        np.stack([own[:, ankles][frames, foot], own[:, hips].mean(axis=1)[frames]], axis=1),
         np.linalg.inv(to_reference[frames]),
         middle[frames] - motion.points3d[:, ankles, 2][frames, foot],
         motion.scale[frames],

@@ -63,7 +63,7 @@ def told(folder, marks=(), fov=None, forget=()):
 def test_the_motion_comes_to_stand_on_the_ground(walked):
     text = told(walked, posts(), 2 * np.degrees(np.arctan(640 / 1100)))
     high = re.search(r"The camera is (\d\.\d\d) m high", text)
-    assert abs(float(high[1]) - CAMERA.centre[2]) < 0.08 and "2 upright things" in text
+    assert abs(float(high[1]) - CAMERA.centre[2]) < 0.05 and "2 upright things" in text
     workspace = Workspace(walked)
     camera = read_camera(workspace.camera_file)
     assert camera.origin == GROUND

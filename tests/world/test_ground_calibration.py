@@ -171,7 +171,7 @@ def test_a_size_is_that_of_the_picture_it_was_measured_in(followed, longest):
         found = calibrate_ground(seen_by(views, points), path, SIZE, (), known)
         true = replace(TRUE, log_focal=np.log(views[found.reference].focal))
         off = size_residuals(true.pinhole(PRINCIPAL), found.stances, 0.0)
-        assert np.abs(off).max() < 0.03
+        assert np.abs(off).max() < 0.005
 
 
 def test_a_camera_that_follows_the_player_far_round_is_found(followed):
