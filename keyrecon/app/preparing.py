@@ -11,17 +11,18 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from keyrecon.app.prepared_marks import marks_of_last_preparation, teach_more
 from keyrecon.io.durable import write_durably
-from keyrecon.io.formats.coco import coco_text, read_coco
+from keyrecon.io.formats.coco import coco_text
 from keyrecon.io.formats.picks import write_picks
 from keyrecon.io.formats.shot_choices import ShotChoices
 from keyrecon.io.video import Video
 from keyrecon.io.workspace import Workspace
 from keyrecon.keyframes.absence import MOST_STRETCHES, format_stretches
 from keyrecon.numerics.runs import list_runs
-from keyrecon.pipeline import Options, frames_off_marks, prepare
+from keyrecon.pipeline import Options, prepare
 from keyrecon.progress import Progress
 from keyrecon.records import (
     PERHAPS,
@@ -49,9 +50,6 @@ click in eleven on a real rally: .77 with it, .99 without."""
 CUT_OFF, HIDDEN = 0.1, 0.05
 """Shares of the frames from which feet that the picture cuts off are told of, and a player who is
 hidden."""
-MOVED = 0.03
-"""A marked head or foot that was moved farther than this is told to the track anew, player heights:
-two eyes mark the same joint .016 apart in the median, .042 in the worst tenth."""
 LIGHT_CHANGE = 1.25
 """Brightest by darkest frame from which a change of the light is told of: one that is seen."""
 
@@ -319,11 +317,11 @@ def prepare_project(
         write_picks(workspace.prepared_picks_file, prepared.prepared_picks)
         return _with_marks_and_picks(workspace, prepared, marks)
     file = workspace.prepared_marks_file
-    track_marks = _marks_of_last_preparation(workspace, video, marks)
+    track_marks = marks_of_last_preparation(workspace, video, marks)
     if track_marks is None and marks is not None and not workspace.picks_file.is_file():
         track_marks = marks
     prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
-    if marks is not None and _teach_more(marks, track_marks, prepared.preparation):
+    if marks is not None and teach_more(marks, track_marks, prepared.preparation):
         track_marks = marks
         prepared = _without_outlier_picks(workspace, video, options, track_marks, progress)
     if track_marks is None:
@@ -333,48 +331,6 @@ def prepare_project(
         write_durably(file, coco_text(track_marks, size).encode())
     write_picks(workspace.prepared_picks_file, prepared.prepared_picks)
     return _with_marks_and_picks(workspace, prepared, marks)
-
-
-def _teach_more(marks: Annotations, known: Annotations | None, made: Preparation) -> bool:
-    """Whether marks disagree with the track, or are in a shot that is left out without the track
-    having been made with them: they tell that it shows the player."""
-    if len(frames_off_marks(made, marks)):
-        return True
-    new = anchors_from_bodies(marks).frames
-    if known is not None:
-        new = np.setdiff1d(new, anchors_from_bodies(known).frames)
-    return bool(np.setdiff1d(new, made.shots.usable_frames).size)
-
-
-def _marks_of_last_preparation(
-    workspace: Workspace, video: Video, marks: Annotations | None
-) -> Annotations | None:
-    """The marks that the last preparation was made with; the present ones where a head or feet of
-    those was deleted or moved; None without any."""
-    file = workspace.prepared_marks_file
-    if workspace.stages.force or not file.is_file():
-        return None
-    last_marks = read_coco(file, workspace.skeleton, len(video), (video.width, video.height))
-    still_marked = {} if marks is None else _marked_parts(marks)
-    y = last_marks.joints[..., 1]
-    tall = np.fmax.reduce(np.fmax.reduce(y, axis=1) - np.fmin.reduce(y, axis=1), initial=0.0)
-    in_place = (
-        part in still_marked and np.abs(still_marked[part] - place).max() <= MOVED * tall
-        for part, place in _marked_parts(last_marks).items()
-    )
-    return last_marks if all(in_place) else marks
-
-
-def _marked_parts(marks: Annotations) -> dict[tuple[str, int], Float[np.ndarray, "n"]]:
-    """The heads and the pairs of feet that are marked, by part and frame, and where, px."""
-    anchors = anchors_from_bodies(marks)
-    places = {"head": anchors.head, "feet": anchors.feet.reshape(-1, 4)}
-    return {
-        (part, frame): place[row]
-        for part, place in places.items()
-        for row, frame in enumerate(anchors.frames.tolist())
-        if np.isfinite(place[row]).all()
-    }
 
 
 def _with_marks_and_picks(
