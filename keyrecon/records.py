@@ -121,6 +121,10 @@ class Track:
         """Frames of shots that show the player."""
         return ~np.isnan(self.box).any(axis=1)
 
+    def feet_inside(self, rows: int) -> Bool[np.ndarray, "T"]:
+        """Frames in which both feet lie above the lower edge of a picture of so many rows."""
+        return self.feet[..., 1].max(axis=1) < rows
+
     @property
     def mid_feet(self) -> Float[np.ndarray, "T 2"]:
         """Point between the feet, px."""

@@ -193,7 +193,8 @@ def _doubt_figure(fitted: FittedSwing, observations: Observations) -> list[Swing
         return []
     (off, masked), start = _off_figure(fitted, observations), _swing(fitted, 3).start
     if not masked.any():
-        return []
+        middle = start + len(off) // 2
+        return [SwingDoubt("the player's figure is whole in no frame of the swing", middle)]
     on = 1 - off[masked].mean()
     if on < LEAST_ON_FIGURE:
         worst = start + int(off.mean(axis=1).argmax())

@@ -221,8 +221,7 @@ class FootEvidence:
 def feet_in_sight(preparation: Preparation) -> Bool[np.ndarray, "T"]:
     """Frames in which the feet were seen, not interpolated or put beneath the picture."""
     track = preparation.track
-    inside = (track.feet[..., 1] < preparation.video.height).all(axis=1)
-    return (track.confidence > 0) & inside
+    return (track.confidence > 0) & track.feet_inside(preparation.video.height)
 
 
 def learn_foot_offsets(

@@ -85,7 +85,6 @@ def doubted(
         ]
     )
     right = np.interp(found[:, 0], HEAD_RESPONSES, HEAD_RIGHT)
-    shown = (track.feet[..., 1] < rows).all(axis=1)
     feet_right = np.interp(found[:, 1], FOOT_RESPONSES, FOOT_RIGHT)
-    right = np.minimum(right, np.where(shown, feet_right, 1.0))
+    right = np.minimum(right, np.where(track.feet_inside(rows), feet_right, 1.0))
     return replace(track, confidence=track.confidence * right)

@@ -119,6 +119,8 @@ def test_frames_without_a_mask_do_not_speak_for_a_swing(played):
     away = np.where(masked[:, None, None], np.full(shape, 50.0), 0.0)
     seen = replace(observations, foreground=tuple(samples), silhouette_distance=away)
     assert "only 0% of the joints lie on the player" in texts(fitted, seen)
+    nowhere = replace(seen, foreground=tuple(s[:0] for s in samples))
+    assert "figure is whole in no frame" in texts(fitted, nowhere)
 
 
 @pytest.mark.parametrize(("beside", "told"), [(0.0, False), (0.15, True)])
