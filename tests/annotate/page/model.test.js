@@ -161,3 +161,19 @@ test("what is told of an edit goes when that edit is taken back, and when anothe
   model.notify(null);
   for (let n = 0; n < 2; n++) await arrive();
 });
+
+test("edits that another page overruled are still offered when another notice has come and gone", async () => {
+  const { model, arrive } = await createTrial(() => ({ ok: false, status: 409, current: {} }));
+  place(model, "neck", 1);
+  for (let n = 0; n < 2; n++) await arrive();
+  model.notify("Work has ended.");
+  assert.equal(model.notice.text, "Work has ended.");
+  place(model, "left_knee", 2);
+  for (let n = 0; n < 2; n++) await arrive();
+  assert.equal(model.notice.offer.overruled.length, 2);
+  model.notify("The work failed.", {});
+  model.notify(null);
+  assert.equal(model.notice.offer.text, "Use mine");
+  model.notify(null);
+  assert.equal(model.notice.text, null);
+});

@@ -87,6 +87,18 @@ test("keyframes that a person added stand among those that were chosen", () => {
   );
 });
 
+test("a keyframe that was added and taken back stays where it was chosen, too", () => {
+  const keyframes = [
+    { frame: 10, half: "both", listed: "upper", own: true },
+    { frame: 20, half: "lower", listed: null, own: true },
+  ];
+  const rows = workflow.allKeyframes({ ...PROJECT, keyframes }, { own: {}, locked: {} });
+  assert.deepEqual(
+    rows.map(({ frame, half, own }) => [frame, half, own]),
+    [[10, "upper", false]],
+  );
+});
+
 test("head, both feet and one region are picked before the program can start", () => {
   const picks = [];
   const missing = () => workflow.missingParts(workflow.partsOf(picks)).map(({ part }) => part);

@@ -194,7 +194,7 @@ export async function createModel() {
 
   // Somebody else was faster, or the server does not take it: its version stays, ours is one click away.
   function yieldTo(failed) {
-    const { text, overruled } = describeRefused(failed, model.notice?.offer?.overruled),
+    const { text, overruled } = describeRefused(failed, (below ?? model.notice)?.offer?.overruled),
       read = model.readState().catch(model.disconnected);
     async function act() {
       await read; // they are made on what stands there
@@ -211,8 +211,13 @@ export async function createModel() {
         if (outbox.waiting().length) throw fault;
       });
 
+  // What a person may want back stays beneath other notices, and is there when they are gone.
+  let below = null;
   model.notify = (text, offer = null) => {
-    model.notice = { text, offer, since: performance.now() };
+    if (model.notice?.offer?.overruled && text) below = model.notice;
+    if (offer?.overruled) below = null;
+    model.notice = text || !below ? { text, offer, since: performance.now() } : below;
+    if (!text) below = null;
     clearTimeout(noticeTimer);
     if (text && !offer) noticeTimer = setTimeout(model.notify, NOTICE_MS, null);
     model.redraw();
@@ -303,6 +308,7 @@ export async function createModel() {
       if (withProject) await model.readProject();
       model.poses.askAgain();
       outbox.reconnected();
+      edited();
     } catch (fault) {
       model.disconnected(fault);
     }

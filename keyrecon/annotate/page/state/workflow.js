@@ -87,23 +87,27 @@ export function nextBeginning(project, keyframes, done) {
   return { do: project.bodies ? "choose" : "follow" };
 }
 
-// Keyframes that were chosen and those that a person added, by frame.
+// Keyframes that were chosen and those that a person added, by frame; one that was added and taken back
+// stays where it was chosen, too.
 export function allKeyframes(project, state) {
-  const byFrame = new Map(project.keyframes.map((keyframe) => [keyframe.frame, keyframe]));
-  for (const [frame, half] of Object.entries(state.own)) {
-    const chosen = byFrame.get(Number(frame));
-    byFrame.set(Number(frame), {
-      why: "added by you",
-      ...chosen,
-      frame: Number(frame),
-      half: joinHalves(chosen?.half, half),
-      own: true,
-    });
-  }
-  return [...byFrame.values()]
-    .filter(({ frame, own }) => !own || state.own[frame])
-    .map((keyframe) => ({ ...keyframe, locked: Boolean(state.locked[keyframe.frame]) }))
-    .sort((a, b) => a.frame - b.frame);
+  const known = new Map(project.keyframes.map((keyframe) => [keyframe.frame, keyframe]));
+  const frames = new Set([...known.keys(), ...Object.keys(state.own).map(Number)]);
+  return [...frames]
+    .sort((a, b) => a - b)
+    .map((frame) => {
+      const keyframe = known.get(frame),
+        listed = keyframe?.own ? keyframe.listed : keyframe?.half,
+        added = state.own[frame];
+      return {
+        why: "added by you",
+        ...keyframe,
+        frame,
+        half: added ? joinHalves(listed, added) : listed,
+        own: Boolean(added),
+        locked: Boolean(state.locked[frame]),
+      };
+    })
+    .filter(({ half }) => half);
 }
 
 // "upper", "lower" or "both", of what is asked for in one frame by two.
