@@ -107,6 +107,8 @@ class _FeatureTracker:
         self.current = self._nearest(guess, grey.shape)
         key = self.keys[self.current]
         match = match_key(key, grey, np.linalg.inv(guess) @ key.to_start)
+        if match is None and self.lost:
+            key, match = self._match_lost(grey, guess)
         if match is None:
             self._begin_lost(grey, guess)
             return guess, 0.0
@@ -120,6 +122,18 @@ class _FeatureTracker:
         elif self.current == len(self.keys) - 1:
             self.lost = False
         return to_start, match.confidence
+
+    def _match_lost(self, grey: Grey, guess: Matrix) -> tuple[KeyPicture, Match | None]:
+        """The view that was begun in the last frame, and this frame in it if that is sure.
+
+        Light that comes up, or a lens that finds its focus, leaves older views unlike what comes.
+        """
+        key = self.keys[-1]
+        match = match_key(key, grey, np.linalg.inv(guess) @ key.to_start)
+        if match is None or match.confidence < MIN_CONFIDENCE:
+            return key, None
+        self.current = len(self.keys) - 1
+        return key, match
 
     def _begin_lost(self, grey: Grey, to_start: Matrix) -> None:
         """Begin a view where we believe to be: what was seen was cut, blurred, or shows nothing.

@@ -59,6 +59,18 @@ def test_corners_on_lines_along_the_pan_are_no_overlay_if_they_move_with_the_sce
     assert follow_pan(lined)[1] < 0.05
 
 
+def test_a_pan_is_followed_from_a_picture_that_comes_up_out_of_black(scene):
+    shifts = np.linspace(0, 90, PAN)
+    light = np.minimum(np.arange(PAN) / 12, 1)
+    pictures = [
+        (view(scene, shift) * gain).astype(np.uint8)
+        for shift, gain in zip(shifts, light, strict=True)
+    ]
+    path, confidence = _register_all(pictures, _FeatureTracker(CameraMotionOptions()))
+    assert np.ptp((path[:, 0, 2] - shifts)[15:]) < 2  # px, of 67
+    assert confidence[15:].min() > 0.5
+
+
 @pytest.mark.parametrize("deviation", [0, 40])
 def test_what_shows_nothing_has_one_key_picture_however_long_it_lasts(scene, deviation):
     rng = np.random.default_rng(0)

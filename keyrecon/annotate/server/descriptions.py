@@ -101,8 +101,8 @@ def describe_keyframes(
 ) -> list[Json]:
     """All frames to annotate: those chosen, those a person added, and others that bear marks.
 
-    `bodies` are asked for before keyframes are chosen. `details` replace what is said here. `listed`
-    is the half that is asked for where the person's own keyframe is taken back, None where none is.
+    `bodies` are asked for before keyframes are chosen. `details` replace what is said here.
+    `listed` is the half that is asked for where the person's own keyframe is taken back.
     """
     chosen, marked = halves_by_frame(keyframes), halves_marked(cells, skeleton)
     for body in bodies:
