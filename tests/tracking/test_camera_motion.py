@@ -4,7 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from keyrecon.tracking.camera_motion import CameraMotionOptions, _FeatureTracker, _register_all
+from keyrecon.tracking.camera_motion import (
+    MIN_CONFIDENCE,
+    CameraMotionOptions,
+    _FeatureTracker,
+    _register_all,
+)
 
 SIZE = 320, 180
 REST, PAN = 24, 60
@@ -68,7 +73,7 @@ def test_a_pan_is_followed_from_a_picture_that_comes_up_out_of_black(scene):
     ]
     path, confidence = _register_all(pictures, _FeatureTracker(CameraMotionOptions()))
     assert np.ptp((path[:, 0, 2] - shifts)[15:]) < 2  # px, of 67
-    assert confidence[15:].min() > 0.5
+    assert confidence[15:].min() > MIN_CONFIDENCE
 
 
 @pytest.mark.parametrize("deviation", [0, 40])
